@@ -75,7 +75,7 @@ uint8_t pack_sync(uint8_t *out, const struct msg_sync *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
-	end = put16(end, m->count);
+	end = put16(end, m->edge);
 	return (uint8_t)(end - out);
 }
 

@@ -5,8 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SCHEMA_HASH 0xF6119C26ul
-#define SCHEMA_SEED 0x6A37u
+#define SCHEMA_HASH 0x28A8D697ul
+#define SCHEMA_SEED 0xFE3Fu
 #define IDENTITY_SEED 0xFFFFu
 #define MSG_MAX_SIZE 37u /* longest body */
 
@@ -138,7 +138,7 @@ uint8_t pack_compass(uint8_t *out, const struct msg_compass *m);
 /* Rising edge of the MTx SyncOut pulse, captured by the timer. */
 struct msg_sync {
 	uint32_t ticks; /* 0.5 us */
-	uint16_t count;
+	uint16_t edge;
 };
 uint8_t pack_sync(uint8_t *out, const struct msg_sync *m);
 

@@ -71,13 +71,15 @@ def camel(name: str) -> str:
     return "".join(part.capitalize() for part in name.split("_"))
 
 
+def read_field(row: dict[str, Any]) -> Field:
+    return Field(**{key: tuple(value) if isinstance(value, list) else value for key, value in row.items()})
+
+
 def read_schema(path: Path) -> list[Message]:
     """Messages of the schema file; raises ValueError naming the message when one is malformed."""
     messages = []
     for table in tomllib.loads(path.read_text())["message"]:
-        fields = tuple(
-            Field(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in table.pop("fields")
-        )
+        fields = tuple(read_field(row) for row in table.pop("fields"))
         message = Message(fields=fields, **table)
         if unknown := {f.type for f in fields} - set(CODES):
             raise ValueError(f"{path.name}: message {message.name}: unknown type {unknown}")

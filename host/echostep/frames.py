@@ -48,7 +48,8 @@ def crc(identifier: int, plain: bytes) -> int:
 def encode(message: Message, sequence: int) -> bytes:
     """One frame with its closing zero; the sequence wraps at 65536."""
     plain = _HEAD.pack(message.id, sequence & 0xFFFF) + message.pack()
-    return cobs.encode(plain + crc(message.id, plain).to_bytes(2, "little")) + b"\0"
+    payload = plain + crc(message.id, plain).to_bytes(2, "little")
+    return bytes(cobs.encode(payload)) + b"\0"
 
 
 @dataclass(slots=True)
@@ -90,7 +91,8 @@ class BoardReader:
             self.counts.bad_message += 1
             return None
         if isinstance(message, Identity) and message.schema_hash != SCHEMA_HASH:
-            return self._refuse(message)
+            self._refuse(message)
+            return None
         self._count_sequence(plain[1] | plain[2] << 8, message)
         return message
 

@@ -9,8 +9,8 @@ import struct
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
-SCHEMA_HASH = 0xF6119C26
-SCHEMA_SEED = 0x6A37
+SCHEMA_HASH = 0x28A8D697
+SCHEMA_SEED = 0xFE3F
 FIXED_SEED = 0xFFFF
 
 
@@ -211,7 +211,7 @@ class Sync(NamedTuple):
     """Rising edge of the MTx SyncOut pulse, captured by the timer."""
 
     ticks: int  # 0.5 us
-    count: int
+    edge: int
 
     @property
     def id(self) -> int:
@@ -219,7 +219,7 @@ class Sync(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _SYNC.pack(self.ticks, self.count)
+        return _SYNC.pack(self.ticks, self.edge)
 
     @classmethod
     def unpack(cls, body: bytes) -> Sync:
