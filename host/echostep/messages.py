@@ -84,7 +84,7 @@ class Identity(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _IDENTITY.pack(self.ticks, self.schema_hash, self.version_major, self.version_minor, self.version_patch, self.reset_cause)
+        return _IDENTITY.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Identity:
@@ -111,7 +111,7 @@ class Ping(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _PING.pack(self.ticks, self.ranger, self.outcome, self.time_of_flight_us)
+        return _PING.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Ping:
@@ -143,7 +143,7 @@ class Gyros(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _GYROS.pack(self.ticks, self.thigh, self.calf, self.belt)
+        return _GYROS.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Gyros:
@@ -169,7 +169,7 @@ class Pressure(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _PRESSURE.pack(self.ticks, self.pressure, self.temperature)
+        return _PRESSURE.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Pressure:
@@ -194,7 +194,7 @@ class Compass(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _COMPASS.pack(self.ticks, self.bearing)
+        return _COMPASS.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Compass:
@@ -219,7 +219,7 @@ class Sync(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _SYNC.pack(self.ticks, self.edge)
+        return _SYNC.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Sync:
@@ -260,7 +260,7 @@ class Status(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _STATUS.pack(self.ticks, self.dropped_ping, self.dropped_gyros, self.dropped_pressure, self.dropped_compass, self.dropped_sync, self.dropped_other, self.errors_ranger_left, self.errors_ranger_right, self.errors_compass, self.errors_thigh, self.errors_calf, self.errors_belt, self.errors_pressure, self.bus_recoveries, self.bad_frames, self.healthy, self.memory_used)
+        return _STATUS.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Status:
@@ -285,7 +285,7 @@ class ClockReply(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _CLOCK_REPLY.pack(self.ticks, self.token)
+        return _CLOCK_REPLY.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> ClockReply:
@@ -314,7 +314,7 @@ class Configuration(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _CONFIGURATION.pack(self.ticks, self.sensors, self.schedule, self.gyro_rate_hz, self.compass_rate_hz, self.pressure_mode)
+        return _CONFIGURATION.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Configuration:
@@ -341,7 +341,7 @@ class Identify(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _IDENTIFY.pack()
+        return _IDENTIFY.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Identify:
@@ -365,7 +365,7 @@ class ClockQuery(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _CLOCK_QUERY.pack(self.token)
+        return _CLOCK_QUERY.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> ClockQuery:
@@ -393,7 +393,7 @@ class Configure(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _CONFIGURE.pack(self.sensors, self.schedule, self.gyro_rate_hz, self.compass_rate_hz, self.pressure_mode)
+        return _CONFIGURE.pack(*self)
 
     @classmethod
     def unpack(cls, body: bytes) -> Configure:

@@ -1,0 +1,40 @@
+"""Counts -> SI, in the body frame.
+
+In: messages and MTx samples with their time. Out: samples in SI units. Owns nothing but the mounting.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from echostep.messages import Outcome, Ping
+
+SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
+ADIS16100_RAD_S = math.radians(0.2439)  # per count [ADIS16100 datasheet, sensitivity]
+
+
+class Echo(NamedTuple):
+    """One ping in SI units: `ranger` 0 looks left, 1 right; `range_m` is None when nothing was heard."""
+
+    t_s: float
+    ranger: int
+    range_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class RangerSettings:
+    """What is known of the rangers: `speed_of_sound_m_s`, and `delay_s` between trigger stamp and burst."""
+
+    speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
+    delay_s: float = 0.0
+
+
+def echo(ping: Ping, t_s: float, settings: RangerSettings) -> Echo | None:
+    """The ping as a range (half the way of the sound); None for a bus error, which says nothing about walls."""
+    if ping.outcome == Outcome.BUS_ERROR:
+        return None
+    if ping.outcome == Outcome.NO_ECHO or ping.time_of_flight_us == 0:
+        return Echo(t_s, ping.ranger, None)
+    return Echo(t_s, ping.ranger, 0.5e-6 * ping.time_of_flight_us * settings.speed_of_sound_m_s)
