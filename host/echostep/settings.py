@@ -1,0 +1,68 @@
+"""Settings: the dataclasses of the stages, gathered from a TOML file.
+
+In: a TOML file (sections named as the fields of `Settings`). Out: `Settings`. Owns nothing; an error names the file, the section and the field.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from echostep.calibration import RangerSettings
+from echostep.errors import EchostepError
+from echostep.foot import FootSettings
+from echostep.gait import GaitSettings
+from echostep.likelihoods import EchoSettings
+from echostep.particles import CloudSettings
+from echostep.timeline import MtxTiming
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Everything that can be set, by stage."""
+
+    mtx: MtxTiming = field(default_factory=MtxTiming)
+    ranger: RangerSettings = field(default_factory=RangerSettings)
+    foot: FootSettings = field(default_factory=FootSettings)
+    gait: GaitSettings = field(default_factory=GaitSettings)
+    echo: EchoSettings = field(default_factory=EchoSettings)
+    cloud: CloudSettings = field(default_factory=CloudSettings)
+
+
+def load_settings(path: Path | str) -> Settings:
+    """Settings from a TOML file; raises EchostepError that names the file and the field."""
+    try:
+        return parse_settings(Path(path).read_text())
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot read the settings: {error.strerror}") from error
+    except (ValueError, UnicodeDecodeError) as error:
+        raise EchostepError(f"{path}: {error}") from error
+
+
+def parse_settings(text: str) -> Settings:
+    """Settings from TOML text; raises ValueError that names the field."""
+    tree = tomllib.loads(text)
+    sections = {f.name: f.default_factory for f in dataclasses.fields(Settings)}
+    made: dict[str, Any] = {}
+    for name, rows in tree.items():
+        if name not in sections:
+            raise ValueError(f"[{name}] is no section; there are {', '.join(sections)}")
+        made[name] = _section(name, rows, sections[name]())  # type: ignore[operator, misc]
+    return Settings(**made)
+
+
+def _section(name: str, rows: Any, default: Any) -> Any:
+    if not isinstance(rows, dict):
+        raise ValueError(f"{name}: expected a section, [{name}]")
+    known = {f.name: getattr(default, f.name) for f in dataclasses.fields(default)}
+    for key, value in rows.items():
+        if key not in known:
+            raise ValueError(f"[{name}] {key}: unknown; there are {', '.join(known)}")
+        if isinstance(value, bool) != isinstance(known[key], bool) or not isinstance(value, int | float | bool):
+            raise ValueError(f"[{name}] {key}: {value!r} is not a number like the default {known[key]!r}")
+        if isinstance(known[key], int) and not isinstance(value, int):
+            raise ValueError(f"[{name}] {key}: {value!r} is not a whole number")
+    return dataclasses.replace(default, **{k: type(known[k])(v) for k, v in rows.items()})

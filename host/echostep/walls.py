@@ -1,0 +1,205 @@
+"""Walls near a point: crossing a wall, and the reflectors that a ranger can hear from a place.
+
+In: wall segments (n, 4) in map metres. Out: `WallIndex` (built once) and kernels on plain arrays. Owns nothing.
+The plane is cut into square tiles; each tile lists the walls within reach, so that a kernel looks at those alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from echostep.errors import EchostepError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+TILE_M = 1.0
+CROSS_REACH_M = 0.6  # a move is checked in pieces of at most this length
+EAR_REACH_M = 6.3  # a little more than the rangers' 6 m
+MAX_TILES = 40_000_000
+CONE_RAD = math.radians(35.0)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
+FAR_M = 1e9  # "no reflector"
+
+
+class WallIndex(NamedTuple):
+    """Walls and, per tile, the indices of those within reach (CSR: tile k has ids[start[k]:start[k + 1]])."""
+
+    walls: Floats
+    x0_m: float
+    y0_m: float
+    columns: int
+    rows: int
+    cross_start: Ints
+    cross_ids: Ints
+    ear_start: Ints
+    ear_ids: Ints
+
+
+def build_index(walls: Floats) -> WallIndex:
+    """Index of walls (n, 4); raises EchostepError for a plan too wide for its tiles."""
+    walls = np.ascontiguousarray(walls, dtype=np.float64).reshape(-1, 4)
+    if not len(walls):
+        empty = np.zeros(1, np.int32)
+        return WallIndex(walls, 0.0, 0.0, 0, 0, empty, empty[:0], empty, empty[:0])
+    ends = walls.reshape(-1, 2)
+    low, high = ends.min(0) - EAR_REACH_M, ends.max(0) + EAR_REACH_M
+    columns, rows = (np.ceil((high - low) / TILE_M).astype(int) + 1).tolist()
+    if columns * rows > MAX_TILES:
+        raise EchostepError(f"the plan spans {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m: are its units metres?")
+    grid = (float(low[0]), float(low[1]), columns, rows)
+    cross = _tile_lists(walls, *grid, CROSS_REACH_M)
+    ear = _tile_lists(walls, *grid, EAR_REACH_M)
+    return WallIndex(walls, *grid, *cross, *ear)
+
+
+@njit(cache=True)
+def _tile_lists(walls: Floats, x0: float, y0: float, columns: int, rows: int, reach: float) -> tuple[Ints, Ints]:
+    """CSR lists of the walls within `reach` of any point of each tile."""
+    limit = reach + TILE_M * math.sqrt(0.5)
+    start = np.zeros(columns * rows + 1, np.int32)
+    ids = np.zeros(0, np.int32)
+    for count_only in (True, False):
+        if not count_only:
+            start[1:] = np.cumsum(start[1:]).astype(np.int32)
+            ids = np.zeros(start[-1], np.int32)
+            filled = start[:-1].copy()
+        for w in range(len(walls)):
+            ax, ay, bx, by = walls[w]
+            c0 = max(int((min(ax, bx) - limit - x0) / TILE_M), 0)
+            c1 = min(int((max(ax, bx) + limit - x0) / TILE_M) + 1, columns)
+            r0 = max(int((min(ay, by) - limit - y0) / TILE_M), 0)
+            r1 = min(int((max(ay, by) + limit - y0) / TILE_M) + 1, rows)
+            for r in range(r0, r1):
+                for c in range(c0, c1):
+                    px, py = x0 + (c + 0.5) * TILE_M, y0 + (r + 0.5) * TILE_M
+                    if _distance2(px, py, ax, ay, bx, by) > limit * limit:
+                        continue
+                    if count_only:
+                        start[r * columns + c + 1] += 1
+                    else:
+                        ids[filled[r * columns + c]] = w
+                        filled[r * columns + c] += 1
+    return start, ids
+
+
+@njit(cache=True, inline="always")
+def _distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Squared distance of a point from a segment."""
+    ux, uy = bx - ax, by - ay
+    s = ((px - ax) * ux + (py - ay) * uy) / (ux * ux + uy * uy)
+    s = min(max(s, 0.0), 1.0)
+    dx, dy = ax + s * ux - px, ay + s * uy - py
+    return dx * dx + dy * dy
+
+
+@njit(cache=True, inline="always")
+def _tile(x: float, y: float, index: WallIndex) -> int:
+    """Number of the tile that holds a point; -1 outside, and for a point that is not finite."""
+    if not (index.x0_m <= x < index.x0_m + index.columns * TILE_M):
+        return -1
+    if not (index.y0_m <= y < index.y0_m + index.rows * TILE_M):
+        return -1
+    return int((y - index.y0_m) / TILE_M) * index.columns + int((x - index.x0_m) / TILE_M)
+
+
+@njit(cache=True)
+def segments_cross(ax: float, ay: float, bx: float, by: float, wall: Floats) -> bool:
+    """Whether the segment a-b meets a wall; touching counts."""
+    cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
+    d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+    d4 = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    return d1 * d2 <= 0.0 and d3 * d4 <= 0.0 and (d1 != 0.0 or d2 != 0.0)
+
+
+@njit(cache=True)
+def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -> bool:
+    """Whether a move from a to b goes through any wall."""
+    length = math.hypot(bx - ax, by - ay)
+    pieces = max(1, math.ceil(length / CROSS_REACH_M))
+    for k in range(pieces):
+        px, py = ax + (bx - ax) * k / pieces, ay + (by - ay) * k / pieces
+        qx, qy = ax + (bx - ax) * (k + 1) / pieces, ay + (by - ay) * (k + 1) / pieces
+        tile = _tile(px, py, index)
+        if tile < 0:
+            continue
+        for j in range(index.cross_start[tile], index.cross_start[tile + 1]):
+            if segments_cross(px, py, qx, qy, index.walls[index.cross_ids[j]]):
+                return True
+    return False
+
+
+@njit(cache=True)
+def reflectors(px: float, py: float, axis_rad: float, index: WallIndex) -> tuple[float, float, float]:
+    """Distance and off-axis angle of the nearest wall that faces the ranger, and distance of the nearest visible wall end.
+
+    A wall faces the ranger when the foot of the perpendicular lies on it, inside the cone, with nothing before it
+    [Girard 2011, eq. 3 with ever finer rays]. Returns (distance_m, off_axis_rad, edge_m); FAR_M where there is none.
+    """
+    tile = _tile(px, py, index)
+    if tile < 0:
+        return FAR_M, 0.0, FAR_M
+    first, last = index.ear_start[tile], index.ear_start[tile + 1]
+    ax, ay = math.cos(axis_rad), math.sin(axis_rad)
+    cone = math.cos(CONE_RAD)
+    wall_m, off_cos = _nearest_facing(px, py, ax, ay, cone, first, last, index)
+    edge_m = _nearest_edge(px, py, ax, ay, cone, min(wall_m, EAR_REACH_M), first, last, index)
+    return wall_m, math.acos(min(off_cos, 1.0)), edge_m
+
+
+@njit(cache=True)
+def _nearest_facing(
+    px: float, py: float, ax: float, ay: float, cone: float, first: int, last: int, index: WallIndex
+) -> tuple[float, float]:
+    """Distance and cosine off the axis of the nearest unhidden perpendicular."""
+    nearest, off = FAR_M, 1.0
+    for j in range(first, last):
+        wall = index.walls[index.ear_ids[j]]
+        ux, uy = wall[2] - wall[0], wall[3] - wall[1]
+        s = ((px - wall[0]) * ux + (py - wall[1]) * uy) / (ux * ux + uy * uy)
+        if not 0.0 <= s <= 1.0:
+            continue
+        fx, fy = wall[0] + s * ux, wall[1] + s * uy
+        d = math.hypot(fx - px, fy - py)
+        if d >= nearest or d < 1e-9 or d > EAR_REACH_M:
+            continue
+        cosine = ((fx - px) * ax + (fy - py) * ay) / d
+        if cosine >= cone and not _hidden(px, py, fx, fy, first, last, index):
+            nearest, off = d, cosine
+    return nearest, off
+
+
+@njit(cache=True)
+def _nearest_edge(
+    px: float, py: float, ax: float, ay: float, cone: float, limit: float, first: int, last: int, index: WallIndex
+) -> float:
+    """Distance of the nearest unhidden wall end in the cone, nearer than `limit`."""
+    nearest = FAR_M
+    for j in range(first, last):
+        wall = index.walls[index.ear_ids[j]]
+        for k in (0, 2):
+            ex, ey = wall[k] - px, wall[k + 1] - py
+            d = math.hypot(ex, ey)
+            if d >= min(limit, nearest) or d < 1e-9 or (ex * ax + ey * ay) / d < cone:
+                continue
+            if not _hidden(px, py, wall[k], wall[k + 1], first, last, index):
+                nearest = d
+    return nearest
+
+
+@njit(cache=True)
+def _hidden(px: float, py: float, qx: float, qy: float, first: int, last: int, index: WallIndex) -> bool:
+    """Whether a wall stands between p and a point q; the last millimetre does not count, q lies on a wall itself."""
+    d = math.hypot(qx - px, qy - py)
+    shrink = max(0.0, 1.0 - 1e-3 / d)
+    ex, ey = px + (qx - px) * shrink, py + (qy - py) * shrink
+    for j in range(first, last):
+        if segments_cross(px, py, ex, ey, index.walls[index.ear_ids[j]]):
+            return True
+    return False
