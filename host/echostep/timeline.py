@@ -1,7 +1,7 @@
 """One clock: board ticks, the MTx sample counter and arrival times -> `t_s`.
 
-In: board messages and MTx samples with their time of arrival. Out: `t_s`, seconds of the board's clock since its first message (without a
-board: of the MTx's). Owns every clock; nothing else converts time, and nothing here waits for a timer.
+In: board messages and MTx samples with their time of arrival. Out: `t_s`, seconds of the board's clock since its first reset (without a
+board: of the MTx's counter). Owns every clock; nothing else converts time, and nothing here waits for a timer.
 
 The board's ticks are the clock. MTx samples are tied to it by SyncOut edges when the wire is there, else by the lower envelopes of both
 ports' arrival times. A device that restarts gets a new epoch, placed by arrival times.
@@ -42,7 +42,7 @@ class DeviceClock:
     def at(self, value: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
         """Device seconds of a counter value; None when it cannot be true (a jump, counted)."""
         if self._newest is None:
-            return self._begin(value, t_arrival_ns, 0.0)
+            return self._begin(value, t_arrival_ns, value * self._unit_s)
         delta = self._delta(value, t_arrival_ns)
         if delta is None:
             self._jumps += 1

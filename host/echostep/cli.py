@@ -1,0 +1,118 @@
+"""The command line: `echostep demo | live | record | replay | decode`.
+
+In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from echostep.errors import EchostepError
+
+if TYPE_CHECKING:
+    from echostep.plan import Pose
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking.")
+
+Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
+Start = Annotated[str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
+SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
+Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
+BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
+MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+
+
+@app.command()
+def demo(
+    out: Out = Path("out/demo"),
+    headless: Headless = False,
+    seed: Seed = 1,
+    board_command: Annotated[
+        str | None,
+        typer.Option("--board-command", metavar="COMMAND", help="Program that plays the sensor board; without it the Python board does."),
+    ] = None,
+) -> None:
+    """Track a simulated walk through a simulated building."""
+    from echostep import runs
+
+    runs.demo(out, seed, board_command, headless=headless)
+
+
+@app.command()
+def live(
+    plan: Plan,
+    board: BoardPort,
+    mtx: MtxPort,
+    out: Out = Path("out/live"),
+    start: Start = None,
+    settings: SettingsFile = None,
+    seed: Seed = 0,
+    headless: Headless = False,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+) -> None:
+    """Track the wearer of a board and an MTx; everything is recorded."""
+    from echostep import runs
+
+    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, headless=headless)
+
+
+@app.command()
+def record(
+    board: BoardPort,
+    mtx: MtxPort,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path("out/recording.mcap"),
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+) -> None:
+    """Record both ports without tracking."""
+    from echostep import runs
+
+    runs.record(board, mtx, out, seconds)
+
+
+@app.command()
+def replay(
+    recording: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
+    plan: Plan,
+    out: Out = Path("out/replay"),
+    start: Start = None,
+    settings: SettingsFile = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
+    truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
+    headless: Headless = False,
+) -> None:
+    """Track a recorded walk again, as it was tracked live."""
+    from echostep import runs
+
+    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, headless=headless)
+
+
+@app.command()
+def decode(file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")]) -> None:
+    """Print a capture as JSON, one message a line."""
+    from echostep import runs
+
+    runs.decode(file)
+
+
+def _pose(text: str | None) -> Pose | None:
+    from echostep.runs import parse_pose
+
+    return None if text is None else parse_pose(text)
+
+
+def main() -> None:
+    """Entry point: mistakes end with one line and status 2."""
+    try:
+        app()
+    except EchostepError as error:
+        print(f"echostep: {error}", file=sys.stderr)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)

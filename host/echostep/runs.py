@@ -1,0 +1,239 @@
+"""What the commands do: a source, a recorder, a tracker, a view.
+
+In: paths, ports and options. Out: recording, track.csv, track.png and a summary on the terminal. Owns nothing of its own.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import shlex
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from rich.console import Console
+
+from echostep.capture import Decoder, as_json, read_capture
+from echostep.errors import EchostepError
+from echostep.estimate import Estimate, digest
+from echostep.frames import encode
+from echostep.messages import Identify
+from echostep.picture import draw_track, write_track
+from echostep.plan import Plan, Pose, load_plan
+from echostep.recording import Recorder, open_recording
+from echostep.settings import Settings, load_settings
+from echostep.sources import BOARD, MTX, Chunk, SerialPorts
+from echostep.tracker import Tracker
+from echostep.truth import Truth, errors, load_truth
+from echostep.view import TerminalView
+
+BAUD = {BOARD: 115200, MTX: 115200}
+console = Console()
+
+
+def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> None:
+    """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
+    from echostep.simulation.board import BoardProcess, PythonBoard
+    from echostep.simulation.scenario import demo_scenario
+
+    board = BoardProcess(shlex.split(board_command)) if board_command else PythonBoard(seed=seed)
+    player = "the real firmware in the simulator" if board_command else "the Python board, not the real firmware"
+    console.print(f"A simulated walk in a simulated building; the sensor board is {player}.")
+    out = _folder(out)
+    with as_file(files("echostep") / "plans" / "demo.json") as plan_path:
+        plan = load_plan(plan_path)
+    scenario = demo_scenario(seed, board=board)
+    try:
+        scenario.write_truth(out / "truth.csv")
+        truth = load_truth(out / "truth.csv")
+        tracker = Tracker(plan, scenario.start, seed=seed)
+        about = _about(plan, scenario.start, seed, Settings(), "simulated walk, simulated sensors")
+        with Recorder(out / "walk.mcap", about) as recorder:
+            estimates = _run(tracker, _kept(scenario.chunks(), recorder), "echostep demo (simulated)", truth, headless)
+    finally:
+        scenario.close()
+    _finish(out, tracker, estimates, truth, "simulated walk")
+
+
+def live(
+    plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
+    settings_path: Path | None, seed: int, seconds: float | None, *, headless: bool,
+) -> None:  # fmt: skip
+    """Track from two serial ports until Ctrl-C."""
+    plan, settings = load_plan(plan_path), _settings(settings_path)
+    tracker = Tracker(plan, start, settings, seed)
+    out = _folder(out)
+    ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
+    try:
+        ports.send(BOARD, encode(Identify(), 0))
+        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, settings, "live")) as recorder:
+            chunks = _kept(_until(ports, seconds), recorder)
+            estimates = _run(tracker, chunks, "echostep live", None, headless)
+    finally:
+        ports.close()
+    _finish(out, tracker, estimates, None, "live")
+
+
+def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
+    """Record from two serial ports until Ctrl-C."""
+    ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
+    count = {BOARD: 0, MTX: 0}
+    try:
+        ports.send(BOARD, encode(Identify(), 0))
+        with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
+            for chunk in _kept(_until(ports, seconds), recorder):
+                count[chunk.port] += len(chunk.data)
+    finally:
+        ports.close()
+    console.print(f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx")
+
+
+def replay(
+    path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
+    seed: int | None, truth_path: Path | None, *, headless: bool,
+) -> None:  # fmt: skip
+    """Track a recording again."""
+    recording, plan = open_recording(path), load_plan(plan_path)
+    about = recording.about
+    if about.get("plan_sha256", plan.digest) != plan.digest:
+        console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
+    settings = _settings(settings_path)
+    truth = load_truth(truth_path) if truth_path else None
+    tracker = Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
+    out = _folder(out)
+    if note := about.get("note"):
+        console.print(f"Recording: {note}")
+    began = time.perf_counter()
+    estimates = _run(tracker, recording.chunks(), f"echostep replay {path.name}", truth, headless)
+    elapsed_s = time.perf_counter() - began
+    if recording.truncated:
+        console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
+    _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+
+
+def decode(path: Path) -> None:
+    """Print a capture as JSON lines, and on stderr what was rejected."""
+    decoder = Decoder()
+    for message in read_capture(path, decoder):
+        sys.stdout.write(json.dumps(as_json(message)) + "\n")
+    board, mtx = decoder.board.counts, decoder.mtx.counts
+    print(f"board: {board}\nmtx: {mtx}", file=sys.stderr)
+
+
+def parse_pose(text: str) -> Pose:
+    """X,Y,DEG as a pose; raises EchostepError."""
+    try:
+        x, y, degrees = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise EchostepError(f"--start {text}: expected X,Y,DEG, for instance 1.5,2,90") from error
+    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)):
+        raise EchostepError(f"--start {text}: not a place")
+    return Pose(x, y, math.radians(degrees))
+
+
+def _run(tracker: Tracker, chunks: Iterable[Chunk], title: str, truth: Truth | None, headless: bool) -> list[Estimate]:
+    """Feed everything; Ctrl-C ends a run like its last chunk does."""
+    view = None if headless else TerminalView(tracker, title, float(truth.t_s[-1]) if truth else None, console)
+    estimates: list[Estimate] = []
+    shown: AbstractContextManager[object] = view or nullcontext()
+    with shown:
+        try:
+            for chunk in chunks:
+                new = tracker.feed(chunk)
+                estimates += new
+                if view:
+                    view.show(new)
+        except KeyboardInterrupt:
+            pass
+    return estimates
+
+
+def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
+    """Every chunk, after it has been written."""
+    for chunk in chunks:
+        recorder.write(chunk)
+        yield chunk
+
+
+def _until(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk]:
+    """Chunks of the ports, for so long or until Ctrl-C; what happens to the ports is said."""
+    end = math.inf if seconds is None else time.monotonic() + seconds
+    try:
+        for chunk in ports.chunks():
+            while ports.notices:
+                console.print(ports.notices.popleft())
+            if chunk is not None:
+                yield chunk
+            if time.monotonic() >= end:
+                return
+    except KeyboardInterrupt:
+        return
+
+
+def _finish(
+    out: Path, tracker: Tracker, estimates: list[Estimate], truth: Truth | None, title: str, elapsed_s: float | None = None
+) -> None:
+    """Write the track and say how it went."""
+    write_track(out / "track.csv", estimates)
+    draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
+    if not estimates:
+        console.print("No estimate: the foot never stood still, or no MTx bytes came.")
+        return
+    off = errors(estimates, truth) if truth else None
+    if off is not None:
+        console.print(
+            f"error: mean {off.mean_m:.2f} m, sd {off.sd_m:.2f}, max {off.max_m:.2f}, end {off.ending_m:.2f} m; "
+            f"RMSE {off.rmse_m:.2f} m; truth inside the 95 % ellipse {100 * off.coverage95:.0f} % of the time"
+        )
+    if elapsed_s:
+        span = estimates[-1].t_s - estimates[0].t_s
+        console.print(f"{span:.0f} s of walk in {elapsed_s:.2f} s: {span / elapsed_s:.0f} x real time")
+    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}; track.csv and track.png are in {out}")
+
+
+def _about(plan: Plan, start: Pose, seed: int, settings: Settings, note: str) -> dict[str, str]:
+    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r}"
+    return {
+        "version": _version(),
+        "plan_sha256": plan.digest,
+        "start_x_y_rad": pose,
+        "seed": str(seed),
+        "settings": repr(settings),
+        "note": note,
+    }
+
+
+def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
+    try:
+        text = about.get("start_x_y_rad")
+        return None if text is None else Pose(*(float(v) for v in text.split(",")))
+    except (ValueError, TypeError) as error:
+        raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
+
+
+def _recorded_seed(about: dict[str, str], path: Path, seed: int | None) -> int:
+    try:
+        return int(about.get("seed", "0")) if seed is None else seed
+    except ValueError as error:
+        raise EchostepError(f"{path}: its recorded seed is damaged: give one with --seed N") from error
+
+
+def _settings(path: Path | None) -> Settings:
+    return Settings() if path is None else load_settings(path)
+
+
+def _folder(out: Path) -> Path:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EchostepError(f"{out}: cannot make the folder: {error.strerror}") from error
+    return out
+
+
+def _version() -> str:
+    return importlib.metadata.version("echostep")
