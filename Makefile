@@ -1,0 +1,78 @@
+# echostep: firmware to map. `make help` lists the targets.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/ready
+ELF := firmware/build/echostep.elf
+TWIN := tools/twin/build/echostep-twin
+APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
+
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
+
+setup: $(READY) ## make .venv with the host package, its tests and its tools
+
+$(READY): host/pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]'
+	touch $@
+
+tools-apt:
+	@tools/apt.sh $(APT_PACKAGES)
+
+firmware: ## build the firmware (firmware/build/echostep.elf and .hex)
+	$(MAKE) -C firmware
+
+twin: $(READY) ## play the board and the MTx on two pseudo terminals, in real time, until Ctrl-C
+	@tools/apt.sh $(APT_PACKAGES)
+	$(MAKE) -C firmware
+	$(MAKE) -C tools/twin
+	$(BIN)/python tools/twin/run.py
+
+demo: $(READY) ## track a simulated walk through the real firmware in the simulator
+	@if tools/apt.sh $(APT_PACKAGES); then \
+		$(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin && \
+		$(BIN)/echostep demo --out out/demo --board-command "$(TWIN) --elf $(ELF)" $(DEMO); \
+	else \
+		echo "No right to install the AVR tools: the demo runs on the Python board, not on the real firmware."; \
+		$(BIN)/echostep demo --out out/demo $(DEMO); \
+	fi
+
+real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path, echoes simulated; prints the error
+	$(BIN)/python tools/real_walk.py --out out/real
+
+test: $(READY) ## run every test
+	@tools/apt.sh $(APT_PACKAGES) || echo "No right to install the AVR tools: tests that need them are skipped."
+	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
+	$(MAKE) --quiet check
+	$(BIN)/python -m pytest -q
+
+check: $(READY) ## types, style, layers, generated files, C checks
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python protocol/generate.py --check
+	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check; else echo "cppcheck is not installed: C checks skipped"; fi
+
+size: ## flash, static RAM and stack of the firmware
+	$(MAKE) -C firmware size
+
+measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmware in the twin, ten simulated minutes
+	$(MAKE) --quiet -C firmware
+	$(MAKE) --quiet -C tools/twin
+	$(BIN)/python tools/twin/measure.py
+
+bench: $(READY) ## speed of the host against real time and against peers
+	$(BIN)/python tools/bench.py
+
+flash: ## write the firmware to a board: make flash PORT=/dev/ttyACM0
+	$(MAKE) -C firmware flash PORT=$(PORT)
+
+clean: ## remove everything that was built
+	$(MAKE) -C firmware clean
+	$(MAKE) -C tools/twin clean
+	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.PHONY: help setup tools-apt firmware twin demo real test check size measure bench flash clean
