@@ -37,6 +37,17 @@ class EchoSettings:
     outlier: float = 0.05
     correlation_m: float = 0.3
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for lengths of zero and for probabilities that are none."""
+        for name in ("sd_m", "rim_width_deg", "fade_m", "correlation_m", "outlier"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"[echo] {name}: must be greater than 0")
+        for name in ("edge", "short", "stray", "outlier"):
+            if getattr(self, name) >= 1.0:
+                raise ValueError(f"[echo] {name}: must be a probability below 1")
+        if not 0.0 < self.minimum_m < 0.5 * self.maximum_m:
+            raise ValueError("[echo] minimum_m: must be well below maximum_m")
+
 
 class EchoModel(NamedTuple):
     """`EchoSettings` as the kernels take them."""

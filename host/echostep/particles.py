@@ -40,6 +40,11 @@ class CloudSettings:
     resample_below: float = 0.5
     rescue_sd_m: float = 0.5
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for a cloud without particles."""
+        if not 1 <= self.size <= 10_000_000:
+            raise ValueError(f"[cloud] size: {self.size} particles make no cloud")
+
 
 class Cloud:
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0."""

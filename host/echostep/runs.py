@@ -26,7 +26,7 @@ from echostep.messages import Identify
 from echostep.picture import draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
-from echostep.settings import Settings, load_settings
+from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, SerialPorts
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
@@ -52,7 +52,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
         scenario.write_truth(out / "truth.csv")
         truth = load_truth(out / "truth.csv")
         tracker = Tracker(plan, scenario.start, seed=seed)
-        about = _about(plan, scenario.start, seed, Settings(), "simulated walk, simulated sensors")
+        about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
         with Recorder(out / "walk.mcap", about) as recorder:
             estimates = _run(tracker, _kept(scenario.chunks(), recorder), "echostep demo (simulated)", truth, headless)
     finally:
@@ -65,13 +65,14 @@ def live(
     settings_path: Path | None, seed: int, seconds: float | None, *, headless: bool,
 ) -> None:  # fmt: skip
     """Track from two serial ports until Ctrl-C."""
-    plan, settings = load_plan(plan_path), _settings(settings_path)
-    tracker = Tracker(plan, start, settings, seed)
+    plan = load_plan(plan_path)
+    text = read_settings(settings_path) if settings_path else ""
+    tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed)
     out = _folder(out)
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, settings, "live")) as recorder:
+        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
             chunks = _kept(_until(ports, seconds), recorder)
             estimates = _run(tracker, chunks, "echostep live", None, headless)
     finally:
@@ -102,7 +103,8 @@ def replay(
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
-    settings = _settings(settings_path)
+    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
+    settings = parse_settings(text, str(settings_path or path))
     truth = load_truth(truth_path) if truth_path else None
     tracker = Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
     out = _folder(out)
@@ -196,14 +198,14 @@ def _finish(
     console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}; track.csv and track.png are in {out}")
 
 
-def _about(plan: Plan, start: Pose, seed: int, settings: Settings, note: str) -> dict[str, str]:
+def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
     pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r}"
     return {
         "version": _version(),
         "plan_sha256": plan.digest,
         "start_x_y_rad": pose,
         "seed": str(seed),
-        "settings": repr(settings),
+        "settings_toml": settings_toml,
         "note": note,
     }
 
@@ -221,10 +223,6 @@ def _recorded_seed(about: dict[str, str], path: Path, seed: int | None) -> int:
         return int(about.get("seed", "0")) if seed is None else seed
     except ValueError as error:
         raise EchostepError(f"{path}: its recorded seed is damaged: give one with --seed N") from error
-
-
-def _settings(path: Path | None) -> Settings:
-    return Settings() if path is None else load_settings(path)
 
 
 def _folder(out: Path) -> Path:

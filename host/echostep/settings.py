@@ -6,6 +6,7 @@ In: a TOML file (sections named as the fields of `Settings`). Out: `Settings`. O
 from __future__ import annotations
 
 import dataclasses
+import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,19 +33,23 @@ class Settings:
     cloud: CloudSettings = field(default_factory=CloudSettings)
 
 
-def load_settings(path: Path | str) -> Settings:
-    """Settings from a TOML file; raises EchostepError that names the file and the field."""
+def read_settings(path: Path | str) -> str:
+    """TOML text of a settings file; raises EchostepError that names the file."""
     try:
-        return parse_settings(Path(path).read_text())
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the settings: {error.strerror}") from error
-    except (ValueError, UnicodeDecodeError) as error:
-        raise EchostepError(f"{path}: {error}") from error
+        return Path(path).read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise EchostepError(f"{path}: cannot read the settings: {error}") from error
 
 
-def parse_settings(text: str) -> Settings:
-    """Settings from TOML text; raises ValueError that names the field."""
-    tree = tomllib.loads(text)
+def parse_settings(text: str, origin: str) -> Settings:
+    """Settings from TOML text; raises EchostepError that names the origin, the section and the field."""
+    try:
+        return _gather(tomllib.loads(text))
+    except ValueError as error:
+        raise EchostepError(f"{origin}: {error}") from error
+
+
+def _gather(tree: dict[str, Any]) -> Settings:
     sections = {f.name: f.default_factory for f in dataclasses.fields(Settings)}
     made: dict[str, Any] = {}
     for name, rows in tree.items():
@@ -65,4 +70,6 @@ def _section(name: str, rows: Any, default: Any) -> Any:
             raise ValueError(f"[{name}] {key}: {value!r} is not a number like the default {known[key]!r}")
         if isinstance(known[key], int) and not isinstance(value, int):
             raise ValueError(f"[{name}] {key}: {value!r} is not a whole number")
+        if not math.isfinite(value) or (known[key] > 0 and value < 0):
+            raise ValueError(f"[{name}] {key}: {value!r} makes no sense; the default is {known[key]!r}")
     return dataclasses.replace(default, **{k: type(known[k])(v) for k, v in rows.items()})

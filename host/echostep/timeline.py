@@ -93,6 +93,11 @@ class MtxTiming:
     rate_hz: float = 100.0
     latency_s: float = 0.0071
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for a rate that no MTx has."""
+        if not 1.0 <= self.rate_hz <= 2000.0:
+            raise ValueError(f"[mtx] rate_hz: {self.rate_hz} is not a rate of an MTx")
+
 
 class Timeline:
     """`t_s` for everything that arrives."""
