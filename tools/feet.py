@@ -22,6 +22,7 @@ from echostep.foot import FootSettings, Step, Track, walk_track
 
 Floats = NDArray[np.float64]
 G = 9.80665
+DOWN = np.array([1.0, -1.0])  # these sets' truth has z down: y to the right of x
 
 
 @dataclass(frozen=True)
@@ -64,23 +65,23 @@ def vicon(folder: Path, settings: FootSettings) -> Iterator[Row]:
         imu, t = mat["imu_data"], mat["timestamps_all"].ravel()
         turn = np.diag([1.0, -1.0, -1.0])  # z is down in this set
         track = walk_track(t - t[0], imu[:, :3] @ turn, imu[:, 3:] @ turn, settings)
-        truth = mat["gt"]
+        truth = mat["gt"] * DOWN
         n = min(len(truth), len(track.position_m))
-        value = rmse(align(track.position_m[:n, :2], truth[:n, :2]), truth[:n, :2])
+        value = rmse(align(track.position_m[:n, :2], truth[:n]), truth[:n])
         yield Row("vicon", path.stem[:19], "2D RMSE, aligned", value, length(track), peer)
 
 
 def hallways(folder: Path, settings: FootSettings) -> Iterator[Row]:
     for name, peer in (("31", "0.578 / 0.297"), ("33", "0.591 / 0.631"), ("34", "0.210 / 0.183")):
         mat = loadmat(folder / f"gx5_gcp/SensorConnectData_{name}_LLIO.mat")
-        imu, t = mat["imu_data"], mat["timestamps_all"].ravel()
-        truth, at = mat["GCP"], mat["strideIndex"].ravel().astype(int) - 1
+        imu, t = mat["imu_data"], mat["timestamps"].ravel()
+        truth, at = mat["GCP"][:, :2] * DOWN, mat["strideIndex"].ravel().astype(int) - 1
         track = walk_track(t - t[0], imu[:, :3], imu[:, 3:], settings)
         here = track.position_m[np.minimum(at, len(imu) - 1), :2]
         n = min(len(here), len(truth))
-        value = rmse(align(here[:n], truth[:n, :2]), truth[:n, :2])
+        value = rmse(align(here[:n], truth[:n]), truth[:n])
         yield Row("hallway", name, "2D RMSE at strides, aligned", value, length(track), peer)
-        stride = np.hypot(*np.diff(here[:n], axis=0).T) - np.hypot(*np.diff(truth[:n, :2], axis=0).T)
+        stride = np.hypot(*np.diff(here[:n], axis=0).T) - np.hypot(*np.diff(truth[:n], axis=0).T)
         yield Row("hallway", name, "stride length MAE", float(np.abs(stride).mean()), length(track), "0.03")
 
 
@@ -88,9 +89,9 @@ def openshoe(folder: Path, settings: FootSettings) -> Iterator[Row]:
     for name, peer in (("2", "0.67"), ("31", "0.39"), ("44", "0.05")):
         rows = []
         for line in (folder / f"openshoe/Measurement_100521_{name}.txt").read_text().splitlines()[1:]:
-            parts = line.replace(",", " ").split()
-            if len(parts) > 12:
-                rows.append([float(v) for v in parts[1:7]] + [float(parts[7])])
+            parts = line.split()
+            if len(parts) > 12 and parts[0].startswith("0x"):
+                rows.append([float(v) for v in parts[1:7]])
         table = np.array(rows)
         t = np.arange(len(table)) / 250.0
         track = walk_track(t, table[:, :3] * G, table[:, 3:6], settings)
@@ -110,14 +111,12 @@ def xio(folder: Path, settings: FootSettings) -> Iterator[Row]:
 def mtw(folder: Path, settings: FootSettings) -> Iterator[Row]:
     for path in sorted((folder / "xsens_mtw_voisard").glob("*_?f.txt")):
         trial = json.loads(path.with_name(path.name[:3] + ".json").read_text())
-        table = np.loadtxt(path, skiprows=1)
+        table = np.loadtxt(path, skiprows=2)
         track = walk_track(np.arange(len(table)) / 100.0, table[:, 1:4], table[:, 4:7], settings)
-        start, end = trial["TrialBoundaries"]
-        turn = trial["UTurnBoundaries"]
+        start, turn = trial["TrialBoundaries"][0], trial["UTurnBoundaries"]
         p = track.position_m
         out = float(np.hypot(*(p[min(turn[0], len(p) - 1), :2] - p[max(start, 0), :2])))
         yield Row("mtw", path.stem, "outbound (10 m)", out, length(track), "10.0")
-        del end
 
 
 def rows(folder: Path, settings: FootSettings) -> list[Row]:

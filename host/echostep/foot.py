@@ -35,16 +35,16 @@ class FootSettings:
     `accel_still`, `rate_still` scale the stance statistic (m/s2, rad/s); `span_s` is its window; `lever_m` the distance from sensor to contact.
     """
 
-    accel_sd: float = 0.03
+    accel_sd: float = 0.06
     gyro_sd: float = 0.003
-    accel_still: float = 0.8
-    rate_still: float = 0.6
+    accel_still: float = 0.6
+    rate_still: float = 0.5
     span_s: float = 0.06
-    lever_m: float = 0.08
+    lever_m: float = 0.1
     still_sd_m_s: float = 0.01
     patience_s: float = 0.6
     growth_s: float = 0.15
-    bias_sd: float = 0.01
+    bias_sd: float = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,9 +217,9 @@ def _walk(
             still = statistic < threshold
             if still:
                 sd = math.sqrt(still_sd**2 + lever**2 * w2 + (0.05 * span_s) ** 2 * a2)
-                ins.observe_zero(state, cov, ins.V, -state[ins.VEL : ins.VEL + 3], sd)
+                ins.observe(state, cov, ins.V, -state[ins.VEL : ins.VEL + 3], sd)
                 if a2 < STILL_ACCEL**2 and w2 < STILL_RATE**2 and count > 10:
-                    ins.observe_zero(state, cov, ins.BG, gyro[k] - state[ins.BIAS : ins.BIAS + 3], 0.05)
+                    ins.observe(state, cov, ins.BG, gyro[k] - state[ins.BIAS : ins.BIAS + 3], 0.05)
             found = _phases(state, cov, phase, still, dt, events, found)
         if len(track):
             track[k, 0:3] = state[ins.POS : ins.POS + 3]

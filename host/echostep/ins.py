@@ -112,18 +112,25 @@ def _transition(cov: Floats, f: Floats, r: Floats, dt: float) -> None:
 
 
 @njit(cache=True)
-def observe_zero(state: Floats, cov: Floats, at: int, value: Floats, sd: float) -> None:
-    """Kalman update: the error states at..at+2 are `value` +- sd (three scalar updates), then the errors go into the state."""
+def observe(state: Floats, cov: Floats, at: int, value: Floats, sd: float) -> None:
+    """Kalman update: the error states at..at+2 are `value` +- sd (three scalar updates), then the errors go into the state.
+
+    The gyro bias is corrected by gyro readings alone: a velocity says nothing of the bias about the vertical, and what it seems
+    to say is the rest of a foot that was not quite still. For velocities the bias is considered, not estimated [Schmidt 1966].
+    """
     d = np.zeros(12)
     for i in range(3):
         j = at + i
-        s = cov[j, j] + sd * sd
-        gain = cov[:, j] / s
+        row = cov[:, j].copy()
+        s = row[j] + sd * sd
+        gain = row / s
+        if at != BG:
+            gain[BG:] = 0.0
         innovation = value[i] - d[j]
         d += gain * innovation
         for a in range(12):
             for b in range(a, 12):
-                cov[a, b] -= gain[a] * gain[b] * s
+                cov[a, b] += gain[a] * gain[b] * s - gain[a] * row[b] - row[a] * gain[b]
                 cov[b, a] = cov[a, b]
     for i in range(3):
         state[POS + i] += d[P + i]
