@@ -47,7 +47,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
     out = _folder(out)
     with as_file(files("echostep") / "plans" / "demo.json") as plan_path:
         plan = load_plan(plan_path)
-    scenario = demo_scenario(seed, board=board)
+    scenario = demo_scenario(plan, seed, board)
     try:
         scenario.write_truth(out / "truth.csv")
         truth = load_truth(out / "truth.csv")
