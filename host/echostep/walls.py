@@ -158,21 +158,24 @@ def _nearest_facing(
     px: float, py: float, ax: float, ay: float, cone: float, first: int, last: int, index: WallIndex
 ) -> tuple[float, float]:
     """Distance and cosine off the axis of the nearest unhidden perpendicular."""
-    nearest, off = FAR_M, 1.0
+    nearest2, off, found = EAR_REACH_M * EAR_REACH_M, 1.0, False
     for j in range(first, last):
-        wall = index.walls[index.ear_ids[j]]
-        ux, uy = wall[2] - wall[0], wall[3] - wall[1]
-        s = ((px - wall[0]) * ux + (py - wall[1]) * uy) / (ux * ux + uy * uy)
-        if not 0.0 <= s <= 1.0:
+        w = index.ear_ids[j]
+        wx, wy = index.walls[w, 0], index.walls[w, 1]
+        ux, uy = index.walls[w, 2] - wx, index.walls[w, 3] - wy
+        length2 = ux * ux + uy * uy
+        along = (px - wx) * ux + (py - wy) * uy
+        if not 0.0 <= along <= length2:
             continue
-        fx, fy = wall[0] + s * ux, wall[1] + s * uy
-        d = math.hypot(fx - px, fy - py)
-        if d >= nearest or d < 1e-9 or d > EAR_REACH_M:
+        s = along / length2
+        fx, fy = wx + s * ux - px, wy + s * uy - py
+        d2 = fx * fx + fy * fy
+        ahead = fx * ax + fy * ay
+        if d2 >= nearest2 or ahead <= 0.0 or ahead * ahead < cone * cone * d2:
             continue
-        cosine = ((fx - px) * ax + (fy - py) * ay) / d
-        if cosine >= cone and not _hidden(px, py, fx, fy, first, last, index):
-            nearest, off = d, cosine
-    return nearest, off
+        if not _hidden(px, py, px + fx, py + fy, first, last, index):
+            nearest2, off, found = d2, ahead / math.sqrt(d2), True
+    return (math.sqrt(nearest2), off) if found else (FAR_M, 1.0)
 
 
 @njit(cache=True)
@@ -180,17 +183,18 @@ def _nearest_edge(
     px: float, py: float, ax: float, ay: float, cone: float, limit: float, first: int, last: int, index: WallIndex
 ) -> float:
     """Distance of the nearest unhidden wall end in the cone, nearer than `limit`."""
-    nearest = FAR_M
+    nearest2, found = limit * limit, False
     for j in range(first, last):
-        wall = index.walls[index.ear_ids[j]]
+        w = index.ear_ids[j]
         for k in (0, 2):
-            ex, ey = wall[k] - px, wall[k + 1] - py
-            d = math.hypot(ex, ey)
-            if d >= min(limit, nearest) or d < 1e-9 or (ex * ax + ey * ay) / d < cone:
+            ex, ey = index.walls[w, k] - px, index.walls[w, k + 1] - py
+            d2 = ex * ex + ey * ey
+            ahead = ex * ax + ey * ay
+            if d2 >= nearest2 or ahead <= 0.0 or ahead * ahead < cone * cone * d2:
                 continue
-            if not _hidden(px, py, wall[k], wall[k + 1], first, last, index):
-                nearest = d
-    return nearest
+            if not _hidden(px, py, px + ex, py + ey, first, last, index):
+                nearest2, found = d2, True
+    return math.sqrt(nearest2) if found else FAR_M
 
 
 @njit(cache=True)
