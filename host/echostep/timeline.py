@@ -18,6 +18,7 @@ TICK_S = 0.5e-6
 AHEAD_S = 1.0  # a device cannot be further ahead of the arrival of its bytes than this: it restarted, or the bytes lie
 BEHIND_S = 1.0  # messages may be this much older than the newest one (a ping is sent when its ranging is over)
 JUMPS_TO_RESTART = 3
+BOARD_LATENCY_S = 0.001  # a frame waits for the next USB millisecond at best
 
 
 class DeviceClock:
@@ -153,7 +154,8 @@ class Timeline:
     def _on_board_clock(self, device_s: float, counter: int) -> float:
         if self.board.newest_s is None:
             return device_s
-        by_arrival_s = self.board.to_device_s((self.mtx.to_arrival_s(device_s) - self._timing.latency_s) * 1e9)
+        sampled_s = self.mtx.to_arrival_s(device_s) - self._timing.latency_s
+        by_arrival_s = self.board.to_device_s((sampled_s + BOARD_LATENCY_S) * 1e9)
         by_edge_s = self._edges.time_of(counter, by_arrival_s)
         return by_arrival_s if by_edge_s is None else by_edge_s
 
