@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * echostep-twin: runs the firmware's ELF on a board that is fed by the bench protocol on standard input. */
+#include <getopt.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <simavr/avr_extint.h>
+#include <simavr/sim_elf.h>
+#include <simavr/sim_interrupts.h>
+
+#include "twin.h"
+
+#define MCU "atmega32u4"
+#define FREQUENCY 16000000u
+#define MCUSR 0x54
+#define EXTERNAL_INTERRUPTS 7
+enum { POWER_ON = 1, WATCHDOG = 8 };
+
+avr_t *avr;
+uint64_t random_state = 1;
+
+static elf_firmware_t firmware;
+static uint8_t next_cause = POWER_ON;
+static bool powered = true;
+
+void fail(const char *format, ...)
+{
+	va_list arguments;
+
+	fprintf(stderr, "echostep-twin: ");
+	va_start(arguments, format);
+	vfprintf(stderr, format, arguments);
+	va_end(arguments);
+	fprintf(stderr, "\n");
+	exit(2);
+}
+
+/* splitmix64 [Steele, Lea, Flood 2014] */
+uint32_t random_below(uint32_t limit)
+{
+	uint64_t z = random_state += 0x9E3779B97F4A7C15ull;
+
+	z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+	z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+	return (uint32_t)((z ^ (z >> 31)) % limit);
+}
+
+uint64_t time_ns(void)
+{
+	return avr->cycle * 125u / 2u;
+}
+
+avr_int_vector_t *vector(int number)
+{
+	for (int i = 0; i < avr->interrupts.vector_count; i++)
+		if (avr->interrupts.vector[i]->vector == number)
+			return avr->interrupts.vector[i];
+	fail("this simavr has no interrupt vector %d", number);
+}
+
+void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write)
+{
+	avr_io_addr_t io = AVR_DATA_TO_IO(address);
+
+	if (read) {
+		avr->io[io].r.c = read;
+		avr->io[io].r.param = NULL;
+	}
+	if (write) {
+		avr->io[io].w.c = write;
+		avr->io[io].w.param = NULL;
+	}
+}
+
+/* What follows every reset, whoever caused it: simavr has forgotten all timers. */
+static void after_reset(avr_t *a)
+{
+	a->data[MCUSR] = next_cause;
+	bench_trace("reset %s", next_cause == POWER_ON ? "power" : next_cause == WATCHDOG ? "watchdog" : "external");
+	next_cause = WATCHDOG; /* the only one that nobody announces */
+	srf02_start();
+	adis16100_start();
+	scp1000_start();
+	compass_start();
+	usb_host_start();
+}
+
+void board_reset(uint8_t cause)
+{
+	next_cause = cause;
+	avr_reset(avr);
+}
+
+void board_power(bool on)
+{
+	if (on == powered)
+		return;
+	powered = on;
+	usb_host_unplug();
+	if (on) {
+		memset(avr->data + avr->ioend + 1, 0xA5, avr->ramend - avr->ioend); /* RAM holds nothing in particular */
+		board_reset(POWER_ON);
+	}
+}
+
+bool board_has_power(void)
+{
+	return powered;
+}
+
+static void no_sleep(avr_t *a, avr_cycle_count_t cycles)
+{
+	(void)a;
+	(void)cycles; /* simulated time jumps, nobody waits */
+}
+
+/* Entering an interrupt takes 4 cycles on the chip and none in simavr. */
+static void entered(struct avr_irq_t *irq, uint32_t running, void *param)
+{
+	(void)irq;
+	(void)param;
+	if (running)
+		avr->cycle += 4;
+}
+
+static void make_board(const char *path)
+{
+	if (access(path, R_OK) || elf_read_firmware(path, &firmware))
+		fail("%s: cannot read the firmware; build it with: make firmware", path);
+	strcpy(firmware.mmcu, MCU);
+	firmware.frequency = FREQUENCY;
+	avr = avr_make_mcu_by_name(MCU);
+	if (!avr)
+		fail("this simavr does not know the " MCU);
+	avr_init(avr);
+	avr->log = LOG_ERROR;
+	avr->frequency = FREQUENCY;
+	avr_load_firmware(avr, &firmware);
+	avr->sleep = no_sleep;
+	usb_device_init();
+	twi_init();
+	spi_init();
+	for (int i = 0; i < avr->interrupts.vector_count; i++)
+		avr_irq_register_notify(avr->interrupts.vector[i]->irq + AVR_INT_IRQ_RUNNING, entered, NULL);
+	for (uint8_t i = 0; i < EXTERNAL_INTERRUPTS; i++)
+		avr_extint_set_strict_lvl_trig(avr, i, 0); /* else simavr looks at a low pin on every cycle, wanted or not */
+	avr->reset = after_reset;
+	after_reset(avr);
+}
+
+int main(int argc, char **argv)
+{
+	static const struct option options[] = {
+		{ "elf", required_argument, NULL, 'e' },
+		{ "seed", required_argument, NULL, 's' },
+		{ "pty", no_argument, NULL, 'p' },
+		{ "help", no_argument, NULL, 'h' },
+		{ NULL, 0, NULL, 0 },
+	};
+	const char *elf = NULL;
+	bool pty = false;
+	int option;
+
+	while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
+		switch (option) {
+		case 'e': elf = optarg; break;
+		case 's': random_state = strtoull(optarg, NULL, 0); break;
+		case 'p': pty = true; break;
+		case 'h':
+			printf("echostep-twin --elf FILE [--seed N] [--pty]\nThe bench protocol on standard input and output; see README.md.\n");
+			return 0;
+		default: return 2;
+		}
+	}
+	if (!elf)
+		fail("say which firmware: --elf firmware/build/echostep.elf");
+	signal(SIGPIPE, SIG_IGN);
+
+	int out = dup(STDOUT_FILENO); /* simavr prints on stdout: that must not get into the protocol */
+
+	if (out < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
+		fail("cannot set up the output");
+	if (pty)
+		pty_open();
+	usb_host_open(!pty);
+	make_board(elf);
+	bench_run(STDIN_FILENO, out);
+	return 0;
+}

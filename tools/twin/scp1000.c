@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * SCP1000-D01 barometer on SPI [SCP1000 product family specification]: mode 0, at most 500 kHz, frames of address << 2 | write << 1.
+ *
+ * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and falls when
+ * DATARD16 is read. DRDY is wired to PE6. */
+#include <string.h>
+
+#include <simavr/avr_ioport.h>
+#include <simavr/sim_cycle_timers.h>
+
+#include "twin.h"
+
+enum { OPERATION = 0x03, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 0x20, TEMPOUT = 0x21 };
+#define MAX_HERTZ 500000u
+#define START_UP US(60000)
+#define FAST US(111000)
+#define SLOW US(556000)
+
+static struct spi_device spi;
+static bool absent, no_eeprom, drdy_stuck, ready;
+static uint8_t command, count, answer[2], mode;
+static avr_cycle_count_t up_at;
+static uint32_t pressure;
+static int16_t temperature;
+
+static void set_ready(bool on)
+{
+	ready = on;
+	avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('E'), 6), (on || drdy_stuck) && !absent);
+}
+
+static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	(void)a;
+	(void)param;
+	if (mode != 0x09 && mode != 0x0A)
+		return 0;
+	pressure = mode == 0x09 ? row.pressure & ~15u : row.pressure & ~3u; /* 15 and 17 bits of the 19 */
+	temperature = row.temperature;
+	set_ready(true);
+	return when + (mode == 0x09 ? FAST : SLOW);
+}
+
+static void load(uint8_t address)
+{
+	uint16_t word = 0;
+
+	switch (address) {
+	case STATUS: word = avr->cycle < up_at ? 0x0100 : ready ? 0x2000 : 0; break;
+	case DATARD8: word = (uint16_t)(mode ? (pressure >> 16) << 8 : no_eeprom ? 0 : 0x0100); break;
+	case DATARD16:
+		word = (uint16_t)pressure;
+		set_ready(false);
+		break;
+	case TEMPOUT: word = (uint16_t)temperature & 0x3FFF; break;
+	default: break;
+	}
+	answer[0] = (uint8_t)(word >> 8);
+	answer[1] = (uint8_t)word;
+}
+
+static void on_select(struct spi_device *self, bool on)
+{
+	(void)self;
+	count = 0;
+	if (on && spi_hertz() > MAX_HERTZ)
+		bench_trace("scp1000 too fast");
+	if (on && spi_mode() != 0)
+		bench_trace("scp1000 wrong mode");
+}
+
+static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+{
+	(void)self;
+	if (absent)
+		return 0xFF;
+	if (count++ == 0) {
+		command = out;
+		if (!(command & 2))
+			load(command >> 2);
+		return 0;
+	}
+	if (command & 2) {
+		if (command >> 2 == OPERATION && out != mode) {
+			mode = out;
+			avr_cycle_timer_cancel(avr, sample, NULL);
+			avr_cycle_timer_register(avr, mode == 0x0A ? SLOW : FAST, sample, NULL);
+		}
+		return 0;
+	}
+	return count <= 3 ? answer[count - 2] : 0;
+}
+
+void scp1000_start(void)
+{
+	if (!spi.select) {
+		spi = (struct spi_device){ 'D', 7, on_select, on_exchange, false, NULL };
+		spi_add(&spi);
+	}
+	spi.selected = false;
+	mode = 0;
+	up_at = avr->cycle + START_UP;
+	set_ready(false);
+}
+
+bool scp1000_fault(const char *name, const char *value)
+{
+	if (strcmp(name, "scp1000"))
+		return false;
+	absent = !strcmp(value, "absent");
+	no_eeprom = !strcmp(value, "no_eeprom");
+	drdy_stuck = !strcmp(value, "drdy_stuck");
+	set_ready(ready);
+	return absent || no_eeprom || drdy_stuck || !strcmp(value, "ok");
+}

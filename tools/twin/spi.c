@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * SPI master with the clock of SPCR and SPSR (simavr takes 100 us a byte), and chip selects on port pins. */
+#include <simavr/avr_ioport.h>
+#include <simavr/avr_spi.h>
+#include <simavr/sim_cycle_timers.h>
+#include <simavr/sim_interrupts.h>
+
+#include "twin.h"
+
+enum { SPCR = 0x4C, SPSR, SPDR };
+#define VECTOR 24
+
+static struct spi_device *devices;
+static avr_irq_t *input;
+static uint8_t outgoing;
+
+static unsigned divisor(void)
+{
+	static const unsigned by_rate[4] = { 4, 16, 64, 128 };
+	unsigned d = by_rate[avr->data[SPCR] & 3];
+
+	return avr->data[SPSR] & 1 ? d / 2 : d;
+}
+
+unsigned spi_hertz(void)
+{
+	return 16000000u / divisor();
+}
+
+unsigned spi_mode(void)
+{
+	return (avr->data[SPCR] >> 2) & 3;
+}
+
+static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	uint8_t answer = 0xFF; /* nobody drives MISO */
+
+	(void)a;
+	(void)when;
+	(void)param;
+	for (struct spi_device *d = devices; d; d = d->next)
+		if (d->selected)
+			answer &= d->exchange(d, outgoing);
+	avr_raise_irq(input, answer);
+	return 0;
+}
+
+static void write_byte(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+{
+	(void)at;
+	(void)param;
+	avr_regbit_clear(a, vector(VECTOR)->raised);
+	outgoing = value;
+	avr_cycle_timer_register(a, divisor() * 8 + 1, done, NULL);
+}
+
+static void select_changed(struct avr_irq_t *irq, uint32_t level, void *param)
+{
+	struct spi_device *d = param;
+
+	(void)irq;
+	if (d->selected != !level) {
+		d->selected = !level;
+		d->select(d, d->selected);
+	}
+}
+
+void spi_init(void)
+{
+	take_register(SPDR, NULL, write_byte);
+	input = avr_io_getirq(avr, AVR_IOCTL_SPI_GETIRQ(0), SPI_IRQ_INPUT);
+}
+
+void spi_add(struct spi_device *device)
+{
+	device->next = devices;
+	devices = device;
+	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(device->port), device->pin), select_changed, device);
+}

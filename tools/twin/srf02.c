@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * Two SRF02 ultrasonic rangers on the I2C bus [SRF02 technical specification].
+ *
+ * Ranging takes 61 ms and up to 1 ms more; meanwhile the device does not answer its address. The echo that arrives first after the
+ * ring-down and within the listening window wins: the own one, or that of the other ranger's ping. */
+#include <string.h>
+
+#include "twin.h"
+
+enum { COMMAND, RANGE_HIGH = 2, RANGE_LOW, MINIMUM_HIGH, MINIMUM_LOW };
+#define REVISION 6
+#define UNUSED 0x80
+#define RANGING_US 61000u
+#define SPREAD_US 1000u
+#define RING_DOWN_US 875u /* 15 cm, out and back */
+#define WINDOW_US 35000u  /* 600 cm */
+#define STRETCH US(500)
+#define PINGS 4
+
+struct ping {
+	avr_cycle_count_t at;
+	uint16_t cross_us; /* when it reaches the other ranger, 0: never */
+};
+
+static struct ranger {
+	struct twi_device twi;
+	const char *name;
+	int side;
+	bool absent, refuses, stretches;
+	uint8_t pointer, written[2], count;
+	avr_cycle_count_t busy_until, began;
+	bool emitted, listening;
+	uint8_t unit;
+	uint16_t own_us, result;
+	struct ping pings[PINGS];
+	unsigned next_ping;
+} rangers[2] = { { .name = "left", .side = 0 }, { .name = "right", .side = 1 } };
+
+/* Earliest audible arrival at this ranger, in us after its own trigger; 0 for none. */
+static uint16_t earliest(const struct ranger *r)
+{
+	const struct ranger *other = &rangers[1 - r->side];
+	int64_t best = r->emitted && r->own_us >= RING_DOWN_US && r->own_us <= WINDOW_US ? r->own_us : WINDOW_US + 1;
+
+	for (int k = 0; k < PINGS; k++) {
+		const struct ping *p = &other->pings[k];
+		int64_t arrival = ((int64_t)p->at - (int64_t)r->began) / 16 + p->cross_us;
+
+		if (p->cross_us && arrival >= RING_DOWN_US && arrival < best)
+			best = arrival;
+	}
+	return best > WINDOW_US ? 0 : (uint16_t)best;
+}
+
+static void finish(struct ranger *r)
+{
+	uint16_t us = earliest(r);
+
+	r->listening = false;
+	r->result = r->unit == 2 ? us : (uint16_t)(us / (r->unit == 1 ? 58u : 148u));
+}
+
+static void begin(struct ranger *r, uint8_t command)
+{
+	bool burst = command != 0x56 && command != 0x57 && command != 0x58;
+
+	if (command == 0x5C || burst) {
+		r->pings[r->next_ping++ % PINGS] = (struct ping){ avr->cycle, row.cross_us[1 - r->side] };
+		bench_trace("trigger %s", r->name);
+	}
+	if (command == 0x5C)
+		return;
+	r->began = avr->cycle;
+	r->emitted = burst;
+	r->own_us = row.own_us[r->side];
+	r->unit = (uint8_t)((command - 0x50) % 6);
+	r->listening = true;
+	r->busy_until = avr->cycle + US(RANGING_US + random_below(SPREAD_US));
+}
+
+static bool on_start(struct twi_device *self, bool read)
+{
+	struct ranger *r = (struct ranger *)self;
+
+	if (r->absent || r->refuses || avr->cycle < r->busy_until)
+		return false;
+	if (r->listening)
+		finish(r);
+	if (!read)
+		r->count = 0;
+	self->stretch = r->stretches ? STRETCH : 0;
+	return true;
+}
+
+static bool on_write(struct twi_device *self, uint8_t byte)
+{
+	struct ranger *r = (struct ranger *)self;
+
+	if (r->count == 0)
+		r->pointer = byte;
+	if (r->count < sizeof r->written)
+		r->written[r->count++] = byte;
+	return true;
+}
+
+static uint8_t on_read(struct twi_device *self)
+{
+	struct ranger *r = (struct ranger *)self;
+	uint8_t registers[6] = { REVISION, UNUSED, (uint8_t)(r->result >> 8), (uint8_t)r->result, 0, 15 };
+
+	return registers[r->pointer++ % 6];
+}
+
+/* Commands take effect at the stop condition. Address change: A0, AA, A5, then the new 8-bit address, one command each. */
+static void on_stop(struct twi_device *self)
+{
+	static uint8_t sequence;
+	struct ranger *r = (struct ranger *)self;
+	uint8_t command = r->written[1];
+
+	if (r->count == 2 && r->written[0] == COMMAND) {
+		if ((command >= 0x50 && command <= 0x52) || (command >= 0x56 && command <= 0x58) || command == 0x5C)
+			begin(r, command);
+		else if (sequence == 3)
+			self->address = command >> 1;
+		sequence = command == 0xA0 ? 1 : command == 0xAA && sequence == 1 ? 2 : command == 0xA5 && sequence == 2 ? 3 : 0;
+	}
+	r->count = 0;
+	self->stretch = 0;
+}
+
+void srf02_start(void)
+{
+	for (int k = 0; k < 2; k++) {
+		struct ranger *r = &rangers[k];
+
+		if (!r->twi.start) {
+			r->twi = (struct twi_device){ (uint8_t)(0x70 + k), on_start, on_write, on_read, on_stop, 0, NULL };
+			twi_add(&r->twi);
+		}
+		r->listening = false;
+		r->busy_until = 0;
+		r->count = 0;
+		memset(r->pings, 0, sizeof r->pings);
+	}
+}
+
+bool srf02_fault(const char *name, const char *value)
+{
+	if (strncmp(name, "srf_", 4))
+		return false;
+	for (int k = 0; k < 2; k++)
+		if (!strcmp(name + 4, rangers[k].name)) {
+			struct ranger *r = &rangers[k];
+
+			r->absent = !strcmp(value, "absent");
+			r->refuses = !strcmp(value, "nack");
+			r->stretches = !strcmp(value, "stretch");
+			return r->absent || r->refuses || r->stretches || !strcmp(value, "ok");
+		}
+	return false;
+}

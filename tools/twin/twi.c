@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * Two-wire interface, master mode, with the bit timing of TWBR and TWSR [ATmega32U4 data sheet, chapter 20], a bus of devices, clock
+ * stretching, and an SDA line that a device may hold down until it has seen nine clocks. */
+#include <simavr/avr_ioport.h>
+#include <simavr/sim_cycle_timers.h>
+#include <simavr/sim_interrupts.h>
+
+#include "twin.h"
+
+enum { TWBR = 0xB8, TWSR, TWAR, TWDR, TWCR };
+enum { TWINT = 0x80, TWEA = 0x40, TWSTA = 0x20, TWSTO = 0x10, TWEN = 4, TWIE = 1 };
+enum { DDRD = 0x2A, SCL = 1, SDA = 2 };
+#define VECTOR 36
+#define IDLE_STATUS 0xF8
+#define CLOCKS_TO_FREE 9
+
+static struct twi_device *devices, *active;
+static enum { IDLE, ADDRESS, WRITING, READING, REFUSED } phase;
+static bool own;         /* a start condition was sent */
+static uint8_t status;   /* of the operation under way */
+static int read_byte = -1;
+static avr_cycle_count_t bus_free_at;
+static enum twi_fault line;
+static unsigned clocks;
+
+static unsigned bit_cycles(void)
+{
+	static const unsigned prescale[4] = { 1, 4, 16, 64 };
+
+	return 16u + 2u * avr->data[TWBR] * prescale[avr->data[TWSR] & 3];
+}
+
+static void set_status(uint8_t value)
+{
+	avr->data[TWSR] = (uint8_t)((avr->data[TWSR] & 3) | value);
+}
+
+static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	(void)when;
+	(void)param;
+	set_status(status);
+	if (read_byte >= 0)
+		a->data[TWDR] = (uint8_t)read_byte;
+	read_byte = -1;
+	avr_raise_interrupt(a, vector(VECTOR));
+	return 0;
+}
+
+static avr_cycle_count_t stopped(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	(void)when;
+	(void)param;
+	a->data[TWCR] &= (uint8_t)~TWSTO;
+	return 0;
+}
+
+static void operate(unsigned bits, uint8_t result)
+{
+	uint32_t stretch = active ? active->stretch : 0;
+
+	status = result;
+	avr_cycle_timer_register(avr, bits * bit_cycles() + stretch, done, NULL);
+}
+
+static void release(void)
+{
+	if (active && active->stop)
+		active->stop(active);
+	active = NULL;
+	own = false;
+	phase = IDLE;
+	set_status(IDLE_STATUS);
+}
+
+static void start(void)
+{
+	unsigned wait = 0;
+
+	if (line != TWI_GOOD)
+		return; /* SDA never rises: the start condition never happens */
+	if (!own && avr->cycle < bus_free_at)
+		wait = (unsigned)((bus_free_at - avr->cycle + bit_cycles() - 1) / bit_cycles());
+	active = NULL;
+	operate(1 + wait, own ? 0x10 : 0x08);
+	own = true;
+	phase = ADDRESS;
+}
+
+static void stop(void)
+{
+	release();
+	avr_cycle_timer_register(avr, bit_cycles(), stopped, NULL);
+	bus_free_at = avr->cycle + bit_cycles() + bit_cycles() / 2;
+}
+
+static void address(uint8_t byte)
+{
+	bool reading = byte & 1, ack = false;
+
+	for (struct twi_device *d = devices; d && !ack; d = d->next)
+		if (d->address == byte >> 1 && d->start(d, reading)) {
+			active = d;
+			ack = true;
+		}
+	phase = !ack ? REFUSED : reading ? READING : WRITING;
+	operate(9, reading ? (ack ? 0x40 : 0x48) : (ack ? 0x18 : 0x20));
+}
+
+static void transfer(uint8_t control)
+{
+	uint8_t byte = avr->data[TWDR];
+
+	switch (phase) {
+	case ADDRESS: address(byte); break;
+	case WRITING: operate(9, active->write(active, byte) ? 0x28 : 0x30); break;
+	case READING:
+		read_byte = active->read(active);
+		operate(9, control & TWEA ? 0x50 : 0x58);
+		break;
+	case REFUSED: operate(9, 0x30); break;
+	case IDLE: break;
+	}
+}
+
+static void disable(void)
+{
+	avr_cycle_timer_cancel(avr, done, NULL);
+	avr_clear_interrupt(avr, vector(VECTOR));
+	release();
+	avr->data[TWCR] = 0;
+	clocks = 0;
+}
+
+static void write_control(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+{
+	uint8_t flag = a->data[TWCR] & TWINT;
+
+	(void)at;
+	(void)param;
+	a->data[TWCR] = (uint8_t)((value & 0x75) | (value & TWINT ? 0 : flag));
+	if (!(value & TWEN)) {
+		disable();
+	} else if (!(value & TWINT)) {
+		if ((value & TWIE) && flag && !vector(VECTOR)->pending)
+			avr_raise_interrupt(a, vector(VECTOR));
+	} else {
+		avr_clear_interrupt(a, vector(VECTOR));
+		a->data[TWCR] &= (uint8_t)~TWINT;
+		if (value & TWSTO)
+			stop();
+		if (value & TWSTA)
+			start();
+		else if (own)
+			transfer(value);
+	}
+}
+
+static void write_status(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+{
+	(void)param;
+	a->data[at] = (uint8_t)((a->data[at] & 0xF8) | (value & 3));
+}
+
+static void write_plain(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+{
+	(void)param;
+	a->data[at] = value;
+}
+
+static uint8_t read_plain(avr_t *a, avr_io_addr_t at, void *param)
+{
+	(void)param;
+	return a->data[at];
+}
+
+/* With the TWI off, the program may clock the bus by hand: DDRD drives the lines low. */
+static void lines_changed(struct avr_irq_t *irq, uint32_t value, void *param)
+{
+	static uint8_t before;
+	uint8_t driven = (uint8_t)value;
+
+	(void)irq;
+	(void)param;
+	if (!(avr->data[TWCR] & TWEN) && (before & SCL) && !(driven & SCL) && ++clocks >= CLOCKS_TO_FREE && line == TWI_STUCK) {
+		line = TWI_GOOD;
+		bench_trace("sda released");
+	}
+	before = driven;
+}
+
+void twi_init(void)
+{
+	take_register(TWCR, NULL, write_control);
+	take_register(TWSR, NULL, write_status);
+	take_register(TWDR, read_plain, write_plain);
+	set_status(IDLE_STATUS);
+	avr->data[TWDR] = 0xFF;
+	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL), lines_changed, NULL);
+	active = NULL;
+	own = false;
+	phase = IDLE;
+	read_byte = -1;
+}
+
+void twi_add(struct twi_device *device)
+{
+	device->next = devices;
+	devices = device;
+}
+
+void twi_fault(enum twi_fault fault)
+{
+	line = fault;
+}

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * The twin: an unmodified ATmega32U4 ELF in simavr, with buses, devices and a USB host around it.
+ *
+ * simavr's own USB, TWI and SPI are replaced from outside, through its public tables, by models with true timing: usb_device.c, twi.c,
+ * spi.c. Everything happens in simulated time; equal input gives equal output. */
+#ifndef ECHOSTEP_TWIN_H
+#define ECHOSTEP_TWIN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <simavr/sim_avr.h>
+
+#define CYCLES_PER_MS 16000u
+#define US(n) ((avr_cycle_count_t)(n) * 16u)
+
+/* One millisecond of what the sensors feel (host/DESIGN.md, the bench). */
+struct row {
+	int16_t rate[3]; /* thigh, calf, belt: ADIS16100 counts */
+	uint16_t own_us[2], cross_us[2];
+	uint16_t bearing;
+	uint32_t pressure;
+	int16_t temperature;
+	uint16_t sync_us;
+} __attribute__((packed));
+
+#define ROW_SIZE sizeof(struct row)
+#define NO_SYNC 65535u
+
+extern avr_t *avr;
+extern struct row row;       /* the millisecond under way */
+extern uint64_t random_state; /* of everything that varies from part to part */
+
+uint32_t random_below(uint32_t limit);
+uint64_t time_ns(void);
+void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
+avr_int_vector_t *vector(int number);
+
+/* Take a register over: reads and writes of the program call these. */
+void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write);
+
+/* bench.c: what leaves the board, and what tests may know about its buses. */
+void bench_sent(const uint8_t *bytes, unsigned length);
+void bench_trace(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void bench_run(int in, int out);
+
+/* usb_device.c: the device controller, seen from the cable. */
+enum usb_answer { USB_ACK = 0, USB_NAK = -1, USB_STALL = -2, USB_SILENCE = -3 };
+void usb_device_init(void);
+bool usb_device_attached(void);
+void usb_bus_reset(void);
+void usb_frame(uint16_t number);
+int usb_setup(const uint8_t *request);
+int usb_in(uint8_t endpoint, uint8_t *bytes); /* length, or an answer */
+int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length);
+
+/* usb_host.c: enumerates, opens the port, moves bytes. */
+void usb_host_start(void);   /* after power-up: registers its timer */
+void usb_host_unplug(void);
+void usb_host_reset(void);   /* a bus reset: the device is enumerated again */
+void usb_host_stall(bool on); /* the program on the host does not read */
+void usb_host_open(bool on);  /* a program has the port open (DTR) */
+void usb_host_send(const uint8_t *bytes, unsigned length);
+
+/* twi.c */
+struct twi_device {
+	uint8_t address;                                       /* 7-bit */
+	bool (*start)(struct twi_device *self, bool read);     /* acknowledge? */
+	bool (*write)(struct twi_device *self, uint8_t byte);  /* acknowledge? */
+	uint8_t (*read)(struct twi_device *self);
+	void (*stop)(struct twi_device *self);
+	uint32_t stretch; /* cycles that the device holds the clock after its next byte */
+	struct twi_device *next;
+};
+enum twi_fault { TWI_GOOD, TWI_STUCK, TWI_STUCK_FOREVER };
+void twi_init(void);
+void twi_add(struct twi_device *device);
+void twi_fault(enum twi_fault fault);
+
+/* spi.c */
+struct spi_device {
+	char port;
+	uint8_t pin; /* chip select, active low */
+	void (*select)(struct spi_device *self, bool on);
+	uint8_t (*exchange)(struct spi_device *self, uint8_t out);
+	bool selected;
+	struct spi_device *next;
+};
+void spi_init(void);
+void spi_add(struct spi_device *device);
+unsigned spi_hertz(void);
+unsigned spi_mode(void);
+
+/* The devices: power-up, and `name=value` switches (false: no such switch). */
+void srf02_start(void);
+bool srf02_fault(const char *name, const char *value);
+void adis16100_start(void);
+bool adis16100_fault(const char *name, const char *value);
+void scp1000_start(void);
+bool scp1000_fault(const char *name, const char *value);
+void compass_start(void);
+bool compass_fault(const char *name, const char *value);
+
+/* pty.c: the port as a pseudo terminal. */
+void pty_open(void);
+bool pty_wanted(void);
+bool pty_write(const uint8_t *bytes, unsigned length); /* false: the program does not read */
+void pty_poll(void);
+
+/* main.c */
+void board_power(bool on);
+void board_reset(uint8_t cause); /* MCUSR bits */
+bool board_has_power(void);
+
+#endif

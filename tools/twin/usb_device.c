@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: registers on one side, the cable on the other.
+ *
+ * Two-bank endpoints, interrupts on levels as in silicon: recomputed on every access and after every interrupt. */
+#include <string.h>
+
+#include <simavr/sim_interrupts.h>
+
+#include "twin.h"
+
+enum {
+	UHWCON = 0xD7, USBCON, USBSTA, USBINT, UDCON = 0xE0, UDINT, UDIEN, UDADDR, UDFNUML, UDFNUMH, UDMFN,
+	UEINTX = 0xE8, UENUM, UERST, UECONX, UECFG0X, UECFG1X, UESTA0X, UESTA1X, UEIENX, UEDATX, UEBCLX, UEBCHX, UEINT,
+};
+enum { TXINI = 1, STALLEDI = 2, RXOUTI = 4, RXSTPI = 8, NAKOUTI = 16, RWAL = 32, NAKINI = 64, FIFOCON = 128 };
+enum { USBE = 0x80, FRZCLK = 0x20, OTGPADE = 0x10, VBUS = 1, VBUSTI = 1, VBUSTE = 1, DETACH = 1, SOFI = 4, EORSTI = 8 };
+enum { EPEN = 1, RSTDT = 8, STALLRQC = 16, STALLRQ = 32, ALLOC = 2, ADDEN = 0x80 };
+#define ENDPOINTS 7
+#define BANK_SIZE 256
+#define VECTOR_GENERAL 10
+#define VECTOR_ENDPOINT 11
+
+struct bank {
+	uint8_t bytes[BANK_SIZE];
+	int length, read;
+	bool full; /* belongs to the cable (IN) or to the program (OUT) */
+};
+
+static struct endpoint {
+	uint8_t conx, cfg0, cfg1, enabled, flags;
+	bool stalled;
+	struct bank bank[2]; /* of a control endpoint: 0 is OUT and SETUP, 1 is IN */
+	int cpu, cable;      /* which bank either side works on */
+} endpoints[ENDPOINTS];
+
+static bool is_in(const struct endpoint *e) { return e->cfg0 & 1; }
+static bool is_control(const struct endpoint *e) { return (e->cfg0 >> 6) == 0; }
+static int size_of(const struct endpoint *e) { return 8 << ((e->cfg1 >> 4) & 7); }
+static int banks_of(const struct endpoint *e) { return (e->cfg1 >> 2) & 3 ? 2 : 1; }
+static struct endpoint *selected(void) { return &endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
+static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control(e) ? 0 : e->cpu]; }
+
+static uint8_t interrupts_of(struct endpoint *e)
+{
+	struct bank *b = &e->bank[e->cpu];
+	uint8_t flags = e->flags & (uint8_t)~RWAL;
+
+	if (is_control(e) || !(flags & FIFOCON))
+		return flags;
+	if (is_in(e) ? b->length < size_of(e) : b->read < b->length)
+		flags |= RWAL;
+	return flags;
+}
+
+static void set_level(int number, bool level)
+{
+	avr_int_vector_t *v = vector(number);
+
+	if (level && !v->pending)
+		avr_raise_interrupt(avr, v);
+	else if (!level && v->pending)
+		avr_clear_interrupt(avr, v);
+}
+
+static void refresh(void)
+{
+	uint8_t raised = 0;
+
+	for (int i = 0; i < ENDPOINTS; i++)
+		if (interrupts_of(&endpoints[i]) & endpoints[i].enabled & (uint8_t)~RWAL)
+			raised |= (uint8_t)(1 << i);
+	avr->data[UEINT] = raised;
+	bool bus = avr->data[UDINT] & avr->data[UDIEN] & 0x7D;
+	bool vbus = (avr->data[USBINT] & VBUSTI) && (avr->data[USBCON] & VBUSTE);
+	set_level(VECTOR_GENERAL, bus || vbus);
+	set_level(VECTOR_ENDPOINT, raised != 0);
+}
+
+static void offer_bank(struct endpoint *e)
+{
+	struct bank *b = &e->bank[e->cpu];
+
+	if (is_in(e) && !b->full)
+		e->flags |= TXINI | FIFOCON;
+	else if (!is_in(e) && b->full)
+		e->flags |= RXOUTI | FIFOCON;
+}
+
+static uint8_t read_register(avr_t *a, avr_io_addr_t address, void *param)
+{
+	struct endpoint *e = selected();
+	struct bank *b = bank_of_cpu(e);
+
+	(void)param;
+	switch (address) {
+	case UEINTX: return interrupts_of(e);
+	case UECONX: return (uint8_t)((e->conx & EPEN) | (e->stalled ? STALLRQ : 0));
+	case UECFG0X: return e->cfg0;
+	case UECFG1X: return e->cfg1;
+	case UEIENX: return e->enabled;
+	case UESTA0X: return (uint8_t)((e->cfg1 & ALLOC ? 0x80 : 0) | (e->bank[0].full + e->bank[1].full));
+	case UEDATX: return b->read < b->length ? b->bytes[b->read++] : 0;
+	case UEBCLX: return (uint8_t)(is_in(e) && !is_control(e) ? b->length : b->length - b->read);
+	default: return a->data[address];
+	}
+}
+
+static void write_byte(struct endpoint *e, uint8_t value)
+{
+	struct bank *b = is_control(e) ? &e->bank[1] : &e->bank[e->cpu];
+
+	if (b->length < size_of(e))
+		b->bytes[b->length++] = value;
+}
+
+/* UEINTX: bits written as zero are cleared, and with some of them a bank changes hands. */
+static void clear_flags(struct endpoint *e, uint8_t cleared)
+{
+	e->flags &= (uint8_t)~(cleared & (STALLEDI | NAKOUTI | NAKINI));
+	if (is_control(e)) {
+		if (cleared & RXSTPI) {
+			e->flags &= (uint8_t)~RXSTPI;
+			memset(e->bank, 0, sizeof e->bank);
+			e->flags |= TXINI;
+		}
+		if (cleared & RXOUTI) {
+			e->flags &= (uint8_t)~RXOUTI;
+			e->bank[0].length = e->bank[0].read = 0;
+			e->bank[0].full = false;
+		}
+		if ((cleared & TXINI) && !(cleared & RXSTPI)) {
+			e->flags &= (uint8_t)~TXINI;
+			e->bank[1].full = true;
+		}
+		return;
+	}
+	e->flags &= (uint8_t)~(cleared & (is_in(e) ? TXINI : RXOUTI));
+	if (cleared & FIFOCON) {
+		struct bank *b = &e->bank[e->cpu];
+
+		e->flags &= (uint8_t)~(FIFOCON | (is_in(e) ? TXINI : RXOUTI));
+		b->full = is_in(e);
+		if (!is_in(e))
+			b->length = b->read = 0;
+		e->cpu = (e->cpu + 1) % banks_of(e);
+		offer_bank(e);
+	}
+}
+
+static void reset_fifo(struct endpoint *e)
+{
+	memset(e->bank, 0, sizeof e->bank);
+	e->cpu = e->cable = 0;
+	e->flags = 0;
+	if (is_control(e))
+		e->flags = TXINI;
+	else
+		offer_bank(e);
+}
+
+static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void *param)
+{
+	struct endpoint *e = selected();
+	uint8_t old = a->data[address];
+
+	(void)param;
+	switch (address) {
+	case USBCON:
+		a->data[address] = value;
+		if ((value & OTGPADE) && !(old & OTGPADE)) {
+			a->data[USBSTA] |= VBUS;
+			a->data[USBINT] |= VBUSTI;
+		}
+		if (!(value & USBE))
+			memset(endpoints, 0, sizeof endpoints);
+		break;
+	case USBINT:
+	case UDINT: a->data[address] &= value; break;
+	case UENUM: a->data[address] = value & 7; break;
+	case UERST:
+		for (int i = 1; i < ENDPOINTS; i++)
+			if ((old & ~value) & (1 << i))
+				reset_fifo(&endpoints[i]);
+		a->data[address] = value;
+		break;
+	case UECONX:
+		e->conx = value & EPEN;
+		if (value & STALLRQ)
+			e->stalled = true;
+		if (value & STALLRQC)
+			e->stalled = false;
+		break;
+	case UECFG0X: e->cfg0 = value; break;
+	case UECFG1X:
+		e->cfg1 = value;
+		if (value & ALLOC)
+			reset_fifo(e);
+		break;
+	case UEIENX: e->enabled = value; break;
+	case UEDATX: write_byte(e, value); break;
+	case UEINTX: clear_flags(e, (uint8_t)(e->flags & ~value)); break;
+	case UEINT:
+	case UEBCLX:
+	case UEBCHX:
+	case UESTA0X:
+	case UESTA1X:
+	case UDFNUML:
+	case UDFNUMH: break; /* read only */
+	default: a->data[address] = value;
+	}
+	refresh();
+}
+
+static void after_interrupt(struct avr_irq_t *irq, uint32_t running, void *param)
+{
+	(void)irq;
+	(void)param;
+	if (!running)
+		refresh();
+}
+
+void usb_device_init(void)
+{
+	for (avr_io_addr_t a = UHWCON; a <= UEINT; a++)
+		take_register(a, read_register, write_register);
+	for (int v = VECTOR_GENERAL; v <= VECTOR_ENDPOINT; v++)
+		avr_irq_register_notify(vector(v)->irq + AVR_INT_IRQ_RUNNING, after_interrupt, NULL);
+	memset(endpoints, 0, sizeof endpoints);
+	avr->data[UDCON] = DETACH;
+	avr->data[USBCON] = FRZCLK;
+}
+
+bool usb_device_attached(void)
+{
+	return (avr->data[USBCON] & (USBE | FRZCLK)) == USBE && !(avr->data[UDCON] & DETACH);
+}
+
+void usb_bus_reset(void)
+{
+	memset(endpoints, 0, sizeof endpoints);
+	avr->data[UDADDR] = 0;
+	avr->data[UDINT] |= EORSTI;
+	refresh();
+}
+
+void usb_frame(uint16_t number)
+{
+	avr->data[UDFNUML] = (uint8_t)number;
+	avr->data[UDFNUMH] = (number >> 8) & 7;
+	avr->data[UDINT] |= SOFI;
+	refresh();
+}
+
+int usb_setup(const uint8_t *request)
+{
+	struct endpoint *e = &endpoints[0];
+
+	if (!usb_device_attached() || !(e->conx & EPEN) || !(e->cfg1 & ALLOC))
+		return USB_SILENCE;
+	e->stalled = false; /* a SETUP always gets through */
+	memcpy(e->bank[0].bytes, request, 8);
+	e->bank[0].length = 8;
+	e->bank[0].read = 0;
+	e->flags = (uint8_t)((e->flags & ~RXOUTI) | RXSTPI);
+	refresh();
+	return USB_ACK;
+}
+
+int usb_in(uint8_t endpoint, uint8_t *bytes)
+{
+	struct endpoint *e = &endpoints[endpoint];
+	struct bank *b = &e->bank[is_control(e) ? 1 : e->cable];
+	int length = b->length;
+
+	if (!usb_device_attached() || !(e->conx & EPEN))
+		return USB_SILENCE;
+	if (e->stalled) {
+		e->flags |= STALLEDI;
+		refresh();
+		return USB_STALL;
+	}
+	if ((is_control(e) && (e->flags & RXSTPI)) || !b->full) {
+		e->flags |= NAKINI;
+		refresh();
+		return USB_NAK;
+	}
+	memcpy(bytes, b->bytes, (size_t)length);
+	b->length = b->read = 0;
+	b->full = false;
+	if (is_control(e)) {
+		e->flags |= TXINI;
+	} else {
+		e->cable = (e->cable + 1) % banks_of(e);
+		offer_bank(e);
+	}
+	refresh();
+	return length;
+}
+
+int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length)
+{
+	struct endpoint *e = &endpoints[endpoint];
+	struct bank *b = &e->bank[is_control(e) ? 0 : e->cable];
+
+	if (!usb_device_attached() || !(e->conx & EPEN))
+		return USB_SILENCE;
+	if (e->stalled) {
+		e->flags |= STALLEDI;
+		refresh();
+		return USB_STALL;
+	}
+	if ((is_control(e) && (e->flags & (RXSTPI | RXOUTI))) || b->full) {
+		e->flags |= NAKOUTI;
+		refresh();
+		return USB_NAK;
+	}
+	if (length)
+		memcpy(b->bytes, bytes, length);
+	b->length = (int)length;
+	b->read = 0;
+	if (is_control(e)) {
+		e->flags |= RXOUTI;
+	} else {
+		b->full = true;
+		e->cable = (e->cable + 1) % banks_of(e);
+		offer_bank(e);
+	}
+	refresh();
+	return USB_ACK;
+}

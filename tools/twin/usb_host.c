@@ -1,0 +1,251 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * The USB host: waits for a device, resets and enumerates it, configures the CDC-ACM port, then moves bulk data every millisecond.
+ *
+ * The requests are those of a Linux host with its cdc_acm driver. */
+#include <string.h>
+
+#include <simavr/sim_cycle_timers.h>
+
+#include "twin.h"
+
+#define CONTROL_POLL US(100)
+#define FRAME US(1000)
+#define DEBOUNCE_MS 20
+#define STAGE_LIMIT_MS 500
+#define PACKETS_PER_FRAME 19 /* what full speed has room for */
+#define DTR_RTS 3
+
+static const uint8_t script[][16] = {
+	/* request, data stage out */
+	{ 0x80, 6, 0, 1, 0, 0, 64, 0 },       /* device descriptor, its beginning */
+	{ 0x00, 5, 7, 0, 0, 0, 0, 0 },        /* address 7 */
+	{ 0x80, 6, 0, 1, 0, 0, 18, 0 },       /* device descriptor */
+	{ 0x80, 6, 0, 2, 0, 0, 9, 0 },        /* configuration descriptor, its head */
+	{ 0x80, 6, 0, 2, 0, 0, 255, 0 },      /* configuration descriptor */
+	{ 0x80, 6, 0, 3, 0, 0, 255, 0 },      /* languages */
+	{ 0x80, 6, 2, 3, 9, 4, 255, 0 },      /* product */
+	{ 0x80, 6, 0, 6, 0, 0, 10, 0 },       /* device qualifier: a full-speed device refuses */
+	{ 0x00, 9, 1, 0, 0, 0, 0, 0 },        /* configuration 1 */
+	{ 0x21, 0x20, 0, 0, 0, 0, 7, 0, 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }, /* 115200 8N1 */
+};
+#define SCRIPT_LENGTH (sizeof script / sizeof *script)
+
+enum stage { SETUP, DATA_IN, DATA_OUT, STATUS_IN, STATUS_OUT };
+
+static enum { DETACHED, DEBOUNCING, ENUMERATING, RUNNING } state;
+static unsigned step;
+static enum stage stage;
+static uint8_t request[16]; /* under way */
+static bool requesting;
+static unsigned received, stage_ms, waited_ms;
+static uint8_t in_endpoint, out_endpoint;
+static bool stalled, wanted_open, is_open;
+static uint16_t frame_number;
+static uint8_t outbox[1 << 16];
+static unsigned outbox_length;
+static uint8_t descriptor[256];
+
+/* Bulk endpoints from the configuration descriptor, as a driver finds them. */
+static void find_endpoints(unsigned length)
+{
+	for (unsigned at = 0; at + 1 < length && descriptor[at]; at += descriptor[at])
+		if (descriptor[at + 1] == 5 && at + 3 < length && (descriptor[at + 3] & 3) == 2) {
+			if (descriptor[at + 2] & 0x80)
+				in_endpoint = descriptor[at + 2] & 0x7F;
+			else
+				out_endpoint = descriptor[at + 2];
+		}
+}
+
+static void begin_request(const uint8_t *bytes)
+{
+	memcpy(request, bytes, sizeof request);
+	requesting = true;
+	stage = SETUP;
+	received = 0;
+	stage_ms = 0;
+}
+
+static void set_line_state(bool open)
+{
+	uint8_t bytes[16] = { 0x21, 0x22, open ? DTR_RTS : 0 };
+
+	is_open = open;
+	begin_request(bytes);
+}
+
+static void finish_request(void)
+{
+	requesting = false;
+	if (request[0] == 0x80 && request[1] == 6 && request[3] == 2)
+		find_endpoints(received);
+	if (state == ENUMERATING && ++step == SCRIPT_LENGTH) {
+		state = RUNNING;
+		bench_trace("enumerated");
+	}
+}
+
+static void next_stage(enum stage next)
+{
+	stage = next;
+	stage_ms = 0;
+}
+
+/* One attempt at the stage under way; true when the request moved on. */
+static bool advance_request(void)
+{
+	uint8_t bytes[64];
+	unsigned length = request[6] | (unsigned)request[7] << 8;
+	int answer;
+
+	switch (stage) {
+	case SETUP:
+		if (usb_setup(request) != USB_ACK)
+			return false;
+		next_stage(!length ? STATUS_IN : request[0] & 0x80 ? DATA_IN : DATA_OUT);
+		return true;
+	case DATA_IN:
+		answer = usb_in(0, bytes);
+		if (answer == USB_STALL) {
+			finish_request();
+			return true;
+		}
+		if (answer < 0)
+			return false;
+		for (int k = 0; k < answer && received < sizeof descriptor; k++)
+			descriptor[received++] = bytes[k];
+		if (answer < 64 || received >= length)
+			next_stage(STATUS_OUT);
+		return true;
+	case DATA_OUT:
+		if (usb_out(0, request + 8, length) != USB_ACK)
+			return false;
+		next_stage(STATUS_IN);
+		return true;
+	case STATUS_IN:
+		answer = usb_in(0, bytes);
+		if (answer == USB_NAK || answer == USB_SILENCE)
+			return false;
+		finish_request();
+		return true;
+	case STATUS_OUT:
+		if (usb_out(0, NULL, 0) != USB_ACK)
+			return false;
+		finish_request();
+		return true;
+	}
+	return false;
+}
+
+static void move_bulk(void)
+{
+	uint8_t bytes[64];
+
+	while (outbox_length) {
+		unsigned part = outbox_length < 64 ? outbox_length : 64;
+
+		if (usb_out(out_endpoint, outbox, part) != USB_ACK)
+			break;
+		outbox_length -= part;
+		memmove(outbox, outbox + part, outbox_length);
+	}
+	if (!is_open || stalled)
+		return;
+	for (int k = 0; k < PACKETS_PER_FRAME; k++) {
+		int length = usb_in(in_endpoint, bytes);
+
+		if (length < 0)
+			break;
+		bench_sent(bytes, (unsigned)length);
+	}
+}
+
+static void watch(void)
+{
+	if (!usb_device_attached()) {
+		state = DETACHED;
+		requesting = is_open = false;
+	} else if (state == DETACHED) {
+		state = DEBOUNCING;
+		waited_ms = 0;
+	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS) {
+		usb_bus_reset();
+		state = ENUMERATING;
+		step = 0;
+		requesting = is_open = false;
+		waited_ms = 0;
+	}
+	if (requesting && ++stage_ms > STAGE_LIMIT_MS) {
+		bench_trace("usb: no answer to request %02x %02x", request[0], request[1]);
+		state = DEBOUNCING;
+		requesting = false;
+	}
+}
+
+static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	static unsigned in_frame;
+
+	(void)param;
+	if (a->cycle % FRAME < CONTROL_POLL || !requesting) {
+		in_frame = 0;
+		watch();
+		if (state != DETACHED)
+			usb_frame(frame_number++);
+		if (state == RUNNING && !requesting) {
+			if (wanted_open != is_open)
+				set_line_state(wanted_open);
+			else
+				move_bulk();
+		}
+		if (state == ENUMERATING && !requesting && ++waited_ms > 10)
+			begin_request(script[step]);
+	}
+	in_frame++;
+	if (requesting) {
+		advance_request();
+		return when + CONTROL_POLL;
+	}
+	return when - when % FRAME + FRAME;
+}
+
+void usb_host_start(void)
+{
+	state = DETACHED;
+	requesting = is_open = false;
+	outbox_length = 0;
+	avr_cycle_timer_register(avr, FRAME - avr->cycle % FRAME, poll, NULL);
+}
+
+void usb_host_unplug(void)
+{
+	state = DETACHED;
+	requesting = is_open = false;
+	outbox_length = 0;
+}
+
+void usb_host_reset(void)
+{
+	if (state != DETACHED)
+		state = DEBOUNCING;
+	waited_ms = 0;
+	requesting = is_open = false;
+}
+
+void usb_host_stall(bool on)
+{
+	stalled = on;
+}
+
+void usb_host_open(bool on)
+{
+	wanted_open = on;
+}
+
+void usb_host_send(const uint8_t *bytes, unsigned length)
+{
+	if (length > sizeof outbox - outbox_length)
+		length = (unsigned)sizeof outbox - outbox_length;
+	memcpy(outbox + outbox_length, bytes, length);
+	outbox_length += length;
+}
