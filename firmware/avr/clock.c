@@ -1,0 +1,75 @@
+/* The 32-bit clock: Timer1 at 2 MHz extended by an overflow count, SyncOut edges on its input capture (PD4), and the alarm that
+ * ends a sleep. */
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
+#include "shared.h"
+
+static volatile uint16_t overflows;
+static struct clock_edge edge;
+static bool edge_waiting;
+
+void clock_start(void)
+{
+	PORTD |= BIT(PD4); /* an unconnected SyncOut input stays quiet */
+	TCCR1A = 0;
+	TCCR1B = BIT(ICNC1) | BIT(ICES1) | BIT(CS11); /* noise canceller, rising edge, 16 MHz / 8 */
+	TIMSK1 = BIT(ICIE1) | BIT(OCIE1A) | BIT(TOIE1);
+}
+
+/* Interrupts are off: an overflow that nobody counted yet belongs to a small timer value, not to a large one. */
+static uint32_t extend(uint16_t low)
+{
+	uint16_t high = overflows;
+	if ((TIFR1 & BIT(TOV1)) && low < 0x8000u)
+		high++;
+	return (uint32_t)high << 16 | low;
+}
+
+uint32_t clock_now(void)
+{
+	uint32_t now;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		now = extend(TCNT1);
+	}
+	return now;
+}
+
+void clock_alarm(uint32_t ticks)
+{
+	OCR1A = (uint16_t)ticks;
+}
+
+bool clock_take_edge(struct clock_edge *out)
+{
+	bool waiting;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		waiting = edge_waiting;
+		*out = edge;
+		edge.missed = 0;
+		edge_waiting = false;
+	}
+	return waiting;
+}
+
+ISR(TIMER1_OVF_vect)
+{
+	overflows++;
+}
+
+ISR(TIMER1_COMPA_vect)
+{
+	awake = true;
+}
+
+ISR(TIMER1_CAPT_vect)
+{
+	edge.ticks = extend(ICR1);
+	edge.edge++;
+	if (edge_waiting)
+		edge.missed++;
+	edge_waiting = true;
+	awake = true;
+}

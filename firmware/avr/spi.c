@@ -1,0 +1,57 @@
+/* SPI master: polled bytes to one of four chips, each with its own mode and rate. SCK PB1, MOSI PB2, MISO PB3; chip selects
+ * PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6. */
+#include <avr/io.h>
+#include "shared.h"
+
+#define SS BIT(PB0) /* an output, or a low level there would end master mode */
+#define SCK BIT(PB1)
+#define MOSI BIT(PB2)
+#define MISO BIT(PB3)
+#define GYRO_SELECTS (BIT(PB4) | BIT(PB5) | BIT(PB6))
+#define PRESSURE_SELECT BIT(PD7)
+#define DRDY BIT(PE6)
+
+#define MASTER (BIT(SPE) | BIT(MSTR))
+#define GYRO_MODE (MASTER | BIT(CPOL) | BIT(SPR0)) /* mode 2; with SPI2X 16 MHz / 8 = 2 MHz */
+#define PRESSURE_MODE (MASTER | BIT(SPR1))         /* mode 0; 16 MHz / 64 = 250 kHz */
+#define EXCHANGE_TRIES 255u                        /* over 1000 cycles; a byte takes at most 512 */
+
+void spi_start(void)
+{
+	PORTB |= SS | GYRO_SELECTS | MISO; /* MISO pulled up: an absent chip reads as ones */
+	DDRB |= SS | SCK | MOSI | GYRO_SELECTS;
+	PORTD |= PRESSURE_SELECT;
+	DDRD |= PRESSURE_SELECT;
+}
+
+void spi_select(enum chip chip)
+{
+	if (chip == CHIP_PRESSURE) {
+		SPCR = PRESSURE_MODE;
+		SPSR = 0;
+		PORTD &= (uint8_t)~PRESSURE_SELECT;
+	} else {
+		SPCR = GYRO_MODE;
+		SPSR = BIT(SPI2X);
+		PORTB &= (uint8_t)~(uint8_t)(BIT(PB4) << chip);
+	}
+}
+
+uint8_t spi_exchange(uint8_t out)
+{
+	SPDR = out;
+	for (uint8_t n = 0; n < EXCHANGE_TRIES && !(SPSR & BIT(SPIF)); n++)
+		;
+	return SPDR;
+}
+
+void spi_release(void)
+{
+	PORTB |= GYRO_SELECTS;
+	PORTD |= PRESSURE_SELECT;
+}
+
+bool pressure_ready(void)
+{
+	return PINE & DRDY;
+}

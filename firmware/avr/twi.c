@@ -1,0 +1,177 @@
+/* I2C master: interrupts carry out one transfer at a time; the main loop frees a bus that got stuck. SCL is PD0, SDA is PD1. */
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
+#include <util/delay.h>
+#include <util/twi.h>
+#include "shared.h"
+
+#define SCL BIT(PD0)
+#define SDA BIT(PD1)
+#define BIT_RATE 72u                       /* 16 MHz / (16 + 2 * 72) = 100 kHz */
+#define STOP_TICKS 20u                     /* from the request to the stop condition: one bit */
+#define TRANSFER_MAX_TICKS (5u * TICKS_PER_MS)
+#define STOP_TRIES 100u                    /* 40 us: four times what a stop condition takes */
+#define HALF_BIT_US 5
+#define RECOVERY_PULSES 9u                 /* a slave holds SDA for at most eight bits and an acknowledge */
+
+#define GO (BIT(TWINT) | BIT(TWEN) | BIT(TWIE))
+
+static struct twi_transfer *volatile current;
+static uint8_t at; /* next byte of the transfer */
+static uint32_t started;
+
+void twi_start(void)
+{
+	PORTD |= SCL | SDA; /* without a single device the lines must still be high */
+	TWSR = 0;
+	TWBR = BIT_RATE;
+}
+
+static void await_stop(void)
+{
+	for (uint8_t n = 0; n < STOP_TRIES && (TWCR & BIT(TWSTO)); n++)
+		;
+}
+
+bool twi_begin(struct twi_transfer *transfer)
+{
+	if (current)
+		return false;
+	await_stop(); /* one that never ends makes this transfer time out */
+	at = 0;
+	transfer->state = TWI_BUSY;
+	started = clock_now();
+	current = transfer;
+	TWCR = GO | BIT(TWSTA);
+	return true;
+}
+
+enum twi_state twi_state(const struct twi_transfer *transfer)
+{
+	enum twi_state state = transfer->state;
+	__asm__ volatile("" ::: "memory"); /* bytes and ticks were written by the interrupt before the state */
+	return state;
+}
+
+static void finish(enum twi_state state)
+{
+	current->ticks = clock_now() + STOP_TICKS;
+	current->state = state;
+	current = 0;
+	awake = true;
+}
+
+/* SCL is held low until TWCR is written, so the clock read right after it dates the stop condition however late we are. */
+static void stop(enum twi_state state)
+{
+	TWCR = BIT(TWINT) | BIT(TWEN) | BIT(TWSTO);
+	finish(state);
+}
+
+static void write_next(void)
+{
+	if (at < current->write_length) {
+		TWDR = current->bytes[at++];
+		TWCR = GO;
+	} else if (current->read_length) {
+		TWCR = GO | BIT(TWSTA);
+	} else {
+		stop(TWI_DONE);
+	}
+}
+
+static void read_next(void)
+{
+	TWCR = at + 1 < current->read_length ? GO | BIT(TWEA) : GO;
+}
+
+ISR(TWI_vect)
+{
+	if (!current) { /* given up by twi_watch */
+		TWCR = BIT(TWEN);
+		return;
+	}
+	switch (TW_STATUS) {
+	case TW_START:
+		TWDR = (uint8_t)(current->address << 1 | TW_WRITE);
+		TWCR = GO;
+		break;
+	case TW_REP_START:
+		TWDR = (uint8_t)(current->address << 1 | TW_READ);
+		TWCR = GO;
+		at = 0;
+		break;
+	case TW_MT_SLA_ACK:
+	case TW_MT_DATA_ACK:
+		write_next();
+		break;
+	case TW_MR_DATA_ACK:
+		current->bytes[at++] = TWDR;
+		read_next();
+		break;
+	case TW_MR_SLA_ACK:
+		read_next();
+		break;
+	case TW_MR_DATA_NACK:
+		current->bytes[at] = TWDR;
+		stop(TWI_DONE);
+		break;
+	case TW_MT_SLA_NACK:
+	case TW_MT_DATA_NACK:
+	case TW_MR_SLA_NACK:
+		stop(TWI_NACK);
+		break;
+	case TW_MT_ARB_LOST: /* somebody pulls the lines: no stop condition can be sent */
+		TWCR = BIT(TWINT) | BIT(TWEN);
+		finish(TWI_FAILED);
+		break;
+	default:
+		stop(TWI_FAILED);
+	}
+}
+
+/* The lines are driven low or let go, never driven high. */
+static void pull(uint8_t line)
+{
+	DDRD |= line;
+	_delay_us(HALF_BIT_US);
+}
+
+static void let_go(uint8_t line)
+{
+	DDRD &= (uint8_t)~line;
+	_delay_us(HALF_BIT_US);
+}
+
+/* Clocks a slave through the byte it believes to be sending, then ends it with a stop condition [I2C specification, 3.1.16]. */
+static void clock_free(void)
+{
+	TWCR = 0;
+	PORTD &= (uint8_t)~(SCL | SDA);
+	for (uint8_t n = 0; n < RECOVERY_PULSES; n++) {
+		pull(SCL);
+		let_go(SCL);
+	}
+	pull(SCL);
+	pull(SDA);
+	let_go(SCL);
+	let_go(SDA);
+	PORTD |= SCL | SDA;
+}
+
+bool twi_watch(uint32_t now)
+{
+	bool stuck = false;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		if (current && ticks_reached(now, started + TRANSFER_MAX_TICKS)) {
+			stuck = true;
+			TWCR = 0;
+			finish(TWI_FAILED);
+		}
+	}
+	if (stuck)
+		clock_free();
+	return stuck;
+}

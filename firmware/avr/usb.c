@@ -1,0 +1,170 @@
+/* USB device controller of the ATmega32U4 [datasheet, chapters 21 and 22]: attach, bus reset, and the port's two bulk endpoints.
+ * Interrupts only silence themselves and wake the main loop; usb_run does the work and arms them again. */
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include "shared.h"
+#include "usb.h"
+
+#define PLL_TRIES 60000u /* 15 ms; it locks within 0.1 ms */
+
+#define TYPE_BULK_OUT (BIT(EPTYPE1))
+#define TYPE_BULK_IN (BIT(EPTYPE1) | BIT(EPDIR))
+#define TYPE_INTERRUPT_IN (BIT(EPTYPE1) | BIT(EPTYPE0) | BIT(EPDIR))
+#define MEMORY_16 (BIT(EPSIZE0) | BIT(ALLOC))
+#define MEMORY_64_DOUBLE (BIT(EPSIZE1) | BIT(EPSIZE0) | BIT(EPBK0) | BIT(ALLOC))
+
+/* Hands a bank over by clearing FIFOCON and its flag. A one leaves a flag alone, but where IN endpoints have RXOUTI it would
+ * take back the bank just sent (KILLBK), so that bit stays zero. */
+#define RELEASE_IN (BIT(NAKOUTI) | BIT(RXSTPI) | BIT(STALLEDI) | BIT(RWAL))
+#define RELEASE_OUT (BIT(NAKINI) | BIT(RXSTPI) | BIT(STALLEDI) | BIT(RWAL) | BIT(TXINI))
+
+/* A bank is never filled: every packet is short, and the host passes a short packet on at once. */
+#define PACKET_MAX (EP_SIZE - 1u)
+
+#define RING_SIZE (USB_ROOM + 1u)
+
+static volatile bool bus_was_reset;
+static uint8_t ring[RING_SIZE];
+static uint16_t head, tail;
+
+void usb_start(void)
+{
+	USBCON = 0; /* the bootloader may have left it running */
+	UHWCON = BIT(UVREGE);
+	USBCON = BIT(USBE) | BIT(FRZCLK);
+	PLLCSR = BIT(PINDIV) | BIT(PLLE);
+	for (uint16_t n = 0; n < PLL_TRIES && !(PLLCSR & BIT(PLOCK)); n++)
+		;
+	USBCON = BIT(USBE) | BIT(OTGPADE);
+	UDIEN = BIT(EORSTE);
+	UDCON = 0; /* full speed, attached */
+}
+
+ISR(USB_GEN_vect)
+{
+	if (UDINT & BIT(EORSTI))
+		bus_was_reset = true;
+	UDINT = 0;
+	awake = true;
+}
+
+ISR(USB_COM_vect)
+{
+	uint8_t selected = UENUM, waiting = UEINT;
+	for (uint8_t endpoint = 0; endpoint < EP_COUNT; endpoint++) {
+		if (waiting & BIT(endpoint)) {
+			UENUM = endpoint;
+			UEIENX = 0;
+		}
+	}
+	UENUM = selected;
+	awake = true;
+}
+
+void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory)
+{
+	UENUM = endpoint;
+	UECONX = BIT(EPEN);
+	UECFG0X = type;
+	UECFG1X = memory;
+}
+
+static void reset_endpoints(uint8_t mask)
+{
+	UERST = mask;
+	UERST = 0;
+}
+
+void usb_start_port(void)
+{
+	usb_enable(EP_NOTIFY, TYPE_INTERRUPT_IN, MEMORY_16);
+	usb_enable(EP_OUT, TYPE_BULK_OUT, MEMORY_64_DOUBLE);
+	usb_enable(EP_IN, TYPE_BULK_IN, MEMORY_64_DOUBLE);
+	reset_endpoints(BIT(EP_NOTIFY) | BIT(EP_OUT) | BIT(EP_IN));
+}
+
+void usb_empty_port(void)
+{
+	tail = head;
+	reset_endpoints(BIT(EP_IN));
+}
+
+static uint16_t ring_next(uint16_t at)
+{
+	return (uint16_t)((at + 1u) & (RING_SIZE - 1u));
+}
+
+static uint16_t ring_room(void)
+{
+	return (uint16_t)((tail - head - 1u) & (RING_SIZE - 1u));
+}
+
+bool usb_write(const uint8_t *bytes, uint8_t length)
+{
+	if (ring_room() < length)
+		return false;
+	while (length--) {
+		ring[head] = *bytes++;
+		head = ring_next(head);
+	}
+	return true;
+}
+
+static void send_packet(void)
+{
+	for (uint8_t n = 0; n < PACKET_MAX && tail != head; n++) {
+		UEDATX = ring[tail];
+		tail = ring_next(tail);
+	}
+	UEINTX = RELEASE_IN;
+}
+
+static void send_waiting(void)
+{
+	UENUM = EP_IN;
+	while (tail != head && (UEINTX & BIT(RWAL)))
+		send_packet();
+	UEIENX = tail != head ? BIT(TXINE) : 0;
+}
+
+static void listen_for_more(void)
+{
+	UENUM = EP_OUT;
+	UEIENX = BIT(RXOUTE);
+}
+
+int16_t usb_read(void)
+{
+	if (!control_configured())
+		return -1;
+	UENUM = EP_OUT;
+	if (!(UEINTX & BIT(RXOUTI)))
+		return -1;
+	int16_t byte = (UEINTX & BIT(RWAL)) ? (int16_t)UEDATX : (int16_t)-1;
+	if (!(UEINTX & BIT(RWAL)))
+		UEINTX = RELEASE_OUT;
+	return byte;
+}
+
+bool usb_open(void)
+{
+	return control_configured() && control_port_open();
+}
+
+static bool cable_pulled(void)
+{
+	return !(USBSTA & BIT(VBUS));
+}
+
+void usb_run(void)
+{
+	if (bus_was_reset || cable_pulled()) {
+		bus_was_reset = false;
+		control_start();
+	}
+	control_run();
+	if (!control_configured())
+		return;
+	listen_for_more();
+	send_waiting();
+}

@@ -1,0 +1,326 @@
+/* USB control endpoint: descriptors, standard requests [USB 2.0, chapter 9] and the CDC-ACM ones [PSTN120, 6.3]. Never waits: each
+ * call does what the controller is ready for, and asks for an interrupt at the next step. */
+#include <avr/io.h>
+#include <avr/pgmspace.h>
+#include "shared.h"
+#include "usb.h"
+
+#define MEMORY_64 (BIT(EPSIZE1) | BIT(EPSIZE0) | BIT(ALLOC))
+#define BOOTLOADER_BAUD 1200u
+#define LINE_CODING_SIZE 7u
+
+enum { /* bRequest */
+	GET_STATUS = 0,
+	CLEAR_FEATURE = 1,
+	SET_FEATURE = 3,
+	SET_ADDRESS = 5,
+	GET_DESCRIPTOR = 6,
+	GET_CONFIGURATION = 8,
+	SET_CONFIGURATION = 9,
+	GET_INTERFACE = 10,
+	SET_INTERFACE = 11,
+	SET_LINE_CODING = 0x20,
+	GET_LINE_CODING = 0x21,
+	SET_CONTROL_LINE_STATE = 0x22,
+};
+
+enum { /* bmRequestType: direction, type, recipient */
+	TO_DEVICE = 0x00,
+	TO_INTERFACE = 0x01,
+	TO_ENDPOINT = 0x02,
+	TO_PORT = 0x21,
+	FROM_DEVICE = 0x80,
+	FROM_INTERFACE = 0x81,
+	FROM_ENDPOINT = 0x82,
+	FROM_PORT = 0xA1,
+};
+#define REQUEST(type, request) ((uint16_t)((uint16_t)(type) << 8 | (uint16_t)(request)))
+
+/* 0x1209:0x0001 is the identifier pid.codes reserves for testing. */
+static const uint8_t device_descriptor[] PROGMEM = {
+	18, 1, 0x00, 0x02, 0x02, 0, 0, EP_SIZE, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 0, 1,
+};
+
+#define CONFIGURATION_SIZE 67
+static const uint8_t configuration_descriptor[] PROGMEM = {
+	9, 2, CONFIGURATION_SIZE, 0, 2, 1, 0, 0x80, 50,      /* two interfaces, bus powered, 100 mA */
+	9, 4, 0, 0, 1, 2, 2, 1, 0,                           /* communications interface, abstract control model */
+	5, 0x24, 0, 0x10, 0x01,                              /* CDC 1.10 */
+	5, 0x24, 1, 0, 1,                                    /* no call management */
+	4, 0x24, 2, 2,                                       /* line coding and line state */
+	5, 0x24, 6, 0, 1,                                    /* union of interfaces 0 and 1 */
+	7, 5, EP_NOTIFY | 0x80, 3, NOTIFY_SIZE, 0, 64,       /* never used, but asked for by the class */
+	9, 4, 1, 0, 2, 0x0A, 0, 0, 0,                        /* bytes interface */
+	7, 5, EP_OUT, 2, EP_SIZE, 0, 0,
+	7, 5, EP_IN | 0x80, 2, EP_SIZE, 0, 0,
+};
+_Static_assert(sizeof configuration_descriptor == CONFIGURATION_SIZE, "wTotalLength");
+
+static const uint8_t languages[] PROGMEM = { 4, 3, 0x09, 0x04 };
+static const uint8_t maker[] PROGMEM = { 18, 3, 'e', 0, 'c', 0, 'h', 0, 'o', 0, 's', 0, 't', 0, 'e', 0, 'p', 0 };
+static const uint8_t product[] PROGMEM = {
+	26, 3, 's', 0, 'e', 0, 'n', 0, 's', 0, 'o', 0, 'r', 0, ' ', 0, 'b', 0, 'o', 0, 'a', 0, 'r', 0, 'd', 0,
+};
+
+struct setup {
+	uint8_t type, request;
+	uint16_t value, index, length;
+};
+
+enum stage { IDLE, REPLYING, RECEIVING_LINE_CODING, ACKNOWLEDGING, ADDRESSING };
+
+static enum stage stage;
+static uint8_t configured; /* bConfigurationValue */
+static uint8_t address;
+static bool dtr;
+static uint8_t line_coding[LINE_CODING_SIZE] = { 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }; /* 115200 8N1; of no effect */
+static bool opened;
+static bool bootloader_wanted;
+static struct {
+	const uint8_t *next;
+	uint8_t left;
+	bool in_flash;
+} reply;
+static uint8_t answer[2];
+
+void control_start(void)
+{
+	stage = IDLE;
+	configured = 0;
+	dtr = false;
+	usb_enable(EP_CONTROL, 0, MEMORY_64);
+}
+
+bool control_configured(void)
+{
+	return configured != 0;
+}
+
+bool control_port_open(void)
+{
+	return dtr;
+}
+
+bool usb_opened(void)
+{
+	bool was = opened;
+	opened = false;
+	return was;
+}
+
+bool usb_bootloader_wanted(void)
+{
+	return bootloader_wanted && stage == IDLE; /* the host gets its acknowledge first */
+}
+
+static bool send(const uint8_t *bytes, uint8_t length, uint16_t wanted, bool in_flash)
+{
+	reply.next = bytes;
+	reply.left = (uint8_t)(wanted < length ? wanted : length);
+	reply.in_flash = in_flash;
+	stage = REPLYING;
+	return true;
+}
+
+static bool send_answer(uint8_t low, uint8_t length, uint16_t wanted)
+{
+	answer[0] = low;
+	answer[1] = 0;
+	return send(answer, length, wanted, false);
+}
+
+static bool acknowledge(void)
+{
+	stage = ACKNOWLEDGING;
+	return true;
+}
+
+static bool send_descriptor(const struct setup *s)
+{
+	switch (s->value) {
+	case 0x0100:
+		return send(device_descriptor, sizeof device_descriptor, s->length, true);
+	case 0x0200:
+		return send(configuration_descriptor, sizeof configuration_descriptor, s->length, true);
+	case 0x0300:
+		return send(languages, sizeof languages, s->length, true);
+	case 0x0301:
+		return send(maker, sizeof maker, s->length, true);
+	case 0x0302:
+		return send(product, sizeof product, s->length, true);
+	default:
+		return false;
+	}
+}
+
+static bool set_configuration(uint8_t value)
+{
+	if (value > 1)
+		return false;
+	configured = value;
+	dtr = false;
+	if (configured)
+		usb_start_port();
+	return acknowledge();
+}
+
+static void check_for_1200_baud(void)
+{
+	if (line_coding[0] == (BOOTLOADER_BAUD & 0xFFu) && line_coding[1] == BOOTLOADER_BAUD >> 8 && !line_coding[2] && !dtr)
+		bootloader_wanted = true;
+}
+
+static bool set_line_state(bool new_dtr)
+{
+	if (new_dtr && !dtr) {
+		usb_empty_port();
+		opened = true;
+	}
+	dtr = new_dtr;
+	check_for_1200_baud();
+	return acknowledge();
+}
+
+/* Selects an endpoint other than the control endpoint for the halt requests; false: there is no such endpoint. */
+static bool select_endpoint(const struct setup *s)
+{
+	uint8_t endpoint = s->index & 0x7Fu;
+	if (!configured || endpoint == EP_CONTROL || endpoint >= EP_COUNT)
+		return false;
+	UENUM = endpoint;
+	return true;
+}
+
+static bool set_halt(const struct setup *s, bool halt)
+{
+	if (s->value != 0 || !select_endpoint(s))
+		return false;
+	UECONX = halt ? BIT(STALLRQ) | BIT(EPEN) : BIT(STALLRQC) | BIT(RSTDT) | BIT(EPEN);
+	return acknowledge();
+}
+
+static bool send_halt(const struct setup *s)
+{
+	bool halted = select_endpoint(s) && (UECONX & BIT(STALLRQ));
+	return send_answer(halted, 2, s->length);
+}
+
+static bool obey(const struct setup *s)
+{
+	switch (REQUEST(s->type, s->request)) {
+	case REQUEST(FROM_DEVICE, GET_DESCRIPTOR):
+		return send_descriptor(s);
+	case REQUEST(TO_DEVICE, SET_ADDRESS):
+		address = s->value & 0x7Fu;
+		return acknowledge();
+	case REQUEST(TO_DEVICE, SET_CONFIGURATION):
+		return set_configuration((uint8_t)s->value);
+	case REQUEST(FROM_DEVICE, GET_CONFIGURATION):
+		return send_answer(configured, 1, s->length);
+	case REQUEST(FROM_DEVICE, GET_STATUS):
+	case REQUEST(FROM_INTERFACE, GET_STATUS):
+		return send_answer(0, 2, s->length);
+	case REQUEST(FROM_ENDPOINT, GET_STATUS):
+		return send_halt(s);
+	case REQUEST(TO_ENDPOINT, SET_FEATURE):
+		return set_halt(s, true);
+	case REQUEST(TO_ENDPOINT, CLEAR_FEATURE):
+		return set_halt(s, false);
+	case REQUEST(FROM_INTERFACE, GET_INTERFACE):
+		return send_answer(0, 1, s->length);
+	case REQUEST(TO_INTERFACE, SET_INTERFACE):
+		return s->value == 0 && acknowledge();
+	case REQUEST(FROM_PORT, GET_LINE_CODING):
+		return send(line_coding, LINE_CODING_SIZE, s->length, false);
+	case REQUEST(TO_PORT, SET_LINE_CODING):
+		stage = RECEIVING_LINE_CODING;
+		return s->length == LINE_CODING_SIZE;
+	case REQUEST(TO_PORT, SET_CONTROL_LINE_STATE):
+		return set_line_state(s->value & 1u);
+	default:
+		return false;
+	}
+}
+
+static uint16_t read16(void)
+{
+	uint8_t low = UEDATX;
+	return (uint16_t)(low | (uint16_t)(UEDATX << 8));
+}
+
+static void take_setup(void)
+{
+	struct setup s;
+	s.type = UEDATX;
+	s.request = UEDATX;
+	s.value = read16();
+	s.index = read16();
+	s.length = read16();
+	UEINTX = (uint8_t)~(BIT(RXSTPI) | BIT(RXOUTI));
+	stage = IDLE;
+	address = UDADDR & 0x7Fu;
+	if (obey(&s))
+		return;
+	stage = IDLE;
+	UENUM = EP_CONTROL;
+	UECONX = BIT(STALLRQ) | BIT(EPEN);
+}
+
+/* Either the line coding, or the empty packet by which the host ends or aborts what it reads. */
+static void take_packet(void)
+{
+	if (stage == RECEIVING_LINE_CODING) {
+		for (uint8_t n = 0; n < LINE_CODING_SIZE; n++)
+			line_coding[n] = UEDATX;
+		check_for_1200_baud();
+		stage = ACKNOWLEDGING;
+	} else {
+		stage = IDLE;
+	}
+	UEINTX = (uint8_t)~BIT(RXOUTI);
+}
+
+static void send_part(void)
+{
+	for (uint8_t n = 0; n < EP_SIZE && reply.left; n++, reply.left--) {
+		UEDATX = reply.in_flash ? pgm_read_byte(reply.next) : *reply.next;
+		reply.next++;
+	}
+	if (!reply.left) /* no descriptor is a multiple of EP_SIZE long, so the last packet is always short or the last wanted */
+		stage = IDLE;
+	UEINTX = (uint8_t)~BIT(TXINI);
+}
+
+/* The bank for answers is free. The new address holds from the end of the transfer that brought it. */
+static void send_next(void)
+{
+	switch (stage) {
+	case REPLYING:
+		send_part();
+		break;
+	case ACKNOWLEDGING:
+		stage = address == (UDADDR & 0x7Fu) ? IDLE : ADDRESSING;
+		UEINTX = (uint8_t)~BIT(TXINI);
+		break;
+	case ADDRESSING:
+		UDADDR = (uint8_t)(address | BIT(ADDEN));
+		stage = IDLE;
+		break;
+	default:
+		break;
+	}
+}
+
+void control_run(void)
+{
+	UENUM = EP_CONTROL;
+	if (UEINTX & BIT(RXSTPI))
+		take_setup();
+	UENUM = EP_CONTROL;
+	if (UEINTX & BIT(RXOUTI))
+		take_packet();
+	if (UEINTX & BIT(TXINI))
+		send_next();
+	bool sending = stage == REPLYING || stage == ACKNOWLEDGING || stage == ADDRESSING;
+	UEIENX = (uint8_t)(BIT(RXSTPE) | BIT(RXOUTE) | (sending ? BIT(TXINE) : 0u));
+}

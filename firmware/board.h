@@ -1,0 +1,70 @@
+/* What the portable firmware asks of the board. `avr/` implements it for the ATmega32U4; a test may implement it in memory.
+ * Nothing here blocks for longer than its comment says. Everything is called from the main loop, never from an interrupt. */
+#ifndef ECHOSTEP_BOARD_H
+#define ECHOSTEP_BOARD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Time: 0.5 us ticks since the start, wrapping after 35.8 minutes. */
+#define TICKS_PER_MS UINT32_C(2000)
+#define TICKS_PER_S UINT32_C(2000000)
+
+uint32_t clock_now(void);
+
+/* Whether `now` is at or after `due`; right while the two are less than 17.9 minutes apart. */
+static inline bool ticks_reached(uint32_t now, uint32_t due)
+{
+	return (int32_t)(now - due) >= 0;
+}
+
+/* A rising edge of the SyncOut input. */
+struct clock_edge {
+	uint32_t ticks;  /* captured by the timer itself */
+	uint16_t edge;   /* edges since the start */
+	uint16_t missed; /* edges since the previous call that were overwritten by this one */
+};
+bool clock_take_edge(struct clock_edge *out); /* false: no edge since the last call */
+
+/* I2C at 100 kHz, one transfer at a time, carried out by interrupts. */
+enum twi_state { TWI_BUSY, TWI_DONE, TWI_NACK, TWI_FAILED };
+
+struct twi_transfer {
+	uint8_t address;        /* 7 bits */
+	uint8_t write_length;   /* 0-4 bytes to write */
+	uint8_t read_length;    /* 0-4 bytes to read after a repeated start */
+	uint8_t bytes[4];       /* in: what to write; out: what was read */
+	volatile uint8_t state; /* enum twi_state */
+	uint32_t ticks;         /* of the stop condition */
+};
+/* Starts a transfer; false: the bus is in use. The caller leaves the transfer alone until its state is no longer TWI_BUSY. */
+bool twi_begin(struct twi_transfer *transfer);
+enum twi_state twi_state(const struct twi_transfer *transfer);
+/* Ends a transfer that takes longer than 5 ms as TWI_FAILED and frees the bus (0.2 ms); true: that happened. */
+bool twi_watch(uint32_t now);
+
+/* SPI: full duplex bytes between select and release; each chip has its own clock rate and mode. */
+enum chip { CHIP_THIGH, CHIP_CALF, CHIP_BELT, CHIP_PRESSURE };
+void spi_select(enum chip chip);
+uint8_t spi_exchange(uint8_t out);
+void spi_release(void);
+bool pressure_ready(void); /* level of the SCP1000's DRDY */
+
+/* USB CDC-ACM. */
+#define USB_ROOM 1023u /* bytes that can wait for the host */
+
+void usb_run(void);                                   /* moves bytes and answers the host's requests */
+bool usb_open(void);                                  /* a host program holds the port (DTR) */
+bool usb_opened(void);                                /* true once after each opening, which empties the buffers */
+bool usb_write(const uint8_t *bytes, uint8_t length); /* all of them or, without room, none and false */
+int16_t usb_read(void);                               /* one byte, or -1 */
+bool usb_bootloader_wanted(void);                     /* the port was closed at 1200 Bd */
+
+/* Power and start. */
+void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
+void board_sleep(uint32_t wake_ticks); /* until then or until an interrupt has news; feeds the watchdog */
+uint8_t board_reset_cause(void);       /* RESET_CAUSE_* flags */
+uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack so far (0.4 ms) */
+void board_bootloader(void);           /* resets into the bootloader; does not return */
+
+#endif

@@ -1,0 +1,71 @@
+#include "compass.h"
+#include "board.h"
+#include "configuration.h"
+#include "link.h"
+#include "ranger.h"
+#include "status.h"
+
+/* [Devantech CMPS10] bearing in 0.1 degrees, big-endian, in registers 2 and 3. */
+#define ADDRESS 0x60u
+#define REGISTER_BEARING 2u
+#define BEARING_MAX 3599u
+#define INVALID 0xFFFFu
+
+#define RETRY_TICKS TICKS_PER_MS
+
+static struct twi_transfer transfer;
+static bool reading;
+static uint32_t due;
+static uint32_t period;
+
+void compass_start(uint32_t now)
+{
+	due = now;
+	period = TICKS_PER_S / configuration.compass_rate_hz;
+}
+
+static void report(uint32_t ticks, uint16_t bearing)
+{
+	struct msg_compass m = { ticks, bearing };
+	link_send(MSG_COMPASS, pack_compass(link_body(), &m));
+}
+
+static void finish(enum twi_state state, uint32_t now)
+{
+	uint16_t bearing = (uint16_t)((uint16_t)(transfer.bytes[0] << 8) | transfer.bytes[1]);
+	reading = false;
+	if (state == TWI_DONE && bearing <= BEARING_MAX) {
+		status_ok(HEALTHY_COMPASS);
+		report(transfer.ticks, bearing);
+	} else {
+		status_failed(HEALTHY_COMPASS, &status.errors_compass);
+		report(now, INVALID);
+	}
+}
+
+static void begin(uint32_t now)
+{
+	transfer.address = ADDRESS;
+	transfer.write_length = 1;
+	transfer.read_length = 2;
+	transfer.bytes[0] = REGISTER_BEARING;
+	reading = twi_begin(&transfer);
+	if (!reading)
+		return;
+	due += period;
+	if (ticks_reached(now, due))
+		due = now + period;
+}
+
+uint32_t compass_run(uint32_t now)
+{
+	if (reading && twi_state(&transfer) != TWI_BUSY)
+		finish(twi_state(&transfer), now);
+	if (!configuration_reads(SENSORS_COMPASS)) {
+		due = now + period;
+		return due;
+	}
+	if (!reading && ticks_reached(now, due) && ranger_quiet(now))
+		begin(now);
+	return ticks_reached(now, due) ? now + RETRY_TICKS : due;
+}

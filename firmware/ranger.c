@@ -1,0 +1,211 @@
+#include "ranger.h"
+#include "board.h"
+#include "configuration.h"
+#include "link.h"
+#include "status.h"
+
+/* SRF02 [Devantech, SRF02 technical specification]: it does not answer while ranging, up to 65 ms, in practice about 61. */
+#define COMMAND_RANGE_US 0x52u
+#define REGISTER_COMMAND 0u
+#define REGISTER_REVISION 0u
+#define REVISION_BUSY 0xFFu /* what some of them answer while ranging instead of staying silent */
+#define RANGING_MIN_TICKS (60u * TICKS_PER_MS)
+#define RANGING_MAX_TICKS (72u * TICKS_PER_MS)
+#define POLL_TICKS (TICKS_PER_MS / 2u)
+
+#define TRIGGER_TRIES 3u
+#define RETRY_TICKS TICKS_PER_MS
+#define QUIET_TICKS TICKS_PER_MS
+#define START_TICKS (100u * TICKS_PER_MS) /* whatever was ranging before a reset is over by then */
+#define IDLE_TICKS (30u * TICKS_PER_MS)
+
+#define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
+#define CONCURRENT_JITTER_MASK 0x1FFFu
+#define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
+
+enum stage { WAITING, TRIGGERING, RANGING, READING };
+
+static struct ranger {
+	struct twi_transfer transfer;
+	enum stage stage;
+	uint8_t index; /* RANGER_LEFT, RANGER_RIGHT */
+	uint8_t tries;
+	uint32_t slot;    /* on the grid */
+	uint32_t due;     /* when to trigger or to ask for the result */
+	uint32_t trigger; /* when it was triggered */
+} rangers[2];
+
+static const struct {
+	uint8_t address, sensor, healthy;
+	uint16_t *errors;
+} devices[2] = {
+	[RANGER_LEFT] = { 0x70, SENSORS_RANGER_LEFT, HEALTHY_RANGER_LEFT, &status.errors_ranger_left },
+	[RANGER_RIGHT] = { 0x71, SENSORS_RANGER_RIGHT, HEALTHY_RANGER_RIGHT, &status.errors_ranger_right },
+};
+
+static uint16_t lfsr;
+
+static uint32_t half_period(void)
+{
+	return configuration.schedule == SCHEDULE_SEQUENTIAL ? SEQUENTIAL_HALF_TICKS : CONCURRENT_HALF_TICKS;
+}
+
+/* A 16-bit Galois shift register of maximal length: the same delays after every start. */
+static uint16_t jitter(void)
+{
+	lfsr = (uint16_t)((lfsr >> 1) ^ (lfsr & 1u ? 0xB400u : 0u));
+	return configuration.schedule == SCHEDULE_SEQUENTIAL ? 0u : lfsr & CONCURRENT_JITTER_MASK;
+}
+
+static bool blocked_by_other(const struct ranger *r)
+{
+	return configuration.schedule == SCHEDULE_SEQUENTIAL && rangers[!r->index].stage != WAITING;
+}
+
+static bool wants_to_fire(const struct ranger *r)
+{
+	return r->stage == WAITING && configuration_reads(devices[r->index].sensor) && !blocked_by_other(r);
+}
+
+/* A ranger that lags by less than half a period fires late, one that lags more gives up slots: the grid stays. */
+static void schedule_next(struct ranger *r, uint32_t now)
+{
+	do
+		r->slot += 2u * half_period();
+	while (ticks_reached(now, r->slot + half_period()));
+	r->due = r->slot + jitter();
+	r->tries = 0;
+	r->stage = WAITING;
+}
+
+static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_flight_us)
+{
+	struct msg_ping ping = { r->trigger, r->index, outcome, time_of_flight_us };
+	link_send(MSG_PING, pack_ping(link_body(), &ping));
+}
+
+static void fail(struct ranger *r, uint32_t now)
+{
+	status_failed(devices[r->index].healthy, devices[r->index].errors);
+	report(r, OUTCOME_BUS_ERROR, 0);
+	schedule_next(r, now);
+}
+
+static void succeed(struct ranger *r, uint32_t now)
+{
+	uint16_t time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
+	status_ok(devices[r->index].healthy);
+	report(r, time_of_flight_us ? OUTCOME_ECHO : OUTCOME_NO_ECHO, time_of_flight_us);
+	schedule_next(r, now);
+}
+
+static void begin(struct ranger *r, enum stage stage)
+{
+	if (twi_begin(&r->transfer))
+		r->stage = stage;
+}
+
+static void trigger(struct ranger *r, uint32_t now)
+{
+	r->transfer.write_length = 2;
+	r->transfer.read_length = 0;
+	r->transfer.bytes[0] = REGISTER_COMMAND;
+	r->transfer.bytes[1] = COMMAND_RANGE_US;
+	r->trigger = now;
+	begin(r, TRIGGERING);
+}
+
+static void check_trigger(struct ranger *r, uint32_t now)
+{
+	enum twi_state state = twi_state(&r->transfer);
+	if (state == TWI_DONE) {
+		r->trigger = r->transfer.ticks;
+		r->due = r->trigger + RANGING_MIN_TICKS;
+		r->stage = RANGING;
+	} else if (state == TWI_NACK && ++r->tries < TRIGGER_TRIES) {
+		r->due = now + RETRY_TICKS;
+		r->stage = WAITING;
+	} else if (state != TWI_BUSY) {
+		fail(r, now);
+	}
+}
+
+/* Reads from the revision on, to tell a result from the 0xFF of a ranger that is still at it. */
+static void ask(struct ranger *r)
+{
+	r->transfer.write_length = 1;
+	r->transfer.read_length = 4;
+	r->transfer.bytes[0] = REGISTER_REVISION;
+	begin(r, READING);
+}
+
+static void check_answer(struct ranger *r, uint32_t now)
+{
+	enum twi_state state = twi_state(&r->transfer);
+	if (state == TWI_BUSY)
+		return;
+	if (state == TWI_DONE && r->transfer.bytes[0] != REVISION_BUSY) {
+		succeed(r, now);
+	} else if (ticks_reached(now, r->trigger + RANGING_MAX_TICKS)) {
+		fail(r, now);
+	} else {
+		r->due = now + POLL_TICKS;
+		r->stage = RANGING;
+	}
+}
+
+static void advance(struct ranger *r, uint32_t now)
+{
+	if (r->stage == TRIGGERING)
+		check_trigger(r, now);
+	else if (r->stage == READING)
+		check_answer(r, now);
+	if (!ticks_reached(now, r->due))
+		return;
+	if (wants_to_fire(r))
+		trigger(r, now);
+	else if (r->stage == RANGING && ranger_quiet(now))
+		ask(r);
+}
+
+/* The end of a transfer interrupts the sleep, so only times need to be told. */
+static uint32_t wake_time(const struct ranger *r, uint32_t now)
+{
+	bool timed = r->stage == RANGING || wants_to_fire(r);
+	if (!timed)
+		return now + IDLE_TICKS;
+	return ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
+}
+
+static void start_one(uint8_t index, uint32_t slot)
+{
+	struct ranger *r = &rangers[index];
+	r->index = index;
+	r->transfer.address = devices[index].address;
+	r->slot = slot;
+	if (r->stage == WAITING)
+		r->due = slot + jitter();
+}
+
+void ranger_start(uint32_t now)
+{
+	lfsr = 0xACE1u;
+	start_one(RANGER_LEFT, now + START_TICKS);
+	start_one(RANGER_RIGHT, now + START_TICKS + half_period());
+}
+
+uint32_t ranger_run(uint32_t now)
+{
+	advance(&rangers[RANGER_LEFT], now);
+	advance(&rangers[RANGER_RIGHT], now);
+	uint32_t left = wake_time(&rangers[RANGER_LEFT], now), right = wake_time(&rangers[RANGER_RIGHT], now);
+	return ticks_reached(left, right) ? right : left;
+}
+
+bool ranger_quiet(uint32_t now)
+{
+	for (uint8_t i = 0; i < 2; i++)
+		if (wants_to_fire(&rangers[i]) && ticks_reached(now + QUIET_TICKS, rangers[i].due))
+			return false;
+	return true;
+}
