@@ -1,55 +1,64 @@
 """Zero-velocity inertial navigation of one foot: samples -> stances and steps.
 
-In: time, specific force, angular rate of the foot, any mounting, 50-500 Hz. Out: `Step` when the foot lands, `Stance` when it leaves. Owns the
-filter's state (`ins`) and where the last step began. Walk frame: levelled, z up, yaw zero at the start.
+In: time, specific force and angular rate of the foot, any mounting, 50-500 Hz. Out: `Step` when the foot has landed, `Stance` when it has left.
+Owns the filter's state (`ins`), the stance detector's (`stance`), and where the last step ended. Walk frame: levelled, z up, origin and yaw
+those of the first rest.
 
-The stance detector is the SHOE statistic [Skog et al. 2010] in physical units, with two additions that make one setting serve walking and running:
-its threshold grows with the time since the last stance [Wahlstrom et al. 2019], and the velocity in a stance is only as good as zero as the foot's
-own rotation allows: the sensor sits a lever arm away from the point of contact, so v = 0 +- lever x rate.
+Until the foot has been still for a moment there is no level and no navigation; the same holds after samples were missing for too long.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep import ins
+from echostep import ins, stance
+from echostep.ins import POS, TILT, YAW, Nav
+from echostep.stance import Rest, Window
 
 Floats = NDArray[np.float64]
 
-STEP, STANCE = 0, 1
-EVENT_SIZE = 12  # kind, start, end, move (3), covariance xx yy zz xy, yaw, yaw sd
-CONFIRM_S = 0.03
-LEAVE_S = 0.04
-GAP_S = 0.25
-STILL_ACCEL, STILL_RATE = 0.15, 0.05  # m/s2 and rad/s rms: nobody moves; the gyro shows its bias
+CONFIRM_S = 0.03  # a stance is told after so much rest
+SETTLE_S = 0.2  # by then it has corrected the step that led to it
+LEAVE_S = 0.1  # and is over after so long without rest
+GAP_S = 0.25  # the filter carries on over shorter gaps
+STRAY_SAMPLES = 20  # so many samples in a row from the past: the clock has been set back
+WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
+MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # no foot goes beyond
+STEEP_M_S2, STEEP_RAD_S = 30.0, 6.0  # beyond these, two equal readings in a row are a sensor at its limit
+LOST_SHARE = 0.3  # of such a reading
+LEVEL_S, LEVEL_RAD_S, LEVEL_M_S2 = 0.1, 0.3, 1.0  # still enough, for long enough, to take gravity from
+IMPATIENT_S = 3.0  # without any such moment, start all the same
+ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
+FLAT_M, FLAT_SD_M = 0.04, 0.01  # floors are level: a step that rises less is no stair, kerb or ramp
+
+STEP, STANCE = 0.0, 1.0
+EVENT_SIZE = 17  # kind, start, end, move (3), covariance (9), heading, heading sd
+
+STATE = np.dtype(
+    [(name, "f8") for name in (
+        "t_s", "levelled", "yaw", "still_s", "waited_s", "calm_s", "rest_s", "rest_t_s", "rest_yaw", "in_stance", "began_s", "left_s",
+        "stepped", "settled", "yaw_variance", "lost_m2",
+    )] + [("samples", "i8"), ("force_samples", "i8"), ("not_finite", "i8"), ("not_later", "i8"), ("stray", "i8"), ("saturated", "i8"), ("gaps", "i8"), ("forced", "i8")]
+    + [("origin", "f8", 3), ("force", "f8", 3), ("rate", "f8", 3), ("force_sum", "f8", 3)]
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class FootSettings:
-    """One setting for everybody: `accel_sd`, `gyro_sd` are noise densities (m/s2, rad/s per root Hz) of an MTx-class sensor, vibration included;
-    `accel_still`, `rate_still` scale the stance statistic (m/s2, rad/s); `span_s` is its window; `lever_m` the distance from sensor to contact.
-    """
+    """`height_m`: of the sensor above the sole's contact with the floor; the instep of a shoe by default."""
 
-    accel_sd: float = 0.06
-    gyro_sd: float = 0.003
-    accel_still: float = 0.6
-    rate_still: float = 0.5
-    span_s: float = 0.06
-    lever_m: float = 0.1
-    still_sd_m_s: float = 0.01
-    patience_s: float = 0.6
-    growth_s: float = 0.15
-    bias_sd: float = 0.005
+    height_m: float = 0.08
 
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """The foot stood still from `t_start_s` to `t_end_s`; `heading_rad` is its yaw in the walk frame."""
+    """The foot stood from `t_start_s` to `t_end_s`; `heading_rad` is its yaw in the walk frame when it left."""
 
     t_start_s: float
     t_end_s: float
@@ -58,9 +67,10 @@ class Stance:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The foot left at `t_start_s`, landed at `t_end_s`, and moved by `move_m` (walk frame) with `covariance` (3, 3).
+    """The foot left at `t_start_s`, landed at `t_end_s` and moved by `move_m` (walk frame) with `covariance` (3, 3) m2.
 
-    `heading_rad` is its yaw after the step, `heading_sd_rad` the growth of the yaw's error during it.
+    `heading_rad` is its yaw after the step; the covariance is given for a known yaw before it, and `heading_sd_rad` is the growth of the
+    yaw's error: its square is the growth of the variance. All moves together give the position.
     """
 
     t_start_s: float
@@ -72,220 +82,299 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
+class FootCounts:
+    """What was wrong with the samples, and what was done: `not_finite` (or impossible) and `not_later` were skipped, `saturated` trusted less.
+
+    `gaps` made the foot wait for a new level; `forced` stances contradicted the filter, which gave in.
+    """
+
+    samples: int
+    not_finite: int
+    not_later: int
+    saturated: int
+    gaps: int
+    forced: int
+
+
+@dataclass(frozen=True, slots=True)
 class Track:
-    """A whole walk: `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, and the events."""
+    """A whole walk: `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, the events and the counts."""
 
     t_s: Floats
     position_m: Floats
     heading_rad: Floats
     stance: NDArray[np.bool_]
     events: list[Step | Stance]
+    counts: FootCounts
+
+    @property
+    def steps(self) -> list[Step]:
+        """The steps among the events."""
+        return [event for event in self.events if isinstance(event, Step)]
 
 
 class Foot:
-    """Feed it samples in any portions; equal samples give equal events."""
+    """Feed it samples in any portions; equal samples give equal events, bit for bit."""
 
     def __init__(self, settings: FootSettings | None = None) -> None:
-        s = settings or FootSettings()
-        self._numbers = np.array(
-            [s.accel_sd, s.gyro_sd, s.accel_still, s.rate_still, s.span_s, s.lever_m, s.still_sd_m_s, s.patience_s,
-             s.growth_s, s.bias_sd]
-        )  # fmt: skip
-        self._state = np.zeros(ins.STATE_SIZE)
-        self._state[ins.QUAT] = 1.0
-        self._cov = np.zeros((12, 12))
-        self._ring = np.zeros((ins.WINDOW, 7))
-        self._phase = np.zeros(8)  # standing, begin, end, origin xyz, seen a stance, yaw variance used
-        self.bad_samples = 0
+        self._height_m = (settings or FootSettings()).height_m
+        self._nav = ins.new_nav()
+        self._window = stance.new_window()
+        self._rest = stance.new_rest()
+        self._state = np.zeros(1, STATE)
 
     @property
     def in_stance(self) -> bool:
         """Whether the foot stands."""
-        return bool(self._phase[0])
+        return bool(self._state["in_stance"][0])
 
     @property
     def position_m(self) -> tuple[float, float, float]:
         """Position in the walk frame."""
-        x, y, z = self._state[ins.POS : ins.POS + 3].tolist()
+        x, y, z = self._nav.position.tolist()
         return x, y, z
 
     @property
     def heading_rad(self) -> float:
-        """Yaw of the sensor's x axis in the walk frame."""
-        return float(_yaw(self._state))
+        """Yaw in the walk frame."""
+        return float(ins.heading(self._nav))
 
     @property
-    def gaps(self) -> int:
-        """How often samples were missing for longer than a quarter of a second."""
-        return int(self._state[ins.GAPS])
+    def counts(self) -> FootCounts:
+        """What was wrong with the samples so far."""
+        return FootCounts(**{name: int(self._state[name][0]) for name in FootCounts.__slots__})
 
     def feed(self, t_s: Floats, accel: Floats, gyro: Floats) -> list[Step | Stance]:
-        """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s; samples that are not finite or not later are counted and skipped."""
-        track = np.empty((0, 5))
-        return self._run(t_s, accel, gyro, track)
+        """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame; raises ValueError for other shapes."""
+        return self._run(t_s, accel, gyro, np.empty((0, 5)))
 
-    def _run(self, t_s: Floats, accel: Floats, gyro: Floats, track: Floats) -> list[Step | Stance]:
-        events = np.zeros((len(t_s) + 2, EVENT_SIZE))
-        count = _walk(
-            self._state, self._cov, self._ring, self._phase, self._numbers,
-            np.ascontiguousarray(t_s, np.float64), np.ascontiguousarray(accel, np.float64),
-            np.ascontiguousarray(gyro, np.float64), events, track,
-        )  # fmt: skip
-        self.bad_samples = int(self._state[ins.BAD])
-        return [_event(row) for row in events[:count].tolist()]
+    def _run(self, t_s: Floats, accel: Floats, gyro: Floats, rows: Floats) -> list[Step | Stance]:
+        t_s, accel, gyro = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro))
+        if t_s.ndim != 1 or accel.shape != (len(t_s), 3) or gyro.shape != (len(t_s), 3):
+            raise ValueError(f"samples of shapes {t_s.shape}, {accel.shape}, {gyro.shape}; expected (n,), (n, 3), (n, 3)")
+        events = np.zeros((2 * len(t_s), EVENT_SIZE))
+        found = _walk(self._state[0], self._nav, self._window, self._rest, self._height_m, t_s, accel, gyro, events, rows)
+        return [_event(row) for row in events[:found]]
 
 
 def walk_track(t_s: Floats, accel: Floats, gyro: Floats, settings: FootSettings | None = None) -> Track:
-    """The whole walk at once, by the same kernel as live."""
+    """The whole walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s at once; what `Foot` would have told live."""
     foot = Foot(settings)
     rows = np.zeros((len(t_s), 5))
     events = foot._run(t_s, accel, gyro, rows)
-    return Track(np.asarray(t_s), rows[:, :3], rows[:, 3], rows[:, 4] > 0.5, events)
+    return Track(np.asarray(t_s, np.float64), rows[:, :3], rows[:, 3], rows[:, 4] > 0.0, events, foot.counts)
 
 
-def _event(row: list[float]) -> Step | Stance:
-    kind, start, end, dx, dy, dz, xx, yy, zz, xy, yaw, yaw_sd = row
+def _event(row: Floats) -> Step | Stance:
+    kind, start, end, dx, dy, dz = row[:6].tolist()
+    heading, heading_sd = row[15:].tolist()
     if kind == STANCE:
-        return Stance(start, end, yaw)
-    covariance = np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, zz]])
-    return Step(start, end, (dx, dy, dz), covariance, yaw, yaw_sd)
-
-
-@njit(cache=True)
-def _yaw(state: Floats) -> float:
-    r = ins.rotation(state[ins.QUAT : ins.QUAT + 4])
-    return math.atan2(r[1, 0], r[0, 0])
-
-
-@njit(cache=True)
-def _begin(state: Floats, cov: Floats, t: float, accel: Floats, gyro: Floats, bias_sd: float) -> None:
-    """First sample: level, and know nothing of the velocity but that people start slowly."""
-    ins.level(state, accel)
-    state[ins.T] = t
-    state[ins.ACC : ins.ACC + 3] = accel
-    state[ins.GYR : ins.GYR + 3] = gyro
-    for i in range(3):
-        cov[ins.V + i, ins.V + i] = 0.5**2
-        cov[ins.TH + i, ins.TH + i] = 0.1**2 if i < 2 else 0.0
-        cov[ins.BG + i, ins.BG + i] = bias_sd**2
-
-
-@njit(cache=True)
-def _gap(cov: Floats, dt: float) -> None:
-    """Samples are missing: whatever the foot did in the meantime, a walking foot stays within this."""
-    for i in range(3):
-        cov[ins.P + i, ins.P + i] += (1.5 * dt) ** 2
-        cov[ins.V + i, ins.V + i] += 2.0**2
-        cov[ins.TH + i, ins.TH + i] += 0.3**2
+        return Stance(start, end, heading)
+    return Step(start, end, (dx, dy, dz), row[6:15].reshape(3, 3).copy(), heading, heading_sd)
 
 
 @njit(cache=True)
 def _walk(
-    state: Floats, cov: Floats, ring: Floats, phase: Floats, numbers: Floats,
-    t: Floats, accel: Floats, gyro: Floats, events: Floats, track: Floats,
+    s: Any, nav: Nav, window: Window, rest: Rest, height_m: float,
+    t_s: Floats, accel: Floats, gyro: Floats, events: Floats, rows: Floats,
 ) -> int:  # fmt: skip
-    """All samples; fills `events`, and `track` when it has rows; returns the number of events."""
-    accel_sd, gyro_sd, accel_still, rate_still, span_s = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
-    lever, still_sd, patience, growth, bias_sd = numbers[5], numbers[6], numbers[7], numbers[8], numbers[9]
+    """Every sample in turn; fills `events`, and `rows` where there are any; returns the number of events."""
     found = 0
-    zero = np.zeros(3)
-    for k in range(len(t)):
-        if _usable(state, t[k], accel[k], gyro[k]):
-            count = int(state[ins.COUNT])
-            ring[count % ins.WINDOW, 0] = t[k]
-            ring[count % ins.WINDOW, 1:4] = accel[k]
-            ring[count % ins.WINDOW, 4:7] = gyro[k]
-            state[ins.COUNT] = count + 1
-            if count == 0:
-                _begin(state, cov, t[k], accel[k], gyro[k], bias_sd)
-            dt = t[k] - state[ins.T]
-            if dt > GAP_S:
-                _gap(cov, dt)
-                state[ins.GAPS] += 1
-                dt = GAP_S
-            force = 0.5 * (accel[k] + state[ins.ACC : ins.ACC + 3])
-            rate = 0.5 * (gyro[k] + state[ins.GYR : ins.GYR + 3])
-            if dt > 0.0:
-                ins.predict(state, cov, force, rate, dt, accel_sd, gyro_sd)
-            state[ins.T] = t[k]
-            state[ins.ACC : ins.ACC + 3] = accel[k]
-            state[ins.GYR : ins.GYR + 3] = gyro[k]
-            a2, w2 = ins.motion(ring, count + 1, span_s, state[ins.BIAS : ins.BIAS + 3])
-            statistic = a2 / accel_still**2 + w2 / rate_still**2
-            since = t[k] - phase[2] if phase[0] == 0.0 and phase[6] else 0.0
-            threshold = math.exp(min(max(since - patience, 0.0) / growth, 4.0))
-            still = statistic < threshold
-            if still:
-                sd = math.sqrt(still_sd**2 + lever**2 * w2 + (0.05 * span_s) ** 2 * a2)
-                ins.observe(state, cov, ins.V, -state[ins.VEL : ins.VEL + 3], sd)
-                if a2 < STILL_ACCEL**2 and w2 < STILL_RATE**2 and count > 10:
-                    ins.observe(state, cov, ins.BG, gyro[k] - state[ins.BIAS : ins.BIAS + 3], 0.05)
-            found = _phases(state, cov, phase, still, dt, events, found)
-        if len(track):
-            track[k, 0:3] = state[ins.POS : ins.POS + 3]
-            track[k, 3] = _yaw(state)
-            track[k, 4] = phase[0]
-    return found
-
-
-@njit(cache=True)
-def _usable(state: Floats, t: float, accel: Floats, gyro: Floats) -> bool:
-    """Whether a sample can be taken: finite, within what a foot can do, later than the last one."""
-    good = math.isfinite(t) and (state[ins.COUNT] == 0 or t > state[ins.T])
-    for i in range(3):
-        good = good and abs(accel[i]) < 1e3 and abs(gyro[i]) < 1e2  # false for NaN, too
-    if not good:
-        state[ins.BAD] += 1
-    return good
-
-
-@njit(cache=True)
-def _phases(
-    state: Floats, cov: Floats, phase: Floats, still: bool, dt: float, events: Floats, found: int
-) -> int:
-    """Stance and swing with a little patience at either end; writes the event that completes."""
-    t = state[ins.T]
-    if phase[0] == 0.0:
-        state[ins.STILL_S] = state[ins.STILL_S] + dt if still else 0.0
-        if still and state[ins.STILL_S] >= CONFIRM_S:
-            begin = t - state[ins.STILL_S]
-            if phase[6]:
-                _write_step(state, cov, phase, begin, events[found])
-                found += 1
+    for k in range(len(t_s)):
+        if _usable(s, t_s[k], accel[k], gyro[k]):
+            dt = t_s[k] - s.t_s
+            if s.samples > 1 and not 0.0 < dt <= GAP_S:
+                found = _lose(s, nav, rest, dt, events, found)
+            stance.put(window, t_s[k], accel[k], gyro[k])
+            rate2, force2 = stance.activity(window, nav.gyro_bias)
+            if s.levelled:
+                found = _advance(s, nav, rest, height_m, dt, t_s[k], accel[k], gyro[k], rate2, force2, events, found)
             else:
-                phase[3:6] = state[ins.POS : ins.POS + 3]
-                _forget_position(cov)
-            phase[0], phase[1], phase[6] = 1.0, begin, 1.0
-            state[ins.SWING_S] = 0.0
-    else:
-        state[ins.SWING_S] = 0.0 if still else state[ins.SWING_S] + dt
-        if state[ins.SWING_S] >= LEAVE_S:
-            events[found, 0], events[found, 1] = STANCE, phase[1]
-            events[found, 2] = max(t - state[ins.SWING_S], phase[1])
-            events[found, 10] = _yaw(state)
-            phase[0], phase[2] = 0.0, events[found, 2]
-            state[ins.STILL_S] = 0.0
-            found += 1
+                found = _find_level(s, nav, min(max(dt, 0.0), GAP_S), t_s[k], accel[k], gyro[k], rate2, force2, events, found)
+            s.t_s = t_s[k]
+            s.force[:] = accel[k]
+            s.rate[:] = gyro[k]
+        if len(rows):
+            rows[k, 0:3] = nav.position
+            rows[k, 3] = ins.heading(nav)
+            rows[k, 4] = s.in_stance
     return found
 
 
 @njit(cache=True)
-def _write_step(state: Floats, cov: Floats, phase: Floats, begin: float, row: Floats) -> None:
-    """The move since the last step was written, with its own covariance; then position and yaw count from here."""
-    row[0], row[1], row[2] = STEP, phase[2], begin
+def _usable(s: Any, t_s: float, accel: Floats, gyro: Floats) -> bool:
+    """Whether this is a sample: finite, possible, later than the last one; counts those that are not."""
+    possible = math.isfinite(t_s)
     for i in range(3):
-        row[3 + i] = state[ins.POS + i] - phase[3 + i]
-        phase[3 + i] = state[ins.POS + i]
-    row[6], row[7], row[8] = cov[ins.P, ins.P], cov[ins.P + 1, ins.P + 1], cov[ins.P + 2, ins.P + 2]
-    row[9] = cov[ins.P, ins.P + 1]
-    row[10] = _yaw(state)
-    row[11] = math.sqrt(max(cov[ins.TH + 2, ins.TH + 2], 0.0))
-    _forget_position(cov)
+        possible = possible and abs(accel[i]) < MAX_ACCEL_M_S2 and abs(gyro[i]) < MAX_RATE_RAD_S  # false for NaN
+    if not possible:
+        s.not_finite += 1
+        return False
+    if s.samples > 0 and t_s <= s.t_s:
+        s.stray += 1
+        if s.stray < STRAY_SAMPLES:
+            s.not_later += 1
+            return False
+    s.stray = 0
+    s.samples += 1
+    return True
 
 
 @njit(cache=True)
-def _forget_position(cov: Floats) -> None:
-    """Where the foot is and looks now becomes the reference: those errors belong to the steps already written."""
-    for j in (ins.P, ins.P + 1, ins.P + 2, ins.TH + 2):
-        cov[j, :] = 0.0
-        cov[:, j] = 0.0
+def _lose(s: Any, nav: Nav, rest: Rest, dt: float, events: Floats, found: int) -> int:
+    """Samples are missing, or the clock was set: the stance ends, the level is lost, and what the foot did meanwhile is unknown."""
+    s.gaps += 1
+    span = min(max(dt, GAP_S), 3600.0)
+    s.lost_m2 += (WALK_M_S * span) ** 2
+    nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + span, math.pi**2 / 3.0)
+    if s.in_stance:
+        found = _leave(s, events, found)
+    if s.levelled:
+        s.yaw = ins.heading(nav)
+    stance.end_rest(rest)
+    s.levelled = s.still_s = s.waited_s = s.calm_s = s.rest_s = 0.0
+    return found
+
+
+@njit(cache=True)
+def _find_level(
+    s: Any, nav: Nav, dt: float, t_s: float, accel: Floats, gyro: Floats, rate2: float, force2: float, events: Floats, found: int
+) -> int:
+    """Wait for a still moment and take level and gyro bias from it; after a while, start without."""
+    still = rate2 < LEVEL_RAD_S**2 and force2 < LEVEL_M_S2**2
+    s.waited_s += dt
+    s.still_s = s.still_s + dt if still else 0.0
+    if s.still_s == 0.0:
+        s.force_sum[:] = 0.0
+        s.force_samples = 0
+    s.force_sum += accel
+    s.force_samples += 1
+    if s.still_s >= LEVEL_S or s.waited_s >= IMPATIENT_S:
+        sure = s.still_s >= LEVEL_S
+        _begin(s, nav, t_s, math.sqrt(force2), sure)
+        found = _land(s, nav, t_s - s.still_s, events, found)
+    return found
+
+
+@njit(cache=True)
+def _begin(s: Any, nav: Nav, t_s: float, scatter: float, sure: bool) -> None:
+    """Navigate from here on: level, at rest as far as anybody knows."""
+    ins.set_level(nav, s.force_sum / s.force_samples, s.yaw)
+    nav.velocity[:] = 0.0
+    tilt_sd = 0.005 + scatter / ins.GRAVITY_M_S2 if sure else 0.5
+    ins.set_covariance(nav, tilt_sd, 0.02 if sure else WALK_M_S, GYRO_BIAS_RAD_S, ACCEL_BIAS_M_S2)
+    for i in range(3):
+        nav.P[POS + i, POS + i] = s.lost_m2
+    s.lost_m2 = 0.0
+    s.levelled = 1.0
+    s.rest_t_s = t_s
+
+
+@njit(cache=True)
+def _advance(
+    s: Any, nav: Nav, rest: Rest, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats, rate2: float, force2: float,
+    events: Floats, found: int,
+) -> int:  # fmt: skip
+    """One sample of navigation: predict, decide whether the foot rests, correct."""
+    ins.predict(nav, dt, s.force, accel, s.rate, gyro)
+    _doubt_limits(s, nav, dt, accel, gyro)
+    if _rests(s, nav, height_m, dt, t_s, gyro, rate2, force2):
+        stance.learn_bias(nav, rest, dt, s.rate, gyro)
+        s.rest_s += dt
+        s.rest_t_s = t_s
+        s.rest_yaw = ins.heading(nav)
+        if not s.in_stance and s.rest_s >= CONFIRM_S - 1e-6:
+            found = _land(s, nav, t_s - s.rest_s, events, found)
+        if s.in_stance and not s.settled and s.rest_s >= SETTLE_S:
+            _settle(s, nav)
+    else:
+        stance.end_rest(rest)
+        s.rest_s = 0.0
+        if s.in_stance and t_s - s.rest_t_s >= LEAVE_S - 1e-6:
+            found = _leave(s, events, found)
+            if not s.settled:
+                _settle(s, nav)
+    return found
+
+
+@njit(cache=True)
+def _rests(s: Any, nav: Nav, height_m: float, dt: float, t_s: float, gyro: Floats, rate2: float, force2: float) -> bool:
+    """Whether the foot rests now; if so, the velocity has been corrected."""
+    s.calm_s = s.calm_s + dt if stance.calm(rate2, force2) else 0.0
+    if s.calm_s == 0.0:
+        return False
+    expected = stance.rolling(nav, gyro, height_m)
+    variance = stance.rest_variance(rate2)
+    if stance.surprise(nav, expected, variance) > stance.BELIEF:
+        if s.calm_s < stance.LASTING_S and t_s - s.rest_t_s < stance.OVERDUE_S:
+            return False
+        s.forced += 1
+        stance.distrust(nav, t_s - s.rest_t_s)
+    stance.hold(nav, expected, variance, dt)
+    return True
+
+
+@njit(cache=True)
+def _doubt_limits(s: Any, nav: Nav, dt: float, accel: Floats, gyro: Floats) -> None:
+    """A sensor at the end of its range reads the same twice: then the true value may be anything beyond."""
+    saturated = False
+    for i in range(3):
+        if accel[i] == s.force[i] and abs(accel[i]) > STEEP_M_S2:
+            saturated = True
+            for j in range(3):
+                nav.P[ins.VEL + j, ins.VEL + j] += (LOST_SHARE * accel[i] * dt) ** 2
+        if gyro[i] == s.rate[i] and abs(gyro[i]) > STEEP_RAD_S:
+            saturated = True
+            lost = (LOST_SHARE * gyro[i] * dt) ** 2
+            for j in range(3):
+                nav.P[TILT + j, TILT + j] += lost
+            nav.P[YAW, YAW] += lost
+    if saturated:
+        s.saturated += 1
+
+
+@njit(cache=True)
+def _land(s: Any, nav: Nav, began_s: float, events: Floats, found: int) -> int:
+    """A stance begins; the step that led to it is told, unless it is the first."""
+    s.in_stance = 1.0
+    s.began_s = max(began_s, s.left_s)
+    s.rest_yaw = ins.heading(nav)
+    rise = nav.position[2] - s.origin[2]
+    if s.stepped and abs(rise) < FLAT_M:
+        ins.observe(nav, POS + 2, -rise, FLAT_SD_M**2)
+    if s.stepped:
+        _write_step(s, nav, events[found])
+        found += 1
+    s.stepped = 1.0
+    s.origin[:] = nav.position
+    s.yaw_variance = nav.P[YAW, YAW]
+    s.settled = 0.0
+    return found
+
+
+@njit(cache=True)
+def _settle(s: Any, nav: Nav) -> None:
+    """The rest so far has corrected the step before it; the next step's errors count from here."""
+    s.settled = 1.0
+    ins.forget_start(nav)
+
+
+@njit(cache=True)
+def _write_step(s: Any, nav: Nav, row: Floats) -> None:
+    row[0], row[1], row[2] = STEP, s.left_s, s.began_s
+    for i in range(3):
+        row[3 + i] = nav.position[i] - s.origin[i]
+        for j in range(3):
+            row[6 + 3 * i + j] = nav.P[POS + i, POS + j]
+    row[15] = s.rest_yaw
+    row[16] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
+
+
+@njit(cache=True)
+def _leave(s: Any, events: Floats, found: int) -> int:
+    """The stance is over since its last rest."""
+    row = events[found]
+    row[0], row[1], row[2], row[15] = STANCE, s.began_s, max(s.rest_t_s, s.began_s), s.rest_yaw
+    s.left_s = row[2]
+    s.in_stance = 0.0
+    return found + 1

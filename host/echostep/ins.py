@@ -1,162 +1,232 @@
-"""The inertial kernel: strapdown integration and zero-velocity updates in an error-state Kalman filter.
+"""The inertial kernel: strapdown integration and its error-state Kalman filter.
 
-In: specific force and angular rate of the foot, sample by sample. Out: position, velocity, attitude, and per sample whether the foot stands.
-Owns nothing: state and covariance are arrays that the caller keeps. Feeding n samples at once or one at a time gives the same bits.
+In: specific force and angular rate of the foot. Out: position, velocity, attitude and their covariance, in a `Nav` that the caller owns.
 
-Errors are true minus estimated: position, velocity, attitude (walk frame), gyro bias; 12 in all [Foxlin 2005; Skog et al. 2010; Nilsson
-et al. 2012]. The walk frame is levelled, z up, its yaw is zero at the start.
+Errors are true minus estimated, in the order of the constants below [Foxlin 2005; Nilsson et al. 2012]; attitude errors turn about the walk
+frame's axes. `YAW` repeats the attitude's third error but is never forgotten, so that the growth of the heading's error stays known when the
+position and yaw errors of earlier steps have been handed over to whoever adds the steps up.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 GRAVITY_M_S2 = 9.81
-P, V, TH, BG = 0, 3, 6, 9  # where each error begins
+POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
-# `state`, one row of numbers: time, position, velocity, quaternion (body -> walk), gyro bias, last specific force and rate, bookkeeping.
-T, POS, VEL, QUAT, BIAS, ACC, GYR, STILL_S, SWING_S, COUNT, BAD, GAPS = 0, 1, 4, 7, 11, 14, 17, 20, 21, 22, 23, 24
-STATE_SIZE = 25
+# Noise of an MTx-class sensor on a shoe, whatever the rate.
+ACCEL_NOISE = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
+GYRO_NOISE = 1e-3  # rad/s per root Hz
+ACCEL_WANDER = 1e-4  # m/s2 per root s
+GYRO_WANDER = 1e-5  # rad/s per root s
+# Scale and alignment errors act in proportion to the motion; a foot keeps its motion for about a tenth of a second.
+ACCEL_SHARE, GYRO_SHARE, MOTION_S = 0.01, 0.01, 0.1
+# What a sample interval hides: a share of the change across it, and accelerations and jerks of a swing that no sample showed.
+CHANGE_SHARE, HIDDEN_RAD_S2, HIDDEN_M_S3 = 0.1, 30.0, 300.0
 
-WINDOW = 32  # samples kept for the detector, at most
-# `ring`, per sample: time, specific force, angular rate.
+
+class Nav(NamedTuple):
+    """Navigation state: `position` m, `velocity` m/s (walk frame), `attitude` (4,) quaternion w x y z body -> walk, biases (body frame),
+    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors.
+    """
+
+    position: Floats
+    velocity: Floats
+    attitude: Floats
+    gyro_bias: Floats
+    accel_bias: Floats
+    level: Floats
+    P: Floats
+
+
+def new_nav() -> Nav:
+    """At the origin, at rest, not levelled yet."""
+    attitude = np.array([1.0, 0.0, 0.0, 0.0])
+    return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)))
 
 
 @njit(cache=True)
 def rotation(q: Floats) -> Floats:
-    """Rotation matrix (3, 3) body -> walk of a unit quaternion w x y z."""
+    """Rotation matrix (3, 3) of a unit quaternion (4,)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     r = np.empty((3, 3))
-    r[0, 0], r[0, 1], r[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    r[1, 0], r[1, 1], r[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    r[2, 0], r[2, 1], r[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    r[0, 0], r[0, 1], r[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    r[1, 0], r[1, 1], r[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+    r[2, 0], r[2, 1], r[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
     return r
 
 
 @njit(cache=True)
 def multiply(a: Floats, b: Floats) -> Floats:
-    """Quaternion product a b."""
-    return np.array(
-        [
-            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-        ]
-    )
+    """Quaternion product a b, of unit length again."""
+    c = np.empty(4)
+    c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+    c[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
+    c[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
+    c[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+    c /= math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3])
+    return c
 
 
 @njit(cache=True)
-def from_vector(v: Floats) -> Floats:
-    """Unit quaternion of a rotation vector (rad)."""
-    angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    k = 0.5 if angle < 1e-12 else math.sin(0.5 * angle) / angle
-    return np.array([math.cos(0.5 * angle), k * v[0], k * v[1], k * v[2]])
+def turning(x: float, y: float, z: float) -> Floats:
+    """Quaternion of a rotation vector (rad)."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    k = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
+    q = np.empty(4)
+    q[0], q[1], q[2], q[3] = math.cos(0.5 * angle), k * x, k * y, k * z
+    return q
 
 
 @njit(cache=True)
-def level(state: Floats, accel: Floats) -> None:
-    """Attitude from gravity: roll and pitch; yaw zero."""
-    n = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
-    roll = math.atan2(accel[1], accel[2])
-    pitch = math.asin(min(max(-accel[0] / n, -1.0), 1.0)) if n > 0.0 else 0.0
-    about_x = np.array([math.cos(roll / 2), math.sin(roll / 2), 0.0, 0.0])
-    about_y = np.array([math.cos(pitch / 2), 0.0, math.sin(pitch / 2), 0.0])
-    state[QUAT : QUAT + 4] = multiply(about_y, about_x)
-
-
-@njit(cache=True)
-def predict(state: Floats, cov: Floats, force: Floats, rate: Floats, dt: float, accel_sd: float, gyro_sd: float) -> None:
-    """Strapdown step and covariance; `accel_sd`, `gyro_sd`: noise densities, m/s2 and rad/s per root Hz."""
-    q = multiply(state[QUAT : QUAT + 4], from_vector((rate - state[BIAS : BIAS + 3]) * dt))
-    q /= math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    half = q + state[QUAT : QUAT + 4]
-    half /= math.sqrt(half[0] * half[0] + half[1] * half[1] + half[2] * half[2] + half[3] * half[3])
-    r = rotation(half)
-    state[QUAT : QUAT + 4] = q
-    f = np.zeros(3)
+def apply(r: Floats, v: Floats) -> Floats:
+    """The product r v of a (3, 3) and a (3,)."""
+    out = np.empty(3)
     for i in range(3):
-        f[i] = r[i, 0] * force[0] + r[i, 1] * force[1] + r[i, 2] * force[2]
-    for i in range(3):
-        a = f[i] - (GRAVITY_M_S2 if i == 2 else 0.0)
-        state[POS + i] += state[VEL + i] * dt + 0.5 * a * dt * dt
-        state[VEL + i] += a * dt
-    _transition(cov, f, r, dt)
-    for i in range(3):
-        cov[V + i, V + i] += accel_sd * accel_sd * dt
-        cov[TH + i, TH + i] += gyro_sd * gyro_sd * dt
-        cov[BG + i, BG + i] += 1e-12 * dt
+        out[i] = r[i, 0] * v[0] + r[i, 1] * v[1] + r[i, 2] * v[2]
+    return out
 
 
 @njit(cache=True)
-def _transition(cov: Floats, f: Floats, r: Floats, dt: float) -> None:
-    """cov <- F cov F' with F = 1 + dt (dp = v, dv = -[f x] th, dth = -R bg), rows first, then columns."""
+def _norm(v: Floats) -> float:
+    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+@njit(cache=True)
+def heading(nav: Nav) -> float:
+    """How far the foot has turned about the vertical since it was levelled with yaw zero (rad), whatever the mounting.
+
+    The twist about z of the rotation from the levelled attitude to the present one.
+    """
+    r = rotation(nav.attitude)
+    cosine, sine = 0.0, 0.0
+    for k in range(3):
+        cosine += r[0, k] * nav.level[0, k] + r[1, k] * nav.level[1, k]
+        sine += r[1, k] * nav.level[0, k] - r[0, k] * nav.level[1, k]
+    return math.atan2(sine, cosine)
+
+
+@njit(cache=True)
+def set_level(nav: Nav, force: Floats, yaw: float) -> None:
+    """Attitude from gravity, the mean specific force (3,) at rest: roll and pitch from its direction, bias from its size, yaw as given."""
+    size = max(_norm(force), 1e-9)
+    nav.accel_bias[:] = force * (1.0 - GRAVITY_M_S2 / size)
+    roll = turning(math.atan2(force[1], force[2]), 0.0, 0.0)
+    pitch = turning(0.0, math.asin(min(max(-force[0] / size, -1.0), 1.0)), 0.0)
+    flat = multiply(pitch, roll)
+    nav.level[:] = rotation(flat)
+    nav.attitude[:] = multiply(turning(0.0, 0.0, yaw), flat)
+
+
+@njit(cache=True)
+def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: float, accel_bias_sd: float) -> None:
+    """Covariance after levelling: what the accelerometer's bias has tilted, the filter knows to be tilted."""
+    r = rotation(nav.attitude)
+    P = nav.P
+    yaw_variance = P[YAW, YAW]
+    P[:] = 0.0
+    P[YAW, YAW] = yaw_variance
+    lean = accel_bias_sd**2 / GRAVITY_M_S2
+    for i in range(3):
+        P[VEL + i, VEL + i] = velocity_sd**2
+        P[GYRO_BIAS + i, GYRO_BIAS + i] = gyro_bias_sd**2
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] = accel_bias_sd**2
+        P[TILT, ACCEL_BIAS + i] = P[ACCEL_BIAS + i, TILT] = -r[1, i] * lean
+        P[TILT + 1, ACCEL_BIAS + i] = P[ACCEL_BIAS + i, TILT + 1] = r[0, i] * lean
+    for i in range(2):
+        P[TILT + i, TILT + i] = tilt_sd**2 + lean / GRAVITY_M_S2
+
+
+@njit(cache=True)
+def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
+    """Strapdown step over `dt` between two samples of specific force and rate (3,), at the attitude in the middle."""
+    rate = 0.5 * (rate0 + rate1) - nav.gyro_bias
+    half = turning(0.5 * dt * rate[0], 0.5 * dt * rate[1], 0.5 * dt * rate[2])
+    middle = multiply(nav.attitude, half)
+    r = rotation(middle)
+    nav.attitude[:] = multiply(middle, half)
+    f = apply(r, 0.5 * (force0 + force1) - nav.accel_bias)
+    accel = f.copy()
+    accel[2] -= GRAVITY_M_S2
+    for i in range(3):
+        nav.position[i] += nav.velocity[i] * dt + 0.5 * accel[i] * dt * dt
+        nav.velocity[i] += accel[i] * dt
+    _carry(nav.P, f, r, dt)
+    hidden = 0.125 * dt * dt
+    lost_m_s = CHANGE_SHARE * _norm(force1 - force0) * dt + HIDDEN_M_S3 * hidden
+    lost_rad = CHANGE_SHARE * _norm(rate1 - rate0) * dt + HIDDEN_RAD_S2 * hidden
+    _add_noise(nav.P, dt, accel, apply(r, rate), lost_m_s, lost_rad)
+
+
+@njit(cache=True)
+def _carry(P: Floats, f: Floats, r: Floats, dt: float) -> None:
+    """P <- F P F' with F = 1 + dt (dp = v, dv = -[f x] tilt - R b_a, dtilt = -R b_g): once on the rows, once on the columns."""
     for side in range(2):
-        m = cov if side == 0 else cov.T
-        for c in range(12):
+        m = P if side == 0 else P.T
+        for c in range(SIZE):
             for i in range(3):
-                m[P + i, c] += dt * m[V + i, c]
-            a, b, g = m[TH, c], m[TH + 1, c], m[TH + 2, c]
-            m[V, c] -= dt * (f[1] * g - f[2] * b)
-            m[V + 1, c] -= dt * (f[2] * a - f[0] * g)
-            m[V + 2, c] -= dt * (f[0] * b - f[1] * a)
+                m[POS + i, c] += dt * m[VEL + i, c]
+            x, y, z = m[TILT, c], m[TILT + 1, c], m[TILT + 2, c]
+            m[VEL, c] -= dt * (f[1] * z - f[2] * y)
+            m[VEL + 1, c] -= dt * (f[2] * x - f[0] * z)
+            m[VEL + 2, c] -= dt * (f[0] * y - f[1] * x)
             for i in range(3):
-                m[TH + i, c] -= dt * (r[i, 0] * m[BG, c] + r[i, 1] * m[BG + 1, c] + r[i, 2] * m[BG + 2, c])
+                m[VEL + i, c] -= dt * (r[i, 0] * m[ACCEL_BIAS, c] + r[i, 1] * m[ACCEL_BIAS + 1, c] + r[i, 2] * m[ACCEL_BIAS + 2, c])
+                turned = dt * (r[i, 0] * m[GYRO_BIAS, c] + r[i, 1] * m[GYRO_BIAS + 1, c] + r[i, 2] * m[GYRO_BIAS + 2, c])
+                m[TILT + i, c] -= turned
+            m[YAW, c] -= turned
 
 
 @njit(cache=True)
-def observe(state: Floats, cov: Floats, at: int, value: Floats, sd: float) -> None:
-    """Kalman update: the error states at..at+2 are `value` +- sd (three scalar updates), then the errors go into the state.
-
-    The gyro bias is corrected by gyro readings alone: a velocity says nothing of the bias about the vertical, and what it seems
-    to say is the rest of a foot that was not quite still. For velocities the bias is considered, not estimated [Schmidt 1966].
-    """
-    d = np.zeros(12)
+def _add_noise(P: Floats, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float) -> None:
+    """Process noise; scale errors of the gyros turn the foot about the axis about which it turns anyway."""
+    moving = accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2
+    velocity = (ACCEL_NOISE**2 + ACCEL_SHARE**2 * moving * MOTION_S) * dt + lost_m_s**2
+    tilt = GYRO_NOISE**2 * dt + lost_rad**2
     for i in range(3):
-        j = at + i
-        row = cov[:, j].copy()
-        s = row[j] + sd * sd
-        gain = row / s
-        if at != BG:
-            gain[BG:] = 0.0
-        innovation = value[i] - d[j]
-        d += gain * innovation
-        for a in range(12):
-            for b in range(a, 12):
-                cov[a, b] += gain[a] * gain[b] * s - gain[a] * row[b] - row[a] * gain[b]
-                cov[b, a] = cov[a, b]
-    for i in range(3):
-        state[POS + i] += d[P + i]
-        state[VEL + i] += d[V + i]
-        state[BIAS + i] += d[BG + i]
-    state[QUAT : QUAT + 4] = multiply(from_vector(d[TH : TH + 3]), state[QUAT : QUAT + 4])
+        P[VEL + i, VEL + i] += velocity
+        P[GYRO_BIAS + i, GYRO_BIAS + i] += GYRO_WANDER**2 * dt
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] += ACCEL_WANDER**2 * dt
+        for j in range(3):
+            P[TILT + i, TILT + j] += GYRO_SHARE**2 * MOTION_S * dt * rate[i] * rate[j] + (tilt if i == j else 0.0)
+    for i in range(2):
+        vertical = GYRO_SHARE**2 * MOTION_S * dt * rate[i] * rate[2]
+        P[YAW, TILT + i] += vertical
+        P[TILT + i, YAW] += vertical
+    vertical = GYRO_SHARE**2 * MOTION_S * dt * rate[2] * rate[2] + tilt
+    P[YAW, TILT + 2] += vertical
+    P[TILT + 2, YAW] += vertical
+    P[YAW, YAW] += vertical
 
 
 @njit(cache=True)
-def motion(ring: Floats, count: int, span_s: float, bias: Floats) -> tuple[float, float]:
-    """Mean squared deviation of specific force from gravity along its own mean, and mean squared rate, over the last span.
+def observe(nav: Nav, at: int, error: float, variance: float) -> None:
+    """Kalman update: error number `at` has been seen to be `error`, with this variance; the corrections go into the state."""
+    P = nav.P
+    total = P[at, at] + variance
+    row = P[at].copy()
+    for i in range(SIZE):
+        gain = row[i] / total
+        for j in range(SIZE):
+            P[i, j] -= gain * row[j]
+    row *= error / total
+    nav.position[:] += row[POS : POS + 3]
+    nav.velocity[:] += row[VEL : VEL + 3]
+    nav.gyro_bias[:] += row[GYRO_BIAS : GYRO_BIAS + 3]
+    nav.accel_bias[:] += row[ACCEL_BIAS : ACCEL_BIAS + 3]
+    nav.attitude[:] = multiply(turning(row[TILT], row[TILT + 1], row[TILT + 2]), nav.attitude)
 
-    The two terms of the SHOE statistic [Skog et al. 2010], in (m/s2)2 and (rad/s)2.
-    """
-    newest = ring[(count - 1) % WINDOW, 0]
-    mean = np.zeros(3)
-    n = 0
-    while n < min(count, WINDOW) and newest - ring[(count - 1 - n) % WINDOW, 0] <= span_s:
-        mean += ring[(count - 1 - n) % WINDOW, 1:4]
-        n += 1
-    mean /= n
-    scale = GRAVITY_M_S2 / max(math.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2), 1e-9)
-    a2, w2 = 0.0, 0.0
-    for k in range(n):
-        row = ring[(count - 1 - k) % WINDOW]
-        for i in range(3):
-            a2 += (row[1 + i] - mean[i] * scale) ** 2
-            w2 += (row[4 + i] - bias[i]) ** 2
-    return a2 / n, w2 / n
+
+@njit(cache=True)
+def forget_start(nav: Nav) -> None:
+    """Where the foot stands and looks now becomes the reference: those errors belong to the steps already told."""
+    for at in (POS, POS + 1, POS + 2, TILT + 2):
+        nav.P[at, :] = 0.0
+        nav.P[:, at] = 0.0

@@ -1,0 +1,185 @@
+"""Stance: when the foot stands, how still a standing foot is, and what it says about velocity and gyro bias.
+
+In: the latest samples and the navigation state. Out: verdicts, and corrections of that state. Owns a `Window` of samples and a `Rest`.
+
+One setting serves walking, running, stairs and shuffling at any rate, because a stance is decided by two witnesses. The sensors alone (SHOE
+[Skog et al. 2010], in physical units) are asked leniently, as a runner's foot never lies still; then the filter, which knows the foot's velocity
+to a few cm/s at the end of a swing, must find rest believable. In the middle of a swing it never does: the foot moves at metres a second.
+A standing foot rolls. The sensor, at a height above the point of contact, moves with the rate times that height [pivot of a rigid foot], and
+what remains unknown of the lever arm grows with the rate, too: so a calm mid-stance counts for much, a heel rise for little.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from echostep import ins
+from echostep.ins import GYRO_BIAS, VEL, Nav
+
+Floats = NDArray[np.float64]
+
+RING = 32  # samples
+WINDOW_S = 0.03
+CALM_RAD_S, CALM_M_S2 = 1.6, 6.0  # rms over the window; the statistic is 1 on the ellipse between them
+BELIEF = 16.3  # chi-square of three velocities, exceeded once in a thousand stances
+LASTING_S = 0.2  # no swing is calm for so long: this stance is real, the velocity is not
+OVERDUE_S = 2.0  # nor does a swing last so long
+LEVER_M = 0.1  # the foot's point of contact is known to within the foot
+STILL_M_S = 0.005
+KEPT_S = 0.1  # the velocity's error is the same for so long: more samples in that time say no more
+PART_S, PARTS = 0.1, 5  # gyro bias: rest is cut into parts
+SWAY_S = 0.3  # the mean of a sway is as good as one part in so long
+BIAS_FLOOR_RAD_S = 1e-3
+BIAS_BELIEF = 16.0  # chi-square of one rate, four sigma
+
+
+class Window(NamedTuple):
+    """The latest samples in a ring: `t_s` (RING,), `accel` and `gyro` (RING, 3); `count` (1,) of samples ever put in."""
+
+    t_s: Floats
+    accel: Floats
+    gyro: Floats
+    count: NDArray[np.int64]
+
+
+class Rest(NamedTuple):
+    """Sums over the present rest: `part` (3,) rad and `part_s` (1,), `whole` (3,) rad, `squares` (1,) rad2/s, `whole_s` (1,)."""
+
+    part: Floats
+    part_s: Floats
+    whole: Floats
+    squares: Floats
+    whole_s: Floats
+
+
+def new_window() -> Window:
+    """An empty window."""
+    return Window(np.zeros(RING), np.zeros((RING, 3)), np.zeros((RING, 3)), np.zeros(1, np.int64))
+
+
+def new_rest() -> Rest:
+    """No rest so far."""
+    return Rest(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1))
+
+
+@njit(cache=True)
+def put(window: Window, t_s: float, accel: Floats, gyro: Floats) -> None:
+    """Add a sample."""
+    at = window.count[0] % RING
+    window.t_s[at] = t_s
+    window.accel[at] = accel
+    window.gyro[at] = gyro
+    window.count[0] += 1
+
+
+@njit(cache=True)
+def activity(window: Window, bias: Floats) -> tuple[float, float]:
+    """Mean squared angular rate (rad/s)2, and specific force less gravity along its own mean (m/s2)2 [Skog et al. 2010, eq. 12]."""
+    newest = window.count[0] - 1
+    begin = window.t_s[newest % RING] - WINDOW_S - 1e-6
+    n = 1
+    while n < min(newest + 1, RING) and window.t_s[(newest - n) % RING] >= begin:
+        n += 1
+    mean = np.zeros(3)
+    for k in range(n):
+        mean += window.accel[(newest - k) % RING]
+    mean *= ins.GRAVITY_M_S2 / max(math.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2), 1e-9)
+    rate2, force2 = 0.0, 0.0
+    for k in range(n):
+        at = (newest - k) % RING
+        for i in range(3):
+            rate2 += (window.gyro[at, i] - bias[i]) ** 2
+            force2 += (window.accel[at, i] - mean[i]) ** 2
+    return rate2 / n, force2 / n
+
+
+@njit(cache=True)
+def calm(rate2: float, force2: float) -> bool:
+    """Whether the sensors alone would allow a stance."""
+    return rate2 / CALM_RAD_S**2 + force2 / CALM_M_S2**2 < 1.0
+
+
+@njit(cache=True)
+def rolling(nav: Nav, gyro: Floats, height_m: float) -> Floats:
+    """Velocity (3,) of a sensor at this height above the contact of a foot that rolls without sliding: rate x height."""
+    rate = ins.apply(ins.rotation(nav.attitude), gyro - nav.gyro_bias)
+    velocity = np.zeros(3)
+    velocity[0] = rate[1] * height_m
+    velocity[1] = -rate[0] * height_m
+    return velocity
+
+
+@njit(cache=True)
+def surprise(nav: Nav, expected: Floats, variance: float) -> float:
+    """Chi-square of the velocity, were the foot at rest."""
+    total = 0.0
+    for i in range(3):
+        total += (nav.velocity[i] - expected[i]) ** 2 / (nav.P[VEL + i, VEL + i] + variance)
+    return total
+
+
+@njit(cache=True)
+def rest_variance(rate2: float) -> float:
+    """Variance (m/s)2 of the velocity of a standing foot about `rolling`."""
+    return STILL_M_S**2 + LEVER_M**2 * rate2
+
+
+@njit(cache=True)
+def hold(nav: Nav, expected: Floats, variance: float, dt: float) -> None:
+    """Zero-velocity update; what it is worth depends on the time it covers, not on the number of samples."""
+    worth = max(1.0, KEPT_S / dt)
+    for i in range(3):
+        ins.observe(nav, VEL + i, expected[i] - nav.velocity[i], variance * worth)
+
+
+@njit(cache=True)
+def distrust(nav: Nav, since_s: float) -> None:
+    """The foot rests although the filter cannot believe it: then the filter's velocity, attitude and way since the last rest are wrong."""
+    speed2 = nav.velocity[0] ** 2 + nav.velocity[1] ** 2 + nav.velocity[2] ** 2
+    for i in range(3):
+        nav.P[ins.VEL + i, ins.VEL + i] += speed2
+        nav.P[ins.POS + i, ins.POS + i] += 0.25 * speed2 * since_s**2
+        nav.P[ins.TILT + i, ins.TILT + i] += 0.05**2
+    nav.P[ins.YAW, ins.YAW] += 0.05**2
+
+
+@njit(cache=True)
+def end_rest(rest: Rest) -> None:
+    """The foot moves: an unfinished rest says nothing about the gyros."""
+    rest.part[:] = 0.0
+    rest.whole[:] = 0.0
+    rest.part_s[0] = rest.whole_s[0] = rest.squares[0] = 0.0
+
+
+@njit(cache=True)
+def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) -> None:
+    """Zero-angular-rate update after half a second of rest, weighted by how still that rest was.
+
+    Stillness measures itself: the scatter of the parts' mean rates holds the sensor's noise and the person's sway alike.
+    """
+    rest.part[:] += 0.5 * dt * (gyro0 + gyro1)
+    rest.part_s[0] += dt
+    if rest.part_s[0] < PART_S - 1e-6:
+        return
+    for i in range(3):
+        rest.whole[i] += rest.part[i]
+        rest.squares[0] += rest.part[i] ** 2 / rest.part_s[0]
+    rest.whole_s[0] += rest.part_s[0]
+    rest.part[:] = 0.0
+    rest.part_s[0] = 0.0
+    if rest.whole_s[0] < PARTS * PART_S - 1e-6:
+        return
+    span = rest.whole_s[0]
+    mean = rest.whole / span
+    scatter = rest.squares[0] / span - (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
+    variance = BIAS_FLOOR_RAD_S**2 + max(scatter, 0.0) / 3.0 * PARTS / (PARTS - 1) * SWAY_S / span
+    for i in range(3):
+        error = mean[i] - nav.gyro_bias[i]
+        if error * error < BIAS_BELIEF * (nav.P[GYRO_BIAS + i, GYRO_BIAS + i] + variance):
+            ins.observe(nav, GYRO_BIAS + i, error, variance)
+    end_rest(rest)
