@@ -182,7 +182,7 @@ int main(int argc, char **argv)
 
 	int out = dup(STDOUT_FILENO); /* simavr prints on stdout: that must not get into the protocol */
 
-	if (out < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
+	if (out < 0 || !freopen("/dev/null", "w", stdout))
 		fail("cannot set up the output");
 	if (pty)
 		pty_open();

@@ -2,7 +2,7 @@
  * SCP1000-D01 barometer on SPI [SCP1000 product family specification]: mode 0, at most 500 kHz, frames of address << 2 | write << 1.
  *
  * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and falls when
- * DATARD16 is read. DRDY is wired to PE6. */
+ * DATARD16 is read. Writing 1 to RSTR starts it anew. DRDY is wired to PE6. */
 #include <string.h>
 
 #include <simavr/avr_ioport.h>
@@ -10,7 +10,7 @@
 
 #include "twin.h"
 
-enum { OPERATION = 0x03, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 0x20, TEMPOUT = 0x21 };
+enum { OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 0x20, TEMPOUT = 0x21 };
 #define MAX_HERTZ 500000u
 #define START_UP US(60000)
 #define FAST US(111000)
@@ -69,6 +69,14 @@ static void on_select(struct spi_device *self, bool on)
 		bench_trace("scp1000 wrong mode");
 }
 
+static void restart(void)
+{
+	mode = 0;
+	up_at = avr->cycle + START_UP;
+	avr_cycle_timer_cancel(avr, sample, NULL);
+	set_ready(false);
+}
+
 static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 {
 	(void)self;
@@ -81,7 +89,9 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 		return 0;
 	}
 	if (command & 2) {
-		if (command >> 2 == OPERATION && out != mode) {
+		if (command >> 2 == RSTR && out == 1) {
+			restart();
+		} else if (command >> 2 == OPERATION && out != mode) {
 			mode = out;
 			avr_cycle_timer_cancel(avr, sample, NULL);
 			avr_cycle_timer_register(avr, mode == 0x0A ? SLOW : FAST, sample, NULL);
@@ -98,9 +108,7 @@ void scp1000_start(void)
 		spi_add(&spi);
 	}
 	spi.selected = false;
-	mode = 0;
-	up_at = avr->cycle + START_UP;
-	set_ready(false);
+	restart();
 }
 
 bool scp1000_fault(const char *name, const char *value)

@@ -5,6 +5,7 @@ In: rows of one millisecond, bytes from the host, fault switches. Out: (t_ns, by
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import struct
@@ -203,11 +204,10 @@ class BoardProcess:
 
     def close(self) -> None:
         """Ask the child to end; make it, if it does not."""
-        try:
+        with contextlib.suppress(EchostepError):
             self._write(b"Q", b"")
+        with contextlib.suppress(OSError):
             self._in.close()
-        except (EchostepError, OSError):
-            pass
         try:
             self._child.wait(timeout=5.0)
         except subprocess.TimeoutExpired:

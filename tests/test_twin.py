@@ -1,0 +1,266 @@
+"""The real firmware in the twin: what it sends, every fault switch, and that equal input gives equal bytes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+
+import pytest
+from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
+
+from echostep import messages as m
+from echostep.errors import EchostepError
+from echostep.simulation.board import BoardProcess
+
+pytestmark = needs_twin
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    found = Bench()
+    yield found
+    found.board.close()
+
+
+def test_everything_that_the_board_measures_arrives(bench: Bench) -> None:
+    bench.run(1_000)
+    found = bench.run(5_000)
+    count = kinds(found)
+    assert count["Ping"] >= 5 * 28
+    assert abs(count["Gyros"] - 1_000) <= 2
+    assert abs(count["Sync"] - 500) <= 2
+    assert 45 <= count["Compass"] <= 51
+    assert 42 <= count["Pressure"] <= 48
+    assert count["Status"] == count["Identity"] == 5
+    assert bench.reader.counts.lost == bench.reader.counts.rejected == 0
+    assert {g[1:] for g in found if isinstance(g, m.Gyros)} == {(41, -82, 5)}
+    assert {c.bearing for c in found if isinstance(c, m.Compass)} == {900}
+    assert {(p.pressure, p.temperature) for p in found if isinstance(p, m.Pressure)} == {(405_296, 400)}
+    assert {p.time_of_flight_us for p in pings(found, m.Ranger.LEFT)} == {5_831}
+    assert {p.time_of_flight_us for p in pings(found, m.Ranger.RIGHT)} == {7_000}
+    assert bench.status.healthy == 0x7F
+    assert bench.status.memory_used < 2_200
+
+
+def test_the_first_words_are_identity_and_configuration(bench: Bench) -> None:
+    found = bench.run(500)
+    assert isinstance(found[0], m.Identity)
+    assert found[0].schema_hash == m.SCHEMA_HASH
+    assert found[0].reset_cause == m.ResetCause.POWER_ON
+    assert isinstance(found[1], m.Configuration)
+
+
+def test_trigger_stamps_follow_the_bus(bench: Bench) -> None:
+    bench.run(5_000)
+    truth = [t_ns / 500 for t_ns, text in bench.board.trace if text == "trigger left"]
+    stamps = [p.ticks for p in pings(bench.messages, m.Ranger.LEFT)]
+    offsets = [stamp - t for stamp, t in zip(stamps, truth, strict=False)]
+    assert len(offsets) > 60
+    assert max(offsets) - min(offsets) <= 40  # ticks: 20 us
+
+
+def test_commands_are_answered(bench: Bench) -> None:
+    bench.run(500)
+    bench.ask(m.Identify())
+    bench.ask(m.ClockQuery(0x1234))
+    wanted = m.Configure(m.Sensors.RANGER_LEFT | m.Sensors.SYNC, m.Schedule.SEQUENTIAL, 250, 99, m.PressureMode.HIGH_RESOLUTION)
+    bench.ask(wanted)
+    found = bench.run(50)
+    assert any(isinstance(x, m.Identity) for x in found)
+    assert [x.token for x in found if isinstance(x, m.ClockReply)] == [0x1234]
+    assert [x for x in found if isinstance(x, m.Configuration)][-1][1:] == (wanted.sensors, 1, 200, 20, 1)
+    bench.run(200)
+    count = kinds(bench.run(2_000))
+    assert set(count) <= {"Ping", "Sync", "Identity", "Status"}
+    assert count["Ping"] >= 13
+
+
+def test_sequential_pings_take_turns(bench: Bench) -> None:
+    bench.run(500)
+    bench.ask(m.Configure(0xFF, m.Schedule.SEQUENTIAL, 100, 5, 0))
+    bench.run(300)
+    found = [x for x in bench.run(3_000) if isinstance(x, m.Ping)]
+    assert 40 <= len(found) <= 44
+    assert all(a.ranger != b.ranger for a, b in zip(found, found[1:], strict=False))
+    assert all(abs(b.ticks - a.ticks - 140_000) < 8_000 for a, b in zip(found, found[1:], strict=False))
+
+
+def test_damaged_commands_are_counted(bench: Bench) -> None:
+    bench.run(500)
+    bench.board.send(b"\x05garbage\x00" + bytes(range(1, 200)) + b"\x00")
+    bench.run(1_500)
+    assert bench.status.bad_frames == 2
+
+
+@pytest.mark.parametrize("kind", ["absent", "nack"])
+def test_a_ranger_that_fails_does_not_stop_the_other(bench: Bench, kind: str) -> None:
+    bench.run(1_000)
+    bench.fault(f"srf_right={kind}")
+    found = bench.run(3_000)
+    assert len(pings(found, m.Ranger.LEFT)) >= 3 * 14
+    assert {p.outcome for p in pings(found, m.Ranger.RIGHT)[2:]} == {m.Outcome.BUS_ERROR}
+    assert bench.status.errors_ranger_right > 0
+    assert not bench.status.healthy & m.Healthy.RANGER_RIGHT
+    bench.fault("srf_right=ok")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
+    assert bench.status.healthy & m.Healthy.RANGER_RIGHT
+
+
+def test_clock_stretching_is_borne(bench: Bench) -> None:
+    bench.fault("srf_left=stretch")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(2_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+def test_a_stuck_bus_is_clocked_free(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("sda=stuck")
+    bench.run(1_000)
+    found = bench.run(2_000)
+    assert bench.status.bus_recoveries >= 1
+    assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+def test_a_bus_that_stays_stuck_leaves_the_rest_running(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("sda=stuck_forever")
+    found = bench.run(3_000)
+    assert {p.outcome for p in found[200:] if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
+    assert abs(kinds(found)["Gyros"] - 600) <= 3
+    assert kinds(found)["Pressure"] >= 24
+    bench.fault("sda=ok")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+@pytest.mark.parametrize("name", ["thigh", "calf", "belt"])
+@pytest.mark.parametrize("kind", ["absent", "wrong_channel"])
+def test_a_gyro_that_fails_says_so(bench: Bench, name: str, kind: str) -> None:
+    bench.run(500)
+    bench.fault(f"{name}={kind}")
+    bench.run(20)
+    found = [g for g in bench.run(1_500) if isinstance(g, m.Gyros)]
+    assert {getattr(g, name) for g in found} == {-32768}
+    others = {"thigh", "calf", "belt"} - {name}
+    assert all(getattr(g, other) != -32768 for g in found for other in others)
+    assert getattr(bench.status, f"errors_{name}") > 100
+    assert not bench.status.healthy & m.Healthy[name.upper()]
+
+
+@pytest.mark.parametrize("kind", ["absent", "drdy_stuck"])
+def test_a_barometer_that_fails_says_so(bench: Bench, kind: str) -> None:
+    bench.run(1_000)
+    bench.fault(f"scp1000={kind}")
+    bench.run(4_000)
+    found = bench.run(1_000)
+    assert kinds(found)["Pressure"] == 0
+    assert bench.status.errors_pressure > 0
+    assert not bench.status.healthy & m.Healthy.PRESSURE
+    assert kinds(found)["Ping"] >= 28
+    bench.fault("scp1000=ok")
+    bench.run(4_000)
+    assert kinds(bench.run(1_000))["Pressure"] >= 8
+
+
+def test_a_barometer_without_its_eeprom_is_not_believed(bench: Bench) -> None:
+    bench.fault("scp1000=no_eeprom")
+    assert kinds(bench.run(3_000))["Pressure"] == 0
+    assert bench.status.errors_pressure > 0
+
+
+def test_a_compass_that_fails_says_so(bench: Bench) -> None:
+    bench.run(500)
+    bench.fault("compass=absent")
+    bench.run(200)
+    found = bench.run(2_000)
+    assert not any(isinstance(c, m.Compass) and c.bearing != 65535 for c in found)
+    assert bench.status.errors_compass > 0
+    assert kinds(found)["Ping"] >= 2 * 28
+
+
+def test_a_host_that_does_not_read_costs_counted_frames_and_heals_at_once(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("host=stall")
+    assert sum(kinds(bench.run(3_000)).values()) < 60  # what the host had already fetched
+    bench.fault("host=read")
+    found = bench.run(2_000)
+    dropped = sum(v for k, v in bench.status._asdict().items() if k.startswith("dropped_"))
+    assert dropped > 600
+    assert bench.reader.counts.lost == dropped
+    assert bench.reader.counts.rejected == 0  # no torn frame
+    assert kinds(found)["Ping"] >= 2 * 28
+
+
+def test_unplugged_and_plugged_in_again(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("usb=unplug")
+    assert bench.run(1_000) == []
+    bench.fault("usb=plug")
+    found = bench.run(2_000)
+    first = next(x for x in found if isinstance(x, m.Identity))
+    assert first.reset_cause == m.ResetCause.POWER_ON
+    assert first.ticks < 2_000_000
+    assert kinds(found)["Ping"] >= 28
+
+
+@pytest.mark.parametrize(("fault", "cause"), [("reset=external", m.ResetCause.EXTERNAL), ("reset=watchdog", m.ResetCause.WATCHDOG)])
+def test_a_reset_in_mid_run_is_reported(bench: Bench, fault: str, cause: m.ResetCause) -> None:
+    bench.run(1_000)
+    bench.fault(fault)
+    found = bench.run(2_000)
+    assert cause in [x.reset_cause for x in found if isinstance(x, m.Identity)]
+    assert kinds(found)["Ping"] >= 28
+
+
+def test_a_bus_reset_enumerates_again(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("usb=reset")
+    bench.run(300)
+    assert kinds(bench.run(1_000))["Ping"] >= 28
+
+
+def test_an_echo_of_the_other_ping_is_heard(bench: Bench) -> None:
+    rows = quiet_rows(3_000)
+    rows["own_us"] = 0
+    rows["cross_us"] = [34_000, 0]  # the right ranger's ping reaches the left one
+    found = pings(bench.run(3_000, rows), m.Ranger.LEFT)
+    heard = [p.time_of_flight_us for p in found if p.outcome == m.Outcome.ECHO]
+    assert heard
+    assert len(set(heard)) > len(heard) // 2  # it moves with the jitter, an own echo would stay
+
+
+def test_equal_input_gives_equal_bytes() -> None:
+    def run(seed: int) -> str:
+        bench = Bench(BoardProcess([str(TWIN), "--elf", str(ELF), "--seed", str(seed)]))
+        sha = hashlib.sha256()
+        for fault in ("srf_left=nack", "sda=stuck", "usb=unplug", "usb=plug", "host=stall", "host=read"):
+            bench.run(500)
+            bench.fault(fault)
+        bench.run(1_000)
+        for t_ns, part in bench.sent:
+            sha.update(t_ns.to_bytes(8, "little") + part)
+        bench.board.close()
+        return sha.hexdigest()
+
+    assert run(1) == run(1)
+    assert run(1) != run(2)
+
+
+@pytest.mark.parametrize(("arguments", "fault"), [(["--elf", "none.elf"], ""), (["--elf", str(ELF)], "nonsense=1"), ([], "")])
+def test_mistakes_end_the_twin_with_one_line(capfd: pytest.CaptureFixture[str], arguments: list[str], fault: str) -> None:
+    board = BoardProcess([str(TWIN), *arguments])
+    try:
+        with pytest.raises(EchostepError, match="ended"):
+            for _ in range(100):
+                if fault:
+                    board.fault(fault)
+                board.advance(quiet_rows(1))
+    finally:
+        board.close()
+    assert capfd.readouterr().err.count("\n") == 1
+
+
+def test_a_twin_that_is_not_there_is_named() -> None:
+    with pytest.raises(EchostepError, match="cannot start"):
+        BoardProcess(["/no/such/twin"])

@@ -1,0 +1,132 @@
+"""What the real firmware does in the twin, in figures: rates, stamp errors, losses, memory, speed. Each with its limit and PASS or FAIL.
+
+In: the ELF and the twin (`make measure` builds both). Out: a table; exit status 1 when a limit is missed. Simulated hardware, real firmware.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from echostep import messages as m
+from echostep.frames import BoardReader, encode
+from echostep.simulation.board import BoardProcess
+from echostep.simulation.stimulus import NO_SYNC, ROW
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
+SETTLED_S = 2.0  # enumeration and start-up are over
+TICK_US = 0.5
+
+
+@dataclass
+class Seen:
+    """What came out of one run."""
+
+    seconds: float = 0.0
+    wall_s: float = 0.0
+    counts: Counter[str] = field(default_factory=Counter)
+    triggers: dict[int, list[int]] = field(default_factory=lambda: {0: [], 1: []})
+    syncs: list[int] = field(default_factory=list)
+    status: m.Status | None = None
+    lost: int = 0
+
+
+def rows() -> np.ndarray:
+    """A second of a quiet corridor: echoes from both sides, some cross echoes, SyncOut at 100 Hz."""
+    table = np.zeros(1000, ROW)
+    table["own_us"], table["cross_us"] = [5831, 6123], [9000, 0]
+    table["thigh"], table["calf"], table["belt"] = 41, -82, 5
+    table["bearing"], table["pressure"], table["temperature"] = 900, 405_300, 400
+    table["sync_us"] = NO_SYNC
+    table["sync_us"][::10] = 333
+    return table
+
+
+def run(seconds: int, schedule: m.Schedule, title: str) -> tuple[Seen, list[tuple[int, str]]]:
+    """Run the firmware for so long; what the host saw and what happened on the buses."""
+    board, reader, seen, second = BoardProcess(TWIN), BoardReader(), Seen(), rows()
+    began = time.perf_counter()
+    for k in track(range(seconds), title):
+        if k == 1:
+            board.send(encode(m.Configure(0xFF, schedule, 200, 10, m.PressureMode.HIGH_SPEED), 0))
+        for t_ns, sent in board.advance(second):
+            for message in reader.feed(sent):
+                note(seen, message, t_ns)
+    seen.wall_s, seen.seconds, seen.lost = time.perf_counter() - began, float(seconds), reader.counts.lost
+    board.close()
+    return seen, board.trace
+
+
+def note(seen: Seen, message: m.Message, t_ns: int) -> None:
+    """Keep what the figures need."""
+    if isinstance(message, m.Status):
+        seen.status = message
+    if t_ns < SETTLED_S * 1e9:
+        return
+    seen.counts[type(message).__name__] += 1
+    if isinstance(message, m.Ping):
+        seen.triggers[message.ranger].append(message.ticks)
+    elif isinstance(message, m.Sync):
+        seen.syncs.append(message.ticks)
+
+
+def stamp_errors(stamps: list[int], truth_ns: list[int]) -> tuple[float, float]:
+    """Worst and sd of stamp minus truth (us), after the constant offset; each stamp is held against the nearest event."""
+    events = np.array(truth_ns) / 1e3
+    found = np.array(stamps) * TICK_US
+    after = np.clip(np.searchsorted(events, found), 1, len(events) - 1)
+    nearest = np.where(found - events[after - 1] < events[after] - found, events[after - 1], events[after])
+    error = found - nearest
+    error -= np.median(error)
+    return float(np.abs(error).max()), float(error.std())
+
+
+def figures(seconds: int) -> list[tuple[str, str, str, bool]]:
+    """(what, measured, limit, passed) for every figure."""
+    seen, trace = run(seconds, m.Schedule.CONCURRENT, "both rangers at once")
+    slow, _ = run(min(seconds, 30), m.Schedule.SEQUENTIAL, "in turn, the paper's way")
+    span, slow_span = seen.seconds - SETTLED_S, slow.seconds - SETTLED_S
+    assert seen.status is not None
+    dropped = {k: v for k, v in seen.status._asdict().items() if k.startswith("dropped_") and v}
+    pings, gyros = seen.counts["Ping"] / span, seen.counts["Gyros"] / span
+    truth = {side: [t for t, text in trace if text == f"trigger {side}"] for side in ("left", "right")}
+    worst = [stamp_errors(seen.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
+    sync_worst, sync_sd = stamp_errors(seen.syncs, [t for t, text in trace if text == "sync"])
+    speed = seen.seconds / seen.wall_s
+    trigger = max(w for w, _ in worst)
+    return [
+        ("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
+        ("pings/s, in turn", f"{slow.counts['Ping'] / slow_span:.1f}", "14.3 by design", slow.counts["Ping"] / slow_span > 13.5),
+        ("gyro samples/s", f"{gyros:.1f}", "200", abs(gyros - 200.0) < 1.0),
+        ("worst trigger stamp", f"{trigger:.1f} us (sd {max(s for _, s in worst):.2f})", "<= 20 us", trigger <= 20.0),
+        ("worst SyncOut stamp", f"{sync_worst:.1f} us (sd {sync_sd:.2f})", "<= 20 us", sync_worst <= 20.0),
+        (f"frames lost in {seconds / 60:.0f} min", str(seen.lost), "0", seen.lost == 0),
+        ("drops by stream", str(dropped or 0), "0", not dropped),
+        ("static RAM and deepest stack", f"{seen.status.memory_used} B", "< 2200 B", seen.status.memory_used < 2200),
+        ("speed", f"{speed:.0f} x real time", ">= 20 x", speed >= 20.0),
+    ]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--minutes", type=float, default=10.0, help="simulated minutes")
+    found = figures(max(5, round(60 * parser.parse_args().minutes)))
+    table = Table("figure", "measured", "limit", "", title="The real firmware in the twin (simulated hardware)")
+    for what, measured, limit, passed in found:
+        table.add_row(what, measured, limit, "PASS" if passed else "FAIL")
+    Console().print(table)
+    return 0 if all(row[3] for row in found) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
