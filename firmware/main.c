@@ -167,12 +167,12 @@ int main(void)
 	board_start();
 	start_sensors();
 	for (;;) {
-		usb_run();
+		usb_run(); /* what came in */
 		greet_new_host();
 		listen();
 		report_edge();
 		uint32_t wake = run_sensors();
-		usb_run();
+		usb_run(); /* what goes out */
 		board_sleep(wake);
 	}
 }

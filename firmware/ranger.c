@@ -20,7 +20,8 @@
 #define IDLE_TICKS (30u * TICKS_PER_MS)
 
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
-#define CONCURRENT_JITTER_MASK 0x1FFFu
+#define CONCURRENT_JITTER_MASK 0x1FFFu /* up to 4.1 ms */
+#define JITTER_STEPS 13u
 #define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
 
 enum stage { WAITING, TRIGGERING, RANGING, READING };
@@ -50,11 +51,15 @@ static uint32_t half_period(void)
 	return configuration.schedule == SCHEDULE_SEQUENTIAL ? SEQUENTIAL_HALF_TICKS : CONCURRENT_HALF_TICKS;
 }
 
-/* A 16-bit Galois shift register of maximal length: the same delays after every start. */
+/* A 16-bit Galois shift register of maximal length: the same delays after every start. One step a draw would make each delay about
+ * half of the one before. */
 static uint16_t jitter(void)
 {
-	lfsr = (uint16_t)((lfsr >> 1) ^ (lfsr & 1u ? 0xB400u : 0u));
-	return configuration.schedule == SCHEDULE_SEQUENTIAL ? 0u : lfsr & CONCURRENT_JITTER_MASK;
+	if (configuration.schedule == SCHEDULE_SEQUENTIAL)
+		return 0;
+	for (uint8_t n = 0; n < JITTER_STEPS; n++)
+		lfsr = (uint16_t)((lfsr >> 1) ^ ((lfsr & 1u) ? 0xB400u : 0u));
+	return lfsr & CONCURRENT_JITTER_MASK;
 }
 
 static bool blocked_by_other(const struct ranger *r)

@@ -14,6 +14,7 @@
 #define WRITE_FLAG 0x02u
 #define STATUS_STARTING 0x01u
 #define EEPROM_OK 0x01u
+#define OPERATION_STOP 0x00u
 #define OPERATION_HIGH_SPEED 0x09u
 #define OPERATION_HIGH_RESOLUTION 0x0Au
 #define PRESSURE_HIGH_MASK 0x07u
@@ -76,6 +77,7 @@ static void fail(uint32_t now)
 
 void pressure_start(uint32_t now)
 {
+	write8(REGISTER_OPERATION, OPERATION_STOP); /* a board that restarts may find it measuring */
 	write8(REGISTER_RESET, 1);
 	deadline = now + RESET_TICKS + STARTING_MAX_TICKS;
 	wait(STARTING, now + RESET_TICKS);

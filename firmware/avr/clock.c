@@ -11,7 +11,6 @@ static bool edge_waiting;
 
 void clock_start(void)
 {
-	PORTD |= BIT(PD4); /* an unconnected SyncOut input stays quiet */
 	TCCR1A = 0;
 	TCCR1B = BIT(ICNC1) | BIT(ICES1) | BIT(CS11); /* noise canceller, rising edge, 16 MHz / 8 */
 	TIMSK1 = BIT(ICIE1) | BIT(OCIE1A) | BIT(TOIE1);

@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""Flash, static RAM and an upper bound of the stack of the firmware, each against its limit.
+
+In: the ELF, and beside it the compiler's stack usage files (-fstack-usage). Out: a table; exit status 1 when a limit is
+missed. The bound walks the call graph of the disassembly: the deepest chain from main plus the deepest interrupt (they
+do not nest).
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+FUNCTION = re.compile(r"^([0-9a-f]+) <(\w+)>:$")
+CALL = re.compile(r"\s(?:r?call|r?jmp)\s.*;\s*0x([0-9a-f]+)")
+ABSOLUTE_CALL = re.compile(r"\s(?:call|jmp)\s+0x([0-9a-f]+)")
+INDIRECT = re.compile(r"\s(?:icall|eicall|ijmp|eijmp)\b")
+INTERRUPT = re.compile(r"__vector_\d+$")
+RETURN_ADDRESS = 2
+
+
+def output_of(*command: str) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def frames(folder: Path) -> dict[str, int]:
+    """Function name -> stack bytes with its return address; of functions of the same name the largest."""
+    found: dict[str, int] = {}
+    for path in folder.rglob("*.su"):
+        for line in path.read_text().splitlines():
+            place, size, _ = line.split("\t")
+            name = place.rsplit(":", 1)[1]
+            found[name] = max(found.get(name, 0), int(size))
+    return found
+
+
+def call_graph(elf: Path) -> tuple[dict[int, str], dict[int, set[int]], dict[int, int]]:
+    """Address -> name, address -> addresses called or jumped to, address -> bytes pushed."""
+    names: dict[int, str] = {}
+    calls: dict[int, set[int]] = {}
+    pushed: dict[int, int] = {}
+    here = 0
+    for line in output_of("avr-objdump", "-d", str(elf)).splitlines():
+        if match := FUNCTION.match(line):
+            here = int(match[1], 16)
+            names[here], calls[here], pushed[here] = match[2], set(), 0
+        elif match := CALL.search(line) or ABSOLUTE_CALL.search(line):
+            calls[here].add(int(match[1], 16))
+        elif INDIRECT.search(line):
+            raise SystemExit(f"{elf}: {names[here]} jumps to a computed address: its stack cannot be bounded")
+        elif "\tpush\t" in line:
+            pushed[here] += 1
+    return names, calls, pushed
+
+
+def deepest(elf: Path) -> int:
+    """Bytes of the deepest chain from main plus the deepest interrupt; a recursion is an error."""
+    names, calls, pushed = call_graph(elf)
+    known = frames(elf.parent)
+
+    def depth(at: int, above: tuple[int, ...]) -> int:
+        if at in above:
+            raise SystemExit(f"{elf}: {names[at]} calls itself: its stack cannot be bounded")
+        own = known.get(names[at], RETURN_ADDRESS + pushed[at])
+        inner = (depth(to, (*above, at)) for to in calls[at] if to in names and to != at)
+        return own + max(inner, default=0)
+
+    main = next(at for at, name in names.items() if name == "main")
+    interrupts = (depth(at, ()) for at, name in names.items() if INTERRUPT.match(name))
+    return depth(main, ()) + max(interrupts, default=0)
+
+
+def main() -> int:
+    elf = Path(sys.argv[1])
+    flash_max, ram_max, memory_max = map(int, sys.argv[2:5])
+    text, initialised, zeroed = map(int, output_of("avr-size", str(elf)).splitlines()[1].split()[:3])
+    flash, ram, stack = text + initialised, initialised + zeroed, deepest(elf)
+    passed = True
+    for what, value, limit in (
+        ("flash", flash, flash_max),
+        ("static RAM", ram, ram_max),
+        ("static RAM + stack", ram + stack, memory_max),
+    ):
+        passed &= value <= limit
+        print(f"{what:20}{value:7} B  limit {limit:6} B  {'ok' if value <= limit else 'TOO MUCH'}")
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
