@@ -188,7 +188,7 @@ def _walk(
             stance.put(window, t_s[k], accel[k], gyro[k])
             rate2, force2 = stance.activity(window, nav.gyro_bias)
             if s.levelled:
-                found = _advance(s, nav, rest, height_m, dt, t_s[k], accel[k], gyro[k], rate2, force2, events, found)
+                found = _advance(s, nav, window, rest, height_m, dt, t_s[k], accel[k], gyro[k], rate2, force2, events, found)
             else:
                 found = _find_level(s, nav, min(max(dt, 0.0), GAP_S), t_s[k], accel[k], gyro[k], rate2, force2, events, found)
             s.t_s = t_s[k]
@@ -272,13 +272,13 @@ def _begin(s: Any, nav: Nav, t_s: float, scatter: float, sure: bool) -> None:
 
 @njit(cache=True)
 def _advance(
-    s: Any, nav: Nav, rest: Rest, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats, rate2: float, force2: float,
+    s: Any, nav: Nav, window: Window, rest: Rest, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats, rate2: float, force2: float,
     events: Floats, found: int,
 ) -> int:  # fmt: skip
     """One sample of navigation: predict, decide whether the foot rests, correct."""
     ins.predict(nav, dt, s.force, accel, s.rate, gyro)
     _doubt_limits(s, nav, dt, accel, gyro)
-    if _rests(s, nav, height_m, dt, t_s, gyro, rate2, force2):
+    if _rests(s, nav, window, height_m, dt, t_s, gyro, rate2, force2):
         stance.learn_bias(nav, rest, dt, s.rate, gyro)
         s.rest_s += dt
         s.rest_t_s = t_s
@@ -298,14 +298,14 @@ def _advance(
 
 
 @njit(cache=True)
-def _rests(s: Any, nav: Nav, height_m: float, dt: float, t_s: float, gyro: Floats, rate2: float, force2: float) -> bool:
+def _rests(s: Any, nav: Nav, window: Window, height_m: float, dt: float, t_s: float, gyro: Floats, rate2: float, force2: float) -> bool:
     """Whether the foot rests now; if so, the velocity has been corrected."""
     s.calm_s = s.calm_s + dt if stance.calm(rate2, force2) else 0.0
     if s.calm_s == 0.0:
         return False
     expected = stance.rolling(nav, gyro, height_m)
     variance = stance.rest_variance(rate2)
-    if stance.surprise(nav, expected, variance) > stance.BELIEF:
+    if stance.surprise(nav, expected, variance, stance.mean_force(window)) > stance.BELIEF:
         if s.calm_s < stance.LASTING_S and t_s - s.rest_t_s < stance.OVERDUE_S:
             return False
         s.forced += 1

@@ -19,14 +19,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep import ins
-from echostep.ins import GYRO_BIAS, VEL, Nav
+from echostep.ins import GYRO_BIAS, TILT, VEL, Nav
 
 Floats = NDArray[np.float64]
 
 RING = 32  # samples
 WINDOW_S = 0.03
 CALM_RAD_S, CALM_M_S2 = 1.6, 6.0  # rms over the window; the statistic is 1 on the ellipse between them
-BELIEF = 16.3  # chi-square of three velocities, exceeded once in a thousand stances
+BELIEF = 22.5  # chi-square of three velocities and three accelerations, exceeded once in a thousand stances
+ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 LASTING_S = 0.2  # no swing is calm for so long: this stance is real, the velocity is not
 OVERDUE_S = 2.0  # nor does a swing last so long
 LEVER_M = 0.1  # the foot's point of contact is known to within the foot
@@ -78,16 +79,31 @@ def put(window: Window, t_s: float, accel: Floats, gyro: Floats) -> None:
 
 
 @njit(cache=True)
-def activity(window: Window, bias: Floats) -> tuple[float, float]:
-    """Mean squared angular rate (rad/s)2, and specific force less gravity along its own mean (m/s2)2 [Skog et al. 2010, eq. 12]."""
+def mean_force(window: Window) -> Floats:
+    """Mean specific force (3,) over the window."""
+    newest, n = window.count[0] - 1, _length(window)
+    mean = np.zeros(3)
+    for k in range(n):
+        mean += window.accel[(newest - k) % RING]
+    return mean / n
+
+
+@njit(cache=True)
+def _length(window: Window) -> int:
+    """How many of the latest samples the window holds."""
     newest = window.count[0] - 1
     begin = window.t_s[newest % RING] - WINDOW_S - 1e-6
     n = 1
     while n < min(newest + 1, RING) and window.t_s[(newest - n) % RING] >= begin:
         n += 1
-    mean = np.zeros(3)
-    for k in range(n):
-        mean += window.accel[(newest - k) % RING]
+    return n
+
+
+@njit(cache=True)
+def activity(window: Window, bias: Floats) -> tuple[float, float]:
+    """Mean squared angular rate (rad/s)2, and specific force less gravity along its own mean (m/s2)2 [Skog et al. 2010, eq. 12]."""
+    newest, n = window.count[0] - 1, _length(window)
+    mean = mean_force(window)
     mean *= ins.GRAVITY_M_S2 / max(math.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2), 1e-9)
     rate2, force2 = 0.0, 0.0
     for k in range(n):
@@ -115,11 +131,15 @@ def rolling(nav: Nav, gyro: Floats, height_m: float) -> Floats:
 
 
 @njit(cache=True)
-def surprise(nav: Nav, expected: Floats, variance: float) -> float:
-    """Chi-square of the velocity, were the foot at rest."""
+def surprise(nav: Nav, expected: Floats, variance: float, force: Floats) -> float:
+    """Chi-square of velocity and acceleration, were the foot at rest under this mean specific force (3,)."""
+    accel = ins.apply(ins.rotation(nav.attitude), force - nav.accel_bias)
+    accel[2] -= ins.GRAVITY_M_S2
+    lean = ins.GRAVITY_M_S2**2 * (nav.P[TILT, TILT] + nav.P[TILT + 1, TILT + 1])
     total = 0.0
     for i in range(3):
         total += (nav.velocity[i] - expected[i]) ** 2 / (nav.P[VEL + i, VEL + i] + variance)
+        total += accel[i] ** 2 / (ROLL_M_S2**2 + lean)
     return total
 
 
