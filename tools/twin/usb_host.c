@@ -71,6 +71,7 @@ static void set_line_state(bool open)
 	uint8_t bytes[16] = { 0x21, 0x22, open ? DTR_RTS : 0 };
 
 	is_open = open;
+	bench_trace(open ? "port opened" : "port closed");
 	begin_request(bytes);
 }
 

@@ -34,8 +34,8 @@ class Scenario:
     ) -> None:  # fmt: skip
         streams = [np.random.default_rng([seed, k]) for k in range(3, 6)]
         self.walk = walk(waypoints, person or Person(), streams[0])
-        self._mtx = stream(self.walk, model or MtxModel(), streams[1])
-        self._sensors = BoardSensors(self.walk, plan.levels[0].walls, self._mtx.t_s, streams[2])
+        self.mtx = stream(self.walk, model or MtxModel(), streams[1])
+        self.sensors = BoardSensors(self.walk, plan.levels[0].walls, self.mtx.t_s, streams[2])
         self._board = board
         x, y = self.walk.trunk_m[0].tolist()
         self.start = Pose(x, y, float(self.walk.heading_rad[0]))
@@ -53,10 +53,10 @@ class Scenario:
             yield waiting
             yield from mtx
 
-    def write_truth(self, path: Path) -> None:
-        """Where the trunk was, 50 times a second, as CSV."""
+    def write_truth(self, path: Path, begin_s: float = 0.0) -> None:
+        """Where the trunk was, 50 times a second, as CSV; `begin_s`: board time at which the walk begins."""
         w = self.walk
-        table = np.column_stack([w.t_s, w.trunk_m, w.heading_rad])[::20]
+        table = np.column_stack([begin_s + w.t_s, w.trunk_m, w.heading_rad])[::20]
         np.savetxt(path, table, delimiter=",", header="t_s,x,y,heading_rad", comments="", fmt="%.6f")
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class Scenario:
     def _board_chunks(self) -> Iterator[Chunk]:
         """The board's bytes as a USB host gets them, a millisecond's worth at a time."""
         for start in range(0, len(self.walk.t_s), BLOCK_MS):
-            sent = self._board.advance(self._sensors.rows(start, start + BLOCK_MS))
+            sent = self._board.advance(self.sensors.rows(start, start + BLOCK_MS))
             gathered: dict[int, bytes] = {}
             for t_ns, part in sent:
                 arrival = START_NS + t_ns + USB_LATENCY_NS
@@ -75,8 +75,8 @@ class Scenario:
                 yield Chunk(BOARD, t_ns, gathered[t_ns])
 
     def _mtx_chunks(self) -> Iterator[Chunk]:
-        arrivals = START_NS + np.rint(self._mtx.arrival_s * 1e9).astype(np.int64)
-        for t_ns, frame in zip(arrivals.tolist(), self._mtx.frames, strict=True):
+        arrivals = START_NS + np.rint(self.mtx.arrival_s * 1e9).astype(np.int64)
+        for t_ns, frame in zip(arrivals.tolist(), self.mtx.frames, strict=True):
             yield Chunk(MTX, t_ns, frame)
 
 

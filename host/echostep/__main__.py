@@ -1,0 +1,5 @@
+"""`python -m echostep` is the command `echostep`."""
+
+from echostep.cli import main
+
+main()

@@ -1,0 +1,145 @@
+"""The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
+
+In: the ELF and the twin. Out: two ports that `echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port is opened,
+and starts anew when it is over, until Ctrl-C. Simulated hardware, real firmware.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import time
+import tty
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from echostep.plan import load_plan
+from echostep.simulation.board import Sent
+from echostep.simulation.scenario import Scenario, demo_scenario
+from echostep.simulation.stimulus import NO_SYNC, ROW
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]
+BLOCK_MS, IDLE_MS = 10, 50
+LATE_S = 0.5  # a machine that is this far behind is told so
+
+
+class PtyBoard:
+    """The twin with its port on a pseudo terminal: rows go in, bytes go to whoever has the port open."""
+
+    def __init__(self) -> None:
+        self._child = subprocess.Popen(TWIN, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert self._child.stdin and self._child.stdout and self._child.stderr
+        self._in: IO[bytes] = self._child.stdin
+        self._out: IO[bytes] = self._child.stdout
+        found = re.match(rb"board port: (\S+)", self._child.stderr.readline())
+        if not found:
+            raise SystemExit("the twin did not start")
+        self.port = found[1].decode()
+        self.is_open = False
+        self.t_s = 0.0  # board time
+
+    def advance(self, rows: object) -> Sent:
+        """Let the milliseconds of these rows pass."""
+        body = rows.tobytes()  # type: ignore[attr-defined]
+        self._in.write(b"R" + len(body).to_bytes(4, "little") + body)
+        self._in.flush()
+        while True:
+            head = self._out.read(5)
+            if len(head) < 5:
+                raise SystemExit("the twin ended")
+            record = self._out.read(int.from_bytes(head[1:], "little"))
+            if head[:1] == b"T" and record[8:].startswith(b"port "):
+                self.is_open = record[8:] == b"port opened"
+            if head[:1] == b"A":
+                self.t_s = int.from_bytes(record, "little") * 1e-9
+                return []
+
+    def send(self, sent: bytes) -> None:
+        """Nothing: the host writes to the port itself."""
+
+    def fault(self, text: str) -> None:
+        """A fault switch."""
+        self._in.write(b"F" + len(text).to_bytes(4, "little") + text.encode())
+
+    def close(self) -> None:
+        """End the twin."""
+        self._child.kill()
+        self._child.wait()
+
+
+def open_mtx() -> tuple[int, str]:
+    """A pseudo terminal for the MTx: the end to write to, and the name of the other."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    os.set_blocking(ours, False)
+    return ours, os.ttyname(theirs)
+
+
+def wait_for_listener(board: PtyBoard) -> None:
+    """Let the board idle, at the pace of the wall clock, until somebody opens its port."""
+    idle = np.zeros(IDLE_MS, ROW)
+    idle["sync_us"] = NO_SYNC
+    while not board.is_open:
+        board.advance(idle)
+        time.sleep(IDLE_MS * 1e-3)
+
+
+def play(scenario: Scenario, board: PtyBoard, mtx: int) -> None:
+    """One walk at the pace of the wall clock."""
+    frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
+    waiting = next(frames, None)
+    began = time.monotonic()
+    for start in range(0, len(scenario.walk.t_s), BLOCK_MS):
+        board.advance(scenario.sensors.rows(start, start + BLOCK_MS))
+        now_s = (start + BLOCK_MS) * 1e-3
+        while waiting is not None and waiting[0] <= now_s:
+            try:
+                os.write(mtx, waiting[1])
+            except BlockingIOError:
+                pass  # nobody reads: as with a cable that leads nowhere
+            waiting = next(frames, None)
+        ahead = began + now_s - time.monotonic()
+        if ahead > 0:
+            time.sleep(ahead)
+        elif ahead < -LATE_S:
+            print(f"this machine is {-ahead:.1f} s behind real time", file=sys.stderr)
+            began = time.monotonic() - now_s
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--once", action="store_true", help="end after one walk")
+    parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
+    options = parser.parse_args()
+    with as_file(files("echostep") / "plans" / "demo.json") as path:
+        plan = load_plan(path)
+        board = PtyBoard()
+        mtx, mtx_port = open_mtx()
+        options.out.mkdir(parents=True, exist_ok=True)
+        print(f"board {board.port}\nmtx   {mtx_port}\n\nIn another terminal:\n"
+              f"  .venv/bin/echostep live --plan {path} --board {board.port} --mtx {mtx_port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
+    try:
+        while True:
+            scenario = demo_scenario(plan, options.seed, board)
+            wait_for_listener(board)
+            scenario.write_truth(options.out / "truth.csv", board.t_s)
+            play(scenario, board, mtx)
+            if options.once:
+                break
+    except KeyboardInterrupt:
+        pass
+    finally:
+        board.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
