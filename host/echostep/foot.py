@@ -30,7 +30,7 @@ GAP_S = 0.25  # the filter carries on over shorter gaps
 STRAY_SAMPLES = 20  # so many samples in a row from the past: the clock has been set back
 WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # no foot goes beyond
-STEEP_M_S2, STEEP_RAD_S = 30.0, 6.0  # beyond these, two equal readings in a row are a sensor at its limit
+STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # beyond these, two equal readings in a row are a sensor at its limit
 LOST_SHARE = 0.3  # of such a reading
 LEVEL_S, LEVEL_RAD_S, LEVEL_M_S2 = 0.1, 0.3, 1.0  # still enough, for long enough, to take gravity from
 IMPATIENT_S = 3.0  # without any such moment, start all the same
@@ -46,6 +46,7 @@ STATE = np.dtype(
         "stepped", "settled", "yaw_variance", "lost_m2",
     )] + [("samples", "i8"), ("force_samples", "i8"), ("not_finite", "i8"), ("not_later", "i8"), ("stray", "i8"), ("saturated", "i8"), ("gaps", "i8"), ("forced", "i8")]
     + [("origin", "f8", 3), ("force", "f8", 3), ("rate", "f8", 3), ("force_sum", "f8", 3)]
+    + [("force_limit_s", "f8", 3), ("rate_limit_s", "f8", 3)]
 )  # fmt: skip
 
 
@@ -316,21 +317,26 @@ def _rests(s: Any, nav: Nav, window: Window, height_m: float, dt: float, t_s: fl
 
 @njit(cache=True)
 def _doubt_limits(s: Any, nav: Nav, dt: float, accel: Floats, gyro: Floats) -> None:
-    """A sensor at the end of its range reads the same twice: then the true value may be anything beyond."""
-    saturated = False
+    """A sensor at the end of its range reads the same again and again: how far beyond the truth lies stays unknown all that time."""
     for i in range(3):
-        if accel[i] == s.force[i] and abs(accel[i]) > STEEP_M_S2:
-            saturated = True
+        s.force_limit_s[i] = s.force_limit_s[i] + dt if accel[i] == s.force[i] and abs(accel[i]) > STEEP_M_S2 else 0.0
+        s.rate_limit_s[i] = s.rate_limit_s[i] + dt if gyro[i] == s.rate[i] and abs(gyro[i]) > STEEP_RAD_S else 0.0
+        force = _limit_variance(accel[i], s.force_limit_s[i], dt)
+        rate = _limit_variance(gyro[i], s.rate_limit_s[i], dt)
+        if force + rate > 0.0:
+            s.saturated += 1
+            axis = ins.rotation(nav.attitude)[:, i]
             for j in range(3):
-                nav.P[ins.VEL + j, ins.VEL + j] += (LOST_SHARE * accel[i] * dt) ** 2
-        if gyro[i] == s.rate[i] and abs(gyro[i]) > STEEP_RAD_S:
-            saturated = True
-            lost = (LOST_SHARE * gyro[i] * dt) ** 2
-            for j in range(3):
-                nav.P[TILT + j, TILT + j] += lost
-            nav.P[YAW, YAW] += lost
-    if saturated:
-        s.saturated += 1
+                for k in range(3):
+                    nav.P[ins.VEL + j, ins.VEL + k] += force * axis[j] * axis[k]
+                    nav.P[TILT + j, TILT + k] += rate * axis[j] * axis[k]
+            nav.P[YAW, YAW] += rate * axis[2] ** 2
+
+
+@njit(cache=True)
+def _limit_variance(value: float, span_s: float, dt: float) -> float:
+    """Growth over `dt` of the variance of the integral of a value at its limit since `span_s`, whose error is the same all the time."""
+    return (LOST_SHARE * value) ** 2 * (2.0 * span_s - dt) * dt if span_s > 0.0 else 0.0
 
 
 @njit(cache=True)
