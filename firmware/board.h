@@ -64,7 +64,7 @@ bool usb_bootloader_wanted(void);                     /* the port was closed at 
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
 void board_sleep(uint32_t wake_ticks); /* until then or until an interrupt has news; feeds the watchdog */
 uint8_t board_reset_cause(void);       /* RESET_CAUSE_* flags */
-uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack so far (0.4 ms) */
+uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack so far */
 void board_bootloader(void);           /* resets into the bootloader; does not return */
 
 #endif

@@ -1,4 +1,4 @@
-/* USB control endpoint: descriptors, standard requests [USB 2.0, chapter 9] and the CDC-ACM ones [PSTN120, 6.3]. Never waits: each
+/* USB control endpoint: standard requests [USB 2.0, chapter 9] and those of the CDC-ACM class [PSTN120, 6.3]. Never waits: each
  * call does what the controller is ready for, and asks for an interrupt at the next step. */
 #include <avr/io.h>
 #include <avr/pgmspace.h>
@@ -35,32 +35,6 @@ enum { /* bmRequestType: direction, type, recipient */
 	FROM_PORT = 0xA1,
 };
 #define REQUEST(type, request) ((uint16_t)((uint16_t)(type) << 8 | (uint16_t)(request)))
-
-/* 0x1209:0x0001 is the identifier pid.codes reserves for testing. */
-static const uint8_t device_descriptor[] PROGMEM = {
-	18, 1, 0x00, 0x02, 0x02, 0, 0, EP_SIZE, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 0, 1,
-};
-
-#define CONFIGURATION_SIZE 67
-static const uint8_t configuration_descriptor[] PROGMEM = {
-	9, 2, CONFIGURATION_SIZE, 0, 2, 1, 0, 0x80, 50,      /* two interfaces, bus powered, 100 mA */
-	9, 4, 0, 0, 1, 2, 2, 1, 0,                           /* communications interface, abstract control model */
-	5, 0x24, 0, 0x10, 0x01,                              /* CDC 1.10 */
-	5, 0x24, 1, 0, 1,                                    /* no call management */
-	4, 0x24, 2, 2,                                       /* line coding and line state */
-	5, 0x24, 6, 0, 1,                                    /* union of interfaces 0 and 1 */
-	7, 5, EP_NOTIFY | 0x80, 3, NOTIFY_SIZE, 0, 64,       /* never used, but asked for by the class */
-	9, 4, 1, 0, 2, 0x0A, 0, 0, 0,                        /* bytes interface */
-	7, 5, EP_OUT, 2, EP_SIZE, 0, 0,
-	7, 5, EP_IN | 0x80, 2, EP_SIZE, 0, 0,
-};
-_Static_assert(sizeof configuration_descriptor == CONFIGURATION_SIZE, "wTotalLength");
-
-static const uint8_t languages[] PROGMEM = { 4, 3, 0x09, 0x04 };
-static const uint8_t maker[] PROGMEM = { 18, 3, 'e', 0, 'c', 0, 'h', 0, 'o', 0, 's', 0, 't', 0, 'e', 0, 'p', 0 };
-static const uint8_t product[] PROGMEM = {
-	26, 3, 's', 0, 'e', 0, 'n', 0, 's', 0, 'o', 0, 'r', 0, ' ', 0, 'b', 0, 'o', 0, 'a', 0, 'r', 0, 'd', 0,
-};
 
 struct setup {
 	uint8_t type, request;
@@ -137,20 +111,9 @@ static bool acknowledge(void)
 
 static bool send_descriptor(const struct setup *s)
 {
-	switch (s->value) {
-	case 0x0100:
-		return send(device_descriptor, sizeof device_descriptor, s->length, true);
-	case 0x0200:
-		return send(configuration_descriptor, sizeof configuration_descriptor, s->length, true);
-	case 0x0300:
-		return send(languages, sizeof languages, s->length, true);
-	case 0x0301:
-		return send(maker, sizeof maker, s->length, true);
-	case 0x0302:
-		return send(product, sizeof product, s->length, true);
-	default:
-		return false;
-	}
+	uint8_t length;
+	const uint8_t *descriptor = usb_descriptor(s->value, &length);
+	return descriptor && send(descriptor, length, s->length, true);
 }
 
 static bool set_configuration(uint8_t value)

@@ -1,0 +1,59 @@
+/* USB descriptors: one CDC-ACM port [USB 2.0, chapter 9; CDC120; PSTN120]. All in flash. */
+#include <avr/pgmspace.h>
+#include "usb.h"
+
+/* 0x1209:0x0001 is the identifier pid.codes reserves for testing. */
+static const uint8_t device_descriptor[] PROGMEM = {
+	18, 1, 0x00, 0x02, 0x02, 0, 0, EP_SIZE, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 0, 1,
+};
+
+#define CONFIGURATION_SIZE 67
+static const uint8_t configuration_descriptor[] PROGMEM = {
+	9, 2, CONFIGURATION_SIZE, 0, 2, 1, 0, 0x80, 50,      /* two interfaces, bus powered, 100 mA */
+	9, 4, 0, 0, 1, 2, 2, 1, 0,                           /* communications interface, abstract control model */
+	5, 0x24, 0, 0x10, 0x01,                              /* CDC 1.10 */
+	5, 0x24, 1, 0, 1,                                    /* no call management */
+	4, 0x24, 2, 2,                                       /* line coding and line state */
+	5, 0x24, 6, 0, 1,                                    /* union of interfaces 0 and 1 */
+	7, 5, EP_NOTIFY | 0x80, 3, NOTIFY_SIZE, 0, 64,       /* never used, but asked for by the class */
+	9, 4, 1, 0, 2, 0x0A, 0, 0, 0,                        /* bytes interface */
+	7, 5, EP_OUT, 2, EP_SIZE, 0, 0,
+	7, 5, EP_IN | 0x80, 2, EP_SIZE, 0, 0,
+};
+_Static_assert(sizeof configuration_descriptor == CONFIGURATION_SIZE, "wTotalLength");
+
+static const uint8_t languages[] PROGMEM = { 4, 3, 0x09, 0x04 };
+static const uint8_t maker[] PROGMEM = { 18, 3, 'e', 0, 'c', 0, 'h', 0, 'o', 0, 's', 0, 't', 0, 'e', 0, 'p', 0 };
+static const uint8_t product[] PROGMEM = {
+	26, 3, 's', 0, 'e', 0, 'n', 0, 's', 0, 'o', 0, 'r', 0, ' ', 0, 'b', 0, 'o', 0, 'a', 0, 'r', 0, 'd', 0,
+};
+
+struct descriptor {
+	const uint8_t *bytes;
+	uint8_t length;
+};
+
+static struct descriptor find(uint16_t value)
+{
+	switch (value) {
+	case 0x0100:
+		return (struct descriptor){ device_descriptor, sizeof device_descriptor };
+	case 0x0200:
+		return (struct descriptor){ configuration_descriptor, sizeof configuration_descriptor };
+	case 0x0300:
+		return (struct descriptor){ languages, sizeof languages };
+	case 0x0301:
+		return (struct descriptor){ maker, sizeof maker };
+	case 0x0302:
+		return (struct descriptor){ product, sizeof product };
+	default:
+		return (struct descriptor){ 0, 0 };
+	}
+}
+
+const uint8_t *usb_descriptor(uint16_t value, uint8_t *length)
+{
+	struct descriptor d = find(value);
+	*length = d.length;
+	return d.bytes;
+}
