@@ -123,5 +123,5 @@ def test_coverage_guided_hostile_bytes(tmp_path: Path) -> None:
     messages: list[Message] = [Identify(), ClockQuery(0x1234), Configure(0xFF, 1, 200, 10, 0)]
     for number, message in enumerate(messages):
         (corpus / str(number)).write_bytes(encode(message, number))
-    done = run(program, "-seed=1", "-max_total_time=5", "-max_len=600", corpus)
+    done = run(program, "-seed=1", "-max_total_time=5", "-max_len=600", f"-artifact_prefix={tmp_path}/", corpus)
     assert done.returncode == 0, done.stderr[-2000:]
