@@ -17,7 +17,9 @@ def crosses(ax: float, ay: float, bx: float, by: float, walls: Floats) -> bool:
     return any(move.intersects(shapely.LineString(w.reshape(2, 2))) for w in walls)
 
 
-def facing_wall(px: float, py: float, axis_rad: float, walls: Floats, cone_rad: float, reach_m: float) -> tuple[float, float]:
+def facing_wall(
+    px: float, py: float, axis_rad: float, walls: Floats, cone_rad: float, reach_m: float
+) -> tuple[float, float]:
     """Distance and off-axis angle of the nearest unhidden perpendicular in the cone; (inf, 0) when there is none."""
     here = shapely.Point(px, py)
     lines = [shapely.LineString(w.reshape(2, 2)) for w in walls]

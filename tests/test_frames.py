@@ -30,7 +30,9 @@ def gyros(n: int) -> m.Gyros:
     return m.Gyros(ticks=n * 10_000, thigh=n % 7, calf=-(n % 5), belt=0)
 
 
-@pytest.mark.parametrize("vector", [v for v in VECTORS if "message" in v], ids=lambda v: f"{v['message']}-{v['sequence']}")
+@pytest.mark.parametrize(
+    "vector", [v for v in VECTORS if "message" in v], ids=lambda v: f"{v['message']}-{v['sequence']}"
+)
 def test_vectors_encode_and_decode(vector: dict[str, object]) -> None:
     message = message_of(vector)
     frame = bytes.fromhex(str(vector["frame"]))
@@ -42,13 +44,17 @@ def test_vectors_encode_and_decode(vector: dict[str, object]) -> None:
         assert BoardReader().feed(frame) == [message]
 
 
-@pytest.mark.parametrize("vector", [v for v in VECTORS if "cobs" in v], ids=lambda v: f"{v['cobs']}-{len(v['plain']) // 2}")
+@pytest.mark.parametrize(
+    "vector", [v for v in VECTORS if "cobs" in v], ids=lambda v: f"{v['cobs']}-{len(v['plain']) // 2}"
+)
 def test_cobs_vectors(vector: dict[str, str]) -> None:
     assert cobs.encode(bytes.fromhex(vector["plain"])).hex() == vector["encoded"]
 
 
 def test_generated_files_are_fresh() -> None:
-    done = subprocess.run([sys.executable, ROOT / "protocol/generate.py", "--check"], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, ROOT / "protocol/generate.py", "--check"], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout
 
 

@@ -19,7 +19,9 @@ PLAN = ROOT / "host/echostep/plans/demo.json"
 
 
 def echostep(*arguments: object, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*ECHOSTEP, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False)
+    return subprocess.run(
+        [*ECHOSTEP, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False
+    )
 
 
 def sha_of(text: str) -> str:
@@ -37,7 +39,18 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path) -> None:
         assert twin.stdout is not None
         board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
         live = echostep(
-            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--out", tmp_path / "live", "--headless", "--seconds", 14
+            "live",
+            "--plan",
+            PLAN,
+            "--board",
+            board,
+            "--mtx",
+            mtx,
+            "--out",
+            tmp_path / "live",
+            "--headless",
+            "--seconds",
+            14,
         )
     finally:
         twin.send_signal(signal.SIGINT)
@@ -54,11 +67,15 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path) -> None:
 
 
 def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
-    runs = [echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))]
+    runs = [
+        echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
+    ]
     assert all(run.returncode == 0 for run in runs), runs[0].stderr
     first, second, other = (sha_of(run.stdout) for run in runs)
     assert first == second != other
-    tracks = [(tmp_path / str(k) / name).read_bytes() for k in (0, 1) for name in ("track.csv", "walk.mcap", "truth.csv")]
+    tracks = [
+        (tmp_path / str(k) / name).read_bytes() for k in (0, 1) for name in ("track.csv", "walk.mcap", "truth.csv")
+    ]
     assert tracks[:3] == tracks[3:]
     replay = echostep("replay", tmp_path / "0/walk.mcap", "--plan", PLAN, "--headless", "--out", tmp_path / "r")
     assert sha_of(replay.stdout) == first
@@ -132,7 +149,9 @@ def test_a_mistake_ends_with_one_line_that_names_it(tmp_path: Path, arguments: l
 def test_a_wrong_setting_is_named(tmp_path: Path, text: str, named: str) -> None:
     settings = tmp_path / "settings.toml"
     settings.write_text(text)
-    done = echostep("live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", settings, "--out", tmp_path / "out")
+    done = echostep(
+        "live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", settings, "--out", tmp_path / "out"
+    )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert named in done.stderr
     assert "settings.toml" in done.stderr

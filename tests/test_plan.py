@@ -14,7 +14,9 @@ from echostep.plan import load_plan
 GOOD: dict[str, Any] = {
     "echostep_plan": 1,
     "name": "one room",
-    "levels": [{"name": "ground", "height_m": 0, "walls": [[0, 0, 4, 0], [4, 0, 4, 3]], "rooms": [{"name": "A", "at": [2, 1]}]}],
+    "levels": [
+        {"name": "ground", "height_m": 0, "walls": [[0, 0, 4, 0], [4, 0, 4, 3]], "rooms": [{"name": "A", "at": [2, 1]}]}
+    ],
     "start": {"x": 1, "y": 1, "heading_deg": 90},
 }
 

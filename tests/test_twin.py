@@ -63,7 +63,9 @@ def test_commands_are_answered(bench: Bench) -> None:
     bench.run(500)
     bench.ask(m.Identify())
     bench.ask(m.ClockQuery(0x1234))
-    wanted = m.Configure(m.Sensors.RANGER_LEFT | m.Sensors.SYNC, m.Schedule.SEQUENTIAL, 250, 99, m.PressureMode.HIGH_RESOLUTION)
+    wanted = m.Configure(
+        m.Sensors.RANGER_LEFT | m.Sensors.SYNC, m.Schedule.SEQUENTIAL, 250, 99, m.PressureMode.HIGH_RESOLUTION
+    )
     bench.ask(wanted)
     found = bench.run(50)
     assert any(isinstance(x, m.Identity) for x in found)
@@ -204,7 +206,9 @@ def test_unplugged_and_plugged_in_again(bench: Bench) -> None:
     assert kinds(found)["Ping"] >= 28
 
 
-@pytest.mark.parametrize(("fault", "cause"), [("reset=external", m.ResetCause.EXTERNAL), ("reset=watchdog", m.ResetCause.WATCHDOG)])
+@pytest.mark.parametrize(
+    ("fault", "cause"), [("reset=external", m.ResetCause.EXTERNAL), ("reset=watchdog", m.ResetCause.WATCHDOG)]
+)
 def test_a_reset_in_mid_run_is_reported(bench: Bench, fault: str, cause: m.ResetCause) -> None:
     bench.run(1_000)
     bench.fault(fault)
@@ -247,8 +251,12 @@ def test_equal_input_gives_equal_bytes() -> None:
     assert run(1) != run(2)
 
 
-@pytest.mark.parametrize(("arguments", "fault"), [(["--elf", "none.elf"], ""), (["--elf", str(ELF)], "nonsense=1"), ([], "")])
-def test_mistakes_end_the_twin_with_one_line(capfd: pytest.CaptureFixture[str], arguments: list[str], fault: str) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "fault"), [(["--elf", "none.elf"], ""), (["--elf", str(ELF)], "nonsense=1"), ([], "")]
+)
+def test_mistakes_end_the_twin_with_one_line(
+    capfd: pytest.CaptureFixture[str], arguments: list[str], fault: str
+) -> None:
     board = BoardProcess([str(TWIN), *arguments])
     try:
         with pytest.raises(EchostepError, match="ended"):

@@ -57,7 +57,9 @@ def test_a_wall_hides_what_is_behind_it() -> None:
     slanted = [-1.0, 0.5, 1.0, 1.5]
     index = build_index(np.array([[-5.0, 3.0, 5.0, 3.0], slanted]))
     straight, _, _ = reflectors(0.0, 0.0, math.pi / 2, index)
-    assert straight == pytest.approx(2.0 / math.sqrt(5.0))  # the slanted wall's own perpendicular, 26.6 degrees off the axis
+    assert straight == pytest.approx(
+        2.0 / math.sqrt(5.0)
+    )  # the slanted wall's own perpendicular, 26.6 degrees off the axis
     assert reflectors(3.0, 0.0, math.pi / 2, index)[0] == pytest.approx(3.0)
 
 

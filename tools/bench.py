@@ -35,7 +35,12 @@ def office(rooms: int) -> Floats:
     for k in range(rooms):
         x = 4.0 * k
         for back, front in ((0.0, 5.0), (12.5, 7.5)):
-            walls += [[x, back, x + 4, back], [x, back, x, front], [x, front, x + 1.5, front], [x + 2.4, front, x + 4, front]]
+            walls += [
+                [x, back, x + 4, back],
+                [x, back, x, front],
+                [x, front, x + 1.5, front],
+                [x + 2.4, front, x + 4, front],
+            ]
     return np.array(walls)
 
 
@@ -54,7 +59,9 @@ def shapely_rays(x: Floats, y: Floats, heading: Floats, tree: shapely.STRtree, l
     rays = shapely.linestrings(np.stack([start, end], axis=1))
     ray, wall = tree.query(rays, predicate="intersects")
     nearest = np.full(len(rays), EAR_REACH_M)
-    np.minimum.at(nearest, ray, shapely.distance(shapely.points(start[ray]), shapely.intersection(rays[ray], lines[wall])))
+    np.minimum.at(
+        nearest, ray, shapely.distance(shapely.points(start[ray]), shapely.intersection(rays[ray], lines[wall]))
+    )
     return nearest.reshape(-1, RAYS).min(1)
 
 
@@ -94,7 +101,11 @@ def rows(rounds: int) -> list[dict[str, float | str]]:
         tree.query(moves, predicate="intersects")
 
     pairs = [
-        ("weigh a cloud by one echo, peer: shapely STRtree rays", weigh, lambda: shapely_rays(x, y, heading, tree, lines)),
+        (
+            "weigh a cloud by one echo, peer: shapely STRtree rays",
+            weigh,
+            lambda: shapely_rays(x, y, heading, tree, lines),
+        ),
         ("move a cloud and see which particles cross a wall, peer: shapely STRtree", cross, shapely_cross),
     ]
     found: list[dict[str, float | str]] = []
@@ -114,7 +125,9 @@ def main() -> None:
     (options.out / "bench.json").write_text(json.dumps(found, indent=1) + "\n")
     table = Table("what", "ours", "peer", "ratio", title=f"{POSES} poses, {len(office(60))} walls, medians")
     for row in found:
-        table.add_row(str(row["name"]), *(f"{1e3 * float(row[k]):.2f} ms" for k in ("median_s", "peer_s")), f"{row['ratio']:.0f}x")
+        table.add_row(
+            str(row["name"]), *(f"{1e3 * float(row[k]):.2f} ms" for k in ("median_s", "peer_s")), f"{row['ratio']:.0f}x"
+        )
     Console().print(table)
 
 

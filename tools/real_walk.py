@@ -135,7 +135,11 @@ def write_files(out: Path, walk: Recorded, seed: int) -> None:
     """plan.json, truth.csv, settings.toml, walk.mcap."""
     out.mkdir(parents=True, exist_ok=True)
     first = walk.print_m[1] - walk.print_m[0]
-    start = {"x": walk.print_m[0, 0], "y": walk.print_m[0, 1], "heading_deg": math.degrees(math.atan2(first[1], first[0]))}
+    start = {
+        "x": walk.print_m[0, 0],
+        "y": walk.print_m[0, 1],
+        "heading_deg": math.degrees(math.atan2(first[1], first[0])),
+    }
     level = {"name": "corridor", "height_m": 0.0, "walls": np.round(corridor(walk.print_m), 3).tolist()}
     plan = {"echostep_plan": 1, "name": f"Corridor drawn around {NAME}", "levels": [level], "start": start}
     (out / "plan.json").write_text(json.dumps(plan, indent=1) + "\n")
@@ -145,7 +149,13 @@ def write_files(out: Path, walk: Recorded, seed: int) -> None:
     loaded = load_plan(out / "plan.json")
     assert loaded.start is not None
     pose = f"{loaded.start.x_m!r},{loaded.start.y_m!r},{loaded.start.heading_rad!r}"
-    about = {"note": NOTE, "start_x_y_rad": pose, "seed": str(seed), "settings_toml": SETTINGS, "plan_sha256": loaded.digest}
+    about = {
+        "note": NOTE,
+        "start_x_y_rad": pose,
+        "seed": str(seed),
+        "settings_toml": SETTINGS,
+        "plan_sha256": loaded.digest,
+    }
     with Recorder(out / "walk.mcap", about) as recorder:
         for chunk in chunks(walk, loaded, seed):
             recorder.write(chunk)
@@ -199,7 +209,9 @@ def main() -> int:
     console.print(f"2D RMSE at the {len(walk.print_t_s)} stride points, map frame, no alignment:")
     console.print(f"  foot alone       {foot_alone(walk, plan.start):.2f} m")
     console.print(f"  plan and echoes  {rmse:.2f} m   (target 0.30 m: {'met' if rmse <= 0.30 else 'missed'})")
-    console.print(f"{walk.t_s[-1]:.0f} s in {elapsed_s:.2f} s: {walk.t_s[-1] / elapsed_s:.0f} x real time; sha256 {digest(estimates)[:16]}")
+    console.print(
+        f"{walk.t_s[-1]:.0f} s in {elapsed_s:.2f} s: {walk.t_s[-1] / elapsed_s:.0f} x real time; sha256 {digest(estimates)[:16]}"
+    )
     return 0 if rmse <= 0.30 else 1
 
 

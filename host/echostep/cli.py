@@ -16,10 +16,14 @@ from echostep.errors import EchostepError
 if TYPE_CHECKING:
     from echostep.plan import Pose
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking.")
+app = typer.Typer(
+    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
+)
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
-Start = Annotated[str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")]
+Start = Annotated[
+    str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")
+]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
@@ -35,7 +39,11 @@ def demo(
     seed: Seed = 1,
     board_command: Annotated[
         str | None,
-        typer.Option("--board-command", metavar="COMMAND", help="Program that plays the sensor board; without it the Python board does."),
+        typer.Option(
+            "--board-command",
+            metavar="COMMAND",
+            help="Program that plays the sensor board; without it the Python board does.",
+        ),
     ] = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
@@ -66,7 +74,9 @@ def live(
 def record(
     board: BoardPort,
     mtx: MtxPort,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path("out/recording.mcap"),
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
+        "out/recording.mcap"
+    ),
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
 ) -> None:
     """Record both ports without tracking."""
@@ -93,7 +103,9 @@ def replay(
 
 
 @app.command()
-def decode(file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")]) -> None:
+def decode(
+    file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
+) -> None:
     """Print a capture as JSON, one message a line."""
     from echostep import runs
 

@@ -127,7 +127,8 @@ def set_level(nav: Nav, force: Floats, yaw: float) -> None:
 
 @njit(cache=True)
 def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: float, accel_bias_sd: float) -> None:
-    """Covariance after levelling: what the accelerometer's bias has tilted, the filter knows to be tilted."""
+    """At rest after levelling, with these standard deviations: what the accelerometer's bias has tilted, the filter knows to be tilted."""
+    nav.velocity[:] = 0.0
     r = rotation(nav.attitude)
     P = nav.P
     yaw_variance = P[YAW, YAW]
@@ -178,8 +179,12 @@ def _carry(P: Floats, f: Floats, r: Floats, dt: float) -> None:
             m[VEL + 1, c] -= dt * (f[2] * x - f[0] * z)
             m[VEL + 2, c] -= dt * (f[0] * y - f[1] * x)
             for i in range(3):
-                m[VEL + i, c] -= dt * (r[i, 0] * m[ACCEL_BIAS, c] + r[i, 1] * m[ACCEL_BIAS + 1, c] + r[i, 2] * m[ACCEL_BIAS + 2, c])
-                turned = dt * (r[i, 0] * m[GYRO_BIAS, c] + r[i, 1] * m[GYRO_BIAS + 1, c] + r[i, 2] * m[GYRO_BIAS + 2, c])
+                m[VEL + i, c] -= dt * (
+                    r[i, 0] * m[ACCEL_BIAS, c] + r[i, 1] * m[ACCEL_BIAS + 1, c] + r[i, 2] * m[ACCEL_BIAS + 2, c]
+                )
+                turned = dt * (
+                    r[i, 0] * m[GYRO_BIAS, c] + r[i, 1] * m[GYRO_BIAS + 1, c] + r[i, 2] * m[GYRO_BIAS + 2, c]
+                )
                 m[TILT + i, c] -= turned
             m[YAW, c] -= turned
 

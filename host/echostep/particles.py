@@ -73,13 +73,14 @@ class Cloud:
         noise = self._rng.standard_normal((3, len(self.x_m)))
         noise *= np.array([[sd], [sd], [turn_sd]])
         before = self.log_weight.copy()
-        _propagate(self.x_m, self.y_m, self.turn_rad, self.scale, self.log_weight, dx_m, dy_m, noise, walls)
-        if not np.isfinite(self.log_weight).any():
+        died = _propagate(self.x_m, self.y_m, self.turn_rad, self.scale, self.log_weight, dx_m, dy_m, noise, walls)
+        if died and not np.isfinite(self.log_weight).any():
             self.log_weight = before
             self.rescues += 1
             self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
             self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
-        self._renew()
+        if died:
+            self._renew()
 
     def weigh(
         self, axis_walk_rad: float, range_m: float | None, power: float, model: EchoModel, walls: WallIndex
@@ -104,8 +105,9 @@ class Cloud:
 def _propagate(
     x: Floats, y: Floats, turn: Floats, scale: Floats, log_weight: Floats,
     dx: float, dy: float, noise: Floats, walls: WallIndex,
-) -> None:  # fmt: skip
-    """Move every particle in place; a weight of -inf marks one that went through a wall."""
+) -> int:  # fmt: skip
+    """Move every particle in place; a weight of -inf marks one that went through a wall. Returns how many did."""
+    died = 0
     for i in range(len(x)):
         turn[i] += noise[2, i]
         c, s = math.cos(turn[i]), math.sin(turn[i])
@@ -113,7 +115,9 @@ def _propagate(
         to_y = y[i] + scale[i] * (s * dx + c * dy) + noise[1, i]
         if log_weight[i] > -np.inf and crosses_wall(x[i], y[i], to_x, to_y, walls):
             log_weight[i] = -np.inf
+            died += 1
         x[i], y[i] = to_x, to_y
+    return died
 
 
 @njit(cache=True)

@@ -178,7 +178,12 @@ def _until(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk]:
 
 
 def _finish(
-    out: Path, tracker: Tracker, estimates: list[Estimate], truth: Truth | None, title: str, elapsed_s: float | None = None
+    out: Path,
+    tracker: Tracker,
+    estimates: list[Estimate],
+    truth: Truth | None,
+    title: str,
+    elapsed_s: float | None = None,
 ) -> None:
     """Write the track and say how it went."""
     write_track(out / "track.csv", estimates)

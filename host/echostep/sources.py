@@ -103,4 +103,6 @@ def _open(url: str, baud: int) -> serial.SerialBase:
     try:
         return serial.serial_for_url(url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S)
     except (serial.SerialException, OSError, ValueError) as error:
-        raise EchostepError(f"{url}: cannot open the port: {error}; see which ports there are: ls /dev/serial/by-id") from error
+        raise EchostepError(
+            f"{url}: cannot open the port: {error}; see which ports there are: ls /dev/serial/by-id"
+        ) from error

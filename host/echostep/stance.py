@@ -37,6 +37,7 @@ PART_S, PARTS = 0.1, 5  # gyro bias: rest is cut into parts
 SWAY_S = 0.3  # the mean of a sway is as good as one part in so long
 BIAS_FLOOR_RAD_S = 1e-3
 BIAS_BELIEF = 16.0  # chi-square of one rate, four sigma
+BIAS_DOUBT = 0.2  # of the error, so that the third refusal in a row is none
 
 
 class Window(NamedTuple):
@@ -177,15 +178,12 @@ def end_rest(rest: Rest) -> None:
 
 
 @njit(cache=True)
-def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) -> None:
-    """Zero-angular-rate update after half a second of rest, weighted by how still that rest was.
-
-    Stillness measures itself: the scatter of the parts' mean rates holds the sensor's noise and the person's sway alike.
-    """
+def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) -> bool:
+    """Zero-angular-rate update after each half second of rest; true when there was one."""
     rest.part[:] += 0.5 * dt * (gyro0 + gyro1)
     rest.part_s[0] += dt
     if rest.part_s[0] < PART_S - 1e-6:
-        return
+        return False
     for i in range(3):
         rest.whole[i] += rest.part[i]
         rest.squares[0] += rest.part[i] ** 2 / rest.part_s[0]
@@ -193,13 +191,27 @@ def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) ->
     rest.part[:] = 0.0
     rest.part_s[0] = 0.0
     if rest.whole_s[0] < PARTS * PART_S - 1e-6:
-        return
-    span = rest.whole_s[0]
-    mean = rest.whole / span
-    scatter = rest.squares[0] / span - (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
-    variance = BIAS_FLOOR_RAD_S**2 + max(scatter, 0.0) / 3.0 * PARTS / (PARTS - 1) * SWAY_S / span
+        return False
+    mean = rest.whole / rest.whole_s[0]
+    _observe_bias(nav, mean, _bias_variance(rest, mean))
+    end_rest(rest)
+    return True
+
+
+@njit(cache=True)
+def _bias_variance(rest: Rest, mean: Floats) -> float:
+    """Variance of the mean rate (3,), by how still this rest was: its scatter holds the sensor's noise and the person's sway alike."""
+    span_s = rest.whole_s[0]
+    scatter = rest.squares[0] / span_s - (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
+    return BIAS_FLOOR_RAD_S**2 + max(scatter, 0.0) / 3.0 * PARTS / (PARTS - 1) * SWAY_S / span_s
+
+
+@njit(cache=True)
+def _observe_bias(nav: Nav, mean: Floats, variance: float) -> None:
+    """A mean rate that nobody believes (a foot that turns slowly) is refused, but makes the next one more credible."""
     for i in range(3):
         error = mean[i] - nav.gyro_bias[i]
         if error * error < BIAS_BELIEF * (nav.P[GYRO_BIAS + i, GYRO_BIAS + i] + variance):
             ins.observe(nav, GYRO_BIAS + i, error, variance)
-    end_rest(rest)
+        else:
+            nav.P[GYRO_BIAS + i, GYRO_BIAS + i] += (BIAS_DOUBT * error) ** 2

@@ -27,10 +27,11 @@ from echostep.settings import Settings
 from echostep.sources import BOARD, MTX, Chunk
 from echostep.timeline import Timeline
 from echostep.walls import build_index
-from echostep.xsens import MtxReader
+from echostep.xsens import MtSample, MtxReader
 
 PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
 SILENCE_S = 0.5  # a port that is this far behind the other one is not waited for
+PORTION_S = 0.0095  # the foot is fed a hundred times a second
 MAX_WAITING = 4096  # pings and legs; beyond it the oldest are given up and counted
 RANGER_AXES_RAD = (0.5 * math.pi, -0.5 * math.pi)
 
@@ -68,6 +69,8 @@ class Tracker:
         self.identity: Identity | None = None
         self._rng = np.random.default_rng(seed)
         self._model = echo_model(self.settings.echo)
+        self._samples: list[tuple[float, MtSample]] = []  # not yet fed to the foot
+        self._walked_s = -math.inf
         self._pings: list[tuple[float, int, Echo]] = []  # heap, by time
         self._pushed = 0
         self._legs: deque[Leg] = deque()
@@ -119,24 +122,27 @@ class Tracker:
             self.counts.dropped_pings += 1
 
     def _on_mtx(self, chunk: Chunk) -> None:
-        rows = []
         for sample in self.mtx.feed(chunk.data):
             t_s = self.timeline.mtx_time(sample.counter, chunk.t_arrival_ns)
             if t_s is None:
                 self.counts.bad_times += 1
             else:
-                rows.append((t_s, *sample.accel, *sample.gyro))
-        if rows:
-            table = np.array(rows)
-            self._walk(table[:, 0], table[:, 1:4], table[:, 4:7])
+                self._samples.append((t_s, sample))
+        if self._samples and self._samples[-1][0] - self._walked_s >= PORTION_S:
+            self._walked_s = self._samples[-1][0]
+            self._walk(self._samples)
+            self._samples = []
 
     # samples -> legs
 
-    def _walk(self, t_s: np.ndarray, accel: np.ndarray, gyro: np.ndarray) -> None:
+    def _walk(self, samples: list[tuple[float, MtSample]]) -> None:
+        t_s = np.array([t for t, _ in samples])
+        accel = np.array([s.accel for _, s in samples])
+        gyro = np.array([s.gyro for _, s in samples])
         for event in self.foot.feed(t_s, accel, gyro):
             self._legs += self.path.step(event) if isinstance(event, Step) else self.path.stance(event)
         if self.foot.in_stance:
-            self._legs += self.path.stand(float(t_s[-1]), self.foot.heading_rad)
+            self._legs += self.path.stand(samples[-1][0], self.foot.heading_rad)
         if self.cloud is None and self.path.heading_rad is not None:
             self.cloud = Cloud(self.settings.cloud, self.start, self.path.heading_rad, self._rng)
 

@@ -79,7 +79,9 @@ class Canvas:
 class TerminalView:
     """Shows a running tracker; `total_s` gives the progress bar its end."""
 
-    def __init__(self, tracker: Tracker, title: str, total_s: float | None = None, console: Console | None = None) -> None:
+    def __init__(
+        self, tracker: Tracker, title: str, total_s: float | None = None, console: Console | None = None
+    ) -> None:
         self._tracker = tracker
         self._title = title
         self._canvas = Canvas(tracker.plan.levels[0])
@@ -110,7 +112,11 @@ class TerminalView:
         self._drawn = now
         if self._last is not None:
             self._progress.update(self._bar, completed=self._last.t_s)
-        parts = [self._canvas.render(self._last), Text(describe(self._last)), Text(health(self._tracker), style="grey62")]
+        parts = [
+            self._canvas.render(self._last),
+            Text(describe(self._last)),
+            Text(health(self._tracker), style="grey62"),
+        ]
         if notice:
             parts.append(Text(notice, style="bold"))
         self._live.update(Panel(Group(*parts, self._progress), title=self._title, expand=False), refresh=True)

@@ -22,39 +22,47 @@ TILE_M = 1.0
 CROSS_REACH_M = 0.6  # a move is checked in pieces of at most this length
 EAR_REACH_M = 6.3  # a little more than the rangers' 6 m
 MAX_TILES = 40_000_000
-CONE_RAD = math.radians(35.0)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
+CONE_RAD = math.radians(
+    35.0
+)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
 FAR_M = 1e9  # "no reflector"
 
 
 class WallIndex(NamedTuple):
-    """Walls and, per tile, the indices of those within reach (CSR: tile k has ids[start[k]:start[k + 1]])."""
+    """Per tile, the walls within reach of a move and within earshot, and the wall ends within earshot.
 
-    walls: Floats
+    Tile k has rows start[k]:start[k + 1] of `cross` (n, 4), `ear` (n, 4) and `ends` (n, 2): copies, so that a kernel reads them in one sweep.
+    """
+
     x0_m: float
     y0_m: float
     columns: int
     rows: int
     cross_start: Ints
-    cross_ids: Ints
+    cross: Floats
     ear_start: Ints
-    ear_ids: Ints
+    ear: Floats
+    ends_start: Ints
+    ends: Floats
 
 
 def build_index(walls: Floats) -> WallIndex:
     """Index of walls (n, 4); raises EchostepError for a plan too wide for its tiles."""
     walls = np.ascontiguousarray(walls, dtype=np.float64).reshape(-1, 4)
     if not len(walls):
-        empty = np.zeros(1, np.int32)
-        return WallIndex(walls, 0.0, 0.0, 0, 0, empty, empty[:0], empty, empty[:0])
+        none = np.zeros(1, np.int32)
+        return WallIndex(0.0, 0.0, 0, 0, none, walls, none, walls, none, walls.reshape(-1, 2))
     ends = walls.reshape(-1, 2)
     low, high = ends.min(0) - EAR_REACH_M, ends.max(0) + EAR_REACH_M
     columns, rows = (np.ceil((high - low) / TILE_M).astype(int) + 1).tolist()
     if columns * rows > MAX_TILES:
         raise EchostepError(f"the plan spans {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m: are its units metres?")
     grid = (float(low[0]), float(low[1]), columns, rows)
-    cross = _tile_lists(walls, *grid, CROSS_REACH_M)
-    ear = _tile_lists(walls, *grid, EAR_REACH_M)
-    return WallIndex(walls, *grid, *cross, *ear)
+    cross_start, cross_ids = _tile_lists(walls, *grid, CROSS_REACH_M)
+    ear_start, ear_ids = _tile_lists(walls, *grid, EAR_REACH_M)
+    corners = np.unique(ends, axis=0)
+    ends_start, ends_ids = _tile_lists(np.hstack([corners, corners]), *grid, EAR_REACH_M)
+    return WallIndex(*grid, cross_start, walls[cross_ids], ear_start, walls[ear_ids], ends_start, corners[ends_ids])
 
 
 @njit(cache=True)
@@ -91,8 +99,8 @@ def _tile_lists(walls: Floats, x0: float, y0: float, columns: int, rows: int, re
 def _distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Squared distance of a point from a segment."""
     ux, uy = bx - ax, by - ay
-    s = ((px - ax) * ux + (py - ay) * uy) / (ux * ux + uy * uy)
-    s = min(max(s, 0.0), 1.0)
+    length2 = ux * ux + uy * uy
+    s = min(max(((px - ax) * ux + (py - ay) * uy) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
     dx, dy = ax + s * ux - px, ay + s * uy - py
     return dx * dx + dy * dy
 
@@ -129,8 +137,8 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
         tile = _tile(px, py, index)
         if tile < 0:
             continue
-        for j in range(index.cross_start[tile], index.cross_start[tile + 1]):
-            if segments_cross(px, py, qx, qy, index.walls[index.cross_ids[j]]):
+        for wall in index.cross[index.cross_start[tile] : index.cross_start[tile + 1]]:
+            if segments_cross(px, py, qx, qy, wall):
                 return True
     return False
 
@@ -145,65 +153,70 @@ def reflectors(px: float, py: float, axis_rad: float, index: WallIndex) -> tuple
     tile = _tile(px, py, index)
     if tile < 0:
         return FAR_M, 0.0, FAR_M
-    first, last = index.ear_start[tile], index.ear_start[tile + 1]
+    walls = index.ear[index.ear_start[tile] : index.ear_start[tile + 1]]
+    ends = index.ends[index.ends_start[tile] : index.ends_start[tile + 1]]
     ax, ay = math.cos(axis_rad), math.sin(axis_rad)
     cone = math.cos(CONE_RAD)
-    wall_m, off_cos = _nearest_facing(px, py, ax, ay, cone, first, last, index)
-    edge_m = _nearest_edge(px, py, ax, ay, cone, min(wall_m, EAR_REACH_M), first, last, index)
+    wall_m, off_cos = _nearest_facing(px, py, ax, ay, cone, walls)
+    edge_m = _nearest_edge(px, py, ax, ay, cone, min(wall_m, EAR_REACH_M), walls, ends)
     return wall_m, math.acos(min(off_cos, 1.0)), edge_m
 
 
 @njit(cache=True)
-def _nearest_facing(
-    px: float, py: float, ax: float, ay: float, cone: float, first: int, last: int, index: WallIndex
-) -> tuple[float, float]:
-    """Distance and cosine off the axis of the nearest unhidden perpendicular."""
-    nearest2, off, found = EAR_REACH_M * EAR_REACH_M, 1.0, False
-    for j in range(first, last):
-        w = index.ear_ids[j]
-        wx, wy = index.walls[w, 0], index.walls[w, 1]
-        ux, uy = index.walls[w, 2] - wx, index.walls[w, 3] - wy
-        length2 = ux * ux + uy * uy
-        along = (px - wx) * ux + (py - wy) * uy
-        if not 0.0 <= along <= length2:
-            continue
-        s = along / length2
-        fx, fy = wx + s * ux - px, wy + s * uy - py
-        d2 = fx * fx + fy * fy
-        ahead = fx * ax + fy * ay
-        if d2 >= nearest2 or ahead <= 0.0 or ahead * ahead < cone * cone * d2:
-            continue
-        if not _hidden(px, py, px + fx, py + fy, first, last, index):
-            nearest2, off, found = d2, ahead / math.sqrt(d2), True
-    return (math.sqrt(nearest2), off) if found else (FAR_M, 1.0)
+def _nearest_facing(px: float, py: float, ax: float, ay: float, cone: float, walls: Floats) -> tuple[float, float]:
+    """Distance and cosine off the axis of the nearest unhidden perpendicular: nearest first, so that few are looked for."""
+    beyond2 = 0.0
+    while True:
+        best2, best_ahead, fx, fy = EAR_REACH_M * EAR_REACH_M, -1.0, 0.0, 0.0
+        for j in range(len(walls)):
+            wx, wy = walls[j, 0], walls[j, 1]
+            ux, uy = walls[j, 2] - wx, walls[j, 3] - wy
+            length2 = ux * ux + uy * uy
+            along = (px - wx) * ux + (py - wy) * uy
+            if not 0.0 <= along <= length2:
+                continue
+            s = along / length2
+            dx, dy = wx + s * ux - px, wy + s * uy - py
+            d2 = dx * dx + dy * dy
+            ahead = dx * ax + dy * ay
+            if beyond2 < d2 < best2 and ahead > 0.0 and ahead * ahead >= cone * cone * d2:
+                best2, best_ahead, fx, fy = d2, ahead, dx, dy
+        if best_ahead < 0.0:
+            return FAR_M, 1.0
+        if not _hidden(px, py, px + fx, py + fy, walls):
+            d = math.sqrt(best2)
+            return d, best_ahead / d
+        beyond2 = best2
 
 
 @njit(cache=True)
 def _nearest_edge(
-    px: float, py: float, ax: float, ay: float, cone: float, limit: float, first: int, last: int, index: WallIndex
+    px: float, py: float, ax: float, ay: float, cone: float, limit: float, walls: Floats, ends: Floats
 ) -> float:
     """Distance of the nearest unhidden wall end in the cone, nearer than `limit`."""
-    nearest2, found = limit * limit, False
-    for j in range(first, last):
-        w = index.ear_ids[j]
-        for k in (0, 2):
-            ex, ey = index.walls[w, k] - px, index.walls[w, k + 1] - py
-            d2 = ex * ex + ey * ey
-            ahead = ex * ax + ey * ay
-            if d2 >= nearest2 or ahead <= 0.0 or ahead * ahead < cone * cone * d2:
-                continue
-            if not _hidden(px, py, px + ex, py + ey, first, last, index):
-                nearest2, found = d2, True
-    return math.sqrt(nearest2) if found else FAR_M
+    beyond2 = 0.0
+    while True:
+        best2, ex, ey = limit * limit, 0.0, 0.0
+        for j in range(len(ends)):
+            dx, dy = ends[j, 0] - px, ends[j, 1] - py
+            d2 = dx * dx + dy * dy
+            ahead = dx * ax + dy * ay
+            if beyond2 < d2 < best2 and ahead > 0.0 and ahead * ahead >= cone * cone * d2:
+                best2, ex, ey = d2, dx, dy
+        if ex == 0.0 and ey == 0.0:
+            return FAR_M
+        if not _hidden(px, py, px + ex, py + ey, walls):
+            return math.sqrt(best2)
+        beyond2 = best2
 
 
 @njit(cache=True)
-def _hidden(px: float, py: float, qx: float, qy: float, first: int, last: int, index: WallIndex) -> bool:
+def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats) -> bool:
     """Whether a wall stands between p and a point q; the last millimetre does not count, q lies on a wall itself."""
     d = math.hypot(qx - px, qy - py)
     shrink = max(0.0, 1.0 - 1e-3 / d)
     ex, ey = px + (qx - px) * shrink, py + (qy - py) * shrink
-    for j in range(first, last):
-        if segments_cross(px, py, ex, ey, index.walls[index.ear_ids[j]]):
+    for j in range(len(walls)):
+        if segments_cross(px, py, ex, ey, walls[j]):
             return True
     return False

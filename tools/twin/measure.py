@@ -106,7 +106,12 @@ def figures(seconds: int) -> list[tuple[str, str, str, bool]]:
     trigger = max(w for w, _ in worst)
     return [
         ("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
-        ("pings/s, in turn", f"{slow.counts['Ping'] / slow_span:.1f}", "14.3 by design", slow.counts["Ping"] / slow_span > 13.5),
+        (
+            "pings/s, in turn",
+            f"{slow.counts['Ping'] / slow_span:.1f}",
+            "14.3 by design",
+            slow.counts["Ping"] / slow_span > 13.5,
+        ),
         ("gyro samples/s", f"{gyros:.1f}", "200", abs(gyros - 200.0) < 1.0),
         ("worst trigger stamp", f"{trigger:.1f} us (sd {max(s for _, s in worst):.2f})", "<= 20 us", trigger <= 20.0),
         ("worst SyncOut stamp", f"{sync_worst:.1f} us (sd {sync_sd:.2f})", "<= 20 us", sync_worst <= 20.0),

@@ -1,0 +1,298 @@
+"""The foot's kernel: each sample through filter and stance detector, and the steps and stances that come of it.
+
+In: samples, and the states of `ins` and `stance`. Out: rows that `foot` turns into events. Owns the `Footing`.
+
+Until the foot has been still for a moment there is no level and no navigation; the same holds after samples were missing for too long.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from echostep import ins, stance
+from echostep.ins import POS, TILT, VEL, YAW, Nav
+from echostep.stance import Rest, Window
+
+Floats = NDArray[np.float64]
+
+CONFIRM_S = 0.03  # a stance is told after so much rest
+SETTLE_S = 0.2  # by then it has corrected the step before it
+LEAVE_S = 0.1  # and it is over after so long without rest
+GAP_S = 0.25  # the filter carries on over shorter gaps
+STRAY_SAMPLES = 20  # so many samples in a row from the past: the clock has been set back
+WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
+MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
+STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # equal readings beyond these are a sensor at its limit, not a coincidence
+LOST_SHARE = 0.3  # of such a reading may be missing
+LEVEL_S, LEVEL_RAD_S, LEVEL_M_S2 = 0.1, 0.3, 1.0  # still enough, for long enough, to take gravity from
+IMPATIENT_S = 3.0  # without such a moment, start all the same
+UNSURE_TILT_RAD, UNSURE_YAW_RAD2_S = 0.5, 1.0
+ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
+FLAT_M, FLAT_SD_M = 0.04, 0.01  # floors are level: a step that rises less is no stair, kerb or ramp
+
+STEP, STANCE = 0.0, 1.0
+EVENT_SIZE = 17  # kind, start, end, move (3), covariance (9), heading, heading sd
+EVENTS_PER_SAMPLE = 2
+ROW_SIZE = 5  # position (3), heading, in stance
+
+
+class Footing(Protocol):
+    """What is known of the foot besides its navigation: the last sample, the level, the present rest, the last step, the counts."""
+
+    t_s: float
+    force: Floats
+    rate: Floats
+    levelled: int
+    yaw_rad: float  # to level with
+    waited_s: float  # for a level
+    still_s: float
+    force_sum: Floats
+    force_count: int
+    lost_s: float  # since samples were missing
+    force_limit_s: Floats  # how long each axis has read its limit
+    rate_limit_s: Floats
+    calm_s: float
+    rest_s: float
+    rest_end_s: float
+    rest_yaw_rad: float
+    in_stance: int
+    settled: int
+    began_s: float  # the stance
+    left_s: float  # the stance before
+    under_way: int  # there was a stance before
+    origin: Floats  # position at the last step told
+    yaw_variance: float  # at the last step told
+    stray: int
+    samples: int
+    impossible: int
+    not_later: int
+    saturated: int
+    gaps: int
+    forced: int
+
+
+_NUMPY = {"float": ("f8",), "int": ("i8",), "Floats": ("f8", 3)}
+FOOTING = np.dtype([(name, *_NUMPY[kind]) for name, kind in Footing.__annotations__.items()])
+
+
+@njit(cache=True)
+def walk(
+    s: Footing, nav: Nav, window: Window, rest: Rest, height_m: float,
+    t_s: Floats, accel: Floats, gyro: Floats, events: Floats, rows: Floats,
+) -> int:  # fmt: skip
+    """Take samples t_s (n,), accel and gyro (n, 3) in turn; fills `events` (2n, EVENT_SIZE), and `rows` (n, ROW_SIZE) unless it is empty.
+
+    Returns the number of events.
+    """
+    found = 0
+    for k in range(len(t_s)):
+        if _usable(s, t_s[k], accel[k], gyro[k]):
+            dt = t_s[k] - s.t_s if s.samples > 1 else 0.0
+            if s.samples > 1 and not 0.0 < dt <= GAP_S:
+                found = _lose(s, nav, rest, dt, events, found)
+                dt = 0.0
+            stance.put(window, t_s[k], accel[k], gyro[k])
+            if s.levelled:
+                found = _navigate(s, nav, window, rest, height_m, dt, t_s[k], accel[k], gyro[k], events, found)
+            else:
+                found = _find_level(s, nav, window, dt, t_s[k], events, found)
+            s.t_s = t_s[k]
+            s.force[:] = accel[k]
+            s.rate[:] = gyro[k]
+        if len(rows):
+            rows[k, 0:3] = nav.position
+            rows[k, 3] = ins.heading(nav)
+            rows[k, 4] = s.in_stance
+    return found
+
+
+@njit(cache=True)
+def _usable(s: Footing, t_s: float, accel: Floats, gyro: Floats) -> bool:
+    """Whether this is a sample: finite, possible, later than the last one; counts those that are not."""
+    possible = math.isfinite(t_s)
+    for i in range(3):
+        possible = possible and abs(accel[i]) < MAX_ACCEL_M_S2 and abs(gyro[i]) < MAX_RATE_RAD_S  # false for NaN
+    if not possible:
+        s.impossible += 1
+        return False
+    if s.samples > 0 and t_s <= s.t_s:
+        s.stray += 1
+        if s.stray < STRAY_SAMPLES:
+            s.not_later += 1
+            return False
+    s.stray = 0
+    s.samples += 1
+    return True
+
+
+@njit(cache=True)
+def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: int) -> int:
+    """Samples are missing, or the clock was set: the stance is over, the level lost, and what the foot does until the next one unknown."""
+    s.gaps += 1
+    span_s = min(max(dt, GAP_S), 3600.0)
+    s.lost_s += span_s
+    nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, math.pi**2 / 3.0)
+    if s.in_stance:
+        found = _leave(s, nav, events, found)
+    if s.levelled:
+        s.yaw_rad = ins.heading(nav)
+    stance.end_rest(rest)
+    s.levelled = 0
+    s.still_s = s.waited_s = s.calm_s = s.rest_s = 0.0
+    return found
+
+
+@njit(cache=True)
+def _find_level(s: Footing, nav: Nav, window: Window, dt: float, t_s: float, events: Floats, found: int) -> int:
+    """Wait for a still moment to take the level from; after a while, start without."""
+    rate2, force2 = stance.activity(window, nav.gyro_bias)
+    still = rate2 < LEVEL_RAD_S**2 and force2 < LEVEL_M_S2**2
+    s.waited_s += dt
+    s.still_s = s.still_s + dt if still else 0.0
+    if s.still_s == 0.0:
+        s.force_sum[:] = 0.0
+        s.force_count = 0
+    s.force_sum += stance.mean_force(window)
+    s.force_count += 1
+    if s.still_s >= LEVEL_S - 1e-6:
+        _begin(s, nav, t_s, 0.005 + math.sqrt(force2) / ins.GRAVITY_M_S2, 0.02)
+        found = _land(s, nav, t_s - s.still_s, events, found)
+    elif s.waited_s >= IMPATIENT_S:
+        _begin(s, nav, t_s, UNSURE_TILT_RAD, WALK_M_S)
+        s.left_s = s.left_s if s.under_way else t_s
+        s.under_way = 1
+    return found
+
+
+@njit(cache=True)
+def _begin(s: Footing, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
+    """Navigate from here on; whatever the foot did while nobody watched goes into the position's covariance."""
+    ins.set_level(nav, s.force_sum / s.force_count, s.yaw_rad)
+    ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, GYRO_BIAS_RAD_S, ACCEL_BIAS_M_S2)
+    lost_s = s.lost_s + s.waited_s if s.lost_s > 0.0 else 0.0
+    for i in range(3):
+        nav.P[POS + i, POS + i] = (WALK_M_S * lost_s) ** 2
+    s.lost_s = 0.0
+    s.levelled = 1
+    s.rest_end_s = t_s
+
+
+@njit(cache=True)
+def _navigate(
+    s: Footing, nav: Nav, window: Window, rest: Rest, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats,
+    events: Floats, found: int,
+) -> int:  # fmt: skip
+    """One sample of navigation: predict, decide whether the foot rests, correct, tell."""
+    ins.predict(nav, dt, s.force, accel, s.rate, gyro)
+    _doubt_limits(s, nav, dt, accel, gyro)
+    if not _rests(s, nav, window, height_m, dt, t_s, gyro):
+        stance.end_rest(rest)
+        s.rest_s = 0.0
+        if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
+            found = _leave(s, nav, events, found)
+        return found
+    s.rest_s += dt
+    s.rest_end_s = t_s
+    s.rest_yaw_rad = ins.heading(nav)
+    if stance.learn_bias(nav, rest, dt, s.rate, gyro) or (not s.settled and s.rest_s >= SETTLE_S):
+        _settle(s, nav)
+    if not s.in_stance and s.rest_s >= CONFIRM_S - 1e-6:
+        rise_m = nav.position[2] - s.origin[2]
+        if abs(rise_m) < FLAT_M:
+            ins.observe(nav, POS + 2, -rise_m, FLAT_SD_M**2)
+        found = _land(s, nav, t_s - s.rest_s, events, found)
+    return found
+
+
+@njit(cache=True)
+def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s: float, gyro: Floats) -> bool:
+    """Whether the foot rests now; if so, the velocity has been corrected."""
+    rate2, force2 = stance.activity(window, nav.gyro_bias)
+    s.calm_s = s.calm_s + dt if stance.calm(rate2, force2) else 0.0
+    if s.calm_s == 0.0:
+        return False
+    expected = stance.rolling(nav, gyro, height_m)
+    variance = stance.rest_variance(rate2)
+    if stance.surprise(nav, expected, variance, stance.mean_force(window)) > stance.BELIEF:
+        since_s = t_s - s.rest_end_s
+        if s.calm_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
+            return False
+        s.forced += 1
+        stance.distrust(nav, since_s)
+    stance.hold(nav, expected, variance, dt)
+    return True
+
+
+@njit(cache=True)
+def _doubt_limits(s: Footing, nav: Nav, dt: float, accel: Floats, gyro: Floats) -> None:
+    """A sensor at the end of its range reads the same again and again: how far beyond the truth lies stays unknown all that time."""
+    for i in range(3):
+        s.force_limit_s[i] = s.force_limit_s[i] + dt if accel[i] == s.force[i] and abs(accel[i]) > STEEP_M_S2 else 0.0
+        s.rate_limit_s[i] = s.rate_limit_s[i] + dt if gyro[i] == s.rate[i] and abs(gyro[i]) > STEEP_RAD_S else 0.0
+        force = _limit_variance(accel[i], s.force_limit_s[i], dt)
+        rate = _limit_variance(gyro[i], s.rate_limit_s[i], dt)
+        if force + rate > 0.0:
+            s.saturated += 1
+            axis = ins.rotation(nav.attitude)[:, i]
+            for j in range(3):
+                for k in range(3):
+                    nav.P[VEL + j, VEL + k] += force * axis[j] * axis[k]
+                    nav.P[TILT + j, TILT + k] += rate * axis[j] * axis[k]
+            nav.P[YAW, YAW] += rate * axis[2] ** 2
+
+
+@njit(cache=True)
+def _limit_variance(value: float, span_s: float, dt: float) -> float:
+    """Growth over `dt` of the variance of the integral of a reading at its limit since `span_s`, its error being the same all the time."""
+    return (LOST_SHARE * value) ** 2 * (2.0 * span_s - dt) * dt if span_s > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _land(s: Footing, nav: Nav, began_s: float, events: Floats, found: int) -> int:
+    """A stance begins; the step that led to it is told, unless there was no stance before."""
+    s.in_stance = 1
+    s.settled = 0
+    s.began_s = max(began_s, s.left_s) if s.under_way else began_s
+    s.rest_yaw_rad = ins.heading(nav)
+    if s.under_way:
+        _write_step(s, nav, events[found])
+        found += 1
+    s.under_way = 1
+    s.origin[:] = nav.position
+    s.yaw_variance = nav.P[YAW, YAW]
+    return found
+
+
+@njit(cache=True)
+def _write_step(s: Footing, nav: Nav, row: Floats) -> None:
+    row[0], row[1], row[2] = STEP, s.left_s, s.began_s
+    for i in range(3):
+        row[3 + i] = nav.position[i] - s.origin[i]
+        for j in range(3):
+            row[6 + 3 * i + j] = nav.P[POS + i, POS + j]
+    row[15] = s.rest_yaw_rad
+    row[16] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
+
+
+@njit(cache=True)
+def _settle(s: Footing, nav: Nav) -> None:
+    """The errors of the next step count from here."""
+    s.settled = 1
+    ins.forget_start(nav)
+
+
+@njit(cache=True)
+def _leave(s: Footing, nav: Nav, events: Floats, found: int) -> int:
+    """The stance ended with its last rest."""
+    row = events[found]
+    row[0], row[1], row[2], row[15] = STANCE, s.began_s, max(s.rest_end_s, s.began_s), s.rest_yaw_rad
+    s.left_s = row[2]
+    s.in_stance = 0
+    if not s.settled:
+        _settle(s, nav)
+    return found + 1
