@@ -205,7 +205,7 @@ def python_message(message: Message) -> list[str]:
 
 
 def first_sentence(doc: str) -> str:
-    return doc.split(". ")[0].rstrip(".") + "."
+    return doc.split(". ", maxsplit=1)[0].rstrip(".") + "."
 
 
 def c_header(messages: list[Message]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from echostep.timeline import DeviceClock, MtxTiming, Timeline
 
 MS = 1_000_000
@@ -43,6 +42,7 @@ def test_a_restart_goes_on_by_arrival_time() -> None:
     for n in range(2_000):
         clock.at(n * 20_000, n * 10 * MS)
     after = clock.at(4_000, 25_000 * MS, restarted=True)
+    assert after is not None
     assert after == pytest.approx(25.0, abs=0.02)
     assert clock.at(24_000, 25_010 * MS) == pytest.approx(after + 0.01)
     assert clock.restarts == 1

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import pytest
 from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
-
 from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.simulation.board import BoardProcess
@@ -251,6 +250,13 @@ def test_equal_input_gives_equal_bytes() -> None:
     assert run(1) != run(2)
 
 
+def provoke(board: BoardProcess, fault: str) -> None:
+    for _ in range(100):
+        if fault:
+            board.fault(fault)
+        board.advance(quiet_rows(1))
+
+
 @pytest.mark.parametrize(
     ("arguments", "fault"), [(["--elf", "none.elf"], ""), (["--elf", str(ELF)], "nonsense=1"), ([], "")]
 )
@@ -260,10 +266,7 @@ def test_mistakes_end_the_twin_with_one_line(
     board = BoardProcess([str(TWIN), *arguments])
     try:
         with pytest.raises(EchostepError, match="ended"):
-            for _ in range(100):
-                if fault:
-                    board.fault(fault)
-                board.advance(quiet_rows(1))
+            provoke(board, fault)
     finally:
         board.close()
     assert capfd.readouterr().err.count("\n") == 1

@@ -7,7 +7,6 @@ import math
 import naive
 import numpy as np
 import pytest
-
 from echostep.errors import EchostepError
 from echostep.walls import CONE_RAD, EAR_REACH_M, FAR_M, build_index, crosses_wall, reflectors
 
@@ -23,8 +22,8 @@ def test_crossing_agrees_with_shapely() -> None:
     index = build_index(walls)
     moves = np.hstack([rng.uniform(0, 20, (400, 2)), rng.uniform(-2, 2, (400, 2))])
     moves[:, 2:] += moves[:, :2]
-    expected = [naive.crosses(*move, walls) for move in moves]
-    assert [crosses_wall(*move, index) for move in moves] == expected
+    expected = [naive.crosses(move[0], move[1], move[2], move[3], walls) for move in moves]
+    assert [crosses_wall(move[0], move[1], move[2], move[3], index) for move in moves] == expected
     assert 50 < sum(expected) < 350
 
 

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from echostep.foot import FootSettings, Step, Track, walk_track
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from scipy.io import loadmat
-
-from echostep.foot import FootSettings, Step, Track, walk_track
 
 Floats = NDArray[np.float64]
 G = 9.80665

@@ -1,7 +1,7 @@
 """A real foot on a plan: the recorded walk GX5 33 as an echostep recording, and how well it is tracked (`make real`).
 
-Real: the foot's inertial samples (200 Hz), and every footprint, surveyed with a ruler. Simulated: the plan, a corridor 2 m wide drawn around the surveyed
-path, and the echoes from its walls at the true positions. This is said in the recording and in every output.
+Real: the foot's inertial samples (200 Hz), and every footprint, surveyed with a ruler. Simulated: the plan, a corridor 2 m wide drawn around the
+surveyed path, and the echoes from its walls at the true positions. This is said in the recording and in every output.
 
 In: the folder of recordings ($ECHOSTEP_DATA or ../shared/data). Out: walk.mcap, plan.json, truth.csv, settings.toml, track.png in the folder given by
 --out, and the 2D RMSE at the stride points, for the foot alone and for the tracker.
@@ -19,10 +19,6 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
-from rich.console import Console
-from scipy.io import loadmat
-
 from echostep import messages as m
 from echostep.estimate import Estimate, digest
 from echostep.foot import Step, walk_track
@@ -38,6 +34,9 @@ from echostep.sources import BOARD, MTX, Chunk
 from echostep.tracker import Tracker
 from echostep.truth import load_truth
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+from numpy.typing import NDArray
+from rich.console import Console
+from scipy.io import loadmat
 
 Floats = NDArray[np.float64]
 NAME = "GX5 33"
@@ -53,7 +52,7 @@ console = Console()
 
 @dataclass(frozen=True)
 class Recorded:
-    """The real walk in our frames: `t_s` (n,) from 0, `accel`, `gyro` (n, 3) in body axes (x toe, z up), and the footprints: when, where (k,), (k, 2)."""
+    """The real walk: `t_s` (n,) from 0, `accel`, `gyro` (n, 3) in body axes (x toe, z up); footprints: when (k,), where (k, 2)."""
 
     t_s: Floats
     accel: Floats

@@ -66,7 +66,7 @@ def _guess_port(head: bytes) -> str | None:
     return best if found[best] else None
 
 
-NAMES = {kind: kind.__name__ for kind in BY_ID.values()}
+NAMES: dict[type, str] = {kind: kind.__name__ for kind in BY_ID.values()}
 
 
 def as_json(message: Message | MtSample) -> dict[str, Any]:

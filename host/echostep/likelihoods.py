@@ -82,7 +82,7 @@ def echo_model(settings: EchoSettings) -> EchoModel:
 
 @njit(cache=True)
 def log_echo(range_m: float, wall_m: float, off_axis_rad: float, edge_m: float, model: EchoModel) -> float:
-    """log p(range | the wall at `wall_m`, `off_axis_rad` off the axis, a wall end at `edge_m`); range 0 means no echo.
+    """Log p(range | the wall at `wall_m`, `off_axis_rad` off the axis, a wall end at `edge_m`); range 0 means no echo.
 
     A mixture in the manner of the beam model [Thrun, Burgard, Fox 2005, 6.3]: the wall or the end before it,
     something short of it, a stray echo when the wall is not heard, and a uniform rest.

@@ -34,7 +34,7 @@ class Recorder:
         """`about`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
         try:
             Path(path).parent.mkdir(parents=True, exist_ok=True)
-            self._file = Path(path).open("wb")
+            self._file = Path(path).open("wb")  # noqa: SIM115 (open as long as the recorder)
         except OSError as error:
             raise EchostepError(f"{path}: cannot write the recording: {error.strerror}") from error
         self._writer = Writer(
@@ -62,7 +62,7 @@ class Recorder:
 
     def close(self) -> None:
         """Finish the file."""
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.close()
 
     def __enter__(self) -> Self:

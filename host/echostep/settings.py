@@ -55,7 +55,7 @@ def _gather(tree: dict[str, Any]) -> Settings:
     for name, rows in tree.items():
         if name not in sections:
             raise ValueError(f"[{name}] is no section; there are {', '.join(sections)}")
-        made[name] = _section(name, rows, sections[name]())  # type: ignore[operator, misc]
+        made[name] = _section(name, rows, sections[name]())  # type: ignore[operator]
     return Settings(**made)
 
 

@@ -41,12 +41,12 @@ BIAS_DOUBT = 0.2  # of the error, so that the third refusal in a row is none
 
 
 class Window(NamedTuple):
-    """The latest samples in a ring: `t_s` (RING,), `accel` and `gyro` (RING, 3); `count` (1,) of samples ever put in."""
+    """The latest samples in a ring: `t_s` (RING,), `accel` and `gyro` (RING, 3); `taken` (1,) samples ever put in."""
 
     t_s: Floats
     accel: Floats
     gyro: Floats
-    count: NDArray[np.int64]
+    taken: NDArray[np.int64]
 
 
 class Rest(NamedTuple):
@@ -72,17 +72,17 @@ def new_rest() -> Rest:
 @njit(cache=True)
 def put(window: Window, t_s: float, accel: Floats, gyro: Floats) -> None:
     """Add a sample."""
-    at = window.count[0] % RING
+    at = window.taken[0] % RING
     window.t_s[at] = t_s
     window.accel[at] = accel
     window.gyro[at] = gyro
-    window.count[0] += 1
+    window.taken[0] += 1
 
 
 @njit(cache=True)
 def mean_force(window: Window) -> Floats:
     """Mean specific force (3,) over the window."""
-    newest, n = window.count[0] - 1, _length(window)
+    newest, n = window.taken[0] - 1, _length(window)
     mean = np.zeros(3)
     for k in range(n):
         mean += window.accel[(newest - k) % RING]
@@ -92,7 +92,7 @@ def mean_force(window: Window) -> Floats:
 @njit(cache=True)
 def _length(window: Window) -> int:
     """How many of the latest samples the window holds."""
-    newest = window.count[0] - 1
+    newest = window.taken[0] - 1
     begin = window.t_s[newest % RING] - WINDOW_S - 1e-6
     n = 1
     while n < min(newest + 1, RING) and window.t_s[(newest - n) % RING] >= begin:
@@ -103,7 +103,7 @@ def _length(window: Window) -> int:
 @njit(cache=True)
 def activity(window: Window, bias: Floats) -> tuple[float, float]:
     """Mean squared angular rate (rad/s)2, and specific force less gravity along its own mean (m/s2)2 [Skog et al. 2010, eq. 12]."""
-    newest, n = window.count[0] - 1, _length(window)
+    newest, n = window.taken[0] - 1, _length(window)
     mean = mean_force(window)
     mean *= ins.GRAVITY_M_S2 / max(math.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2), 1e-9)
     rate2, force2 = 0.0, 0.0
@@ -201,8 +201,8 @@ def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) ->
 @njit(cache=True)
 def _bias_variance(rest: Rest, mean: Floats) -> float:
     """Variance of the mean rate (3,), by how still this rest was: its scatter holds the sensor's noise and the person's sway alike."""
-    span_s = rest.whole_s[0]
-    scatter = rest.squares[0] / span_s - (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
+    span_s: float = rest.whole_s[0]
+    scatter: float = rest.squares[0] / span_s - (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
     return BIAS_FLOOR_RAD_S**2 + max(scatter, 0.0) / 3.0 * PARTS / (PARTS - 1) * SWAY_S / span_s
 
 

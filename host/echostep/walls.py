@@ -216,7 +216,7 @@ def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats) -> bool:
     d = math.hypot(qx - px, qy - py)
     shrink = max(0.0, 1.0 - 1e-3 / d)
     ex, ey = px + (qx - px) * shrink, py + (qy - py) * shrink
-    for j in range(len(walls)):
+    for j in range(len(walls)):  # noqa: SIM110 (numba)
         if segments_cross(px, py, ex, ey, walls[j]):
             return True
     return False

@@ -1,12 +1,13 @@
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
-In: the ELF and the twin. Out: two ports that `echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port is opened,
-and starts anew when it is over, until Ctrl-C. Simulated hardware, real firmware.
+In: the ELF and the twin. Out: two ports that `echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port
+is opened, and starts anew when it is over, until Ctrl-C. Simulated hardware, real firmware.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
 import subprocess
@@ -18,7 +19,6 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-
 from echostep.plan import load_plan
 from echostep.simulation.board import Sent
 from echostep.simulation.scenario import Scenario, demo_scenario
@@ -35,7 +35,9 @@ class PtyBoard:
 
     def __init__(self) -> None:
         self._child = subprocess.Popen(TWIN, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        assert self._child.stdin and self._child.stdout and self._child.stderr
+        assert self._child.stdin
+        assert self._child.stdout
+        assert self._child.stderr
         self._in: IO[bytes] = self._child.stdin
         self._out: IO[bytes] = self._child.stdout
         found = re.match(rb"board port: (\S+)", self._child.stderr.readline())
@@ -100,10 +102,8 @@ def play(scenario: Scenario, board: PtyBoard, mtx: int) -> None:
         board.advance(scenario.sensors.rows(start, start + BLOCK_MS))
         now_s = (start + BLOCK_MS) * 1e-3
         while waiting is not None and waiting[0] <= now_s:
-            try:
+            with contextlib.suppress(BlockingIOError):  # nobody reads: as with a cable that leads nowhere
                 os.write(mtx, waiting[1])
-            except BlockingIOError:
-                pass  # nobody reads: as with a cable that leads nowhere
             waiting = next(frames, None)
         ahead = began + now_s - time.monotonic()
         if ahead > 0:

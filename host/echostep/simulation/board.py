@@ -60,9 +60,13 @@ class PythonBoard:
         self._configuration = m.Configuration(0, ALL_SENSORS, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
         self._due_ms = [20.0, 20.0 + 0.5 * PERIOD_MS]
         self._grid_ms = list(self._due_ms)
-        self._triggers: list[deque[tuple[int, int, int]]] = [deque(maxlen=4), deque(maxlen=4)]  # ms, own us, cross us at the other
+        self._triggers: list[deque[tuple[int, int, int]]] = [
+            deque(maxlen=4),
+            deque(maxlen=4),
+        ]  # ms, own us, cross us at the other
         self._pending: list[int | None] = [None, None]
         self._out: Sent = []
+        self._answers: Sent = []
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let n milliseconds pass."""
@@ -83,7 +87,9 @@ class PythonBoard:
             elif isinstance(message, m.Configure):
                 rate = min(max(message.gyro_rate_hz, 10), 200)
                 compass = min(max(message.compass_rate_hz, 1), 20)
-                self._configuration = m.Configuration(0, message.sensors, message.schedule, rate, compass, message.pressure_mode)
+                self._configuration = m.Configuration(
+                    0, message.sensors, message.schedule, rate, compass, message.pressure_mode
+                )
                 self._emit(self._configuration._replace(ticks=self._ticks()))
         self._answers = self._out
 
@@ -93,8 +99,6 @@ class PythonBoard:
 
     def close(self) -> None:
         """Nothing to give back."""
-
-    _answers: Sent = []
 
     def _ticks(self, us: int = 0) -> int:
         return (self._ms * 2000 + 2 * us) & 0xFFFFFFFF
@@ -132,7 +136,7 @@ class PythonBoard:
 
     def _report(self) -> None:
         self._emit(m.Identity(self._ticks(), m.SCHEMA_HASH, 0, 0, 0, m.ResetCause.POWER_ON))
-        self._emit(m.Status(self._ticks(), *[0] * 15, healthy=0x7F, memory_used=0))
+        self._emit(m.Status(self._ticks(), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, healthy=0x7F, memory_used=0))
 
     def _range(self, ranger: int, row: Any) -> None:
         began = self._pending[ranger]
@@ -245,4 +249,6 @@ class BoardProcess:
 
     def _death(self) -> EchostepError:
         status = self._child.poll()
-        return EchostepError(f"{self._name}: the board ended ({'still running' if status is None else f'status {status}'})")
+        return EchostepError(
+            f"{self._name}: the board ended ({'still running' if status is None else f'status {status}'})"
+        )

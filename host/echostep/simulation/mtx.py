@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,25 +84,35 @@ def stream(walk: Walk, model: MtxModel, rng: np.random.Generator) -> MtxStream:
     """All samples of a walk, each the mean over its interval, as an MTx gives them."""
     period = (1.0 + model.drift_ppm * 1e-6) / model.rate_hz
     count = int((walk.t_s[-1] - 0.1) / period)
-    t = 0.05 + period * np.arange(1, count)
+    t: Floats = 0.05 + period * np.arange(1, count, dtype=np.float64)
     force, rate = (_means(v, t, period) for v in feelings(walk))
     root = math.sqrt(model.rate_hz)
-    accel = force + model.accel_bias_m_s2 * rng.standard_normal(3) + model.accel_noise * root * rng.standard_normal(force.shape)
-    gyro = rate + model.gyro_bias_rad_s * rng.standard_normal(3) + model.gyro_noise * root * rng.standard_normal(rate.shape)
+    accel = (
+        force
+        + model.accel_bias_m_s2 * rng.standard_normal(3)
+        + model.accel_noise * root * rng.standard_normal(force.shape)
+    )
+    gyro = (
+        rate
+        + model.gyro_bias_rad_s * rng.standard_normal(3)
+        + model.gyro_noise * root * rng.standard_normal(rate.shape)
+    )
     at = np.minimum((t * RATE_HZ).astype(int), len(walk.t_s) - 1)
     r = _mt_world(rotations(walk.foot_rpy_rad[at]))
     mag = np.einsum("nji,j->ni", r, FIELD) + model.mag_noise * rng.standard_normal(accel.shape)
     q = quaternions(r)
     frames = [
-        encode_frame(MTDATA, pack_mtdata(MtSample((model.first_counter + n) & 0xFFFF, tuple(a), tuple(g), tuple(m), tuple(o))))
+        encode_frame(
+            MTDATA, pack_mtdata(MtSample((model.first_counter + n) & 0xFFFF, tuple(a), tuple(g), tuple(m), tuple(o)))
+        )
         for n, (a, g, m, o) in enumerate(zip(accel.tolist(), gyro.tolist(), mag.tolist(), q.tolist(), strict=True))
     ]
     late = t + model.latency_s + model.jitter_s * rng.exponential(size=len(t))
-    arrival = np.maximum.accumulate(np.ceil(late / model.poll_s) * model.poll_s)
+    arrival: Floats = np.maximum.accumulate(np.ceil(late / model.poll_s) * model.poll_s)
     return MtxStream(t, arrival, frames)
 
 
-def _means(values: Floats, t: Floats, period: float) -> Floats:
+def _means(values: Floats, t: NDArray[Any], period: float) -> Floats:
     """Mean of 1 kHz values (n, 3) over the interval that ends at each t, exactly by the running integral."""
     integral = np.vstack([np.zeros(3), np.cumsum(values, axis=0)]) / RATE_HZ
     grid = np.arange(len(integral)) / RATE_HZ - 0.5 / RATE_HZ
@@ -122,9 +133,15 @@ def quaternions(r: Floats) -> Floats:
     columns = np.stack(
         [
             np.stack([1 + trace, r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]], -1),
-            np.stack([r[:, 2, 1] - r[:, 1, 2], 1 + squares[:, 1], r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0]], -1),
-            np.stack([r[:, 0, 2] - r[:, 2, 0], r[:, 0, 1] + r[:, 1, 0], 1 + squares[:, 2], r[:, 1, 2] + r[:, 2, 1]], -1),
-            np.stack([r[:, 1, 0] - r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1], 1 + squares[:, 3]], -1),
+            np.stack(
+                [r[:, 2, 1] - r[:, 1, 2], 1 + squares[:, 1], r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0]], -1
+            ),
+            np.stack(
+                [r[:, 0, 2] - r[:, 2, 0], r[:, 0, 1] + r[:, 1, 0], 1 + squares[:, 2], r[:, 1, 2] + r[:, 2, 1]], -1
+            ),
+            np.stack(
+                [r[:, 1, 0] - r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1], 1 + squares[:, 3]], -1
+            ),
         ],
         axis=1,
     )

@@ -21,7 +21,8 @@ BLOCK_MS = 50
 USB_LATENCY_NS = 1_000_000
 START_NS = 1_000_000_000  # the host's clock when the board is switched on
 DEMO_WAYPOINTS = (
-    (2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (24.0, 7.5), (24.0, 2.0), (17.6, 2.0), (17.6, 4.4), (17.6, 2.0), (2.0, 2.0), (2.0, 7.5), (6.0, 7.5),
+    (2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (24.0, 7.5), (24.0, 2.0), (17.6, 2.0), (17.6, 4.4), (17.6, 2.0),
+    (2.0, 2.0), (2.0, 7.5), (6.0, 7.5),
 )  # fmt: skip
 
 
@@ -83,4 +84,3 @@ class Scenario:
 def demo_scenario(plan: Plan, seed: int, board: Board) -> Scenario:
     """A minute and a half through the corridors and two rooms of the demo plan."""
     return Scenario(plan, DEMO_WAYPOINTS, seed, board)
-

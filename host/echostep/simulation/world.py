@@ -39,6 +39,9 @@ class Acoustics(NamedTuple):
     parallel_rad: float = math.radians(8.0)
 
 
+SRF02 = Acoustics()
+
+
 @dataclass(frozen=True, slots=True)
 class Echoes:
     """`own_us`, `cross_us` (n, 2): left, right; 0 where nothing is heard (see host/DESIGN.md, the bench)."""
@@ -53,7 +56,12 @@ def ranger_bias_m(rng: np.random.Generator) -> Floats:
 
 
 def echoes(
-    trunk_m: Floats, heading_rad: Floats, walls: Floats, bias_m: Floats, rng: np.random.Generator, acoustics: Acoustics = Acoustics()
+    trunk_m: Floats,
+    heading_rad: Floats,
+    walls: Floats,
+    bias_m: Floats,
+    rng: np.random.Generator,
+    acoustics: Acoustics = SRF02,
 ) -> Echoes:
     """Echoes for trunk positions (n, 2) and headings (n,); left looks to +90 degrees of the heading, right to -90."""
     n = len(heading_rad)
@@ -101,7 +109,7 @@ def _hear(
                 if d <= 0.0 or d >= nearest or off > 1.0:
                     continue
                 level = directivity_db(off, a.rim_rad) - 20.0 * math.log10(max(d, 0.1))
-                if level + level_noise < a.threshold_db or _blocked(px, py, axis, d, off, walls, w):
+                if level + level_noise < a.threshold_db or _blocked(px, py, walls, w):
                     continue
                 nearest, heard = d, d
                 facing[side], distance[side], loss[side] = w, d, directivity_db(off, a.rim_rad)
@@ -126,7 +134,7 @@ def _perpendicular(px: float, py: float, axis: float, wall: Floats) -> tuple[flo
 
 
 @njit(cache=True)
-def _blocked(px: float, py: float, axis: float, d: float, off: float, walls: Floats, but: int) -> bool:
+def _blocked(px: float, py: float, walls: Floats, but: int) -> bool:
     """Whether another wall stands before the reflecting point of wall `but`."""
     wall = walls[but]
     ux, uy = wall[2] - wall[0], wall[3] - wall[1]
