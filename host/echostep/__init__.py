@@ -1,26 +1,26 @@
 """echostep: where somebody is in a building, from a foot-mounted MTx, two ultrasonic rangers and the plan.
 
-`read_capture(path)` gives the messages of captured bytes; `Tracker` tracks. Both are loaded when first used.
+`read_capture(path)` gives the messages of captured bytes (`messages.Ping` and so on); `Tracker` tracks. All are loaded when first used.
 """
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from echostep import messages
     from echostep.capture import read_capture
     from echostep.tracker import Tracker
 
-__all__ = ["Tracker", "read_capture"]
+__all__ = ["Tracker", "messages", "read_capture"]
+
+_HOMES = {"Tracker": "echostep.tracker", "read_capture": "echostep.capture"}
 
 
 def __getattr__(name: str) -> Any:
-    if name == "read_capture":
-        from echostep.capture import read_capture
-
-        return read_capture
-    if name == "Tracker":
-        from echostep.tracker import Tracker
-
-        return Tracker
+    if name == "messages":
+        return importlib.import_module("echostep.messages")
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'echostep' has no attribute {name!r}")

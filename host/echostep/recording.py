@@ -79,6 +79,8 @@ class _WholeReads:
     file: IO[bytes]
 
     def read(self, length: int) -> bytes:
+        if not 0 <= length <= RECORD_LIMIT:
+            raise EndOfFile
         found = self.file.read(length)
         if len(found) < length:
             raise EndOfFile
