@@ -9,7 +9,7 @@ import hashlib
 import math
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from echostep.particles import Cloud
 CHI2_95 = 5.991464547107979  # two degrees of freedom
 TRACKING_M = 1.0
 LOST_M = 5.0
+WALKER_M_S = 1.5
 
 
 class Status(StrEnum):
@@ -66,8 +67,8 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]))
 
 
-def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, *, blind: bool) -> Estimate:
-    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]; `blind`: a sensor it needs has fallen silent."""
+def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int) -> Estimate:
+    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]."""
     weight = np.exp(cloud.log_weight)
     weight /= weight.sum()
     x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
@@ -76,8 +77,16 @@ def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, *, bl
     east = float(weight @ np.cos(cloud.turn_rad + walk_heading_rad))
     north = float(weight @ np.sin(cloud.turn_rad + walk_heading_rad))
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    status = Status.LOST if blind else trust(ellipse95(xx, xy, yy).major_m)
+    status = trust(ellipse95(xx, xy, yy).major_m)
     return Estimate(t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status)
+
+
+def unwatched(last: Estimate, t_s: float) -> Estimate:
+    """What is left of an estimate when the foot has been silent since: he may have walked any way at a walker's speed."""
+    more = (WALKER_M_S * max(t_s - last.t_s, 0.0)) ** 2
+    return replace(
+        last, t_s=t_s, xx_m2=last.xx_m2 + more, yy_m2=last.yy_m2 + more, heading_sd_rad=math.pi, status=Status.LOST
+    )
 
 
 def trust(radius95_m: float) -> Status:

@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.calibration import Echo, echo
 from echostep.errors import EchostepError
-from echostep.estimate import Estimate, estimate
+from echostep.estimate import Estimate, estimate, unwatched
 from echostep.foot import Foot, Step
 from echostep.frames import BoardReader
 from echostep.gait import Leg, TrunkPath
@@ -30,6 +30,7 @@ from echostep.walls import build_index
 from echostep.xsens import MtSample, MtxReader
 
 PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
+BLIND_S = 1.0
 SILENCE_S = 0.5  # a port that is this far behind the other one is not waited for
 PORTION_S = 0.0095  # the foot is fed a hundred times a second
 MAX_WAITING = 4096  # pings and legs; beyond it the oldest are given up and counted
@@ -75,6 +76,8 @@ class Tracker:
         self._pushed = 0
         self._legs: deque[Leg] = deque()
         self._t_s = 0.0  # the cloud's time
+        self._last: Estimate | None = None
+        self._told_s = -math.inf
         self._share = 0.0  # of the first leg that the cloud has gone
         self._echo_xy: list[tuple[float, float] | None] = [None, None]
         self._xy = (0.0, 0.0)  # walk frame, of the cloud's time
@@ -162,8 +165,9 @@ class Tracker:
             self._go(self.cloud, leg, leg.t1_s)
             self._legs.popleft()
             self._share = 0.0
-            estimates.append(estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, blind=self._blind()))
-        return estimates
+            self._last = estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step)
+            estimates.append(self._last)
+        return estimates + self._unwatched()
 
     def _watermark_s(self) -> float:
         """Up to this time every ping has come, by the time of the samples themselves."""
@@ -173,10 +177,13 @@ class Tracker:
         by_mtx = -math.inf if mtx is None else mtx - SILENCE_S
         return max(by_board, by_mtx)
 
-    def _blind(self) -> bool:
-        """Whether the foot has fallen silent while the board speaks."""
+    def _unwatched(self) -> list[Estimate]:
+        """Once a second while the foot is silent and the board speaks: nobody knows where he goes."""
         board, mtx = self.timeline.board_newest_s, self.timeline.mtx_newest_s
-        return board is not None and mtx is not None and board - mtx > 2.0 * SILENCE_S
+        if self._last is None or board is None or mtx is None or board - max(mtx, self._told_s) < BLIND_S:
+            return []
+        self._told_s = board
+        return [unwatched(self._last, board)]
 
     def _go(self, cloud: Cloud, leg: Leg, t_s: float) -> None:
         """Propagate along a leg up to a time; the leg's variance is spent evenly over it."""

@@ -1,0 +1,158 @@
+"""The whole pipeline on a simulated walk: accuracy, honest uncertainty, and what happens when streams fail."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from board_runs import ELF, ROOT, TWIN, needs_twin
+
+from echostep.estimate import Estimate, Status, digest
+from echostep.plan import Plan, load_plan
+from echostep.simulation.board import BoardProcess, PythonBoard
+from echostep.simulation.scenario import Scenario, demo_scenario
+from echostep.sources import BOARD, MTX, Chunk
+from echostep.tracker import Tracker
+from echostep.truth import Truth, errors
+
+PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+WAYPOINTS = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5))
+
+
+def walk(plan: Plan = PLAN, seed: int = 5) -> tuple[list[Chunk], Truth, Scenario]:
+    scenario = Scenario(plan, WAYPOINTS, seed, PythonBoard(seed))
+    return list(scenario.chunks()), Truth(scenario.walk.t_s, scenario.walk.trunk_m), scenario
+
+
+CHUNKS, TRUTH, SCENARIO = walk()
+
+
+def track(chunks: list[Chunk], seed: int = 0) -> tuple[Tracker, list[Estimate]]:
+    tracker = Tracker(PLAN, SCENARIO.start, seed=seed)
+    return tracker, [e for chunk in chunks for e in tracker.feed(chunk)]
+
+
+def test_the_walk_is_tracked() -> None:
+    tracker, found = track(CHUNKS)
+    off = errors(found, TRUTH)
+    assert off is not None
+    assert off.mean_m < 0.2
+    assert off.max_m < 0.6
+    assert off.coverage95 > 0.8
+    assert tracker.timeline.synchronised
+    assert tracker.counts.late_pings == tracker.counts.bad_times == 0
+    assert {e.status for e in found} == {Status.TRACKING}
+
+
+def test_estimates_are_in_order_and_finite() -> None:
+    _, found = track(CHUNKS)
+    assert all(b.t_s >= a.t_s for a, b in zip(found, found[1:], strict=False))
+    assert np.isfinite([(e.x_m, e.y_m, e.xx_m2, e.yy_m2, e.heading_rad) for e in found]).all()
+    assert all(e.xx_m2 * e.yy_m2 >= e.xy_m2**2 for e in found)
+
+
+def test_the_same_chunks_give_the_same_bits_and_other_seeds_others() -> None:
+    assert digest(track(CHUNKS)[1]) == digest(track(CHUNKS)[1])
+    assert digest(track(CHUNKS)[1]) != digest(track(CHUNKS, seed=1)[1])
+
+
+def test_chunks_may_be_cut_anywhere() -> None:
+    rng = random.Random(1)
+    cut = []
+    for chunk in CHUNKS:
+        at = rng.randrange(len(chunk.data) + 1)
+        cut += [replace(chunk, data=part) for part in (chunk.data[:at], chunk.data[at:]) if part]
+    assert digest(track(cut)[1]) == digest(track(CHUNKS)[1])
+
+
+def test_without_the_board_the_foot_goes_on_and_grows_less_sure() -> None:
+    half = TRUTH.t_s[-1] / 2
+    silent = [c for c in CHUNKS if c.port == MTX or c.t_arrival_ns < (1.0 + half) * 1e9]
+    _, found = track(silent)
+    _, whole = track(CHUNKS)
+    assert found[-1].t_s == pytest.approx(whole[-1].t_s, abs=1.5)
+    assert found[-1].ellipse95.major_m > whole[-1].ellipse95.major_m
+    off = errors(found, TRUTH)
+    assert off is not None
+    assert off.max_m < 1.5
+
+
+def test_without_a_board_at_all_the_plan_and_the_foot_remain() -> None:
+    _, found = track([c for c in CHUNKS if c.port == MTX])
+    assert len(found) > 10
+    assert abs(found[-1].x_m - 18.0) < 1.5
+
+
+def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
+    half_ns = int((1.0 + TRUTH.t_s[-1] / 2) * 1e9)
+    tracker, found = track([c for c in CHUNKS if c.port == BOARD or c.t_arrival_ns < half_ns])
+    assert found[-1].status == Status.LOST
+    assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
+    assert tracker.status is not None
+
+
+def test_a_fifth_of_the_samples_may_be_missing() -> None:
+    rng = random.Random(2)
+    _, found = track([c for c in CHUNKS if c.port == BOARD or rng.random() > 0.2])
+    off = errors(found, TRUTH)
+    assert off is not None
+    assert off.max_m < 1.5
+
+
+def test_noise_on_both_ports_is_survived() -> None:
+    rng = random.Random(3)
+    noisy = []
+    for chunk in CHUNKS:
+        body = bytearray(chunk.data)
+        if rng.random() < 0.02:
+            body[rng.randrange(len(body))] ^= 1 << rng.randrange(8)
+        noisy.append(replace(chunk, data=bytes(body)))
+    tracker, found = track(noisy)
+    off = errors(found, TRUTH)
+    assert off is not None
+    assert off.max_m < 1.5
+    assert tracker.board.counts.rejected > 50
+    assert tracker.mtx.counts.bad_checksum > 10
+
+
+def test_strange_ports_and_pure_noise_are_counted() -> None:
+    rng = random.Random(4)
+    tracker = Tracker(PLAN, SCENARIO.start)
+    for n in range(2_000):
+        port = rng.choice([BOARD, MTX, "kettle"])
+        assert tracker.feed(Chunk(port, n * 1_000_000, rng.randbytes(rng.randrange(200)))) == []
+    assert tracker.counts.unknown_ports > 500
+    assert tracker.board.counts.rejected > 100
+
+
+@needs_twin
+@pytest.mark.parametrize("fault", ["reset=watchdog", "usb=reset", "srf_left=absent", "sda=stuck", "thigh=absent"])
+def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
+    board = BoardProcess([str(TWIN), "--elf", str(ELF)])
+    scenario = Scenario(PLAN, WAYPOINTS, 5, board)
+    tracker = Tracker(PLAN, scenario.start)
+    found, thrown = [], False
+    for chunk in scenario.chunks():
+        if not thrown and chunk.t_arrival_ns > 9e9:
+            board.fault(fault)
+            thrown = True
+        found += tracker.feed(chunk)
+    scenario.close()
+    off = errors(found, TRUTH)
+    assert off is not None
+    assert off.max_m < 0.8
+    assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
+    assert tracker.timeline.board.restarts == (1 if fault == "reset=watchdog" else 0)
+
+
+@needs_twin
+def test_the_demo_runs_through_the_real_firmware() -> None:
+    scenario = demo_scenario(PLAN, 1, BoardProcess([str(TWIN), "--elf", str(ELF)]))
+    tracker = Tracker(PLAN, scenario.start, seed=1)
+    found = [e for chunk in scenario.chunks() for e in tracker.feed(chunk)]
+    scenario.close()
+    off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
+    assert off is not None
+    assert off.mean_m < 0.2
