@@ -28,8 +28,7 @@ ACCEL_WANDER = 1e-4  # m/s2 per root s
 GYRO_WANDER = 1e-5  # rad/s per root s
 # Scale and alignment errors act in proportion to the motion; a foot keeps its motion for about a tenth of a second.
 ACCEL_SHARE, GYRO_SHARE, MOTION_S = 0.01, 0.01, 0.1
-# What a sample interval hides: a share of the change across it, and accelerations and jerks of a swing that no sample showed.
-CHANGE_SHARE, HIDDEN_RAD_S2, HIDDEN_M_S3 = 0.1, 30.0, 300.0
+CHANGE_SHARE = 0.1  # of the change from one sample to the next is lost between them
 
 
 class Nav(NamedTuple):
@@ -160,10 +159,11 @@ def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, 
         nav.position[i] += nav.velocity[i] * dt + 0.5 * accel[i] * dt * dt
         nav.velocity[i] += accel[i] * dt
     _carry(nav.P, f, r, dt)
-    hidden = 0.125 * dt * dt
-    lost_m_s = CHANGE_SHARE * _norm(force1 - force0) * dt + HIDDEN_M_S3 * hidden
-    lost_rad = CHANGE_SHARE * _norm(rate1 - rate0) * dt + HIDDEN_RAD_S2 * hidden
-    _add_noise(nav.P, dt, accel, apply(r, rate), lost_m_s, lost_rad)
+    turn = apply(r, rate)
+    hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
+    lost_m_s = CHANGE_SHARE * _norm(force1 - force0) * dt + _norm(accel) * hidden
+    lost_rad = CHANGE_SHARE * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
+    _add_noise(nav.P, dt, accel, turn, lost_m_s, lost_rad)
 
 
 @njit(cache=True)
