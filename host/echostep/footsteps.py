@@ -29,7 +29,7 @@ WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
 STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # equal readings beyond these are a sensor at its limit, not a coincidence
 LOST_SHARE = 0.3  # of such a reading may be missing
-LEVEL_S, LEVEL_RAD_S, LEVEL_M_S2 = 0.1, 0.3, 1.0  # still enough, for long enough, to take gravity from
+LEVEL_S = 0.1  # still for long enough to take gravity from
 IMPATIENT_S = 3.0  # without such a moment, start all the same
 UNSURE_TILT_RAD, UNSURE_YAW_RAD2_S = 0.5, 1.0
 ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
@@ -56,7 +56,6 @@ class Footing(Protocol):
     lost_s: float  # since samples were missing
     force_limit_s: Floats  # how long each axis has read its limit
     rate_limit_s: Floats
-    calm_s: float
     rest_s: float
     rest_end_s: float
     rest_yaw_rad: float
@@ -143,7 +142,7 @@ def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: in
         s.yaw_rad = ins.heading(nav)
     stance.end_rest(rest)
     s.levelled = 0
-    s.still_s = s.waited_s = s.calm_s = s.rest_s = 0.0
+    s.still_s = s.waited_s = s.rest_s = 0.0
     return found
 
 
@@ -151,9 +150,8 @@ def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: in
 def _find_level(s: Footing, nav: Nav, window: Window, dt: float, t_s: float, events: Floats, found: int) -> int:
     """Wait for a still moment to take the level from; after a while, start without."""
     rate2, force2 = stance.activity(window, nav.gyro_bias)
-    still = rate2 < LEVEL_RAD_S**2 and force2 < LEVEL_M_S2**2
     s.waited_s += dt
-    s.still_s = s.still_s + dt if still else 0.0
+    s.still_s = s.still_s + dt if stance.still(rate2, force2) else 0.0
     if s.still_s == 0.0:
         s.force_sum[:] = 0.0
         s.force_count = 0
@@ -213,18 +211,18 @@ def _navigate(
 def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s: float, gyro: Floats) -> bool:
     """Whether the foot rests now; if so, the velocity has been corrected."""
     rate2, force2 = stance.activity(window, nav.gyro_bias)
-    s.calm_s = s.calm_s + dt if stance.calm(rate2, force2) else 0.0
-    if s.calm_s == 0.0:
+    s.still_s = s.still_s + dt if stance.still(rate2, force2) else 0.0
+    if not stance.calm(rate2, force2):
         return False
     expected = stance.rolling(nav, gyro, height_m)
     variance = stance.rest_variance(rate2)
     if stance.surprise(nav, expected, variance, stance.mean_force(window)) > stance.BELIEF:
         since_s = t_s - s.rest_end_s
-        if s.calm_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
+        if s.still_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
         stance.distrust(nav, since_s)
-    stance.hold(nav, expected, variance, dt)
+    stance.hold(nav, expected, variance + stance.haste_variance(force2), dt)
     return True
 
 

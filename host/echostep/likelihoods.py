@@ -80,7 +80,7 @@ def echo_model(settings: EchoSettings) -> EchoModel:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def log_echo(range_m: float, wall_m: float, off_axis_rad: float, edge_m: float, model: EchoModel) -> float:
     """Log p(range | the wall at `wall_m`, `off_axis_rad` off the axis, a wall end at `edge_m`); range 0 means no echo.
 
@@ -101,7 +101,7 @@ def log_echo(range_m: float, wall_m: float, off_axis_rad: float, edge_m: float, 
     return math.log((1.0 - model.outlier) * density + model.outlier / span)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def detection(distance_m: float, off_axis_rad: float, model: EchoModel) -> float:
     """Probability that a reflector is heard: falls off at the rim of the cone and at the end of the range."""
     if distance_m >= FAR_M or distance_m < model.minimum_m:
@@ -111,7 +111,7 @@ def detection(distance_m: float, off_axis_rad: float, model: EchoModel) -> float
     return rim * fade
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def normal(x: float, mean: float, sd: float) -> float:
     """Normal density."""
     z = (x - mean) / sd

@@ -101,7 +101,7 @@ class Cloud:
         self.log_weight = np.zeros(len(chosen))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _propagate(
     x: Floats, y: Floats, turn: Floats, scale: Floats, log_weight: Floats,
     dx: float, dy: float, noise: Floats, walls: WallIndex,
@@ -120,7 +120,7 @@ def _propagate(
     return died
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _reweight(
     x: Floats, y: Floats, turn: Floats, log_weight: Floats,
     axis: float, range_m: float, power: float, model: EchoModel, walls: WallIndex,
@@ -137,7 +137,7 @@ def _reweight(
         log_weight[i] -= top
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def effective_size(log_weight: Floats) -> float:
     """Effective number of particles, (sum w)^2 / sum w^2."""
     total, squares = 0.0, 0.0
@@ -148,7 +148,7 @@ def effective_size(log_weight: Floats) -> float:
     return total * total / squares if squares > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def systematic(weight: Floats, draw: float) -> Ints:
     """Indices of systematic resampling for weights (n,) and one uniform draw in [0, 1)."""
     n = len(weight)

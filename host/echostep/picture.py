@@ -35,7 +35,7 @@ def draw_track(path: Path, level: Level, estimates: Sequence[Estimate], truth: T
     from matplotlib.figure import Figure
     from matplotlib.patches import Ellipse as Patch
 
-    figure = Figure(figsize=(10, 6.5), dpi=120, layout="constrained")
+    figure = Figure(figsize=(10, _height(level)), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(aspect="equal", title=title, xlabel="x / m", ylabel="y / m")
     axes.add_collection(LineCollection(list(level.walls.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
@@ -59,6 +59,14 @@ def draw_track(path: Path, level: Level, estimates: Sequence[Estimate], truth: T
     axes.autoscale_view()
     axes.legend(loc="upper right", fontsize=8)
     figure.savefig(path)
+
+
+def _height(level: Level) -> float:
+    """Inches that suit the plan's shape at a width of ten."""
+    if not len(level.walls):
+        return 6.5
+    width, height = np.ptp(level.walls.reshape(-1, 2), axis=0)
+    return float(np.clip(1.0 + 9.2 * height / max(width, 1e-9), 4.0, 12.0))
 
 
 def _spread(estimates: Sequence[Estimate], most: int) -> Sequence[Estimate]:

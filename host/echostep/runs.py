@@ -32,6 +32,7 @@ from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 
+DEMO_PACE = 8.0
 BAUD = {BOARD: 115200, MTX: 115200}
 console = Console()
 
@@ -54,7 +55,8 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
         tracker = Tracker(plan, scenario.start, seed=seed)
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
         with Recorder(out / "walk.mcap", about) as recorder:
-            estimates = _run(tracker, _kept(scenario.chunks(), recorder), "echostep demo (simulated)", truth, headless)
+            chunks = scenario.chunks() if headless else _paced(scenario.chunks())
+            estimates = _run(tracker, _kept(chunks, recorder), "echostep demo (simulated)", truth, headless)
     finally:
         scenario.close()
     _finish(out, tracker, estimates, truth, "simulated walk")
@@ -153,6 +155,17 @@ def _run(tracker: Tracker, chunks: Iterable[Chunk], title: str, truth: Truth | N
         except KeyboardInterrupt:
             pass
     return estimates
+
+
+def _paced(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
+    """Not faster than `DEMO_PACE` times real time, so that one can watch."""
+    began, first_ns = time.monotonic(), None
+    for chunk in chunks:
+        first_ns = chunk.t_arrival_ns if first_ns is None else first_ns
+        ahead_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / DEMO_PACE - (time.monotonic() - began)
+        if ahead_s > 0.02:
+            time.sleep(ahead_s)
+        yield chunk
 
 
 def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:

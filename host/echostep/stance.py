@@ -26,12 +26,13 @@ Floats = NDArray[np.float64]
 RING = 32  # samples
 WINDOW_S = 0.03
 CALM_RAD_S, CALM_M_S2 = 1.6, 6.0  # rms over the window; the statistic is 1 on the ellipse between them
+STILL_RAD_S, STILL_M_S2 = 0.3, 1.0  # rms of a foot that nobody moves on purpose
 BELIEF = 22.5  # chi-square of three velocities and three accelerations, exceeded once in a thousand stances
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
-LASTING_S = 0.2  # no swing is calm for so long: this stance is real, the velocity is not
+LASTING_S = 0.2  # no swing is still for so long: this stance is real, the velocity is not
 OVERDUE_S = 2.0  # nor does a swing last so long
 LEVER_M = 0.1  # the foot's point of contact is known to within the foot
-STILL_M_S = 0.005
+REST_M_S = 0.005
 KEPT_S = 0.1  # the velocity's error is the same for so long: more samples in that time say no more
 PART_S, PARTS = 0.1, 5  # gyro bias: rest is cut into parts
 SWAY_S = 0.3  # the mean of a sway is as good as one part in so long
@@ -122,6 +123,12 @@ def calm(rate2: float, force2: float) -> bool:
 
 
 @njit(cache=True)
+def still(rate2: float, force2: float) -> bool:
+    """Whether the foot is hardly moving at all."""
+    return rate2 < STILL_RAD_S**2 and force2 < STILL_M_S2**2
+
+
+@njit(cache=True)
 def rolling(nav: Nav, gyro: Floats, height_m: float) -> Floats:
     """Velocity (3,) of a sensor at this height above the contact of a foot that rolls without sliding: rate x height."""
     rate = ins.apply(ins.rotation(nav.attitude), gyro - nav.gyro_bias)
@@ -147,7 +154,13 @@ def surprise(nav: Nav, expected: Floats, variance: float, force: Floats) -> floa
 @njit(cache=True)
 def rest_variance(rate2: float) -> float:
     """Variance (m/s)2 of the velocity of a standing foot about `rolling`."""
-    return STILL_M_S**2 + LEVER_M**2 * rate2
+    return REST_M_S**2 + LEVER_M**2 * rate2
+
+
+@njit(cache=True)
+def haste_variance(force2: float) -> float:
+    """Variance (m/s)2 that comes on top while the foot may still be stopping: what its acceleration does within the window."""
+    return WINDOW_S**2 * force2
 
 
 @njit(cache=True)

@@ -38,6 +38,7 @@ class Canvas:
         self._rows = math.ceil((extent[1] * self._scale + 1) / 4)
         self._walls = np.zeros((self._rows, self._columns), np.uint8)
         self._track = np.zeros_like(self._walls)
+        self._last: Estimate | None = None
         for x0, y0, x1, y1 in level.walls:
             self.line(self._walls, x0, y0, x1, y1)
 
@@ -48,8 +49,9 @@ class Canvas:
             self._dot(layer, x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps)
 
     def walked(self, estimate: Estimate) -> None:
-        """Add a place to the track."""
-        self._dot(self._track, estimate.x_m, estimate.y_m)
+        """Go on with the track to a place."""
+        before, self._last = self._last or estimate, estimate
+        self.line(self._track, before.x_m, before.y_m, estimate.x_m, estimate.y_m)
 
     def _dot(self, layer: NDArray[np.uint8], x: float, y: float) -> None:
         column, row = self._place(x, y)

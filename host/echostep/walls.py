@@ -65,7 +65,7 @@ def build_index(walls: Floats) -> WallIndex:
     return WallIndex(*grid, cross_start, walls[cross_ids], ear_start, walls[ear_ids], ends_start, corners[ends_ids])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _tile_lists(walls: Floats, x0: float, y0: float, columns: int, rows: int, reach: float) -> tuple[Ints, Ints]:
     """CSR lists of the walls within `reach` of any point of each tile."""
     limit = reach + TILE_M * math.sqrt(0.5)
@@ -95,7 +95,7 @@ def _tile_lists(walls: Floats, x0: float, y0: float, columns: int, rows: int, re
     return start, ids
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Squared distance of a point from a segment."""
     ux, uy = bx - ax, by - ay
@@ -105,7 +105,7 @@ def _distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float)
     return dx * dx + dy * dy
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _tile(x: float, y: float, index: WallIndex) -> int:
     """Number of the tile that holds a point; -1 outside, and for a point that is not finite."""
     if not (index.x0_m <= x < index.x0_m + index.columns * TILE_M):
@@ -115,10 +115,10 @@ def _tile(x: float, y: float, index: WallIndex) -> int:
     return int((y - index.y0_m) / TILE_M) * index.columns + int((x - index.x0_m) / TILE_M)
 
 
-@njit(cache=True)
-def segments_cross(ax: float, ay: float, bx: float, by: float, wall: Floats) -> bool:
-    """Whether the segment a-b meets a wall; touching counts."""
-    cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
+@njit(cache=True, error_model="numpy")
+def segments_cross(ax: float, ay: float, bx: float, by: float, walls: Floats, j: int) -> bool:
+    """Whether the segment a-b meets wall j; touching counts."""
+    cx, cy, dx, dy = walls[j, 0], walls[j, 1], walls[j, 2], walls[j, 3]
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
     d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
@@ -126,7 +126,7 @@ def segments_cross(ax: float, ay: float, bx: float, by: float, wall: Floats) -> 
     return d1 * d2 <= 0.0 and d3 * d4 <= 0.0 and (d1 != 0.0 or d2 != 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -> bool:
     """Whether a move from a to b goes through any wall."""
     length = math.hypot(bx - ax, by - ay)
@@ -137,13 +137,13 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
         tile = _tile(px, py, index)
         if tile < 0:
             continue
-        for wall in index.cross[index.cross_start[tile] : index.cross_start[tile + 1]]:
-            if segments_cross(px, py, qx, qy, wall):
+        for j in range(index.cross_start[tile], index.cross_start[tile + 1]):
+            if segments_cross(px, py, qx, qy, index.cross, j):
                 return True
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def reflectors(px: float, py: float, axis_rad: float, index: WallIndex) -> tuple[float, float, float]:
     """Distance and off-axis angle of the nearest wall that faces the ranger, and distance of the nearest visible wall end.
 
@@ -162,7 +162,7 @@ def reflectors(px: float, py: float, axis_rad: float, index: WallIndex) -> tuple
     return wall_m, math.acos(min(off_cos, 1.0)), edge_m
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _nearest_facing(px: float, py: float, ax: float, ay: float, cone: float, walls: Floats) -> tuple[float, float]:
     """Distance and cosine off the axis of the nearest unhidden perpendicular: nearest first, so that few are looked for."""
     beyond2 = 0.0
@@ -189,7 +189,7 @@ def _nearest_facing(px: float, py: float, ax: float, ay: float, cone: float, wal
         beyond2 = best2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _nearest_edge(
     px: float, py: float, ax: float, ay: float, cone: float, limit: float, walls: Floats, ends: Floats
 ) -> float:
@@ -210,13 +210,13 @@ def _nearest_edge(
         beyond2 = best2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats) -> bool:
     """Whether a wall stands between p and a point q; the last millimetre does not count, q lies on a wall itself."""
     d = math.hypot(qx - px, qy - py)
     shrink = max(0.0, 1.0 - 1e-3 / d)
     ex, ey = px + (qx - px) * shrink, py + (qy - py) * shrink
     for j in range(len(walls)):  # noqa: SIM110 (numba)
-        if segments_cross(px, py, ex, ey, walls[j]):
+        if segments_cross(px, py, ex, ey, walls, j):
             return True
     return False
