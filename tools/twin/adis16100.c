@@ -11,6 +11,7 @@
 #define OFFSET_BINARY 0x0010u
 #define MAX_HERTZ 2500000u
 #define TEMPERATURE_25C 0
+#define FALLING_EDGE(mode) ((mode) == 1 || (mode) == 2)
 #define MID_SCALE 2048
 
 static struct gyro {
@@ -19,6 +20,7 @@ static struct gyro {
 	int channel_of_row;
 	bool absent, wrong_channel;
 	uint16_t control, answer, incoming, count;
+	bool garbled; /* the processor's edges are not the chip's */
 } gyros[3] = { { .name = "thigh", .channel_of_row = 0 }, { .name = "calf", .channel_of_row = 1 }, { .name = "belt", .channel_of_row = 2 } };
 
 static uint16_t convert(const struct gyro *g)
@@ -45,8 +47,13 @@ static void on_select(struct spi_device *self, bool on)
 		g->answer = convert(g);
 	}
 	g->count = 0;
-	if (on && spi_hertz() > MAX_HERTZ)
+	if (!on)
+		return;
+	g->garbled = spi_hertz() > MAX_HERTZ || !FALLING_EDGE(spi_mode());
+	if (spi_hertz() > MAX_HERTZ)
 		bench_trace("adis16100 too fast");
+	else if (g->garbled)
+		bench_trace("adis16100 wrong mode");
 }
 
 static uint8_t on_exchange(struct spi_device *self, uint8_t out)
@@ -54,12 +61,16 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 	struct gyro *g = (struct gyro *)self;
 	uint8_t in = (uint8_t)(g->count == 0 ? g->answer >> 8 : g->answer);
 
+	if (g->garbled) { /* everything is a bit late */
+		in = (uint8_t)(in >> 1);
+		out = (uint8_t)(out >> 1);
+	}
 	g->incoming = (uint16_t)(g->incoming << 8 | out);
 	g->count++;
 	return g->absent ? 0xFF : in;
 }
 
-void adis16100_start(void)
+void adis16100_power(void)
 {
 	for (int k = 0; k < 3; k++) {
 		struct gyro *g = &gyros[k];

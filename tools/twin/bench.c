@@ -7,7 +7,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 
 #include "twin.h"
@@ -56,10 +55,15 @@ void bench_sent(const uint8_t *bytes, unsigned length)
 {
 	if (!length)
 		return;
-	if (!pty_wanted())
+	if (pty_wanted())
+		pty_write(bytes, length);
+	else
 		put_record('B', bytes, length);
-	else if (!pty_write(bytes, length))
-		usb_host_stall(true); /* until there is room again: pty_poll */
+}
+
+bool bench_has_room(void)
+{
+	return !pty_wanted() || pty_has_room();
 }
 
 void bench_trace(const char *format, ...)
@@ -97,7 +101,13 @@ static bool read_all(int fd, void *into, size_t length)
 
 static void set_sync(bool level)
 {
-	avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), 4), level);
+	drive_pin('D', 4, level);
+}
+
+/* The pulse under way is cut short: its timer is gone. */
+void bench_reset(void)
+{
+	set_sync(false);
 }
 
 static avr_cycle_count_t sync_fall(avr_t *a, avr_cycle_count_t when, void *param)
@@ -214,8 +224,9 @@ void bench_run(int in, int out)
 		case 'R': advance(body, head.length); break;
 		case 'H': usb_host_send(body, head.length); break;
 		case 'F': switch_fault((char *)body); break;
-		case 'Q': return;
-		default: fail("unknown record '%c'", head.kind);
+		case 'Q': flush(); return;
+		default: fail("unknown record 0x%02x", head.kind);
 		}
 	}
+	fail("the input ends without a record Q");
 }

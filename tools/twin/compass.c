@@ -38,7 +38,7 @@ static uint8_t on_read(struct twi_device *self)
 	}
 }
 
-void compass_start(void)
+void compass_power(void)
 {
 	if (!twi.start) {
 		twi = (struct twi_device){ 0x60, on_start, on_write, on_read, NULL, 0, NULL };

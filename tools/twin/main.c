@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * echostep-twin: runs the firmware's ELF on a board that is fed by the bench protocol on standard input. */
+#include <elf.h>
 #include <getopt.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -9,6 +10,7 @@
 #include <unistd.h>
 
 #include <simavr/avr_extint.h>
+#include <simavr/avr_ioport.h>
 #include <simavr/sim_elf.h>
 #include <simavr/sim_interrupts.h>
 
@@ -25,6 +27,7 @@ uint64_t random_state = 1;
 
 static elf_firmware_t firmware;
 static uint8_t next_cause = POWER_ON;
+static bool with_pty;
 static bool powered = true;
 
 void fail(const char *format, ...)
@@ -62,6 +65,15 @@ avr_int_vector_t *vector(int number)
 	fail("this simavr has no interrupt vector %d", number);
 }
 
+/* simavr forgets what drives a pin as soon as the program writes to its port with the pull-up on, unless it is told that way too. */
+void drive_pin(char port, uint8_t pin, bool level)
+{
+	avr_ioport_external_t outside = { .name = (unsigned)port & 0x7Fu, .mask = (uint8_t)(1u << pin), .value = (uint8_t)((unsigned)level << pin) };
+
+	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
+	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
+}
+
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write)
 {
 	avr_io_addr_t io = AVR_DATA_TO_IO(address);
@@ -76,16 +88,34 @@ void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t wri
 	}
 }
 
+static void power_devices(void)
+{
+	srf02_power();
+	adis16100_power();
+	scp1000_power();
+	compass_power();
+}
+
+/* RAM holds nothing in particular. */
+static void scramble_memory(void)
+{
+	memset(avr->data + avr->ioend + 1, 0xA5, (size_t)(avr->ramend - avr->ioend));
+}
+
 /* What follows every reset, whoever caused it: simavr has forgotten all timers. */
 static void after_reset(avr_t *a)
 {
 	a->data[MCUSR] = next_cause;
 	bench_trace("reset %s", next_cause == POWER_ON ? "power" : next_cause == WATCHDOG ? "watchdog" : "external");
+	bench_reset();
+	usb_device_reset();
+	twi_reset();
+	spi_reset();
+	if (next_cause == POWER_ON)
+		power_devices();
+	else
+		scp1000_resume();
 	next_cause = WATCHDOG; /* the only one that nobody announces */
-	srf02_start();
-	adis16100_start();
-	scp1000_start();
-	compass_start();
 	usb_host_start();
 }
 
@@ -101,8 +131,10 @@ void board_power(bool on)
 		return;
 	powered = on;
 	usb_host_unplug();
+	if (with_pty)
+		(on ? pty_open : pty_close)();
 	if (on) {
-		memset(avr->data + avr->ioend + 1, 0xA5, avr->ramend - avr->ioend); /* RAM holds nothing in particular */
+		scramble_memory();
 		board_reset(POWER_ON);
 	}
 }
@@ -110,6 +142,15 @@ void board_power(bool on)
 bool board_has_power(void)
 {
 	return powered;
+}
+
+/* What goes wrong is told once, by `fail`. */
+static void no_log(avr_t *a, const int level, const char *format, va_list arguments)
+{
+	(void)a;
+	(void)level;
+	(void)format;
+	(void)arguments;
 }
 
 static void no_sleep(avr_t *a, avr_cycle_count_t cycles)
@@ -127,19 +168,36 @@ static void entered(struct avr_irq_t *irq, uint32_t running, void *param)
 		avr->cycle += 4;
 }
 
+/* simavr loads anything that it can open. */
+static void check_elf(const char *path)
+{
+	Elf32_Ehdr head = { .e_machine = EM_NONE };
+	FILE *file = fopen(path, "rb");
+
+	if (!file)
+		fail("%s: cannot read the firmware; build it with: make firmware", path);
+	if (fread(&head, sizeof head, 1, file) != 1 || memcmp(head.e_ident, ELFMAG, SELFMAG) || head.e_machine != EM_AVR)
+		fail("%s: not a program for an AVR", path);
+	fclose(file);
+}
+
 static void make_board(const char *path)
 {
-	if (access(path, R_OK) || elf_read_firmware(path, &firmware))
-		fail("%s: cannot read the firmware; build it with: make firmware", path);
+	check_elf(path);
+	if (elf_read_firmware(path, &firmware) || !firmware.flashsize)
+		fail("%s: holds no program", path);
 	strcpy(firmware.mmcu, MCU);
 	firmware.frequency = FREQUENCY;
 	avr = avr_make_mcu_by_name(MCU);
 	if (!avr)
 		fail("this simavr does not know the " MCU);
 	avr_init(avr);
-	avr->log = LOG_ERROR;
+	avr_global_logger_set(no_log);
 	avr->frequency = FREQUENCY;
+	if (firmware.flashsize > avr->flashend + 1)
+		fail("%s: %u bytes do not fit into the flash", path, firmware.flashsize);
 	avr_load_firmware(avr, &firmware);
+	scramble_memory();
 	avr->sleep = no_sleep;
 	usb_device_init();
 	twi_init();
@@ -152,6 +210,16 @@ static void make_board(const char *path)
 	after_reset(avr);
 }
 
+static uint64_t seed_of(const char *text)
+{
+	char *end;
+	uint64_t seed = strtoull(text, &end, 0);
+
+	if (end == text || *end)
+		fail("--seed %s: not a number", text);
+	return seed;
+}
+
 int main(int argc, char **argv)
 {
 	static const struct option options[] = {
@@ -162,20 +230,21 @@ int main(int argc, char **argv)
 		{ NULL, 0, NULL, 0 },
 	};
 	const char *elf = NULL;
-	bool pty = false;
 	int option;
 
 	while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
 		switch (option) {
 		case 'e': elf = optarg; break;
-		case 's': random_state = strtoull(optarg, NULL, 0); break;
-		case 'p': pty = true; break;
+		case 's': random_state = seed_of(optarg); break;
+		case 'p': with_pty = true; break;
 		case 'h':
 			printf("echostep-twin --elf FILE [--seed N] [--pty]\nThe bench protocol on standard input and output; see README.md.\n");
 			return 0;
 		default: return 2;
 		}
 	}
+	if (optind < argc)
+		fail("'%s' is not an option; see --help", argv[optind]);
 	if (!elf)
 		fail("say which firmware: --elf firmware/build/echostep.elf");
 	signal(SIGPIPE, SIG_IGN);
@@ -184,10 +253,10 @@ int main(int argc, char **argv)
 
 	if (out < 0 || !freopen("/dev/null", "w", stdout))
 		fail("cannot set up the output");
-	if (pty)
-		pty_open();
-	usb_host_open(!pty);
+	usb_host_open(!with_pty);
 	make_board(elf);
+	if (with_pty)
+		pty_open();
 	bench_run(STDIN_FILENO, out);
 	return 0;
 }

@@ -5,7 +5,6 @@
  * DATARD16 is read. Writing 1 to RSTR starts it anew. DRDY is wired to PE6. */
 #include <string.h>
 
-#include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 
 #include "twin.h"
@@ -17,28 +16,30 @@ enum { OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 
 #define SLOW US(556000)
 
 static struct spi_device spi;
-static bool absent, no_eeprom, drdy_stuck, ready;
+static bool absent, no_eeprom, drdy_stuck, ready, garbled;
 static uint8_t command, count, answer[2], mode;
-static avr_cycle_count_t up_at;
+static avr_cycle_count_t up_at, sample_at;
 static uint32_t pressure;
 static int16_t temperature;
 
 static void set_ready(bool on)
 {
 	ready = on;
-	avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('E'), 6), (on || drdy_stuck) && !absent);
+	drive_pin('E', 6, (on || drdy_stuck) && !absent);
 }
 
 static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	(void)a;
 	(void)param;
+	sample_at = 0;
 	if (mode != 0x09 && mode != 0x0A)
 		return 0;
 	pressure = mode == 0x09 ? row.pressure & ~15u : row.pressure & ~3u; /* 15 and 17 bits of the 19 */
 	temperature = row.temperature;
 	set_ready(true);
-	return when + (mode == 0x09 ? FAST : SLOW);
+	sample_at = when + (mode == 0x09 ? FAST : SLOW);
+	return sample_at;
 }
 
 static void load(uint8_t address)
@@ -63,23 +64,32 @@ static void on_select(struct spi_device *self, bool on)
 {
 	(void)self;
 	count = 0;
-	if (on && spi_hertz() > MAX_HERTZ)
+	if (!on)
+		return;
+	garbled = spi_hertz() > MAX_HERTZ || spi_mode() != 0;
+	if (spi_hertz() > MAX_HERTZ)
 		bench_trace("scp1000 too fast");
-	if (on && spi_mode() != 0)
+	else if (garbled)
 		bench_trace("scp1000 wrong mode");
+}
+
+static void plan_sample(avr_cycle_count_t at)
+{
+	sample_at = at;
+	avr_cycle_timer_register(avr, at - avr->cycle, sample, NULL);
 }
 
 static void restart(void)
 {
 	mode = 0;
+	sample_at = 0;
 	up_at = avr->cycle + START_UP;
 	avr_cycle_timer_cancel(avr, sample, NULL);
 	set_ready(false);
 }
 
-static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+static uint8_t exchange(uint8_t out)
 {
-	(void)self;
 	if (absent)
 		return 0xFF;
 	if (count++ == 0) {
@@ -94,14 +104,20 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 		} else if (command >> 2 == OPERATION && out != mode) {
 			mode = out;
 			avr_cycle_timer_cancel(avr, sample, NULL);
-			avr_cycle_timer_register(avr, mode == 0x0A ? SLOW : FAST, sample, NULL);
+			plan_sample(avr->cycle + (mode == 0x0A ? SLOW : FAST));
 		}
 		return 0;
 	}
 	return count <= 3 ? answer[count - 2] : 0;
 }
 
-void scp1000_start(void)
+static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+{
+	(void)self;
+	return garbled ? (uint8_t)(exchange((uint8_t)(out >> 1)) >> 1) : exchange(out); /* everything is a bit late */
+}
+
+void scp1000_power(void)
 {
 	if (!spi.select) {
 		spi = (struct spi_device){ 'D', 7, on_select, on_exchange, false, NULL };
@@ -109,6 +125,17 @@ void scp1000_start(void)
 	}
 	spi.selected = false;
 	restart();
+}
+
+/* The processor was reset, the chip was not. */
+void scp1000_resume(void)
+{
+	bool level = ready;
+
+	set_ready(false);
+	set_ready(level);
+	if (sample_at > avr->cycle)
+		plan_sample(sample_at);
 }
 
 bool scp1000_fault(const char *name, const char *value)

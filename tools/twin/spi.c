@@ -8,6 +8,7 @@
 #include "twin.h"
 
 enum { SPCR = 0x4C, SPSR, SPDR };
+enum { SPE = 0x40, MSTR = 0x10 };
 #define VECTOR 24
 
 static struct spi_device *devices;
@@ -50,6 +51,8 @@ static void write_byte(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
 {
 	(void)at;
 	(void)param;
+	if ((a->data[SPCR] & (SPE | MSTR)) != (SPE | MSTR))
+		return;
 	avr_regbit_clear(a, vector(VECTOR)->raised);
 	outgoing = value;
 	avr_cycle_timer_register(a, divisor() * 8 + 1, done, NULL);
@@ -72,9 +75,15 @@ void spi_init(void)
 	input = avr_io_getirq(avr, AVR_IOCTL_SPI_GETIRQ(0), SPI_IRQ_INPUT);
 }
 
+void spi_reset(void)
+{
+	for (struct spi_device *d = devices; d; d = d->next)
+		select_changed(NULL, 1, d); /* the pins are inputs now, and the chips pull them up */
+}
+
 void spi_add(struct spi_device *device)
 {
 	device->next = devices;
 	devices = device;
-	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(device->port), device->pin), select_changed, device);
+	avr_irq_register_notify(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(device->port), device->pin), select_changed, device);
 }

@@ -27,7 +27,7 @@ static struct ranger {
 	const char *name;
 	int side;
 	bool absent, refuses, stretches;
-	uint8_t pointer, written[2], count;
+	uint8_t pointer, written[2], count, sequence; /* of an address change */
 	avr_cycle_count_t busy_until, began;
 	bool emitted, listening;
 	uint8_t unit;
@@ -62,9 +62,12 @@ static void finish(struct ranger *r)
 
 static void begin(struct ranger *r, uint8_t command)
 {
+	struct ranger *other = &rangers[1 - r->side];
 	bool burst = command != 0x56 && command != 0x57 && command != 0x58;
 
-	if (command == 0x5C || burst) {
+	if (other->listening && avr->cycle >= other->busy_until)
+		finish(other); /* before it forgets the pings that it heard */
+	if (burst) {
 		r->pings[r->next_ping++ % PINGS] = (struct ping){ avr->cycle, row.cross_us[1 - r->side] };
 		bench_trace("trigger %s", r->name);
 	}
@@ -106,30 +109,36 @@ static bool on_write(struct twi_device *self, uint8_t byte)
 static uint8_t on_read(struct twi_device *self)
 {
 	struct ranger *r = (struct ranger *)self;
-	uint8_t registers[6] = { REVISION, UNUSED, (uint8_t)(r->result >> 8), (uint8_t)r->result, 0, 15 };
+	const uint8_t registers[6] = { REVISION, UNUSED, (uint8_t)(r->result >> 8), (uint8_t)r->result, 0, 15 };
 
 	return registers[r->pointer++ % 6];
+}
+
+static uint8_t next_in_sequence(uint8_t sequence, uint8_t command)
+{
+	if (command == 0xA0)
+		return 1;
+	return command == 0xAA && sequence == 1 ? 2 : command == 0xA5 && sequence == 2 ? 3 : 0;
 }
 
 /* Commands take effect at the stop condition. Address change: A0, AA, A5, then the new 8-bit address, one command each. */
 static void on_stop(struct twi_device *self)
 {
-	static uint8_t sequence;
 	struct ranger *r = (struct ranger *)self;
 	uint8_t command = r->written[1];
 
 	if (r->count == 2 && r->written[0] == COMMAND) {
 		if ((command >= 0x50 && command <= 0x52) || (command >= 0x56 && command <= 0x58) || command == 0x5C)
 			begin(r, command);
-		else if (sequence == 3)
+		else if (r->sequence == 3 && command >= 0xE0 && !(command & 1))
 			self->address = command >> 1;
-		sequence = command == 0xA0 ? 1 : command == 0xAA && sequence == 1 ? 2 : command == 0xA5 && sequence == 2 ? 3 : 0;
+		r->sequence = next_in_sequence(r->sequence, command);
 	}
 	r->count = 0;
 	self->stretch = 0;
 }
 
-void srf02_start(void)
+void srf02_power(void)
 {
 	for (int k = 0; k < 2; k++) {
 		struct ranger *r = &rangers[k];
@@ -140,7 +149,7 @@ void srf02_start(void)
 		}
 		r->listening = false;
 		r->busy_until = 0;
-		r->count = 0;
+		r->count = r->sequence = 0;
 		memset(r->pings, 0, sizeof r->pings);
 	}
 }

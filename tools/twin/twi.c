@@ -12,9 +12,11 @@ enum { TWINT = 0x80, TWEA = 0x40, TWSTA = 0x20, TWSTO = 0x10, TWEN = 4, TWIE = 1
 enum { DDRD = 0x2A, SCL = 1, SDA = 2 };
 #define VECTOR 36
 #define IDLE_STATUS 0xF8
+#define LOST_STATUS 0x38
+#define READ_REFUSED_STATUS 0x58
 #define CLOCKS_TO_FREE 9
 
-static struct twi_device *devices, *active;
+static struct twi_device *devices, *active, *stopping;
 static enum { IDLE, ADDRESS, WRITING, READING, REFUSED } phase;
 static bool own;         /* a start condition was sent */
 static uint8_t status;   /* of the operation under way */
@@ -35,10 +37,22 @@ static void set_status(uint8_t value)
 	avr->data[TWSR] = (uint8_t)((avr->data[TWSR] & 3) | value);
 }
 
+static void release(void)
+{
+	active = NULL;
+	own = false;
+	phase = IDLE;
+	set_status(IDLE_STATUS);
+}
+
 static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	(void)when;
 	(void)param;
+	if (line != TWI_GOOD && status == READ_REFUSED_STATUS) {
+		release(); /* our NACK read back as an ACK */
+		status = LOST_STATUS;
+	}
 	set_status(status);
 	if (read_byte >= 0)
 		a->data[TWDR] = (uint8_t)read_byte;
@@ -52,6 +66,9 @@ static avr_cycle_count_t stopped(avr_t *a, avr_cycle_count_t when, void *param)
 	(void)when;
 	(void)param;
 	a->data[TWCR] &= (uint8_t)~TWSTO;
+	if (stopping && stopping->stop)
+		stopping->stop(stopping);
+	stopping = NULL;
 	return 0;
 }
 
@@ -61,16 +78,6 @@ static void operate(unsigned bits, uint8_t result)
 
 	status = result;
 	avr_cycle_timer_register(avr, bits * bit_cycles() + stretch, done, NULL);
-}
-
-static void release(void)
-{
-	if (active && active->stop)
-		active->stop(active);
-	active = NULL;
-	own = false;
-	phase = IDLE;
-	set_status(IDLE_STATUS);
 }
 
 static void start(void)
@@ -89,7 +96,10 @@ static void start(void)
 
 static void stop(void)
 {
+	stopping = active;
 	release();
+	if (line != TWI_GOOD)
+		return; /* SDA never rises: the stop condition never happens */
 	avr_cycle_timer_register(avr, bit_cycles(), stopped, NULL);
 	bus_free_at = avr->cycle + bit_cycles() + bit_cycles() / 2;
 }
@@ -107,16 +117,33 @@ static void address(uint8_t byte)
 	operate(9, reading ? (ack ? 0x40 : 0x48) : (ack ? 0x18 : 0x20));
 }
 
+/* Somebody else holds SDA down: a one that we send reads back as a zero, which looks like another master that won. */
+static void lose(uint8_t byte)
+{
+	unsigned zeros = 0;
+
+	while (!(byte & (0x80u >> zeros)))
+		zeros++;
+	active = NULL;
+	own = false;
+	phase = IDLE;
+	operate(zeros + 1, LOST_STATUS);
+}
+
 static void transfer(uint8_t control)
 {
 	uint8_t byte = avr->data[TWDR];
 
+	if (line != TWI_GOOD && phase != READING && byte) {
+		lose(byte);
+		return;
+	}
 	switch (phase) {
 	case ADDRESS: address(byte); break;
 	case WRITING: operate(9, active->write(active, byte) ? 0x28 : 0x30); break;
 	case READING:
-		read_byte = active->read(active);
-		operate(9, control & TWEA ? 0x50 : 0x58);
+		read_byte = line == TWI_GOOD ? active->read(active) : 0;
+		operate(9, control & TWEA ? 0x50 : READ_REFUSED_STATUS);
 		break;
 	case REFUSED: operate(9, 0x30); break;
 	case IDLE: break;
@@ -128,6 +155,8 @@ static void disable(void)
 	avr_cycle_timer_cancel(avr, done, NULL);
 	avr_clear_interrupt(avr, vector(VECTOR));
 	release();
+	avr_cycle_timer_cancel(avr, stopped, NULL);
+	stopping = NULL;
 	avr->data[TWCR] = 0;
 	clocks = 0;
 }
@@ -194,13 +223,17 @@ void twi_init(void)
 	take_register(TWCR, NULL, write_control);
 	take_register(TWSR, NULL, write_status);
 	take_register(TWDR, read_plain, write_plain);
-	set_status(IDLE_STATUS);
-	avr->data[TWDR] = 0xFF;
 	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL), lines_changed, NULL);
-	active = NULL;
-	own = false;
-	phase = IDLE;
+}
+
+void twi_reset(void)
+{
+	release();
+	stopping = NULL;
 	read_byte = -1;
+	bus_free_at = 0;
+	clocks = 0;
+	avr->data[TWDR] = 0xFF;
 }
 
 void twi_add(struct twi_device *device)
@@ -211,5 +244,13 @@ void twi_add(struct twi_device *device)
 
 void twi_fault(enum twi_fault fault)
 {
+	uint8_t control = avr->data[TWCR];
+
 	line = fault;
+	if (fault != TWI_GOOD || !(control & TWEN))
+		return;
+	if (control & TWSTO) /* what waited for SDA to rise happens now */
+		stop();
+	if ((control & TWSTA) && !own)
+		start();
 }

@@ -37,17 +37,23 @@ uint64_t time_ns(void);
 void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
 avr_int_vector_t *vector(int number);
 
+/* What a chip outside drives onto an input; one pin a port. */
+void drive_pin(char port, uint8_t pin, bool level);
+
 /* Take a register over: reads and writes of the program call these. */
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write);
 
 /* bench.c: what leaves the board, and what tests may know about its buses. */
 void bench_sent(const uint8_t *bytes, unsigned length);
+bool bench_has_room(void); /* else the program on the host does not read */
 void bench_trace(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void bench_reset(void);
 void bench_run(int in, int out);
 
 /* usb_device.c: the device controller, seen from the cable. */
 enum usb_answer { USB_ACK = 0, USB_NAK = -1, USB_STALL = -2, USB_SILENCE = -3 };
 void usb_device_init(void);
+void usb_device_reset(void);
 bool usb_device_attached(void);
 void usb_bus_reset(void);
 void usb_frame(uint16_t number);
@@ -70,11 +76,12 @@ struct twi_device {
 	bool (*write)(struct twi_device *self, uint8_t byte);  /* acknowledge? */
 	uint8_t (*read)(struct twi_device *self);
 	void (*stop)(struct twi_device *self);
-	uint32_t stretch; /* cycles that the device holds the clock after its next byte */
+	uint32_t stretch; /* cycles that the device holds the clock at each byte */
 	struct twi_device *next;
 };
 enum twi_fault { TWI_GOOD, TWI_STUCK, TWI_STUCK_FOREVER };
 void twi_init(void);
+void twi_reset(void);
 void twi_add(struct twi_device *device);
 void twi_fault(enum twi_fault fault);
 
@@ -88,24 +95,28 @@ struct spi_device {
 	struct spi_device *next;
 };
 void spi_init(void);
+void spi_reset(void); /* the chip selects */
 void spi_add(struct spi_device *device);
 unsigned spi_hertz(void);
 unsigned spi_mode(void);
 
-/* The devices: power-up, and `name=value` switches (false: no such switch). */
-void srf02_start(void);
+/* The devices: power-up (a reset of the processor is none), and `name=value` switches (false: no such switch). */
+void srf02_power(void);
 bool srf02_fault(const char *name, const char *value);
-void adis16100_start(void);
+void adis16100_power(void);
 bool adis16100_fault(const char *name, const char *value);
-void scp1000_start(void);
+void scp1000_power(void);
+void scp1000_resume(void); /* after a reset of the processor, which lost the timers */
 bool scp1000_fault(const char *name, const char *value);
-void compass_start(void);
+void compass_power(void);
 bool compass_fault(const char *name, const char *value);
 
-/* pty.c: the port as a pseudo terminal. */
+/* pty.c: the port as a pseudo terminal, there while the board is plugged in. */
 void pty_open(void);
+void pty_close(void);
 bool pty_wanted(void);
-bool pty_write(const uint8_t *bytes, unsigned length); /* false: the program does not read */
+bool pty_has_room(void);
+void pty_write(const uint8_t *bytes, unsigned length);
 void pty_poll(void);
 
 /* main.c */

@@ -14,9 +14,10 @@ enum {
 };
 enum { TXINI = 1, STALLEDI = 2, RXOUTI = 4, RXSTPI = 8, NAKOUTI = 16, RWAL = 32, NAKINI = 64, FIFOCON = 128 };
 enum { USBE = 0x80, FRZCLK = 0x20, OTGPADE = 0x10, VBUS = 1, VBUSTI = 1, VBUSTE = 1, DETACH = 1, SOFI = 4, EORSTI = 8 };
+enum { PLLCSR = 0x49, PLOCK = 1, UVREGE = 1 };
 enum { EPEN = 1, RSTDT = 8, STALLRQC = 16, STALLRQ = 32, ALLOC = 2, ADDEN = 0x80 };
 #define ENDPOINTS 7
-#define BANK_SIZE 256
+#define BANK_SIZE 64 /* the most that full speed allows for control and bulk */
 #define VECTOR_GENERAL 10
 #define VECTOR_ENDPOINT 11
 
@@ -35,7 +36,12 @@ static struct endpoint {
 
 static bool is_in(const struct endpoint *e) { return e->cfg0 & 1; }
 static bool is_control(const struct endpoint *e) { return (e->cfg0 >> 6) == 0; }
-static int size_of(const struct endpoint *e) { return 8 << ((e->cfg1 >> 4) & 7); }
+static int size_of(const struct endpoint *e)
+{
+	int size = 8 << ((e->cfg1 >> 4) & 7);
+
+	return size < BANK_SIZE ? size : BANK_SIZE;
+}
 static int banks_of(const struct endpoint *e) { return (e->cfg1 >> 2) & 3 ? 2 : 1; }
 static struct endpoint *selected(void) { return &endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
 static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control(e) ? 0 : e->cpu]; }
@@ -147,6 +153,19 @@ static void clear_flags(struct endpoint *e, uint8_t cleared)
 	}
 }
 
+/* Of an IN endpoint, a one in the place of RXOUTI is KILLBK: the bank handed over last is taken back. */
+static void kill_bank(struct endpoint *e)
+{
+	int last = (e->cpu + banks_of(e) - 1) % banks_of(e);
+
+	if (!e->bank[last].full)
+		return;
+	e->bank[last].full = false;
+	e->bank[last].length = 0;
+	e->cpu = last;
+	offer_bank(e);
+}
+
 static void reset_fifo(struct endpoint *e)
 {
 	memset(e->bank, 0, sizeof e->bank);
@@ -198,7 +217,11 @@ static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void 
 		break;
 	case UEIENX: e->enabled = value; break;
 	case UEDATX: write_byte(e, value); break;
-	case UEINTX: clear_flags(e, (uint8_t)(e->flags & ~value)); break;
+	case UEINTX:
+		if (is_in(e) && !is_control(e) && (value & RXOUTI))
+			kill_bank(e);
+		clear_flags(e, (uint8_t)(e->flags & ~value));
+		break;
 	case UEINT:
 	case UEBCLX:
 	case UEBCHX:
@@ -225,6 +248,10 @@ void usb_device_init(void)
 		take_register(a, read_register, write_register);
 	for (int v = VECTOR_GENERAL; v <= VECTOR_ENDPOINT; v++)
 		avr_irq_register_notify(vector(v)->irq + AVR_INT_IRQ_RUNNING, after_interrupt, NULL);
+}
+
+void usb_device_reset(void)
+{
 	memset(endpoints, 0, sizeof endpoints);
 	avr->data[UDCON] = DETACH;
 	avr->data[USBCON] = FRZCLK;
@@ -232,7 +259,9 @@ void usb_device_init(void)
 
 bool usb_device_attached(void)
 {
-	return (avr->data[USBCON] & (USBE | FRZCLK)) == USBE && !(avr->data[UDCON] & DETACH);
+	bool running = (avr->data[USBCON] & (USBE | FRZCLK)) == USBE && (avr->data[PLLCSR] & PLOCK);
+
+	return running && (avr->data[UHWCON] & UVREGE) && !(avr->data[UDCON] & DETACH);
 }
 
 void usb_bus_reset(void)
@@ -251,11 +280,19 @@ void usb_frame(uint16_t number)
 	refresh();
 }
 
+/* NULL: nobody answers under that number. */
+static struct endpoint *endpoint_at(uint8_t number)
+{
+	if (!usb_device_attached() || number >= ENDPOINTS || !(endpoints[number].conx & EPEN) || !(endpoints[number].cfg1 & ALLOC))
+		return NULL;
+	return &endpoints[number];
+}
+
 int usb_setup(const uint8_t *request)
 {
-	struct endpoint *e = &endpoints[0];
+	struct endpoint *e = endpoint_at(0);
 
-	if (!usb_device_attached() || !(e->conx & EPEN) || !(e->cfg1 & ALLOC))
+	if (!e)
 		return USB_SILENCE;
 	e->stalled = false; /* a SETUP always gets through */
 	memcpy(e->bank[0].bytes, request, 8);
@@ -268,12 +305,14 @@ int usb_setup(const uint8_t *request)
 
 int usb_in(uint8_t endpoint, uint8_t *bytes)
 {
-	struct endpoint *e = &endpoints[endpoint];
+	struct endpoint *e = endpoint_at(endpoint);
+
+	if (!e)
+		return USB_SILENCE;
+
 	struct bank *b = &e->bank[is_control(e) ? 1 : e->cable];
 	int length = b->length;
 
-	if (!usb_device_attached() || !(e->conx & EPEN))
-		return USB_SILENCE;
 	if (e->stalled) {
 		e->flags |= STALLEDI;
 		refresh();
@@ -299,11 +338,13 @@ int usb_in(uint8_t endpoint, uint8_t *bytes)
 
 int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length)
 {
-	struct endpoint *e = &endpoints[endpoint];
+	struct endpoint *e = endpoint_at(endpoint);
+
+	if (!e || length > (unsigned)size_of(e))
+		return USB_SILENCE;
+
 	struct bank *b = &e->bank[is_control(e) ? 0 : e->cable];
 
-	if (!usb_device_attached() || !(e->conx & EPEN))
-		return USB_SILENCE;
 	if (e->stalled) {
 		e->flags |= STALLEDI;
 		refresh();

@@ -17,7 +17,7 @@
 
 static const uint8_t script[][16] = {
 	/* request, data stage out */
-	{ 0x80, 6, 0, 1, 0, 0, 64, 0 },       /* device descriptor, its beginning */
+	{ 0x80, 6, 0, 1, 0, 0, 8, 0 },        /* device descriptor, its beginning: the size of control packets */
 	{ 0x00, 5, 7, 0, 0, 0, 0, 0 },        /* address 7 */
 	{ 0x80, 6, 0, 1, 0, 0, 18, 0 },       /* device descriptor */
 	{ 0x80, 6, 0, 2, 0, 0, 9, 0 },        /* configuration descriptor, its head */
@@ -44,6 +44,7 @@ static uint16_t frame_number;
 static uint8_t outbox[1 << 16];
 static unsigned outbox_length;
 static uint8_t descriptor[256];
+static int control_size = 8;
 
 /* Bulk endpoints from the configuration descriptor, as a driver finds them. */
 static void find_endpoints(unsigned length)
@@ -78,6 +79,8 @@ static void set_line_state(bool open)
 static void finish_request(void)
 {
 	requesting = false;
+	if (request[0] == 0x80 && request[1] == 6 && request[3] == 1 && received >= 8)
+		control_size = descriptor[7];
 	if (request[0] == 0x80 && request[1] == 6 && request[3] == 2)
 		find_endpoints(received);
 	if (state == ENUMERATING && ++step == SCRIPT_LENGTH) {
@@ -113,16 +116,18 @@ static bool advance_request(void)
 		}
 		if (answer < 0)
 			return false;
-		for (int k = 0; k < answer && received < sizeof descriptor; k++)
+		for (int k = 0; k < answer && received < length; k++)
 			descriptor[received++] = bytes[k];
-		if (answer < 64 || received >= length)
+		if (answer < control_size || received >= length)
 			next_stage(STATUS_OUT);
 		return true;
 	case DATA_OUT:
-		if (usb_out(0, request + 8, length) != USB_ACK)
-			return false;
-		next_stage(STATUS_IN);
-		return true;
+		answer = usb_out(0, request + 8, length);
+		if (answer == USB_ACK)
+			next_stage(STATUS_IN);
+		else if (answer == USB_STALL)
+			finish_request();
+		return answer == USB_ACK || answer == USB_STALL;
 	case STATUS_IN:
 		answer = usb_in(0, bytes);
 		if (answer == USB_NAK || answer == USB_SILENCE)
@@ -152,7 +157,7 @@ static void move_bulk(void)
 	}
 	if (!is_open || stalled)
 		return;
-	for (int k = 0; k < PACKETS_PER_FRAME; k++) {
+	for (int k = 0; k < PACKETS_PER_FRAME && bench_has_room(); k++) {
 		int length = usb_in(in_endpoint, bytes);
 
 		if (length < 0)
@@ -173,6 +178,7 @@ static void watch(void)
 		usb_bus_reset();
 		state = ENUMERATING;
 		step = 0;
+		control_size = 8;
 		requesting = is_open = false;
 		waited_ms = 0;
 	}
@@ -185,11 +191,8 @@ static void watch(void)
 
 static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	static unsigned in_frame;
-
 	(void)param;
 	if (a->cycle % FRAME < CONTROL_POLL || !requesting) {
-		in_frame = 0;
 		watch();
 		if (state != DETACHED)
 			usb_frame(frame_number++);
@@ -202,7 +205,6 @@ static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 		if (state == ENUMERATING && !requesting && ++waited_ms > 10)
 			begin_request(script[step]);
 	}
-	in_frame++;
 	if (requesting) {
 		advance_request();
 		return when + CONTROL_POLL;

@@ -1,0 +1,101 @@
+/* A program for the twin's own test, with faults that the real firmware does not have. What it finds out it tells through the bus: a
+ * left trigger means yes, a right one no. MODE chooses the question. */
+#include <avr/io.h>
+#include <avr/interrupt.h>
+#include <avr/sleep.h>
+#include <avr/wdt.h>
+#include <util/delay.h>
+#include <stdint.h>
+
+enum { TWI_AFTER_RESET, SPI_WRONG, STOPPED, PULLED_UP };
+
+static void go(uint8_t control)
+{
+	TWCR = (uint8_t)(_BV(TWINT) | _BV(TWEN) | control);
+	while (!(TWCR & _BV(TWINT)))
+		;
+}
+
+static uint8_t start(void)
+{
+	go(_BV(TWSTA));
+	return TWSR & 0xF8u;
+}
+
+static void put(uint8_t byte)
+{
+	TWDR = byte;
+	go(0);
+}
+
+static void trigger(uint8_t address)
+{
+	put((uint8_t)(address << 1));
+	put(0);
+	put(0x52);
+	TWCR = _BV(TWINT) | _BV(TWEN) | _BV(TWSTO);
+}
+
+static void answer(uint8_t yes)
+{
+	trigger(yes ? 0x70 : 0x71);
+	for (;;)
+		;
+}
+
+/* A start condition, and the watchdog bites before the stop: after it, the first start must be a first start again. */
+static void twi_after_reset(uint8_t cause)
+{
+	if (cause & _BV(WDRF))
+		answer(start() == 0x08);
+	wdt_enable(WDTO_15MS);
+	(void)start();
+	for (;;)
+		;
+}
+
+static void spi_wrong(void)
+{
+	DDRB = _BV(PB0) | _BV(PB1) | _BV(PB2) | _BV(PB4);
+	DDRD = _BV(PD7);
+	PORTB = _BV(PB4);
+	SPCR = _BV(SPE) | _BV(MSTR); /* 4 MHz, mode 0: too fast for both chips */
+	PORTD = 0;
+	PORTD = _BV(PD7);
+	PORTB = 0;
+	PORTB = _BV(PB4);
+	SPCR = _BV(SPE) | _BV(MSTR) | _BV(SPR1) | _BV(SPR0); /* 125 kHz, mode 0: wrong edge for the gyro */
+	PORTB = 0;
+	PORTB = _BV(PB4);
+	for (;;)
+		;
+}
+
+/* SyncOut is driven low 3 ms after the start: neither its pull-up nor a write to a neighbour makes it high. */
+static void pulled_up(void)
+{
+	_delay_ms(3);
+	PORTD = _BV(PD4);
+	PORTD = _BV(PD4) | _BV(PD7);
+	answer(start() == 0x08 && !(PIND & _BV(PD4)));
+}
+
+int main(void)
+{
+	uint8_t cause = MCUSR;
+
+	MCUSR = 0;
+	wdt_disable();
+	TWBR = 72;
+	if (MODE == TWI_AFTER_RESET)
+		twi_after_reset(cause);
+	if (MODE == SPI_WRONG)
+		spi_wrong();
+	if (MODE == PULLED_UP)
+		pulled_up();
+	cli();
+	sleep_enable();
+	sleep_cpu();
+	for (;;)
+		;
+}
