@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
 from echostep import messages as m
 from echostep.frames import BoardReader, encode
 from echostep.simulation.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
-from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parent.parent
 TWIN = ROOT / "tools/twin/build/echostep-twin"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from echostep.frames import encode
 from echostep.messages import ClockQuery, Configure, Identify, Message
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 from cobs import cobs
-from echostep import messages as m
-from echostep.frames import BoardReader, StaleFirmwareError, encode
 from hypothesis import given
 from hypothesis import strategies as st
+
+from echostep import messages as m
+from echostep.frames import BoardReader, StaleFirmwareError, encode
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = [json.loads(line) for line in (ROOT / "protocol/vectors.jsonl").read_text().splitlines()]

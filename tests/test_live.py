@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from board_runs import ROOT, needs_twin
 
 ECHOSTEP = [sys.executable, "-m", "echostep"]

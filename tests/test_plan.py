@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
 

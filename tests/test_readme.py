@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from board_runs import ROOT
 
+from board_runs import ROOT
 from echostep.plan import load_plan
 
 READMES = [

@@ -6,11 +6,12 @@ import contextlib
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
 from echostep.errors import EchostepError
 from echostep.recording import Recorder, open_recording
 from echostep.sources import Chunk
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]
 

@@ -12,6 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
 from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader, encode
@@ -24,9 +28,6 @@ from echostep.simulation.walker import RATE_HZ, Person, Walk, walk
 from echostep.simulation.world import SRF02, Acoustics, Echoes, echoes
 from echostep.sources import BOARD, MTX, Chunk
 from echostep.xsens import MtSample, MtxReader
-from hypothesis import given
-from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 WAYPOINTS = ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0))

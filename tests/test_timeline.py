@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from echostep.timeline import DeviceClock, MtxTiming, Timeline
 
 MS = 1_000_000

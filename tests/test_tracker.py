@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from board_runs import ELF, ROOT, TWIN, needs_twin
 
+from board_runs import ELF, ROOT, TWIN, needs_twin
 from echostep.estimate import Estimate, Status, digest
 from echostep.plan import Plan, load_plan
 from echostep.simulation.board import BoardProcess, PythonBoard

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator
 
 import pytest
+
 from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep import messages as m
 from echostep.errors import EchostepError

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import serial
+
 from board_runs import ELF, TWIN, Bench, needs_twin, pings, quiet_rows
 from echostep import messages as m
 from echostep.errors import EchostepError

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-import naive
 import numpy as np
 import pytest
+
+import naive
 from echostep.errors import EchostepError
 from echostep.walls import CONE_RAD, EAR_REACH_M, FAR_M, build_index, crosses_wall, reflectors
 

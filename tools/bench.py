@@ -16,12 +16,13 @@ from statistics import median
 
 import numpy as np
 import shapely
-from echostep.likelihoods import EchoSettings, echo_model
-from echostep.particles import _propagate, _reweight
-from echostep.walls import EAR_REACH_M, build_index
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
+
+from echostep.likelihoods import EchoSettings, echo_model
+from echostep.particles import _propagate, _reweight
+from echostep.walls import EAR_REACH_M, build_index
 
 Floats = NDArray[np.float64]
 POSES = 2_000

@@ -15,11 +15,12 @@ from statistics import median
 from time import perf_counter
 
 import numpy as np
-from echostep.foot import Track, walk_track
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from scipy.io import loadmat
+
+from echostep.foot import Track, walk_track
 
 Floats = NDArray[np.float64]
 G = 9.80665

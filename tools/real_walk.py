@@ -19,6 +19,10 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
+from rich.console import Console
+from scipy.io import loadmat
+
 from echostep import messages as m
 from echostep.estimate import Estimate, digest
 from echostep.foot import Step, walk_track
@@ -34,9 +38,6 @@ from echostep.sources import BOARD, MTX, Chunk
 from echostep.tracker import Tracker
 from echostep.truth import load_truth
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
-from numpy.typing import NDArray
-from rich.console import Console
-from scipy.io import loadmat
 
 Floats = NDArray[np.float64]
 NAME = "GX5 33"

@@ -17,7 +17,6 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
 from board_runs import ELF, ROOT, TWIN  # noqa: E402
-
 from echostep.capture import as_json, read_capture  # noqa: E402
 from echostep.plan import load_plan  # noqa: E402
 from echostep.recording import Recorder  # noqa: E402

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
 from echostep import messages as m
 from echostep.frames import BoardReader, encode
 from echostep.simulation.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]

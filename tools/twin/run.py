@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
+
 from echostep.plan import load_plan
 from echostep.simulation.board import Sent
 from echostep.simulation.scenario import Scenario, demo_scenario
