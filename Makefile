@@ -13,6 +13,7 @@ help: ## list the targets
 setup: $(READY) ## make .venv with the host package, its tests and its tools
 
 $(READY): host/pyproject.toml
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || tools/apt.sh python3-venv
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]'
 	touch $@

@@ -9,11 +9,14 @@ import signal
 import subprocess
 import sys
 import time
+import tty
 from pathlib import Path
 
 import pytest
 
 from board_runs import ROOT, needs_twin
+from echostep.recording import open_recording
+from echostep.sources import SerialPorts
 
 ECHOSTEP = [sys.executable, "-m", "echostep"]
 PLAN = ROOT / "host/echostep/plans/demo.json"
@@ -162,3 +165,65 @@ def test_help_lists_the_commands() -> None:
     done = echostep("--help")
     assert done.returncode == 0
     assert all(name in done.stdout for name in ("demo", "live", "record", "replay", "decode"))
+
+
+def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
+    pairs = [os.openpty() for _ in range(2)]
+    for _, theirs in pairs:
+        tty.setraw(theirs)
+    names = [os.ttyname(theirs) for _, theirs in pairs]
+    recorder = subprocess.Popen(
+        [*ECHOSTEP, "record", "--board", names[0], "--mtx", names[1], "--out", tmp_path / "x.mcap", "--seconds", "4"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    sent = [b"", b""]
+    while recorder.poll() is None:
+        for k, (ours, _) in enumerate(pairs):
+            part = bytes([k + 1, len(sent[k]) % 256]) * 20
+            sent[k] += part
+            os.write(ours, part)
+        time.sleep(0.05)
+    out, err = recorder.communicate(timeout=20)
+    for pair in pairs:
+        for end in pair:
+            os.close(end)
+    assert recorder.returncode == 0, err
+    chunks = list(open_recording(tmp_path / "x.mcap").chunks())
+    for k, port in enumerate(("board", "mtx")):
+        kept = b"".join(c.data for c in chunks if c.port == port)
+        assert len(kept) > 500
+        assert kept in sent[k]
+    assert all(b.t_arrival_ns >= a.t_arrival_ns for a, b in zip(chunks, chunks[1:], strict=False))
+    assert "bytes from the board" in out
+
+
+def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
+    link = tmp_path / "port"
+    first, theirs = os.openpty()
+    tty.setraw(theirs)
+    name = Path(os.ttyname(theirs))
+    link.symlink_to(name)
+    ports = SerialPorts({"board": str(link)}, {"board": 115200})
+    found = b""
+    try:
+        os.write(first, b"before")
+        second, new = os.openpty()
+        tty.setraw(new)
+        deadline = time.monotonic() + 20
+        for chunk in ports.chunks():
+            found += chunk.data if chunk else b""
+            if found == b"before" and link.is_symlink() and link.readlink() == name:
+                link.unlink()
+                link.symlink_to(os.ttyname(new))
+                os.close(theirs)
+                os.close(first)
+            if "is back" in " ".join(ports.notices):
+                os.write(second, b" after")
+                ports.notices.clear()
+            if found.endswith(b"after") or time.monotonic() > deadline:
+                break
+    finally:
+        ports.close()
+        os.close(second)
+        os.close(new)
+    assert found == b"before after"

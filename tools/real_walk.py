@@ -48,7 +48,7 @@ LATENCY_S = 0.0071
 HALF_WIDTH_M = 1.0
 STRAIGHTEN_M = 0.3  # corridors are straight: the path's own wobble is not built into their walls
 SETTINGS = f"[mtx]\nrate_hz = {MTX_RATE_HZ}\n\n[gait]\nfoot_left_m = 0.0\n"
-console = Console()
+console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
 
 @dataclass(frozen=True)

@@ -149,9 +149,14 @@ def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, 
     """Strapdown step over `dt` between two samples of specific force and rate (3,), at the attitude in the middle."""
     rate = 0.5 * (rate0 + rate1) - nav.gyro_bias
     half = turning(0.5 * dt * rate[0], 0.5 * dt * rate[1], 0.5 * dt * rate[2])
-    middle = multiply(nav.attitude, half)
-    r = rotation(middle)
-    nav.attitude[:] = multiply(middle, half)
+    r = rotation(multiply(nav.attitude, half))
+    c = dt * dt / 12.0
+    whole = turning(
+        dt * rate[0] + c * (rate0[1] * rate1[2] - rate0[2] * rate1[1]),
+        dt * rate[1] + c * (rate0[2] * rate1[0] - rate0[0] * rate1[2]),
+        dt * rate[2] + c * (rate0[0] * rate1[1] - rate0[1] * rate1[0]),
+    )
+    nav.attitude[:] = multiply(nav.attitude, whole)
     f = apply(r, 0.5 * (force0 + force1) - nav.accel_bias)
     accel = f.copy()
     accel[2] -= GRAVITY_M_S2

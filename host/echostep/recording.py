@@ -94,6 +94,7 @@ class Recording:
     path: Path
     about: dict[str, str] = field(default_factory=dict)
     truncated: bool = False
+    fraction: float = 0.0  # of the file read so far
 
     def chunks(self) -> Iterator[Chunk]:
         """Chunks in the order in which they were recorded."""
@@ -103,12 +104,16 @@ class Recording:
                 ports[record.id] = record.topic.removeprefix("/").removesuffix("/bytes")
             elif isinstance(record, Message) and record.channel_id in ports:
                 yield Chunk(ports[record.channel_id], record.log_time, record.data)
+        self.fraction = 1.0
 
     def _records(self) -> Iterator[object]:
         with self.path.open("rb") as file:
+            size = max(1, os.fstat(file.fileno()).st_size)
             reader = StreamReader(_WholeReads(file), record_size_limit=RECORD_LIMIT)  # type: ignore[arg-type]
             try:
-                yield from reader.records
+                for record in reader.records:
+                    self.fraction = file.tell() / size
+                    yield record
             except (McapError, struct.error, UnicodeDecodeError, MemoryError):
                 self.truncated = True
 

@@ -11,7 +11,7 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -34,7 +34,7 @@ from echostep.view import TerminalView
 
 DEMO_PACE = 8.0
 BAUD = {BOARD: 115200, MTX: 115200}
-console = Console()
+console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
 
 def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> None:
@@ -56,7 +56,9 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
         with Recorder(out / "walk.mcap", about) as recorder:
             chunks = scenario.chunks() if headless else _paced(scenario.chunks())
-            estimates = _run(tracker, _kept(chunks, recorder), "echostep demo (simulated)", truth, headless)
+            estimates = _run(
+                tracker, _kept(chunks, recorder), "echostep demo (simulated)", lambda: scenario.fraction, headless
+            )
     finally:
         scenario.close()
     _finish(out, tracker, estimates, truth, "simulated walk")
@@ -113,7 +115,7 @@ def replay(
     if note := about.get("note"):
         console.print(f"Recording: {note}")
     began = time.perf_counter()
-    estimates = _run(tracker, recording.chunks(), f"echostep replay {path.name}", truth, headless)
+    estimates = _run(tracker, recording.chunks(), f"echostep replay {path.name}", lambda: recording.fraction, headless)
     elapsed_s = time.perf_counter() - began
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
@@ -140,9 +142,11 @@ def parse_pose(text: str) -> Pose:
     return Pose(x, y, math.radians(degrees))
 
 
-def _run(tracker: Tracker, chunks: Iterable[Chunk], title: str, truth: Truth | None, headless: bool) -> list[Estimate]:
+def _run(
+    tracker: Tracker, chunks: Iterable[Chunk], title: str, progress: Callable[[], float] | None, headless: bool
+) -> list[Estimate]:
     """Feed everything; Ctrl-C ends a run like its last chunk does."""
-    view = None if headless else TerminalView(tracker, title, float(truth.t_s[-1]) if truth else None, console)
+    view = None if headless else TerminalView(tracker, title, progress, console)
     estimates: list[Estimate] = []
     shown: AbstractContextManager[object] = view or nullcontext()
     with shown:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -79,10 +80,10 @@ class Canvas:
 
 
 class TerminalView:
-    """Shows a running tracker; `total_s` gives the progress bar its end."""
+    """Shows a running tracker; `progress` tells how much of the run is over, 0 to 1, None: nobody knows."""
 
     def __init__(
-        self, tracker: Tracker, title: str, total_s: float | None = None, console: Console | None = None
+        self, tracker: Tracker, title: str, progress: Callable[[], float] | None = None, console: Console | None = None
     ) -> None:
         self._tracker = tracker
         self._title = title
@@ -90,7 +91,8 @@ class TerminalView:
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()
         )
-        self._bar = self._progress.add_task("walk", total=total_s)
+        self._fraction = progress
+        self._bar = self._progress.add_task("walk", total=1.0 if progress else None)
         self._last: Estimate | None = None
         self._drawn = 0.0
         self._live = Live(console=console, auto_refresh=False, transient=False)
@@ -112,8 +114,8 @@ class TerminalView:
         if not final and now - self._drawn < REFRESH_S:
             return
         self._drawn = now
-        if self._last is not None:
-            self._progress.update(self._bar, completed=self._last.t_s)
+        if self._fraction:
+            self._progress.update(self._bar, completed=self._fraction())
         parts = [
             self._canvas.render(self._last),
             Text(describe(self._last)),

@@ -39,6 +39,7 @@ class Scenario:
         self.sensors = BoardSensors(self.walk, plan.levels[0].walls, self.mtx.t_s, streams[2])
         self._board = board
         x, y = self.walk.trunk_m[0].tolist()
+        self.fraction = 0.0  # of the walk that is over
         self.start = Pose(x, y, float(self.walk.heading_rad[0]))
 
     def chunks(self) -> Iterator[Chunk]:
@@ -67,6 +68,7 @@ class Scenario:
     def _board_chunks(self) -> Iterator[Chunk]:
         """The board's bytes as a USB host gets them, a millisecond's worth at a time."""
         for start in range(0, len(self.walk.t_s), BLOCK_MS):
+            self.fraction = start / len(self.walk.t_s)
             sent = self._board.advance(self.sensors.rows(start, start + BLOCK_MS))
             gathered: dict[int, bytes] = {}
             for t_ns, part in sent:
