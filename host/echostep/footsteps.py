@@ -51,6 +51,7 @@ class Footing(Protocol):
     yaw_rad: float  # to level with
     waited_s: float  # for a level
     still_s: float
+    lasting_s: float
     force_sum: Floats
     force_count: int
     lost_s: float  # since samples were missing
@@ -142,7 +143,7 @@ def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: in
         s.yaw_rad = ins.heading(nav)
     stance.end_rest(rest)
     s.levelled = 0
-    s.still_s = s.waited_s = s.rest_s = 0.0
+    s.still_s = s.lasting_s = s.waited_s = s.rest_s = 0.0
     return found
 
 
@@ -151,7 +152,7 @@ def _find_level(s: Footing, nav: Nav, window: Window, dt: float, t_s: float, eve
     """Wait for a still moment to take the level from; after a while, start without."""
     rate2, force2 = stance.activity(window, nav.gyro_bias)
     s.waited_s += dt
-    s.still_s = s.still_s + dt if stance.still(rate2, force2) else 0.0
+    s.still_s = s.still_s + dt if stance.unrest(rate2, force2) < stance.STILL else 0.0
     if s.still_s == 0.0:
         s.force_sum[:] = 0.0
         s.force_count = 0
@@ -211,14 +212,15 @@ def _navigate(
 def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s: float, gyro: Floats) -> bool:
     """Whether the foot rests now; if so, the velocity has been corrected."""
     rate2, force2 = stance.activity(window, nav.gyro_bias)
-    s.still_s = s.still_s + dt if stance.still(rate2, force2) else 0.0
-    if not stance.calm(rate2, force2):
+    unrest = stance.unrest(rate2, force2)
+    s.lasting_s = s.lasting_s + dt if unrest < stance.CALM else 0.0
+    if unrest > 1.0:
         return False
     expected = stance.rolling(nav, gyro, height_m)
     variance = stance.rest_variance(rate2)
     if stance.surprise(nav, expected, variance, stance.mean_force(window)) > stance.BELIEF:
         since_s = t_s - s.rest_end_s
-        if s.still_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
+        if s.lasting_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
         stance.distrust(nav, since_s)

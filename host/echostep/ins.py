@@ -150,7 +150,7 @@ def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, 
     rate = 0.5 * (rate0 + rate1) - nav.gyro_bias
     half = turning(0.5 * dt * rate[0], 0.5 * dt * rate[1], 0.5 * dt * rate[2])
     r = rotation(multiply(nav.attitude, half))
-    c = dt * dt / 12.0
+    c = dt * dt / 12.0  # coning: the axis turns within the interval [Magnus 1954]
     whole = turning(
         dt * rate[0] + c * (rate0[1] * rate1[2] - rate0[2] * rate1[1]),
         dt * rate[1] + c * (rate0[2] * rate1[0] - rate0[0] * rate1[2]),

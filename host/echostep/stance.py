@@ -25,11 +25,11 @@ Floats = NDArray[np.float64]
 
 RING = 32  # samples
 WINDOW_S = 0.03
-CALM_RAD_S, CALM_M_S2 = 1.6, 6.0  # rms over the window; the statistic is 1 on the ellipse between them
-STILL_RAD_S, STILL_M_S2 = 0.3, 1.0  # rms of a foot that nobody moves on purpose
-BELIEF = 22.5  # chi-square of three velocities and three accelerations, exceeded once in a thousand stances
+REST_RAD_S, REST_M_S2 = 1.6, 6.0  # rms over the window: `unrest` is 1 on the ellipse between them
+CALM, STILL = 0.25, 0.03  # `unrest` of a foot that stands, and of one that nobody moves on purpose
+BELIEF = 16.8  # chi-square of three velocities and three accelerations, exceeded by one in a hundred
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
-LASTING_S = 0.2  # no swing is still for so long: this stance is real, the velocity is not
+LASTING_S = 0.15  # no swing is calm for so long: this stance is real, the velocity is not
 OVERDUE_S = 2.0  # nor does a swing last so long
 LEVER_M = 0.1  # the foot's point of contact is known to within the foot
 REST_M_S = 0.005
@@ -117,15 +117,9 @@ def activity(window: Window, bias: Floats) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def calm(rate2: float, force2: float) -> bool:
-    """Whether the sensors alone would allow a stance."""
-    return rate2 / CALM_RAD_S**2 + force2 / CALM_M_S2**2 < 1.0
-
-
-@njit(cache=True)
-def still(rate2: float, force2: float) -> bool:
-    """Whether the foot is hardly moving at all."""
-    return rate2 < STILL_RAD_S**2 and force2 < STILL_M_S2**2
+def unrest(rate2: float, force2: float) -> float:
+    """The sensors' verdict on their own: below 1 they would allow a stance."""
+    return rate2 / REST_RAD_S**2 + force2 / REST_M_S2**2
 
 
 @njit(cache=True)
