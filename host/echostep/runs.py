@@ -72,6 +72,7 @@ def live(
     plan = load_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
     tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed)
+    tracker.warm_up()
     out = _folder(out)
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     try:
