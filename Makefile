@@ -54,7 +54,7 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
-	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check; else echo "cppcheck is not installed: C checks skipped"; fi
+	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
 size: ## flash, static RAM and stack of the firmware
 	$(MAKE) -C firmware size

@@ -80,7 +80,7 @@ class Cloud:
             self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
             self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
         if died:
-            self.renew()
+            self._renew()
 
     def weigh(
         self, axis_walk_rad: float, range_m: float | None, power: float, model: EchoModel, walls: WallIndex
@@ -89,9 +89,9 @@ class Cloud:
         _reweight(
             self.x_m, self.y_m, self.turn_rad, self.log_weight, axis_walk_rad, range_m or 0.0, power, model, walls
         )
-        self.renew()
+        self._renew()
 
-    def renew(self) -> None:
+    def _renew(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight."""
         if effective_size(self.log_weight) >= self._settings.resample_below * len(self.x_m):
             return

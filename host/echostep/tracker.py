@@ -21,7 +21,7 @@ from echostep.frames import BoardReader
 from echostep.gait import Leg, TrunkPath
 from echostep.likelihoods import echo_model
 from echostep.messages import Identity, Message, Ping, Status, Sync
-from echostep.particles import Cloud
+from echostep.particles import Cloud, systematic
 from echostep.plan import Plan, Pose
 from echostep.settings import Settings
 from echostep.sources import BOARD, MTX, Chunk
@@ -100,7 +100,7 @@ class Tracker:
         cloud = Cloud(self.settings.cloud, self.start, 0.0, np.random.default_rng(0))
         cloud.move(0.01, 0.0, 0.01, 0.0, self.walls)
         cloud.weigh(0.0, 1.0, 0.1, self._model, self.walls)
-        cloud.renew()
+        systematic(np.ones(2), 0.5)
 
     # bytes -> samples
 
