@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ import pytest
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from echostep.estimate import Estimate, Status, digest
-from echostep.plan import Plan, load_plan
+from echostep.plan import Plan, Pose, load_plan
 from echostep.simulation.board import BoardProcess, PythonBoard
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.sources import BOARD, MTX, Chunk
@@ -91,6 +92,41 @@ def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
     assert found[-1].status == Status.LOST
     assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
     assert tracker.status is not None
+
+
+def sure_but_wrong(found: list[Estimate], truth: Truth) -> list[Estimate]:
+    off = np.array([(e.x_m, e.y_m) for e in found]) - truth.at(np.array([e.t_s for e in found]))
+    return [e for e, d in zip(found, np.hypot(*off.T), strict=True) if e.status == Status.TRACKING and d > 1.0]
+
+
+@pytest.fixture(scope="module")
+def long_walk() -> tuple[list[Chunk], Truth, Scenario]:
+    scenario = demo_scenario(PLAN, 7, PythonBoard(7))
+    return list(scenario.chunks()), Truth(scenario.walk.t_s, scenario.walk.trunk_m), scenario
+
+
+@pytest.mark.parametrize(("start_s", "gap_s"), [(12, 1.5), (12, 4), (20, 6), (30, 4), (30, 8)])
+def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
+    long_walk: tuple[list[Chunk], Truth, Scenario], start_s: float, gap_s: float
+) -> None:
+    chunks, truth, scenario = long_walk
+    tracker = Tracker(PLAN, scenario.start, seed=1)
+    silent = range(int((1 + start_s) * 1e9), int((1 + start_s + gap_s) * 1e9))
+    found = [e for c in chunks if c.port == BOARD or c.t_arrival_ns not in silent for e in tracker.feed(c)]
+    assert not sure_but_wrong(found, truth)
+    assert found[-1].t_s > 55.0
+
+
+@pytest.mark.parametrize(("dx", "dy", "degrees"), [(0.0, 3.5, 0.0), (6.0, -4.0, 90.0), (0.0, 0.0, 180.0)])
+def test_a_wrong_start_is_noticed(
+    long_walk: tuple[list[Chunk], Truth, Scenario], dx: float, dy: float, degrees: float
+) -> None:
+    chunks, truth, scenario = long_walk
+    there = scenario.start
+    tracker = Tracker(PLAN, Pose(there.x_m + dx, there.y_m + dy, there.heading_rad + math.radians(degrees)), seed=1)
+    found = [e for c in chunks for e in tracker.feed(c)]
+    sure = sure_but_wrong(found, truth)
+    assert not [e for e in sure if e.t_s > 15.0]
 
 
 def test_a_fifth_of_the_samples_may_be_missing() -> None:

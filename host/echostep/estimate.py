@@ -67,8 +67,8 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]))
 
 
-def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int) -> Estimate:
-    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]."""
+def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, doubt_m: float = 0.0) -> Estimate:
+    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]; `doubt_m`: standard deviation that the cloud does not know of."""
     weight = np.exp(cloud.log_weight)
     weight /= weight.sum()
     x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
@@ -77,6 +77,7 @@ def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int) -> Es
     east = float(weight @ np.cos(cloud.turn_rad + walk_heading_rad))
     north = float(weight @ np.sin(cloud.turn_rad + walk_heading_rad))
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
+    xx, yy = xx + doubt_m**2, yy + doubt_m**2
     status = trust(ellipse95(xx, xy, yy).major_m)
     return Estimate(t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status)
 

@@ -16,6 +16,7 @@ from statistics import median
 from echostep.foot import Stance, Step
 
 STANDING_PIECE_S = 0.5
+UNWATCHED_SD_M = 0.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,11 @@ class Leg:
     sd_m: float
     turn_sd_rad: float
     step: int
+
+    @property
+    def unwatched(self) -> bool:
+        """Whether the foot was silent for so long that the move is a guess, and the way to it unknown."""
+        return self.sd_m > UNWATCHED_SD_M
 
     def heading_rad(self, t_s: float) -> float:
         """Heading of the trunk at a time on this leg, the short way round."""

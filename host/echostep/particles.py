@@ -28,7 +28,9 @@ class CloudSettings:
     """Size of the cloud, spread at the start, and what the path's own covariance leaves out.
 
     `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`: of the walk frame's rotation, per square root of a
-    metre; `resample_below`: effective share of the cloud at which it is resampled (systematic).
+    metre; `resample_below`: effective share of the cloud at which it is resampled (systematic). After a
+    move that nobody watched the cloud grows with its area, up to `largest`, until it has gathered again; meanwhile resampling roughens
+    it by `rough_m` and `rough_deg`.
     """
 
     size: int = 1000
@@ -39,6 +41,9 @@ class CloudSettings:
     turn_sd_deg: float = 0.3
     resample_below: float = 0.5
     rescue_sd_m: float = 0.5
+    largest: int = 20_000
+    rough_m: float = 0.1
+    rough_deg: float = 2.0
 
     def __post_init__(self) -> None:
         """Raise ValueError for a cloud without particles."""
@@ -82,23 +87,52 @@ class Cloud:
         if died:
             self._renew()
 
+    def scatter(self, dx_m: float, dy_m: float, sd_m: float, turn_sd_rad: float) -> None:
+        """Spread by a move that nobody watched: he may have gone round any wall, so none can veto it."""
+        chosen = systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest)
+        noise = self._rng.standard_normal((3, len(chosen)))
+        self._take(chosen)
+        self.turn_rad += turn_sd_rad * noise[2]
+        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
+        self.x_m += c * dx_m - s * dy_m + sd_m * noise[0]
+        self.y_m += s * dx_m + c * dy_m + sd_m * noise[1]
+
+    def _take(self, chosen: Ints) -> None:
+        """Keep these particles, with equal weights."""
+        self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
+        self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
+        self.log_weight = np.zeros(len(chosen))
+
+    def _wanted(self, weight: Floats) -> int:
+        """Size for the cloud's present spread: the usual one up to a metre, then as the area, never more than there are."""
+        w = weight / weight.sum()
+        spread2 = float(w @ self.x_m**2 - (w @ self.x_m) ** 2 + w @ self.y_m**2 - (w @ self.y_m) ** 2)
+        return int(min(self._settings.size * max(spread2, 1.0), self._settings.largest, max(len(w), self._settings.size)))
+
     def weigh(
         self, axis_walk_rad: float, range_m: float | None, power: float, model: EchoModel, walls: WallIndex
-    ) -> None:
-        """Reweight by an echo; `axis_walk_rad`: the ranger's axis in the walk frame, `power`: share of independent information."""
-        _reweight(
+    ) -> float:
+        """Reweight by an echo; `axis_walk_rad`: the ranger's axis in the walk frame, `power`: share of independent information.
+
+        Returns the log of the echo's probability under the cloud before it: how well the plan explains what was heard.
+        """
+        found = _reweight(
             self.x_m, self.y_m, self.turn_rad, self.log_weight, axis_walk_rad, range_m or 0.0, power, model, walls
         )
         self._renew()
+        return found
 
     def _renew(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight."""
         if effective_size(self.log_weight) >= self._settings.resample_below * len(self.x_m):
             return
-        chosen = systematic(np.exp(self.log_weight), float(self._rng.random()))
-        self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
-        self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
-        self.log_weight = np.zeros(len(chosen))
+        weight = np.exp(self.log_weight)
+        self._take(systematic(weight, float(self._rng.random()), self._wanted(weight)))
+        if len(self.x_m) > self._settings.size:  # scattered: between the few that fit there are others that do [Gordon et al. 1993]
+            noise = self._rng.standard_normal((3, len(self.x_m)))
+            self.x_m += self._settings.rough_m * noise[0]
+            self.y_m += self._settings.rough_m * noise[1]
+            self.turn_rad += math.radians(self._settings.rough_deg) * noise[2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,17 +158,22 @@ def _propagate(
 def _reweight(
     x: Floats, y: Floats, turn: Floats, log_weight: Floats,
     axis: float, range_m: float, power: float, model: EchoModel, walls: WallIndex,
-) -> None:  # fmt: skip
-    """Add each particle's log-likelihood and bring the greatest weight to 0."""
+) -> float:  # fmt: skip
+    """Add each particle's log-likelihood and bring the greatest weight to 0; returns the log of the mean likelihood before."""
     top = -np.inf
+    weight, explained = 0.0, 0.0
     for i in range(len(x)):
         if log_weight[i] == -np.inf:
             continue
         wall_m, off_axis, edge_m = reflectors(x[i], y[i], axis + turn[i], walls)
-        log_weight[i] += power * log_echo(range_m, wall_m, off_axis, edge_m, model)
+        log_likelihood = log_echo(range_m, wall_m, off_axis, edge_m, model)
+        weight += math.exp(log_weight[i])
+        explained += math.exp(log_weight[i] + log_likelihood)
+        log_weight[i] += power * log_likelihood
         top = max(top, log_weight[i])
     for i in range(len(x)):
         log_weight[i] -= top
+    return math.log(explained / weight)
 
 
 @njit(cache=True, error_model="numpy")
@@ -149,15 +188,14 @@ def effective_size(log_weight: Floats) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def systematic(weight: Floats, draw: float) -> Ints:
-    """Indices of systematic resampling for weights (n,) and one uniform draw in [0, 1)."""
-    n = len(weight)
-    step = weight.sum() / n
-    chosen = np.empty(n, np.int64)
+def systematic(weight: Floats, draw: float, count: int) -> Ints:
+    """`count` indices of systematic resampling for weights (n,) and one uniform draw in [0, 1)."""
+    step = weight.sum() / count
+    chosen = np.empty(count, np.int64)
     reach, k = weight[0], 0
-    for i in range(n):
+    for i in range(count):
         mark = (i + draw) * step
-        while reach < mark and k < n - 1:
+        while reach < mark and k < len(weight) - 1:
             k += 1
             reach += weight[k]
         chosen[i] = k

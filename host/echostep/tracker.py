@@ -31,6 +31,10 @@ from echostep.xsens import MtSample, MtxReader
 
 PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
 BLIND_S = 1.0
+EXPLAINED_SHARE = 0.1
+UNEXPLAINED = -1.5  # a tracked walk has +1, an echo that fits nowhere -5: the plan does not explain what is heard
+LOST_SD_M = 3.0
+REGAIN_M = 10.0
 SILENCE_S = 0.5  # a port that is this far behind the other one is not waited for
 PORTION_S = 0.0095  # the foot is fed a hundred times a second
 MAX_WAITING = 4096  # pings and legs; beyond it the oldest are given up and counted
@@ -76,7 +80,9 @@ class Tracker:
         self._pushed = 0
         self._legs: deque[Leg] = deque()
         self._t_s = 0.0  # the cloud's time
+        self.explained = 0.0  # mean log-probability of the last echoes under the cloud
         self._last: Estimate | None = None
+        self._doubt_m = 0.0  # a cloud that was scattered may gather in the wrong place: trust returns as he walks
         self._told_s = -math.inf
         self._share = 0.0  # of the first leg that the cloud has gone
         self._echo_xy: list[tuple[float, float] | None] = [None, None]
@@ -100,7 +106,7 @@ class Tracker:
         cloud = Cloud(self.settings.cloud, self.start, 0.0, np.random.default_rng(0))
         cloud.move(0.01, 0.0, 0.01, 0.0, self.walls)
         cloud.weigh(0.0, 1.0, 0.1, self._model, self.walls)
-        systematic(np.ones(2), 0.5)
+        systematic(np.ones(2), 0.5, 2)
 
     # bytes -> samples
 
@@ -168,13 +174,15 @@ class Tracker:
             leg = self._legs[0]
             until_s = min(leg.t1_s, complete_s)
             while self._pings and self._pings[0][0] <= until_s:
-                self._hear(self.cloud, leg, heapq.heappop(self._pings)[2])
+                heard = heapq.heappop(self._pings)[2]
+                if not leg.unwatched:
+                    self._hear(self.cloud, leg, heard)
             if leg.t1_s > complete_s:
                 break
             self._go(self.cloud, leg, leg.t1_s)
             self._legs.popleft()
             self._share = 0.0
-            self._last = estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step)
+            self._last = estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, self._doubt_m)
             estimates.append(self._last)
         return estimates + self._unwatched()
 
@@ -201,8 +209,13 @@ class Tracker:
         self._share += part
         self._t_s = max(self._t_s, t_s)
         dx, dy = part * leg.dx_m, part * leg.dy_m
-        if dx or dy:
+        if leg.unwatched:
+            self._t_s = leg.t1_s
+            cloud.scatter(leg.dx_m, leg.dy_m, leg.sd_m, leg.turn_sd_rad)
+            self._doubt_m = math.hypot(self._doubt_m, leg.sd_m)
+        elif dx or dy:
             self._xy = (self._xy[0] + dx, self._xy[1] + dy)
+            self._doubt_m *= math.exp(-math.hypot(dx, dy) / REGAIN_M)
             root = math.sqrt(part)
             cloud.move(dx, dy, leg.sd_m * root, leg.turn_sd_rad * root, self.walls)
 
@@ -212,7 +225,10 @@ class Tracker:
         axis = leg.heading_rad(heard.t_s) + RANGER_AXES_RAD[heard.ranger]
         power = self._news(heard.ranger)
         if power > 0.0:
-            cloud.weigh(axis, heard.range_m, power, self._model, self.walls)
+            explained = cloud.weigh(axis, heard.range_m, power, self._model, self.walls)
+            self.explained += power * EXPLAINED_SHARE * (explained - self.explained)
+            if self.explained < UNEXPLAINED:
+                self._doubt_m = max(self._doubt_m, LOST_SD_M)
 
     def _news(self, ranger: int) -> float:
         """Share of independent information in this ranger's next echo: errors are correlated over some travel."""
