@@ -50,7 +50,7 @@ MANNERS = {
 
 @dataclass(frozen=True)
 class Course:
-    """Truth: `t_s` (n,), sensor `position_m` (n, 3), `rotation` (n, 3, 3) foot -> walk; per step when it left and landed, and footprints (k + 1, 3)."""
+    """Truth: `t_s` (n,), sensor `position_m` (n, 3), `rotation` (n, 3, 3) foot -> walk; steps (k,) in time; footprints (k + 1, 3)."""
 
     t_s: Floats
     position_m: Floats
@@ -69,8 +69,8 @@ def glide(t: Floats, begin: float, end: float) -> Floats:
 def course(manner: Manner, steps: int) -> Course:
     """Stand, take so many equal steps, stand."""
     m = manner
-    left = STAND_S + np.arange(steps) * (m.swing_s + m.stance_s)
-    landed = left + m.swing_s
+    left: Floats = STAND_S + np.arange(steps, dtype=np.float64) * (m.swing_s + m.stance_s)
+    landed: Floats = left + m.swing_s
     t = np.arange(int((landed[-1] + STAND_S) * RATE_HZ)) / RATE_HZ
     ground, pitch, yaw = np.zeros((len(t), 3)), np.zeros(len(t)), np.zeros(len(t))
     prints = [np.zeros(3)]
