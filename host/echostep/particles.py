@@ -107,7 +107,9 @@ class Cloud:
         """Size for the cloud's present spread: the usual one up to a metre, then as the area, never more than there are."""
         w = weight / weight.sum()
         spread2 = float(w @ self.x_m**2 - (w @ self.x_m) ** 2 + w @ self.y_m**2 - (w @ self.y_m) ** 2)
-        return int(min(self._settings.size * max(spread2, 1.0), self._settings.largest, max(len(w), self._settings.size)))
+        return int(
+            min(self._settings.size * max(spread2, 1.0), self._settings.largest, max(len(w), self._settings.size))
+        )
 
     def weigh(
         self, axis_walk_rad: float, range_m: float | None, power: float, model: EchoModel, walls: WallIndex
@@ -128,7 +130,8 @@ class Cloud:
             return
         weight = np.exp(self.log_weight)
         self._take(systematic(weight, float(self._rng.random()), self._wanted(weight)))
-        if len(self.x_m) > self._settings.size:  # scattered: between the few that fit there are others that do [Gordon et al. 1993]
+        if len(self.x_m) > self._settings.size:
+            # Scattered: between the few that fit there are others that do [Gordon et al. 1993, roughening].
             noise = self._rng.standard_normal((3, len(self.x_m)))
             self.x_m += self._settings.rough_m * noise[0]
             self.y_m += self._settings.rough_m * noise[1]
