@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from mcap.exceptions import EndOfFile, McapError
+from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
@@ -25,6 +25,7 @@ from echostep.sources import Chunk
 METADATA_NAME = "echostep"
 FLUSH_NS = 1_000_000_000
 RECORD_LIMIT = 1 << 24
+MAGIC_SIZE = 8
 
 
 class Recorder:
@@ -73,21 +74,6 @@ class Recorder:
 
 
 @dataclass
-class _WholeReads:
-    """A file that ends with an error, not with a short read: a cut record must not pass for a whole one."""
-
-    file: IO[bytes]
-
-    def read(self, length: int) -> bytes:
-        if not 0 <= length <= RECORD_LIMIT:
-            raise EndOfFile
-        found = self.file.read(length)
-        if len(found) < length:
-            raise EndOfFile
-        return found
-
-
-@dataclass
 class Recording:
     """A recording on disk: `about` as it was given, and the chunks; `truncated` is set when the file ends too early."""
 
@@ -108,14 +94,30 @@ class Recording:
 
     def _records(self) -> Iterator[object]:
         with self.path.open("rb") as file:
-            size = max(1, os.fstat(file.fileno()).st_size)
-            reader = StreamReader(_WholeReads(file), record_size_limit=RECORD_LIMIT)  # type: ignore[arg-type]
+            size = os.fstat(file.fileno()).st_size
+            reader = StreamReader(file, record_size_limit=RECORD_LIMIT)
+            start = 0
             try:
                 for record in reader.records:
-                    self.fraction = file.tell() / size
+                    end = file.tell()
+                    if end >= size and not _whole(file, start, size):
+                        break
+                    self.fraction = end / size
                     yield record
-            except (McapError, struct.error, UnicodeDecodeError, MemoryError):
-                self.truncated = True
+                    start = end
+                else:
+                    return
+            except (McapError, struct.error, UnicodeDecodeError, MemoryError, OverflowError):
+                pass
+            self.truncated = True
+
+
+def _whole(file: IO[bytes], start: int, size: int) -> bool:
+    """Whether the record at `start` ends within the file: the library takes what is left for a whole record."""
+    file.seek(max(start, MAGIC_SIZE) + 1)
+    length = int.from_bytes(file.read(8), "little")
+    file.seek(size)
+    return max(start, MAGIC_SIZE) + 9 + length <= size
 
 
 def open_recording(path: Path | str) -> Recording:
