@@ -5,6 +5,7 @@ In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -119,7 +120,9 @@ def _pose(text: str | None) -> Pose | None:
 
 
 def main() -> None:
-    """Entry point: mistakes end with one line and status 2."""
+    """Entry point: mistakes end with one line and status 2; Ctrl-C and SIGTERM end a run with its files."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     try:
         app()
     except EchostepError as error:
@@ -128,3 +131,5 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except KeyboardInterrupt:
+        sys.exit(130)

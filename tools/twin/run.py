@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -120,6 +121,8 @@ def main() -> int:
     parser.add_argument("--once", action="store_true", help="end after one walk")
     parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
     options = parser.parse_args()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     with as_file(files("echostep") / "plans" / "demo.json") as path:
         plan = load_plan(path)
         board = PtyBoard()
