@@ -1,45 +1,38 @@
-"""The world that the rangers hear: echoes from a plan.
+"""The world that the rangers hear: which echoes of a plan come back, and when.
 
-In: where the trunk is, walls, a seeded generator. Out: times of flight a millisecond, for each ranger's own ping and for the other's. Owns nothing.
-Sound levels in dB relative to a wall at 1 m on the axis; the tracker's likelihood shares nothing with this but the plan.
+In: walls, where the trunk is, a seeded generator. Out: times of flight a millisecond, for each ranger's own ping and for the other's. Owns nothing.
+
+Sound at 40 kHz meets walls as light meets mirrors [Kuc and Siegel 1987]: a wall answers from the foot of the perpendicular, the image of
+one's own image gives the way by two walls (corners, and from one ranger to the other between two walls), and an edge answers weakly.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.simulation.acoustics import FIRST_NULL, SRF02, Acoustics, path_db, rod_db, wall_db
+from echostep.simulation.mirrors import (
+    blocked,
+    crossing,
+    distance,
+    foot,
+    in_double_cone,
+    inside_corner,
+    mirror,
+    wall_edges,
+)
+
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Counts = NDArray[np.uint16]
 
-
-class Acoustics(NamedTuple):
-    """What decides whether an echo is heard [Girard 2011, 2.6; SRF02 technical specification].
-
-    `rim_rad`: 6 dB are lost there; the loss grows with the fourth power of the angle, so that the range shrinks toward the edge of the cone.
-    `edge_db`: diffraction at a wall's end against a whole wall. `bounce_db`, `body_db`: loss per further wall, and past the wearer's body.
-    `threshold_db` and its spread: a wall on the axis is heard up to 6 m.
-    """
-
-    speed_m_s: float = 343.2
-    rim_rad: float = math.radians(27.5)
-    edge_db: float = -16.0
-    bounce_db: float = -3.0
-    body_db: float = -8.0
-    threshold_db: float = -18.5
-    threshold_sd_db: float = 1.0
-    minimum_m: float = 0.15
-    maximum_m: float = 6.0
-    noise_m: float = 0.025
-    parallel_rad: float = math.radians(8.0)
-
-
-SRF02 = Acoustics()
+PIECE = 64  # poses that share one list of near walls
+OWN, CROSS = 0, 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +43,9 @@ class Echoes:
     cross_us: Counts
 
 
-def ranger_bias_m(rng: np.random.Generator) -> Floats:
-    """Constant range error of the two rangers, (2,): with the noise it makes the 3-4 cm of the SRF02 [Girard 2011, 2.6]."""
-    return 0.025 * rng.standard_normal(2)
+def ranger_bias_m(rng: np.random.Generator, acoustics: Acoustics = SRF02) -> Floats:
+    """Constant range error of the two rangers, (2,)."""
+    return acoustics.bias_m * rng.standard_normal(2)
 
 
 def echoes(
@@ -65,15 +58,16 @@ def echoes(
 ) -> Echoes:
     """Echoes for trunk positions (n, 2) and headings (n,); left looks to +90 degrees of the heading, right to -90."""
     n = len(heading_rad)
-    near = _near_walls(trunk_m, walls, acoustics.maximum_m + 0.5)
     noise = rng.standard_normal((n, 2, 4))
-    own, cross = np.zeros((n, 2)), np.zeros((n, 2))
-    _hear(trunk_m, heading_rad, near, noise, acoustics, own, cross)
-    to_us = 2e6 / acoustics.speed_m_s
-    own = np.where(own > 0.0, np.maximum(own + bias_m, acoustics.minimum_m), 0.0)
-    own_us = np.clip(np.rint(own * to_us), 0, 65534).astype(np.uint16)
-    cross_us = np.clip(np.rint(cross * to_us), 0, 65534).astype(np.uint16)
-    return Echoes(own_us, cross_us)
+    range_m = np.zeros((n, 2, 2))
+    for start in range(0, n, PIECE):
+        at = slice(start, start + PIECE)
+        near = _near_walls(trunk_m[at], walls, acoustics.maximum_m)
+        _hear(trunk_m[at], heading_rad[at], near, wall_edges(near), noise[at], acoustics, range_m[at])
+    own = range_m[..., OWN]
+    range_m[..., OWN] = np.where(own > 0.0, np.maximum(own + bias_m, acoustics.minimum_m), 0.0)
+    us = np.rint(range_m * (2e6 / acoustics.speed_m_s)).astype(np.uint16)
+    return Echoes(us[..., OWN], us[..., CROSS])
 
 
 def _near_walls(points: Floats, walls: Floats, reach_m: float) -> Floats:
@@ -85,115 +79,125 @@ def _near_walls(points: Floats, walls: Floats, reach_m: float) -> Floats:
 
 
 @njit(cache=True)
-def directivity_db(off_axis_rad: float, rim_rad: float) -> float:
-    """Level against the axis, -6 dB at the rim [Girard 2011, Figure 2b]."""
-    return -6.0 * (off_axis_rad / rim_rad) ** 4
-
-
-@njit(cache=True)
 def _hear(
-    trunk: Floats, heading: Floats, walls: Floats, noise: Floats, a: Acoustics, own: Floats, cross: Floats
+    trunk: Floats, heading: Floats, walls: Floats, edges: Floats, noise: Floats, a: Acoustics, range_m: Floats
 ) -> None:
-    """Ranges (m, half the way of the sound) per millisecond and ranger; 0 when nothing is heard."""
+    """Fill `range_m` (n, 2 rangers, own or cross): half the way of the nearest echo heard, with noise; 0 for none."""
+    best, heard_db = np.zeros((2, 2)), np.zeros((2, 2))
+    lit = np.zeros(len(walls), np.int64)
     for k in range(len(heading)):
         px, py = trunk[k, 0], trunk[k, 1]
-        facing = np.full(2, -1)
-        distance, loss = np.zeros(2), np.zeros(2)
+        ax, ay = -math.sin(heading[k]), math.cos(heading[k])  # the left ranger's axis; the right one's is opposite
+        best[:] = a.maximum_m + 1e-9
+        heard_db[:, OWN] = a.threshold_db + a.threshold_sd_db * noise[k, :, 0]
+        heard_db[:, CROSS] = a.threshold_db + a.threshold_sd_db * noise[k, :, 2]
+        some = lit[: _lit(px, py, ax, ay, walls, a, lit)]
+        _one_wall(px, py, ax, ay, walls, some, heard_db, a, best)
+        _one_edge(px, py, ax, ay, walls, edges, heard_db, a, best)
+        _two_walls(px, py, ax, ay, walls, some, heard_db, a, best)
         for side in range(2):
-            axis = heading[k] + (0.5 - side) * math.pi
-            level_noise = a.threshold_sd_db * noise[k, side, 0]
-            nearest = a.maximum_m + 0.1
-            heard = 0.0
-            for w in range(len(walls)):
-                d, off = _perpendicular(px, py, axis, walls[w])
-                if d <= 0.0 or d >= nearest or off > 1.0:
-                    continue
-                level = directivity_db(off, a.rim_rad) - 20.0 * math.log10(max(d, 0.1))
-                if level + level_noise < a.threshold_db or _blocked(px, py, walls, w):
-                    continue
-                nearest, heard = d, d
-                facing[side], distance[side], loss[side] = w, d, directivity_db(off, a.rim_rad)
-            edge = _edge(px, py, axis, nearest, level_noise, walls, a)
-            if edge > 0.0:
-                heard = edge
-            if heard >= a.minimum_m:
-                own[k, side] = heard + a.noise_m * noise[k, side, 1]
-        _cross_talk(k, facing, distance, loss, walls, noise, a, cross)
+            for kind in (OWN, CROSS):
+                if best[side, kind] <= a.maximum_m:
+                    noisy = best[side, kind] + a.noise_m * noise[k, side, 1 + 2 * kind]
+                    range_m[k, side, kind] = max(noisy, a.minimum_m)
 
 
 @njit(cache=True)
-def _perpendicular(px: float, py: float, axis: float, wall: Floats) -> tuple[float, float]:
-    """Distance and off-axis angle of the point of a wall that throws sound straight back; distance 0 when there is none."""
-    ux, uy = wall[2] - wall[0], wall[3] - wall[1]
-    s = ((px - wall[0]) * ux + (py - wall[1]) * uy) / (ux * ux + uy * uy)
-    if s < 0.0 or s > 1.0:
-        return 0.0, 0.0
-    fx, fy = wall[0] + s * ux - px, wall[1] + s * uy - py
-    d = math.hypot(fx, fy)
-    return d, abs((math.atan2(fy, fx) - axis + math.pi) % (2.0 * math.pi) - math.pi)
-
-
-@njit(cache=True)
-def _blocked(px: float, py: float, walls: Floats, but: int) -> bool:
-    """Whether another wall stands before the reflecting point of wall `but`."""
-    wall = walls[but]
-    ux, uy = wall[2] - wall[0], wall[3] - wall[1]
-    s = ((px - wall[0]) * ux + (py - wall[1]) * uy) / (ux * ux + uy * uy)
-    return _blocked_point(px, py, wall[0] + s * ux, wall[1] + s * uy, walls, but)
-
-
-@njit(cache=True)
-def _blocked_point(px: float, py: float, qx: float, qy: float, walls: Floats, but: int) -> bool:
-    """Whether any wall other than `but` meets the open segment p-q; walls that merely touch q do not count."""
+def _lit(px: float, py: float, ax: float, ay: float, walls: Floats, a: Acoustics, lit: Ints) -> int:
+    """Fill `lit` with the numbers of the walls that reach into a ranger's cone; returns how many."""
+    cosine = math.sqrt(1.0 - min(FIRST_NULL / a.size, 1.0) ** 2)
+    count = 0
     for w in range(len(walls)):
-        if w == but:
-            continue
-        cx, cy, dx, dy = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-        rx, ry, sx, sy = qx - px, qy - py, dx - cx, dy - cy
-        det = rx * sy - ry * sx
-        if abs(det) < 1e-12:
-            continue
-        t = ((cx - px) * sy - (cy - py) * sx) / det
-        u = ((cx - px) * ry - (cy - py) * rx) / det
-        if 1e-6 < t < 0.999 and -1e-9 <= u <= 1.0 + 1e-9:
-            return True
-    return False
+        if in_double_cone(px, py, ax, ay, cosine, walls[w]):
+            lit[count] = w
+            count += 1
+    return count
 
 
 @njit(cache=True)
-def _edge(px: float, py: float, axis: float, before: float, level_noise: float, walls: Floats, a: Acoustics) -> float:
-    """Distance of the nearest wall end that is heard before `before`; 0 for none."""
-    nearest = before
-    found = 0.0
-    for w in range(len(walls)):
-        for e in (0, 2):
-            dx, dy = walls[w, e] - px, walls[w, e + 1] - py
-            d = math.hypot(dx, dy)
-            if d >= nearest or d < a.minimum_m:
-                continue
-            off = abs((math.atan2(dy, dx) - axis + math.pi) % (2.0 * math.pi) - math.pi)
-            if off > 1.0:
-                continue
-            level = a.edge_db + directivity_db(off, a.rim_rad) - 30.0 * math.log10(max(d, 0.1))
-            if level + level_noise < a.threshold_db or _blocked_point(px, py, walls[w, e], walls[w, e + 1], walls, w):
-                continue
-            nearest, found = d, d
-    return found
-
-
-@njit(cache=True)
-def _cross_talk(
-    k: int, facing: Floats, distance: Floats, loss: Floats, walls: Floats, noise: Floats, a: Acoustics, cross: Floats
+def _one_wall(
+    px: float, py: float, ax: float, ay: float, walls: Floats, lit: Ints, heard_db: Floats, a: Acoustics, best: Floats
 ) -> None:
-    """The other ranger's ping by two bounces between parallel walls [Girard 2011, Figure 3b]: past the wearer, out and in again."""
-    if facing[0] < 0 or facing[1] < 0:
+    """Straight back from the foot of the perpendicular on each wall."""
+    for w in lit:
+        s = foot(px, py, walls[w])
+        if s < 0.0 or s > 1.0:
+            continue
+        x, y = walls[w, 0] + s * (walls[w, 2] - walls[w, 0]), walls[w, 1] + s * (walls[w, 3] - walls[w, 1])
+        side, away, off = _seen(px, py, ax, ay, x, y)
+        if away < a.minimum_m or away >= best[side, OWN] or wall_db(away, off, a) < heard_db[side, OWN]:
+            continue
+        if not blocked(px, py, x, y, walls, w, w):
+            best[side, OWN] = away
+
+
+@njit(cache=True)
+def _one_edge(
+    px: float, py: float, ax: float, ay: float, walls: Floats, edges: Floats, heard_db: Floats, a: Acoustics,
+    best: Floats,
+) -> None:  # fmt: skip
+    """Straight back from the ends of walls; not from the inside of a corner."""
+    for e in range(len(edges)):
+        x, y = edges[e, 0], edges[e, 1]
+        side, away, off = _seen(px, py, ax, ay, x, y)
+        if away < a.minimum_m or away >= best[side, OWN]:
+            continue
+        if rod_db(away, off, a.frame_radius_m, a) < heard_db[side, OWN] or inside_corner(px - x, py - y, edges[e]):
+            continue
+        if not blocked(px, py, x, y, walls, -1, -1):
+            best[side, OWN] = away
+
+
+@njit(cache=True)
+def _two_walls(
+    px: float, py: float, ax: float, ay: float, walls: Floats, lit: Ints, heard_db: Floats, a: Acoustics, best: Floats
+) -> None:
+    """Out to one wall, on to another, and back: to the same ranger (a corner) or to the other [Girard 2011, Figure 3b].
+
+    The way is as long as the straight line to the mirror image, in the first wall, of one's own image in the last wall.
+    """
+    reach2 = 4.0 * a.maximum_m * a.maximum_m
+    for last in lit:
+        ix, iy = mirror(px, py, walls[last])
+        if (ix - px) ** 2 + (iy - py) ** 2 > reach2:
+            continue
+        for first in lit:
+            jx, jy = mirror(ix, iy, walls[first])
+            way2 = (jx - px) ** 2 + (jy - py) ** 2
+            if first == last or way2 > reach2:
+                continue
+            s = crossing(px, py, jx, jy, walls[first])
+            bx, by = px + s * (jx - px), py + s * (jy - py)
+            t = crossing(bx, by, ix, iy, walls[last]) if s >= 0.0 else -1.0
+            if t >= 0.0:
+                cx, cy = bx + t * (ix - bx), by + t * (iy - by)
+                way = math.sqrt(way2)
+                _offer(px, py, ax, ay, bx, by, cx, cy, 0.5 * way, walls, first, last, heard_db, a, best)
+
+
+@njit(cache=True)
+def _offer(
+    px: float, py: float, ax: float, ay: float, bx: float, by: float, cx: float, cy: float, range_m: float,
+    walls: Floats, first: int, last: int, heard_db: Floats, a: Acoustics, best: Floats,
+) -> None:  # fmt: skip
+    """Take the way p-b-c-p as the best echo if it is shorter, loud enough and free."""
+    sender, _, off_out = _seen(px, py, ax, ay, bx, by)
+    side, _, off_back = _seen(px, py, ax, ay, cx, cy)
+    kind = OWN if sender == side else CROSS
+    if range_m < a.minimum_m or range_m >= best[side, kind]:
         return
-    w, v = walls[facing[0]], walls[facing[1]]
-    turn = math.atan2(w[3] - w[1], w[2] - w[0]) - math.atan2(v[3] - v[1], v[2] - v[0])
-    if abs((turn + 0.5 * math.pi) % math.pi - 0.5 * math.pi) > a.parallel_rad:
+    level = path_db(range_m, off_out, off_back, 2, a)
+    if distance(px, py, bx, by, cx, cy) < a.body_m:
+        level += a.body_db
+    if level < heard_db[side, kind] or blocked(px, py, bx, by, walls, first, first):
         return
-    way = distance[0] + distance[1]
-    level = loss[0] + loss[1] + 2.0 * a.bounce_db + a.body_db - 20.0 * math.log10(max(way, 0.1))
-    for side in range(2):
-        if way <= a.maximum_m and level + a.threshold_sd_db * noise[k, side, 2] >= a.threshold_db:
-            cross[k, side] = way + a.noise_m * noise[k, side, 3]
+    if not blocked(cx, cy, px, py, walls, last, last) and not blocked(bx, by, cx, cy, walls, first, last):
+        best[side, kind] = range_m
+
+
+@njit(cache=True)
+def _seen(px: float, py: float, ax: float, ay: float, x: float, y: float) -> tuple[int, float, float]:
+    """On which side of p a point lies (0 left, 1 right), how far away, and its angle off that ranger's axis."""
+    away = max(math.hypot(x - px, y - py), 1e-9)
+    along = ((x - px) * ax + (y - py) * ay) / away
+    return (0 if along > 0.0 else 1), away, math.acos(min(abs(along), 1.0))
