@@ -1,39 +1,42 @@
 """A person who walks: trunk, right foot, thigh and calf, a thousand times a second.
 
 In: waypoints on the plan, a seeded generator. Out: `Walk`: arrays at 1 kHz, map frame. Owns nothing.
-The foot's path is built from smooth pieces, so that integrating what its sensors would feel gives the path back.
+The person walks rounded corners, and stops for a pause or a sharp turn, where he turns on the spot. The right foot's path is built from
+smooth pieces (`footpath`), so that integrating what its sensors would feel gives the path back.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.simulation.footpath import Foot, Strides, foot_path
+from echostep.simulation.legs import leg_rates, sway
+
 Floats = NDArray[np.float64]
+Waypoint = tuple[float, float] | tuple[float, float, float]  # x, y, and how long to pause there (s)
 
 RATE_HZ = 1000
+SPACING_M = 0.01
+SHARP_RAD = math.radians(100.0)  # nobody walks such a corner in a curve
+TURN_STRIDE_RAD = math.radians(75.0)  # per stride when turning on the spot
+SMOOTH_MS = 301
 
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Stride length and time with their spread, and the right foot: its distance from the trunk's line, toe angle and clearance.
-
-    Typical of adults at 1.2 m/s [Perry 1992; Winter 2009].
-    """
+    """Stride length and time with their spread, and how far corners are cut; typical of adults at 1.2 m/s [Perry 1992; Winter 2009]."""
 
     stride_m: float = 1.3
     stride_s: float = 1.1
     stride_sd: float = 0.03
-    foot_left_m: float = -0.08
-    toe_out_deg: float = 7.0
-    clearance_m: float = 0.12
-    flat_share: float = 0.4
     corner_m: float = 0.6
     stand_s: float = 3.0
+    foot: Foot = field(default_factory=Foot)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,20 +56,14 @@ class Walk:
     flat: NDArray[np.bool_]
 
 
-def walk(waypoints: Sequence[tuple[float, float]], person: Person, rng: np.random.Generator) -> Walk:
-    """Stand, walk along the waypoints with rounded corners, stand again."""
-    path = round_corners(np.asarray(waypoints, float), person.corner_m)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    strides = _strides(float(along[-1]), person, rng)
-    t = np.arange(int((strides.t_s[-1] + person.stand_s) * RATE_HZ)) / RATE_HZ
-    progress = _hermite(t, strides.t_s, strides.s_m)
-    trunk = np.column_stack([np.interp(progress, along, path[:, k]) for k in (0, 1)])
-    course = _smooth(np.unwrap(np.arctan2(*np.diff(path, axis=0).T[::-1])), 9)
-    heading = _smooth(np.interp(progress, 0.5 * (along[1:] + along[:-1]), course), 301)
-    foot, rpy, flat = _foot(t, strides, trunk, heading, person)
-    thigh, calf = _leg_rates(t, strides)
-    belt = np.gradient(heading, 1.0 / RATE_HZ)
-    return Walk(t, trunk, heading, foot, rpy, thigh, calf, belt, flat)
+def walk(waypoints: Sequence[Waypoint], person: Person, rng: np.random.Generator) -> Walk:
+    """Stand, walk along the waypoints, stand again."""
+    schedule = _Schedule(person, rng)
+    for points, pause_s in _legs(waypoints):
+        schedule.walk(round_corners(points, person.corner_m))
+        schedule.stand(pause_s)
+    schedule.stand(person.stand_s)
+    return schedule.played()
 
 
 def round_corners(points: Floats, radius_m: float) -> Floats:
@@ -79,25 +76,129 @@ def round_corners(points: Floats, radius_m: float) -> Floats:
         u = np.linspace(0.0, 1.0, 60)[:, None]
         pieces.append((1 - u) ** 2 * start + 2 * u * (1 - u) * corner + u**2 * end)
     corners = np.vstack([*pieces, points[-1:]])
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-    even = np.linspace(0.0, along[-1], max(2, int(along[-1] / 0.01)))
+    along = _along(corners)
+    even = np.linspace(0.0, along[-1], max(3, int(along[-1] / SPACING_M)))
     return np.column_stack([np.interp(even, along, corners[:, k]) for k in (0, 1)])
 
 
-@dataclass(frozen=True, slots=True)
-class _Strides:
-    """Mid-stances of the right foot: when, and how far along the path."""
+def _legs(waypoints: Sequence[Waypoint]) -> list[tuple[Floats, float]]:
+    """Pieces of the way that are walked without a stop, and the pause after each."""
+    points = [np.array(w[:2], np.float64) for w in waypoints]
+    legs, begin = [], 0
+    for k in range(1, len(points)):
+        waypoint = waypoints[k]
+        pause_s = waypoint[2] if len(waypoint) == 3 else 0.0
+        sharp = k + 1 < len(points) and _turn(points[k - 1], points[k], points[k + 1]) > SHARP_RAD
+        if k + 1 == len(points) or pause_s > 0.0 or sharp:
+            legs.append((np.array(points[begin : k + 1]), pause_s))
+            begin = k
+    return legs
 
-    t_s: Floats
-    s_m: Floats
+
+def _turn(before: Floats, corner: Floats, after: Floats) -> float:
+    a, b = corner - before, after - corner
+    return abs(math.atan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
-def _strides(length_m: float, person: Person, rng: np.random.Generator) -> _Strides:
-    count = max(1, round(length_m / person.stride_m))
-    lengths = 1.0 + person.stride_sd * rng.standard_normal(count)
-    times = person.stride_s * (1.0 + person.stride_sd * rng.standard_normal(count))
-    s = np.concatenate([[0.0], np.cumsum(lengths) * length_m / lengths.sum()])
-    return _Strides(person.stand_s + np.concatenate([[0.0], np.cumsum(times)]), s)
+def _along(points: Floats) -> Floats:
+    """Length of the polyline up to each point."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+class _Schedule:
+    """Strides of the right foot from one mid-stance to the next: when, how far along which path, how much turned."""
+
+    def __init__(self, person: Person, rng: np.random.Generator) -> None:
+        self._person, self._rng = person, rng
+        self._t = [0.0, person.stand_s]
+        self._moves = [False]  # one for each interval between times
+        self._trunk: list[Floats] = []
+        self._heading: list[Floats] = []
+        self._ms = 0
+
+    def walk(self, path: Floats) -> None:
+        """Walk a path (n, 2) from rest to rest; first turn on the spot to where it leads."""
+        along = _along(path)
+        course = np.unwrap(np.arctan2(*np.diff(path, axis=0).T[::-1]))
+        self._turn_to(path[0], float(course[0]))
+        if self._heading:
+            course += 2.0 * math.pi * round((self._heading[-1][-1] - course[0]) / (2.0 * math.pi))
+        times, lengths = self._strides(float(along[-1]))
+        t, s = self._t[-1] + times, lengths
+        self._add_times(times[1:])
+        progress = _hermite(self._grid(t[-1]), t, s)
+        middle = 0.5 * (along[1:] + along[:-1])
+        self._trunk.append(np.column_stack([np.interp(progress, along, path[:, k]) for k in (0, 1)]))
+        self._heading.append(np.interp(progress, middle, course))
+
+    def stand(self, pause_s: float) -> None:
+        """Stay."""
+        if pause_s > 0.0:
+            self._t.append(self._t[-1] + pause_s)
+            self._moves.append(False)
+            self._hold(self._t[-1], self._trunk[-1][-1], self._heading[-1][-1:])
+
+    def played(self) -> Walk:
+        """The walk that was planned."""
+        trunk, heading = np.vstack(self._trunk), _smooth(np.concatenate(self._heading))
+        t = np.arange(len(heading)) / RATE_HZ
+        strides = self._landings(trunk, heading)
+        foot_m, rpy, flat = foot_path(t, strides, self._person.foot)
+        phase, effort = strides.phase(t), _smooth(strides.effort(t, self._person.stride_m))
+        thigh, calf = leg_rates(phase, effort, RATE_HZ)
+        left_m, twist = sway(phase, effort)
+        worn = heading + twist
+        trunk = trunk + left_m[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
+        return Walk(t, trunk, worn, foot_m, rpy, thigh, calf, np.gradient(worn) * RATE_HZ, flat)
+
+    def _turn_to(self, at: Floats, course: float) -> None:
+        """Turn on the spot, the short way, a few strides if it takes that."""
+        if not self._heading:
+            self._hold(self._t[-1], at, np.array([course]))
+            return
+        start = float(self._heading[-1][-1])
+        turn = (course - start + math.pi) % (2.0 * math.pi) - math.pi
+        count = math.ceil(abs(turn) / TURN_STRIDE_RAD - 0.1)
+        if count == 0:
+            return
+        begin = self._t[-1]
+        self._add_times(np.cumsum(self._times(count)))
+        share = np.clip((self._grid(self._t[-1]) - begin) / (self._t[-1] - begin), 0.0, 1.0)
+        self._heading.append(start + turn * share**2 * (3.0 - 2.0 * share))
+        self._trunk.append(np.tile(at, (len(share), 1)))
+
+    def _strides(self, length_m: float) -> tuple[Floats, Floats]:
+        """Times and lengths walked (k + 1,) from rest to rest; the first and the last stride are shorter."""
+        count = max(2, round(length_m / self._person.stride_m + 0.8))
+        lengths = 1.0 + self._person.stride_sd * self._rng.standard_normal(count)
+        lengths[[0, -1]] *= 0.6
+        s = np.concatenate([[0.0], np.cumsum(lengths) * length_m / lengths.sum()])
+        return np.concatenate([[0.0], np.cumsum(self._times(count))]), s
+
+    def _times(self, count: int) -> Floats:
+        return self._person.stride_s * (1.0 + self._person.stride_sd * self._rng.standard_normal(count))
+
+    def _add_times(self, after_s: Floats) -> None:
+        self._t += (self._t[-1] + after_s).tolist()
+        self._moves += [True] * len(after_s)
+
+    def _grid(self, end_s: float) -> Floats:
+        """The milliseconds from where the plan ends up to a time."""
+        first, self._ms = self._ms, max(self._ms, math.ceil(end_s * RATE_HZ))
+        return np.arange(first, self._ms) / RATE_HZ
+
+    def _hold(self, end_s: float, at: Floats, heading: Floats) -> None:
+        n = len(self._grid(end_s))
+        self._trunk.append(np.tile(at, (n, 1)))
+        self._heading.append(np.repeat(heading, n))
+
+    def _landings(self, trunk: Floats, heading: Floats) -> Strides:
+        """Where the foot stands at each time; who stands does not lift it."""
+        t = np.array(self._t)
+        at = np.minimum((t * RATE_HZ).astype(int), len(heading) - 1)
+        landed = np.maximum.accumulate(np.where(np.concatenate([[True], self._moves]), np.arange(len(t)), 0))
+        at = at[landed]
+        return Strides(t, np.array(self._moves), trunk[at], heading[at])
 
 
 def _hermite(t: Floats, knots: Floats, values: Floats) -> Floats:
@@ -108,63 +209,13 @@ def _hermite(t: Floats, knots: Floats, values: Floats) -> Floats:
     span = knots[k + 1] - knots[k]
     u = np.clip((t - knots[k]) / span, 0.0, 1.0)
     a, b = values[k], values[k + 1]
-    return (
-        a * (1 + 2 * u) * (1 - u) ** 2
-        + b * u**2 * (3 - 2 * u)
-        + span * (slopes[k] * u * (1 - u) ** 2 - slopes[k + 1] * u**2 * (1 - u))
-    )
+    cubic = a * (1 + 2 * u) * (1 - u) ** 2 + b * u**2 * (3 - 2 * u)
+    found: Floats = cubic + span * (slopes[k] * u * (1 - u) ** 2 - slopes[k + 1] * u**2 * (1 - u))
+    return found
 
 
-def _smooth(values: Floats, width: int) -> Floats:
+def _smooth(values: Floats) -> Floats:
     """Running mean, ends held."""
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")[: len(values)]
-
-
-def _foot(
-    t: Floats, strides: _Strides, trunk: Floats, heading: Floats, person: Person
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Foot position (n, 3), roll pitch yaw (n, 3) and whether it is flat: still in stance, minimum-jerk in swing [Flash and Hogan 1985]."""
-    at = np.clip((strides.t_s * RATE_HZ).astype(int), 0, len(t) - 1)
-    yaw = heading[at] - math.radians(person.toe_out_deg)
-    left = np.column_stack([-np.sin(heading[at]), np.cos(heading[at])])
-    prints = trunk[at] + person.foot_left_m * left
-    span = np.diff(strides.t_s)
-    k = np.clip(np.searchsorted(strides.t_s, t, side="right") - 1, 0, len(span) - 1)
-    half = 0.5 * person.flat_share
-    u = np.clip(((t - strides.t_s[k]) / span[k] - half) / (1.0 - 2.0 * half), 0.0, 1.0)
-    share = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    foot = np.zeros((len(t), 3))
-    foot[:, :2] = prints[k] + share[:, None] * (prints[k + 1] - prints[k])
-    foot[:, 2] = person.clearance_m * _bump(u, 0.0, 1.0)
-    rpy = np.zeros((len(t), 3))
-    rpy[:, 1] = math.radians(60.0) * _bump(u, 0.0, 0.55) - math.radians(22.0) * _bump(u, 0.55, 1.0)
-    rpy[:, 2] = yaw[k] + share * (yaw[k + 1] - yaw[k])
-    return foot, rpy, (u <= 0.0) | (u >= 1.0)
-
-
-def _bump(u: Floats, start: float, end: float) -> Floats:
-    """A smooth rise to 1 and back between two values of u, with two vanishing derivatives at either end."""
-    v = np.clip((u - start) / (end - start), 0.0, 1.0)
-    return 64.0 * v**3 * (1.0 - v) ** 3
-
-
-def _leg_rates(t: Floats, strides: _Strides) -> tuple[Floats, Floats]:
-    """Pitch rates of thigh and calf, forward positive.
-
-    Hip between 30 degrees of flexion and 10 of extension; knee with its peaks of 18 degrees in loading (15 % of the cycle after
-    heel strike) and 60 degrees in swing (72 %) [Perry 1992]. Heel strike is 30 % of a cycle before mid-stance.
-    """
-    count = np.arange(len(strides.t_s))
-    phase = (np.interp(t, strides.t_s, count) + 0.3) % 1.0
-    moving = _smooth(((t >= strides.t_s[0]) & (t <= strides.t_s[-1])).astype(float), 201)
-    hip = np.radians(10.0 + 20.0 * np.cos(2 * np.pi * (phase - 0.9)))
-    knee = np.radians(5.0 + 13.0 * _peak(phase, 0.15, 0.07) + 55.0 * _peak(phase, 0.72, 0.09))
-    rate = float(RATE_HZ)
-    return np.gradient(hip * moving) * rate, np.gradient((hip - knee) * moving) * rate
-
-
-def _peak(phase: Floats, at: float, width: float) -> Floats:
-    """A periodic bell of height 1."""
-    distance = (phase - at + 0.5) % 1.0 - 0.5
-    return np.exp(-0.5 * (distance / width) ** 2)
+    padded = np.pad(values, SMOOTH_MS // 2, mode="edge")
+    total = np.concatenate([[0.0], np.cumsum(padded)])
+    return (total[SMOOTH_MS:] - total[:-SMOOTH_MS]) / SMOOTH_MS
