@@ -6,13 +6,14 @@ In: rows of one millisecond, bytes from the host, fault switches. Out: (t_ns, by
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import select
 import struct
 import subprocess
 import time
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from typing import IO, Any, Protocol
 
 import numpy as np
@@ -21,15 +22,15 @@ from numpy.typing import NDArray
 from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader, encode
+from echostep.simulation.rangers import TICKS_US, Rangers
 from echostep.simulation.stimulus import NO_SYNC, ROW
 
 Sent = list[tuple[int, bytes]]
 TIMEOUT_S = 60.0
-MINIMUM_US, WINDOW_US = 875, 35_000  # 15 cm and 600 cm, out and back
-RANGING_MS = 61
-PERIOD_MS, JITTER_MS = 65.0, 3.0
-SEQUENTIAL_MS = 70
 ALL_SENSORS = 0xFF
+ABSENT = -32768
+GYROS = ("thigh", "calf", "belt")
+PRESSURE_US = {m.PressureMode.HIGH_SPEED: 1e6 / 9.0, m.PressureMode.HIGH_RESOLUTION: 1e6 / 1.8}  # [SCP1000 data sheet]
 
 
 class Board(Protocol):
@@ -52,46 +53,35 @@ class PythonBoard:
     """Sends what the firmware would send, without being it: no buses, no faults, no lost frames."""
 
     def __init__(self, seed: int = 0) -> None:
-        self._rng = np.random.default_rng([seed, 2])
+        self._rangers = Rangers(np.random.default_rng([seed, 2]))
         self._ms = 0
         self._sequence = 0
         self._edge = 0
         self._inbox = BoardReader()
+        self._answers: list[m.Message] = []
         self._configuration = m.Configuration(0, ALL_SENSORS, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
-        self._due_ms = [20.0, 20.0 + 0.5 * PERIOD_MS]
-        self._grid_ms = list(self._due_ms)
-        self._triggers: list[deque[tuple[int, int, int]]] = [
-            deque(maxlen=4),
-            deque(maxlen=4),
-        ]  # ms, own us, cross us at the other
-        self._pending: list[int | None] = [None, None]
-        self._out: Sent = []
-        self._answers: Sent = []
+        self._began_us = 0  # when the sensors were started
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let n milliseconds pass."""
-        self._out = []
-        for row in rows:
-            self._tick(row)
-            self._ms += 1
-        return self._out
+        start_us = 1000 * self._ms
+        found: list[tuple[int, m.Message]] = [(start_us, answer) for answer in self._answers]
+        self._answers = []
+        found += self._reports(len(rows)) + self._edges(rows) + self._samples(rows)
+        found += self._rangers.advance(start_us, rows, self._configuration.sensors)
+        found.sort(key=itemgetter(0))
+        self._ms += len(rows)
+        return [self._sent(us, message) for us, message in found]
 
     def send(self, sent: bytes) -> None:
-        """Answer identify, clock_query and configure."""
-        self._out = []
+        """Answer identify, clock_query and configure, with the next millisecond."""
         for message in self._inbox.feed(sent):
             if isinstance(message, m.Identify):
-                self._introduce()
+                self._answers += self._introduction(1000 * self._ms)
             elif isinstance(message, m.ClockQuery):
-                self._emit(m.ClockReply(self._ticks(), message.token))
+                self._answers.append(m.ClockReply(_ticks(1000 * self._ms), message.token))
             elif isinstance(message, m.Configure):
-                rate = min(max(message.gyro_rate_hz, 10), 200)
-                compass = min(max(message.compass_rate_hz, 1), 20)
-                self._configuration = m.Configuration(
-                    0, message.sensors, message.schedule, rate, compass, message.pressure_mode
-                )
-                self._emit(self._configuration._replace(ticks=self._ticks()))
-        self._answers = self._out
+                self._configure(message)
 
     def fault(self, text: str) -> None:
         """The Python board knows no faults."""
@@ -100,72 +90,78 @@ class PythonBoard:
     def close(self) -> None:
         """Nothing to give back."""
 
-    def _ticks(self, us: int = 0) -> int:
-        return (self._ms * 2000 + 2 * us) & 0xFFFFFFFF
+    def _configure(self, wanted: m.Configure) -> None:
+        """Take the settings, clamped as the firmware does (firmware/configuration.c), and start the sensors anew."""
+        self._began_us = 1000 * self._ms
+        schedule = m.Schedule(min(wanted.schedule, m.Schedule.SEQUENTIAL))
+        mode = m.PressureMode(min(wanted.pressure_mode, m.PressureMode.HIGH_RESOLUTION))
+        gyro_hz, compass_hz = min(max(wanted.gyro_rate_hz, 10), 200), min(max(wanted.compass_rate_hz, 1), 20)
+        ticks = _ticks(self._began_us)
+        self._configuration = m.Configuration(ticks, wanted.sensors, schedule, gyro_hz, compass_hz, mode)
+        self._rangers.start(self._began_us, schedule)
+        self._answers.append(self._configuration)
 
-    def _emit(self, message: m.Message) -> None:
-        self._out.append(((self._ms + 1) * 1_000_000, encode(message, self._sequence)))
+    def _sent(self, us: int, message: m.Message) -> tuple[int, bytes]:
+        """The frame, and when it leaves: at the start of the next USB frame."""
         self._sequence += 1
+        return (us // 1000 + 1) * 1_000_000, encode(message, self._sequence - 1)
 
-    def _introduce(self) -> None:
-        self._emit(m.Identity(self._ticks(), m.SCHEMA_HASH, 0, 0, 0, m.ResetCause.POWER_ON))
-        self._emit(self._configuration._replace(ticks=self._ticks()))
+    def _introduction(self, us: int) -> list[m.Message]:
+        identity = m.Identity(_ticks(us), m.SCHEMA_HASH, 0, 0, 0, m.ResetCause.POWER_ON)
+        return [identity, self._configuration._replace(ticks=_ticks(us))]
 
-    def _tick(self, row: Any) -> None:
-        on, c = self._configuration.sensors, self._configuration
-        if self._answers:
-            self._out += self._answers
-            self._answers = []
-        if self._ms == 0:
-            self._introduce()
-        elif self._ms % 1000 == 0:
-            self._report()
-        if on & m.Sensors.SYNC and row["sync_us"] != NO_SYNC:
-            self._emit(m.Sync(self._ticks(int(row["sync_us"])), self._edge & 0xFFFF))
-            self._edge += 1
-        if self._ms % max(1, 1000 // c.gyro_rate_hz) == 0 and on & (m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT):
-            self._emit(m.Gyros(self._ticks(), int(row["thigh"]), int(row["calf"]), int(row["belt"])))
-        if on & m.Sensors.COMPASS and self._ms % (1000 // c.compass_rate_hz) == 0:
-            self._emit(m.Compass(self._ticks(), int(row["bearing"])))
-        slow = c.pressure_mode == m.PressureMode.HIGH_RESOLUTION
-        if on & m.Sensors.PRESSURE and self._ms % (556 if slow else 111) == 110:
-            self._emit(m.Pressure(self._ticks(), int(row["pressure"]), int(row["temperature"])))
-        for ranger in range(2):
-            if on & (1 << ranger):
-                self._range(ranger, row)
+    def _reports(self, n: int) -> list[tuple[int, m.Message]]:
+        """Who it is at the start; once a second, and how it is."""
+        found: list[tuple[int, m.Message]] = []
+        for ms in range(self._ms, self._ms + n):
+            if ms == 0:
+                found += [(0, message) for message in self._introduction(0)]
+            elif ms % 1000 == 0:
+                us = 1000 * ms
+                found += [(us, self._introduction(us)[0]), (us, self._status(us))]
+        return found
 
-    def _report(self) -> None:
-        self._emit(m.Identity(self._ticks(), m.SCHEMA_HASH, 0, 0, 0, m.ResetCause.POWER_ON))
-        self._emit(m.Status(self._ticks(), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, healthy=0x7F, memory_used=0))
+    def _status(self, us: int) -> m.Status:
+        bad = self._inbox.counts.rejected & 0xFFFF
+        return m.Status(_ticks(us), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, bad, healthy=0x7F, memory_used=0)
 
-    def _range(self, ranger: int, row: Any) -> None:
-        began = self._pending[ranger]
-        if began is not None and self._ms - began >= RANGING_MS:
-            self._pending[ranger] = None
-            self._answer(ranger, began)
-        if self._pending[ranger] is None and self._ms >= self._due_ms[ranger]:
-            self._pending[ranger] = self._ms
-            self._triggers[ranger].append((self._ms, int(row["own_us"][ranger]), int(row["cross_us"][1 - ranger])))
-            self._schedule(ranger)
+    def _edges(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
+        found: list[tuple[int, m.Message]] = []
+        if self._configuration.sensors & m.Sensors.SYNC:
+            for k in np.flatnonzero(rows["sync_us"] != NO_SYNC).tolist():
+                us = 1000 * (self._ms + k) + int(rows["sync_us"][k])
+                found.append((us, m.Sync(_ticks(us), self._edge & 0xFFFF)))
+                self._edge += 1
+        return found
 
-    def _schedule(self, ranger: int) -> None:
-        """Concurrent: a locked grid, half a period apart, with jitter. Sequential: the other one, 70 ms later [Girard 2011, 2.6.5]."""
-        if self._configuration.schedule == m.Schedule.SEQUENTIAL:
-            self._due_ms[1 - ranger] = self._ms + SEQUENTIAL_MS
-            self._due_ms[ranger] = self._ms + 2 * SEQUENTIAL_MS
-            return
-        self._grid_ms[ranger] = max(self._grid_ms[ranger] + PERIOD_MS, self._ms + RANGING_MS + 1.0)
-        self._due_ms[ranger] = self._grid_ms[ranger] + JITTER_MS * float(self._rng.random())
+    def _samples(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
+        """Gyros, compass and barometer, each at its own rate."""
+        c = self._configuration
+        on = [bool(c.sensors & one) for one in (m.Sensors.THIGH, m.Sensors.CALF, m.Sensors.BELT)]
+        found: list[tuple[int, m.Message]] = []
+        for us, row in self._due(rows, 1e6 / c.gyro_rate_hz) if any(on) else ():
+            rates = [int(row[name]) if there else ABSENT for name, there in zip(GYROS, on, strict=True)]
+            found.append((us, m.Gyros(_ticks(us), *rates)))
+        for us, row in self._due(rows, 1e6 / c.compass_rate_hz) if c.sensors & m.Sensors.COMPASS else ():
+            found.append((us, m.Compass(_ticks(us), int(row["bearing"]))))
+        for us, row in (
+            self._due(rows, PRESSURE_US[m.PressureMode(c.pressure_mode)]) if c.sensors & m.Sensors.PRESSURE else ()
+        ):
+            found.append((us, m.Pressure(_ticks(us), int(row["pressure"]), int(row["temperature"]))))
+        return found
 
-    def _answer(self, ranger: int, began_ms: int) -> None:
-        """The earliest audible arrival: the own echo, or the other ranger's."""
-        own = next(us for ms, us, _ in self._triggers[ranger] if ms == began_ms)
-        arrivals = [own] if own else []
-        arrivals += [(ms - began_ms) * 1000 + cross for ms, _, cross in self._triggers[1 - ranger] if cross]
-        heard = [us for us in arrivals if MINIMUM_US <= us <= WINDOW_US]
-        ticks = (began_ms * 2000) & 0xFFFFFFFF
-        outcome = m.Outcome.ECHO if heard else m.Outcome.NO_ECHO
-        self._emit(m.Ping(ticks, ranger, outcome, min(heard, default=0)))
+    def _due(self, rows: NDArray[Any], period_us: float) -> Iterator[tuple[int, Any]]:
+        """Times on a grid from the start of the sensors that fall into these rows, and the row of each."""
+        start_us = 1000 * self._ms
+        k = math.ceil((start_us - self._began_us) / period_us)
+        while (us := self._began_us + round(k * period_us)) < start_us + 1000 * len(rows):
+            if us >= start_us:
+                yield us, rows[(us - start_us) // 1000]
+            k += 1
+
+
+def _ticks(us: int) -> int:
+    return (TICKS_US * us) & 0xFFFFFFFF
 
 
 class BoardProcess:
