@@ -20,12 +20,26 @@ from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader, encode
 from echostep.plan import Plan, load_plan
+from echostep.simulation.acoustics import (
+    PIPE_RADIUS_M,
+    SRF02,
+    Acoustics,
+    directivity_db,
+    rod_db,
+    speed_of_sound_m_s,
+    wall_db,
+)
+from echostep.simulation.attitude import quaternions, rotations
 from echostep.simulation.board import BoardProcess, PythonBoard
-from echostep.simulation.mtx import GRAVITY_M_S2, MtxModel, MtxStream, feelings, quaternions, rotations, stream
+from echostep.simulation.delivery import deliver
+from echostep.simulation.magnetism import EARTH, Magnetism
+from echostep.simulation.mirrors import wall_edges
+from echostep.simulation.mtx import GRAVITY_M_S2, MtxModel, MtxStream, feelings, stream
 from echostep.simulation.scenario import Scenario, demo_scenario
+from echostep.simulation.sensors import Adis16100, Compass, Scp1000
 from echostep.simulation.stimulus import NO_SYNC, ROW, BoardSensors
 from echostep.simulation.walker import RATE_HZ, Person, Walk, walk
-from echostep.simulation.world import SRF02, Acoustics, Echoes, echoes
+from echostep.simulation.world import Echoes, echoes
 from echostep.sources import BOARD, MTX, Chunk
 from echostep.xsens import MtSample, MtxReader
 
@@ -34,7 +48,13 @@ WAYPOINTS = ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0))
 SPEED_M_S = 343.2
 QUIET = SRF02._replace(noise_m=0.0, threshold_sd_db=0.0)
 FAULTLESS = MtxModel(
-    gyro_noise=0.0, gyro_bias_rad_s=0.0, accel_noise=0.0, accel_bias_m_s2=0.0, mag_noise=0.0, drift_ppm=0.0
+    gyro_noise=0.0,
+    gyro_bias_rad_s=0.0,
+    accel_noise=0.0,
+    accel_bias_m_s2=0.0,
+    mag_noise=0.0,
+    drift_ppm=0.0,
+    lean_rad=0.0,
 )
 
 
@@ -87,6 +107,27 @@ def test_the_trunk_passes_over_the_foot_in_the_middle_of_its_stance(l_walk: Walk
         assert left == pytest.approx(-0.08, abs=0.05)
 
 
+def test_a_person_stops_turns_on_the_spot_and_goes_back() -> None:
+    walked = walk(((0.0, 0.0), (4.0, 0.0, 2.0), (0.0, 0.0)), Person(), np.random.default_rng(1))
+    speed = np.hypot(*np.gradient(walked.trunk_m, axis=0).T) * RATE_HZ
+    paused = (np.abs(walked.trunk_m[:, 0] - 4.0) < 0.02) & (speed < 0.01) & walked.flat
+    assert 1.5 < paused.sum() / RATE_HZ < 4.0
+    assert np.degrees(np.abs(np.gradient(walked.heading_rad)) * RATE_HZ).max() < 200.0
+    assert np.cos(walked.heading_rad[-1] - walked.heading_rad[0]) == pytest.approx(-1.0, abs=1e-3)
+    assert np.allclose(walked.trunk_m[-1], 0.0, atol=0.02)
+
+
+def test_the_foot_moves_as_feet_do(l_walk: Walk) -> None:
+    velocity = np.diff(l_walk.foot_m, axis=0) * RATE_HZ
+    force = np.diff(velocity, axis=0) * RATE_HZ
+    assert 3.0 < np.abs(velocity[:, :2]).max() < 6.0
+    assert np.abs(force).max() < 60.0
+    assert 0.05 < np.ptp(l_walk.foot_m[:, 2]) < 0.25
+    assert l_walk.foot_m[:, 2].min() == pytest.approx(l_walk.foot_m[0, 2], abs=0.005)
+    assert np.degrees(l_walk.foot_rpy_rad[:, 1].max()) == pytest.approx(60.0, abs=10.0)
+    assert np.degrees(l_walk.foot_rpy_rad[:, 1].min()) == pytest.approx(-22.0, abs=5.0)
+
+
 def test_leg_rates_are_those_of_a_gait(l_walk: Walk) -> None:
     for rate in (l_walk.thigh_rad_s, l_walk.calf_rad_s):
         swing = np.cumsum(rate) / RATE_HZ
@@ -126,7 +167,7 @@ def test_what_the_foot_feels_integrates_back_to_its_path(l_walk: Walk) -> None:
     path = strapdown(force, rate, r0, 1.0 / RATE_HZ)
     truth = l_walk.foot_m - l_walk.foot_m[0]
     assert np.hypot(*truth[-1, :2]) > 7.0
-    assert np.abs(path[:-1] - truth[1:]).max() < 0.03  # of 11 m in 16 s; 1e-4 m/s2 would already give 1 cm
+    assert np.abs(path[:-1] - truth[1:]).max() < 0.005  # of 11 m in 16 s; 1e-4 m/s2 would already give 1 cm
 
 
 def test_a_standing_foot_feels_gravity_and_nothing_else(l_walk: Walk) -> None:
@@ -221,10 +262,60 @@ def test_the_mtx_world_is_north_west_up(l_walk: Walk) -> None:
     sample = samples_of(stream(l_walk, FAULTLESS, np.random.default_rng(1)).frames)[0]
     w, x, y, z = sample.quaternion
     ahead = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
-    toe_out = -math.radians(Person().toe_out_deg)
+    toe_out = -Person().foot.toe_out_rad
     assert np.allclose(ahead, [math.sin(toe_out), -math.cos(toe_out), 0.0], atol=0.05)
     assert sample.mag[1] > 0.3
     assert sample.mag[2] < -0.8
+
+
+def test_a_mounting_turns_what_is_felt(l_walk: Walk) -> None:
+    upside_down = MtxModel(**{**vars_of(FAULTLESS), "mounting_rpy_rad": (math.pi, 0.0, 0.0)})
+    sample = samples_of(stream(l_walk, upside_down, np.random.default_rng(1)).frames)[10]
+    assert sample.accel[2] == pytest.approx(-GRAVITY_M_S2, abs=1e-3)
+    with_z_down = 1.0 - 2.0 * (sample.quaternion[1] ** 2 + sample.quaternion[2] ** 2)
+    assert with_z_down == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_nothing_leaves_the_sensors_range(l_walk: Walk) -> None:
+    loud = MtxModel(gyro_noise=10.0, accel_noise=100.0)
+    samples = samples_of(stream(l_walk, loud, np.random.default_rng(1)).frames)
+    assert np.abs([x.accel for x in samples]).max() == pytest.approx(180.0)
+    assert np.degrees(np.abs([x.gyro for x in samples]).max()) == pytest.approx(1200.0)
+
+
+def test_a_disturbed_field_turns_the_sensors_north_slowly(l_walk: Walk) -> None:
+    magnetism = Magnetism(np.random.default_rng(5))
+    found = stream(l_walk, FAULTLESS, np.random.default_rng(1), magnetism)
+    q = np.array([x.quaternion for x in samples_of(found.frames)])
+    yaw = np.arctan2(2 * (q[:, 0] * q[:, 3] + q[:, 1] * q[:, 2]), 1 - 2 * (q[:, 2] ** 2 + q[:, 3] ** 2)) + 0.5 * math.pi
+    at = (found.t_s * RATE_HZ).astype(int)
+    error = np.degrees((yaw - l_walk.foot_rpy_rad[at, 2] + math.pi) % (2 * math.pi) - math.pi)
+    assert 1.0 < np.abs(error).max() < 40.0
+    assert np.abs(np.diff(error)).max() < 1.0
+    field = magnetism.field(np.random.default_rng(1).uniform(0, 30, (2_000, 2)))
+    assert 0.02 < (field - EARTH).std() < 0.1
+
+
+def test_an_adapter_hands_over_when_its_timer_ends_or_its_packet_is_full() -> None:
+    rng = np.random.default_rng(1)
+    arrival_s, portions, complete_s = deliver([bytes(59)], np.array([0.01]), 115_200, 0.001, rng)
+    assert [len(x) for x in portions] == [11, 12, 11, 12, 11, 2]  # 11.52 bytes a millisecond
+    assert arrival_s[0] >= 0.011
+    assert complete_s[0] == arrival_s[-1] < 0.02
+    _, slow, _ = deliver([bytes(59)] * 4, 0.01 * np.arange(4.0), 115_200, 0.016, rng)
+    assert max(len(x) for x in slow) == 62
+    assert sum(len(x) for x in slow) == 4 * 59
+
+
+@given(st.lists(st.integers(1, 100), min_size=1, max_size=20), st.sampled_from([0.001, 0.016]))
+def test_delivery_keeps_every_byte_in_order(lengths: list[int], timer_s: float) -> None:
+    frames = [bytes([k]) * n for k, n in enumerate(lengths)]
+    begin_s = 0.003 * np.arange(float(len(frames)))
+    arrival_s, portions, complete_s = deliver(frames, begin_s, 115_200, timer_s, np.random.default_rng(1))
+    assert b"".join(portions) == b"".join(frames)
+    assert all(portions)
+    assert np.diff(arrival_s).min(initial=0.0) >= 0.0
+    assert (complete_s - begin_s >= np.array(lengths) * 10 / 115_200 - 1e-12).all()
 
 
 # Echoes
@@ -330,6 +421,41 @@ def test_parallel_walls_pass_a_ping_to_the_other_ranger() -> None:
     assert not listen(wide).cross_us.any()
 
 
+def test_a_corridor_of_two_metres_passes_pings_to_the_other_ranger() -> None:
+    found = listen([[-5.0, 1.0, 5.0, 1.0], [-5.0, -0.8, 5.0, -0.8]])
+    assert np.allclose(found.cross_us[0] * 0.5e-6 * SPEED_M_S, 1.8, atol=1e-3)
+
+
+def test_a_corner_sends_the_ping_back_from_its_apex() -> None:
+    """Both walls end there and neither has a perpendicular in the cone: two reflections, the way of the corner itself."""
+    corner = [[-3.0, 2.0, 0.3, 2.0], [0.3, 2.0, 0.3, -3.0]]
+    turned = listen(corner, at=(-1.5, 0.2), heading_deg=-45.0)  # the left ranger looks at the corner
+    assert ranges(turned)[0] == pytest.approx(math.hypot(1.8, 1.8), abs=1e-3)
+    assert ranges(listen([corner[0], [0.3, 1.9, 0.3, -3.0]], at=(-1.5, 0.2), heading_deg=-45.0))[0] == 0.0  # leaks
+
+
+def test_edges_answer_from_outside_a_corner_only() -> None:
+    outside = [[0.1, 1.0, 5.0, 1.0], [0.1, 1.0, 0.1, 5.0]]
+    assert ranges(listen(outside))[0] == pytest.approx(math.hypot(0.1, 1.0), abs=1e-3)
+    assert ranges(listen([[0.1, 1.0, 5.0, 1.0], [-4.0, 1.0, 0.1, 1.0]]))[0] == pytest.approx(1.0, abs=1e-3)
+    edges = wall_edges(
+        np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 2.0, 0.0], [1.5, 0.0, 1.5, 1.0], [2.0, 0.0, 2.0, 1.0]])
+    )
+    assert sorted((x, y) for x, y, *_ in edges.tolist()) == [(0.0, 0.0), (1.5, 1.0), (2.0, 0.0), (2.0, 1.0)]
+
+
+def test_levels_are_those_of_the_data_sheet() -> None:
+    a = SRF02
+    assert directivity_db(math.radians(27.5), a.size) == pytest.approx(-6.0, abs=0.05)
+    assert directivity_db(math.radians(70.0), a.size) < -100.0
+    assert wall_db(1.0, 0.0, a) == pytest.approx(0.0, abs=1e-9)
+    assert wall_db(6.0, 0.0, a) == pytest.approx(a.threshold_db, abs=0.1)
+    assert wall_db(2.0, 0.0, a) == pytest.approx(-20.0 * math.log10(2.0) - 2.0 * a.absorption_db_m, abs=1e-9)
+    assert rod_db(1.0, 0.0, 1e6, a) == pytest.approx(wall_db(1.0, 0.0, a), abs=1e-3)  # a rod of that size is a wall
+    assert rod_db(1.0, 0.0, PIPE_RADIUS_M, a) == pytest.approx(-15.7, abs=0.1)
+    assert speed_of_sound_m_s(20.0) == pytest.approx(343.2, abs=0.05)
+
+
 def test_a_door_shows_while_one_walks_along_a_corridor() -> None:
     """The range jumps from the wall to the room behind when the door comes abeam, and back [Girard 2011, Figure 5b]."""
     x = np.linspace(-3.0, 3.0, 600)
@@ -413,6 +539,33 @@ def test_sync_edges_fall_into_their_millisecond(l_walk: Walk) -> None:
 def test_rows_are_equal_for_equal_seeds_and_not_for_others(l_walk: Walk) -> None:
     a, b, c = (sensors(l_walk, np.zeros(0), seed).rows(0, 100).tobytes() for seed in (1, 1, 2))
     assert a == b != c
+
+
+def test_rows_do_not_depend_on_how_they_are_cut(l_walk: Walk) -> None:
+    whole = sensors(l_walk, np.zeros(0)).rows(0, 300)
+    cut = sensors(l_walk, np.zeros(0))
+    parts = [cut.rows(a, b) for a, b in ((0, 7), (7, 100), (100, 300))]
+    assert np.concatenate(parts).tobytes() == whole.tobytes()
+
+
+def test_gyros_saturate() -> None:
+    counts = Adis16100(np.random.default_rng(1)).counts(np.radians([-2_000.0, 0.0, 2_000.0]))
+    assert counts[[0, 2]].tolist() == [-1230, 1230]
+
+
+def test_pressure_falls_with_height_and_drifts_slowly() -> None:
+    ground, above = (Scp1000(np.random.default_rng(1)).counts(h, 20.0, 5_000)[0].mean() / 4.0 for h in (0.0, 3.0))
+    assert ground - above == pytest.approx(36.0, abs=0.5)
+    long = Scp1000(np.random.default_rng(1)).counts(0.0, 20.0, 600_000)[0] / 4.0
+    minutes = long.reshape(10, -1).mean(1)
+    assert 0.1 < np.ptp(minutes) < 20.0
+
+
+def test_bearings_are_clockwise_from_north() -> None:
+    heading = np.radians([90.0, 0.0, -90.0, 180.0])
+    seen = Compass(None, np.random.default_rng(1)).bearings(np.zeros((4, 2)), heading)
+    off = (seen - np.array([0, 900, 1800, 2700]) + 1800) % 3600 - 1800
+    assert np.abs(off).max() < 150
 
 
 # The Python board
@@ -613,6 +766,33 @@ def test_equal_seeds_give_equal_chunks_in_order(plan: Plan) -> None:
         (reader if chunk.port == BOARD else mtx_reader).feed(chunk.data)
     assert reader.counts.rejected == reader.counts.lost == 0
     assert mtx_reader.counts.lost == mtx_reader.counts.skipped_bytes == mtx_reader.counts.bad_checksum == 0
+
+
+def test_a_configuration_reaches_the_board(plan: Plan) -> None:
+    wanted = m.Configure(m.Sensors.RANGER_LEFT, m.Schedule.SEQUENTIAL, 50, 5, m.PressureMode.HIGH_SPEED)
+    scenario = Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1), configure=wanted)
+    reader = BoardReader()
+    found = [x for c in scenario.chunks() if c.port == BOARD for x in reader.feed(c.data)]
+    assert [x for x in found if isinstance(x, m.Configuration)][-1].sensors == m.Sensors.RANGER_LEFT
+    assert not any(isinstance(x, m.Gyros) for x in found)
+
+
+class Mute:
+    """A board whose bytes go elsewhere, as with the twin on a pseudo terminal."""
+
+    def advance(self, rows: NDArray[Any]) -> list[tuple[int, bytes]]:
+        self.ms = getattr(self, "ms", 0) + len(rows)
+        return []
+
+    def send(self, sent: bytes) -> None: ...
+    def fault(self, text: str) -> None: ...
+    def close(self) -> None: ...
+
+
+def test_a_scenario_can_be_paced_without_a_boards_bytes(plan: Plan) -> None:
+    board = Mute()
+    for chunk in Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, board).chunks():
+        assert abs((chunk.t_arrival_ns - 1_000_000_000) * 1e-6 - board.ms) <= 60
 
 
 def test_each_sample_has_its_sync_edge(plan: Plan) -> None:

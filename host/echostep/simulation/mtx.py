@@ -1,6 +1,7 @@
 """An Xsens MTx on the foot: what it feels, as the bytes that it would send.
 
-In: a walk, a seeded generator. Out: samples at its own rate: when taken, and the MTData frame. Owns the sensor's constant errors.
+In: a walk, a seeded generator. Out: samples at its own rate: when taken, and the MTData frames. Owns the sensor's constant errors.
+The versions for 18 g and 1200 deg/s, which a foot needs [Xsens MT0100P, 4.1 and 4.4].
 """
 
 from __future__ import annotations
@@ -12,80 +13,91 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.simulation.attitude import quaternions, rotations, turns
+from echostep.simulation.delivery import deliver
+from echostep.simulation.magnetism import EARTH, Magnetism
 from echostep.simulation.walker import RATE_HZ, Walk
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 Floats = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.81
-FIELD = np.array([0.4, 0.0, -0.9])  # earth's field in north, west, up: unit length, inclination 66 degrees
+ACCEL_LIMIT_M_S2, GYRO_LIMIT_RAD_S = 180.0, math.radians(1200.0)
+FIRST_S = 0.05  # when the first sample's interval begins
+COMPUTING_S = 0.002  # from the sample to the first byte
+TURN_S, LEAN_S = 5.0, 10.0  # how slowly the orientation filter follows the field, and forgets its tilt error
 
 
 @dataclass(frozen=True, slots=True)
 class MtxModel:
-    """Errors after the MTx data sheet (noise densities; bias as left by its calibration), its crystal, and its cable.
+    """Errors after the MTx manual (noise densities; biases as left by its calibration), its crystal, its mounting and its cable.
 
-    `drift_ppm`: its clock against the board's. `latency_s`: from sample to the last byte at 115200 Bd. `poll_s`: the USB adapter hands
-    over what it has this often.
+    `drift_ppm`: its period against the board's clock. `mounting_rpy_rad`: sensor -> foot. `timer_s`: latency timer of the USB adapter.
     """
 
     rate_hz: float = 100.0
-    gyro_noise: float = math.radians(0.05)
+    gyro_noise: float = math.radians(0.1)
     gyro_bias_rad_s: float = math.radians(0.2)
-    accel_noise: float = 0.002
+    accel_noise: float = 0.004
     accel_bias_m_s2: float = 0.02
     mag_noise: float = 0.005
+    lean_rad: float = math.radians(0.5)
     drift_ppm: float = 30.0
-    latency_s: float = 0.0071
+    mounting_rpy_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     jitter_s: float = 0.0003
-    poll_s: float = 0.001
+    timer_s: float = 0.001
     first_counter: int = 65_000  # so that it wraps within a short walk
+
+    @property
+    def baud(self) -> int:
+        """What the frames need of the MTx's rates."""
+        return 115_200 if self.rate_hz <= 120.0 else 460_800
 
 
 @dataclass(frozen=True, slots=True)
 class MtxStream:
-    """`t_s` (n,): the sample instants, when SyncOut rises; `arrival_s` (n,): when the host gets the bytes; `frames` (n)."""
+    """`t_s` (n,): the sample instants, when SyncOut rises; `frames` (n) and `arrival_s` (n,): when the host has each; `portions` with the
+    times `portion_s`: the same bytes as the serial driver hands them over.
+    """
 
     t_s: Floats
     arrival_s: Floats
     frames: list[bytes]
+    portion_s: Floats
+    portions: list[bytes]
 
 
-def rotations(rpy: Floats) -> Floats:
-    """Rotation matrices (n, 3, 3) foot -> map of roll, pitch, yaw (n, 3): yaw about z, then pitch about y, then roll about x."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy).T, np.sin(rpy).T
-    return np.stack(
-        [
-            np.stack([cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr], -1),
-            np.stack([sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], -1),
-            np.stack([-sp, cp * sr, cp * cr], -1),
-        ],
-        axis=1,
-    )
-
-
-def feelings(walk: Walk) -> tuple[Floats, Floats]:
-    """Specific force (m/s2) and angular rate (rad/s) of the foot in its own frame at 1 kHz, without error."""
-    r = rotations(walk.foot_rpy_rad)
-    dt = 1.0 / RATE_HZ
+def feelings(walk: Walk, mounting: Floats | None = None) -> tuple[Floats, Floats]:
+    """Specific force (m/s2) and angular rate (rad/s) (n, 3) at 1 kHz, without error, in the sensor's frame; `mounting` (3, 3) sensor -> foot."""
+    r = rotations(walk.foot_rpy_rad) if mounting is None else rotations(walk.foot_rpy_rad) @ mounting
     accel = np.zeros_like(walk.foot_m)
-    accel[1:-1] = (walk.foot_m[2:] - 2.0 * walk.foot_m[1:-1] + walk.foot_m[:-2]) / dt**2
+    accel[1:-1] = (walk.foot_m[2:] - 2.0 * walk.foot_m[1:-1] + walk.foot_m[:-2]) * RATE_HZ**2
     accel[:, 2] += GRAVITY_M_S2
-    force = np.einsum("nji,nj->ni", r, accel)
-    turn = np.einsum("nji,njk->nik", r[:-1], r[1:])
-    rate = np.zeros_like(force)
-    rate[:-1] = 0.5 * np.stack(
-        [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1
-    )
-    return force, rate / dt
+    rate = np.zeros_like(accel)
+    rate[:-1] = turns(r) * RATE_HZ
+    return np.einsum("nji,nj->ni", r, accel), rate
 
 
-def stream(walk: Walk, model: MtxModel, rng: np.random.Generator) -> MtxStream:
+def stream(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: Magnetism | None = None) -> MtxStream:
     """All samples of a walk, each the mean over its interval, as an MTx gives them."""
     period = (1.0 + model.drift_ppm * 1e-6) / model.rate_hz
-    count = int((walk.t_s[-1] - 0.1) / period)
-    t: Floats = 0.05 + period * np.arange(1, count, dtype=np.float64)
-    force, rate = (_means(v, t, period) for v in feelings(walk))
+    count = int((walk.t_s[-1] - 2.0 * FIRST_S) / period)
+    t: Floats = FIRST_S + period * np.arange(1, count, dtype=np.float64)
+    accel, gyro, mag, q = _measured(walk, model, t, period, rng, magnetism)
+    counters = ((model.first_counter + np.arange(len(t))) & 0xFFFF).tolist()
+    rows = zip(counters, accel.tolist(), gyro.tolist(), mag.tolist(), q.tolist(), strict=True)
+    frames = [encode_frame(MTDATA, pack_mtdata(MtSample(*row))) for row in rows]
+    begin_s = t + COMPUTING_S + model.jitter_s * rng.exponential(size=len(t))
+    portion_s, portions, arrival_s = deliver(frames, begin_s, model.baud, model.timer_s, rng)
+    return MtxStream(t, arrival_s, frames, portion_s, portions)
+
+
+def _measured(
+    walk: Walk, model: MtxModel, t: Floats, period: float, rng: np.random.Generator, magnetism: Magnetism | None
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Specific force, angular rate, magnetic field (n, 3) and quaternion (n, 4) with their errors."""
+    mounting = rotations(np.array([model.mounting_rpy_rad]))[0]
+    force, rate = (_means(v, t, period) for v in feelings(walk, mounting))
     root = math.sqrt(model.rate_hz)
     accel = (
         force
@@ -98,18 +110,36 @@ def stream(walk: Walk, model: MtxModel, rng: np.random.Generator) -> MtxStream:
         + model.gyro_noise * root * rng.standard_normal(rate.shape)
     )
     at = np.minimum((t * RATE_HZ).astype(int), len(walk.t_s) - 1)
-    r = _mt_world(rotations(walk.foot_rpy_rad[at]))
-    mag = np.einsum("nji,j->ni", r, FIELD) + model.mag_noise * rng.standard_normal(accel.shape)
-    q = quaternions(r)
-    frames = [
-        encode_frame(
-            MTDATA, pack_mtdata(MtSample((model.first_counter + n) & 0xFFFF, tuple(a), tuple(g), tuple(m), tuple(o)))
-        )
-        for n, (a, g, m, o) in enumerate(zip(accel.tolist(), gyro.tolist(), mag.tolist(), q.tolist(), strict=True))
-    ]
-    late = t + model.latency_s + model.jitter_s * rng.exponential(size=len(t))
-    arrival: Floats = np.maximum.accumulate(np.ceil(late / model.poll_s) * model.poll_s)
-    return MtxStream(t, arrival, frames)
+    r = rotations(walk.foot_rpy_rad[at]) @ mounting
+    field = magnetism.field(walk.foot_m[at, :2]) if magnetism else np.tile(EARTH, (len(t), 1))
+    mag = np.einsum("nji,nj->ni", r, field) + model.mag_noise * rng.standard_normal(r.shape[:2])
+    believed = _believed(r, field, model, period, rng)
+    return (
+        np.clip(accel, -ACCEL_LIMIT_M_S2, ACCEL_LIMIT_M_S2),
+        np.clip(gyro, -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S),
+        mag,
+        quaternions(_mt_world(believed)),
+    )
+
+
+def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.random.Generator) -> Floats:
+    """The attitude that the sensor believes in: its heading follows the disturbed field, its tilt wanders [MT0100P: 0.5 deg]."""
+    error = np.zeros((len(r), 3))
+    kept = math.exp(-period / LEAN_S)
+    lean = model.lean_rad * math.sqrt(1.0 - kept * kept) * rng.standard_normal((len(r), 2))
+    error[:, :2] = np.column_stack([_followed(lean[:, k] / (1.0 - kept), kept, 0.0) for k in (0, 1)])
+    north = np.arctan2(field[:, 0], field[:, 1])
+    error[:, 2] = _followed(north, math.exp(-period / TURN_S), float(north[0]))
+    return rotations(error) @ r
+
+
+def _followed(wanted: Floats, kept: float, value: float) -> Floats:
+    """What a filter of first order makes of a series, beginning with a value."""
+    found = np.empty(len(wanted))
+    for k, aim in enumerate(wanted.tolist()):
+        value = aim + kept * (value - aim)
+        found[k] = value
+    return found
 
 
 def _means(values: Floats, t: NDArray[Any], period: float) -> Floats:
@@ -121,29 +151,5 @@ def _means(values: Floats, t: NDArray[Any], period: float) -> Floats:
 
 
 def _mt_world(r: Floats) -> Floats:
-    """Foot -> map (x east, y north) into foot -> MT world (x north, y west)."""
+    """Sensor -> map (x east, y north) into sensor -> MT world (x north, y west)."""
     return np.stack([r[:, 1], -r[:, 0], r[:, 2]], axis=1)
-
-
-def quaternions(r: Floats) -> Floats:
-    """Unit quaternions (n, 4), w x y z, of rotation matrices (n, 3, 3) [Shepperd 1978]."""
-    trace = r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2]
-    squares = np.stack([trace, *(2.0 * r[:, i, i] - trace for i in range(3))], axis=1)
-    best = squares.argmax(1)
-    columns = np.stack(
-        [
-            np.stack([1 + trace, r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]], -1),
-            np.stack(
-                [r[:, 2, 1] - r[:, 1, 2], 1 + squares[:, 1], r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0]], -1
-            ),
-            np.stack(
-                [r[:, 0, 2] - r[:, 2, 0], r[:, 0, 1] + r[:, 1, 0], 1 + squares[:, 2], r[:, 1, 2] + r[:, 2, 1]], -1
-            ),
-            np.stack(
-                [r[:, 1, 0] - r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1], 1 + squares[:, 3]], -1
-            ),
-        ],
-        axis=1,
-    )
-    q = columns[np.arange(len(r)), best]
-    return q / np.linalg.norm(q, axis=1, keepdims=True)

@@ -6,23 +6,31 @@ In: a plan, waypoints, a seed, a board. Out: the chunks of both ports in order o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from echostep.frames import encode
+from echostep.messages import Configure
 from echostep.plan import Plan, Pose
 from echostep.simulation.board import Board
+from echostep.simulation.magnetism import Magnetism
 from echostep.simulation.mtx import MtxModel, stream
 from echostep.simulation.stimulus import BoardSensors
-from echostep.simulation.walker import Person, walk
+from echostep.simulation.walker import Person, Waypoint, walk
 from echostep.sources import BOARD, MTX, Chunk
+
+Floats = NDArray[np.float64]
 
 BLOCK_MS = 50
 USB_LATENCY_NS = 1_000_000
 START_NS = 1_000_000_000  # the host's clock when the board is switched on
-DEMO_WAYPOINTS = (
-    (2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (24.0, 7.5), (24.0, 2.0), (17.6, 2.0), (17.6, 4.4), (17.6, 2.0),
-    (2.0, 2.0), (2.0, 7.5), (6.0, 7.5),
+TRUTH_MS = 20
+DEMO_WAYPOINTS: tuple[Waypoint, ...] = (
+    (2.0, 7.5), (9.5, 7.5), (9.5, 10.8, 2.0), (9.5, 7.5), (24.0, 7.5), (24.0, 2.0), (17.6, 2.0), (17.6, 4.4, 2.0),
+    (17.6, 2.0), (2.0, 2.0), (2.0, 7.5), (16.0, 7.5),
 )  # fmt: skip
 
 
@@ -30,57 +38,68 @@ class Scenario:
     """One walk; equal arguments give equal chunks."""
 
     def __init__(
-        self, plan: Plan, waypoints: Sequence[tuple[float, float]], seed: int, board: Board,
-        person: Person | None = None, model: MtxModel | None = None,
+        self, plan: Plan, waypoints: Sequence[Waypoint], seed: int, board: Board,
+        person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
     ) -> None:  # fmt: skip
-        streams = [np.random.default_rng([seed, k]) for k in range(3, 6)]
+        """`configure` is sent to the board before it starts."""
+        streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
+        magnetism = Magnetism(streams[3])
+        level = plan.levels[0]
         self.walk = walk(waypoints, person or Person(), streams[0])
-        self.mtx = stream(self.walk, model or MtxModel(), streams[1])
-        self.sensors = BoardSensors(self.walk, plan.levels[0].walls, self.mtx.t_s, streams[2])
+        self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
+        self.sensors = BoardSensors(self.walk, level.walls, self.mtx.t_s, streams[2], magnetism, level.height_m)
         self._board = board
-        x, y = self.walk.trunk_m[0].tolist()
         self.fraction = 0.0  # of the walk that is over
+        if configure is not None:
+            board.send(encode(configure, 0))
+        x, y = self.walk.trunk_m[0].tolist()
         self.start = Pose(x, y, float(self.walk.heading_rad[0]))
 
+    @property
+    def truth(self) -> Floats:
+        """Where the trunk was, 50 times a second: (n, 4) t_s, x, y, heading_rad, map frame."""
+        w = self.walk
+        return np.column_stack([w.t_s, w.trunk_m, w.heading_rad])[::TRUTH_MS]
+
     def chunks(self) -> Iterator[Chunk]:
-        """Chunks of both ports in order of arrival."""
+        """Chunks of both ports in order of arrival, those of a block as soon as the board has lived through it."""
         mtx = self._mtx_chunks()
-        waiting = next(mtx, None)
-        for chunk in self._board_chunks():
-            while waiting is not None and waiting.t_arrival_ns <= chunk.t_arrival_ns:
-                yield waiting
-                waiting = next(mtx, None)
-            yield chunk
-        if waiting is not None:
-            yield waiting
-            yield from mtx
+        coming: list[Chunk] = []
+        following = next(mtx, None)
+        for start in range(0, len(self.walk.t_s), BLOCK_MS):
+            self.fraction = start / len(self.walk.t_s)
+            coming += self._board_chunks(start, start + BLOCK_MS)
+            now_ns = START_NS + (start + BLOCK_MS) * 1_000_000
+            while following is not None and following.t_arrival_ns <= now_ns:
+                coming.append(following)
+                following = next(mtx, None)
+            coming.sort(key=attrgetter("t_arrival_ns"))
+            while coming and coming[0].t_arrival_ns <= now_ns:
+                yield coming.pop(0)
+        late = [*coming, *([following] if following else []), *mtx]
+        yield from sorted(late, key=attrgetter("t_arrival_ns"))
 
     def write_truth(self, path: Path, begin_s: float = 0.0) -> None:
-        """Where the trunk was, 50 times a second, as CSV; `begin_s`: board time at which the walk begins."""
-        w = self.walk
-        table = np.column_stack([begin_s + w.t_s, w.trunk_m, w.heading_rad])[::20]
+        """The truth as CSV; `begin_s`: board time at which the walk begins."""
+        table = self.truth + [begin_s, 0.0, 0.0, 0.0]
         np.savetxt(path, table, delimiter=",", header="t_s,x,y,heading_rad", comments="", fmt="%.6f")
 
     def close(self) -> None:
         """Switch the board off."""
         self._board.close()
 
-    def _board_chunks(self) -> Iterator[Chunk]:
-        """The board's bytes as a USB host gets them, a millisecond's worth at a time."""
-        for start in range(0, len(self.walk.t_s), BLOCK_MS):
-            self.fraction = start / len(self.walk.t_s)
-            sent = self._board.advance(self.sensors.rows(start, start + BLOCK_MS))
-            gathered: dict[int, bytes] = {}
-            for t_ns, part in sent:
-                arrival = START_NS + t_ns + USB_LATENCY_NS
-                gathered[arrival] = gathered.get(arrival, b"") + part
-            for t_ns in sorted(gathered):
-                yield Chunk(BOARD, t_ns, gathered[t_ns])
+    def _board_chunks(self, start: int, stop: int) -> list[Chunk]:
+        """The board's bytes of these milliseconds as a USB host gets them, those of one instant together."""
+        gathered: dict[int, bytes] = {}
+        for t_ns, part in self._board.advance(self.sensors.rows(start, stop)):
+            arrival = START_NS + t_ns + USB_LATENCY_NS
+            gathered[arrival] = gathered.get(arrival, b"") + part
+        return [Chunk(BOARD, t_ns, part) for t_ns, part in gathered.items()]
 
     def _mtx_chunks(self) -> Iterator[Chunk]:
         arrivals = START_NS + np.rint(self.mtx.arrival_s * 1e9).astype(np.int64)
-        for t_ns, frame in zip(arrivals.tolist(), self.mtx.frames, strict=True):
-            yield Chunk(MTX, t_ns, frame)
+        for t_ns, part in zip(arrivals.tolist(), self.mtx.frames, strict=True):
+            yield Chunk(MTX, t_ns, part)
 
 
 def demo_scenario(plan: Plan, seed: int, board: Board) -> Scenario:
