@@ -97,8 +97,8 @@ class Scenario:
         return [Chunk(BOARD, t_ns, part) for t_ns, part in gathered.items()]
 
     def _mtx_chunks(self) -> Iterator[Chunk]:
-        arrivals = START_NS + np.rint(self.mtx.arrival_s * 1e9).astype(np.int64)
-        for t_ns, part in zip(arrivals.tolist(), self.mtx.frames, strict=True):
+        arrivals = START_NS + np.rint(self.mtx.portion_s * 1e9).astype(np.int64)
+        for t_ns, part in zip(arrivals.tolist(), self.mtx.portions, strict=True):
             yield Chunk(MTX, t_ns, part)
 
 
