@@ -205,11 +205,12 @@ def _finish(
 ) -> None:
     """Write the track and say how it went."""
     write_track(out / "track.csv", estimates)
+    off = errors(estimates, truth) if truth else None
+    title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
     draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
-    off = errors(estimates, truth) if truth else None
     if off is not None:
         console.print(
             f"error: mean {off.mean_m:.2f} m, sd {off.sd_m:.2f}, max {off.max_m:.2f}, end {off.ending_m:.2f} m; "
