@@ -68,6 +68,9 @@ bench: $(READY) ## speed of the host against real time and against peers
 	$(BIN)/python tools/bench.py
 
 flash: ## write the firmware to a board: make flash PORT=/dev/ttyACM0
+	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }
+	@[ -e "$(PORT)" ] || { echo "$(PORT): there is no such port; see ls /dev/serial/by-id"; exit 2; }
+	@tools/apt.sh avrdude || { echo "avrdude is not installed and this user may not install it: apt install avrdude"; exit 2; }
 	$(MAKE) -C firmware flash PORT=$(PORT)
 
 clean: ## remove everything that was built

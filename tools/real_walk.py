@@ -38,6 +38,7 @@ from echostep.sources import BOARD, MTX, Chunk
 from echostep.tracker import Tracker
 from echostep.truth import load_truth
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+from feet import align, rmse
 
 Floats = NDArray[np.float64]
 NAME = "GX5 33"
@@ -176,14 +177,15 @@ def rmse_at_prints(walk: Recorded, t_s: Floats, xy_m: Floats) -> float:
     return float(np.sqrt(((there - walk.print_m) ** 2).sum(1).mean()))
 
 
-def foot_alone(walk: Recorded, start: Pose) -> float:
-    """RMSE of the foot's own track, laid at the given start."""
+def foot_alone(walk: Recorded, start: Pose) -> tuple[float, float]:
+    """RMSE of the foot's own track, laid at the given start, and after the rigid motion that fits it best (the peers' metric)."""
     found = walk_track(walk.t_s, walk.accel, walk.gyro)
     steps = [e for e in found.events if isinstance(e, Step) and math.hypot(*e.move_m[:2]) > 0.8][:1]
     turn = start.heading_rad - math.atan2(steps[0].move_m[1], steps[0].move_m[0])
     c, s = math.cos(turn), math.sin(turn)
     xy = found.position_m[:, :2] @ np.array([[c, s], [-s, c]]) + [start.x_m, start.y_m]
-    return rmse_at_prints(walk, walk.t_s, xy)
+    there = np.column_stack([np.interp(walk.print_t_s, walk.t_s, xy[:, k]) for k in (0, 1)])
+    return rmse_at_prints(walk, walk.t_s, xy), rmse(align(there, walk.print_m), walk.print_m)
 
 
 def main() -> int:
@@ -201,18 +203,19 @@ def main() -> int:
     track(options.out, options.seed)  # compiles the kernels
     estimates, elapsed_s = track(options.out, options.seed)
     t_s = np.array([e.t_s for e in estimates]) - START_S
-    rmse = rmse_at_prints(walk, t_s, np.array([(e.x_m, e.y_m) for e in estimates]))
+    found = rmse_at_prints(walk, t_s, np.array([(e.x_m, e.y_m) for e in estimates]))
+    laid, fitted = foot_alone(walk, plan.start)
     write_track(options.out / "track.csv", estimates)
-    title = f"{NAME}: real foot, echoes simulated; RMSE {rmse:.2f} m at the surveyed footprints"
+    title = f"{NAME}: real foot, echoes simulated; RMSE {found:.2f} m at the surveyed footprints"
     draw_track(options.out / "track.png", plan.levels[0], estimates, load_truth(options.out / "truth.csv"), title)
     console.print(f"{NAME}: {NOTE}.")
     console.print(f"2D RMSE at the {len(walk.print_t_s)} stride points, map frame, no alignment:")
-    console.print(f"  foot alone       {foot_alone(walk, plan.start):.2f} m")
-    console.print(f"  plan and echoes  {rmse:.2f} m   (target 0.30 m: {'met' if rmse <= 0.30 else 'missed'})")
+    console.print(f"  foot alone       {laid:.2f} m   ({fitted:.2f} m after rigid alignment)")
+    console.print(f"  plan and echoes  {found:.2f} m   (target 0.30 m: {'met' if found <= 0.30 else 'missed'})")
     console.print(
         f"{walk.t_s[-1]:.0f} s in {elapsed_s:.2f} s: {walk.t_s[-1] / elapsed_s:.0f} x real time; sha256 {digest(estimates)[:16]}"
     )
-    return 0 if rmse <= 0.30 else 1
+    return 0 if found <= 0.30 else 1
 
 
 if __name__ == "__main__":
