@@ -59,7 +59,7 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
     assert len(done.stdout.splitlines()) > 40
 
 
-@pytest.mark.parametrize("command", ["demo", "live", "record", "replay", "decode"])
+@pytest.mark.parametrize("command", ["demo", "live", "record", "replay", "foot", "decode"])
 def test_every_option_that_is_named_exists(command: str) -> None:
     usage = subprocess.run(
         [sys.executable, "-m", "echostep", command, "--help"],

@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """
@@ -101,6 +101,18 @@ def replay(
     from echostep import runs
 
     runs.replay(recording, plan, out, _pose(start), settings, seed, truth, headless=headless)
+
+
+@app.command()
+def foot(
+    imu: Annotated[Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    plot: Annotated[bool, typer.Option("--plot", help="Draw it beside the track, as PNG.")] = False,
+) -> None:
+    """Zero-velocity navigation of a recorded foot IMU."""
+    from echostep import runs
+
+    runs.foot(imu, out, plot=plot)
 
 
 @app.command()

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.estimate import Estimate
+from echostep.foot import Track
 from echostep.plan import Level
 from echostep.truth import Truth
 
@@ -58,6 +59,25 @@ def draw_track(path: Path, level: Level, estimates: Sequence[Estimate], truth: T
     axes.plot(*track.T, color=TRACK_COLOUR, linewidth=1, marker=".", markersize=4, label="estimate, 95 % ellipses")
     axes.autoscale_view()
     axes.legend(loc="upper right", fontsize=8)
+    figure.savefig(path)
+
+
+def draw_foot(path: Path, track: Track, title: str) -> None:
+    """The foot's way from above and its height over time, stances as dots, as a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 7), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    above, side = figure.subplots(2, 1, height_ratios=(3, 1))
+    x, y, z = track.position_m.T
+    above.plot(x, y, color=TRACK_COLOUR, linewidth=1)
+    above.plot(x[track.stance], y[track.stance], ".", color=TRUTH_COLOUR, markersize=3, label="foot stands")
+    above.plot(x[:1], y[:1], "k^", label="start")
+    above.set(aspect="equal", title=title, xlabel="x / m", ylabel="y / m")
+    above.legend(fontsize=8)
+    side.plot(track.t_s, z, color=TRACK_COLOUR, linewidth=1)
+    side.set(xlabel="t / s", ylabel="height / m")
     figure.savefig(path)
 
 

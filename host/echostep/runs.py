@@ -21,9 +21,11 @@ from rich.console import Console
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
+from echostep.foot import walk_track
 from echostep.frames import encode
+from echostep.imu import describe_track, load_imu, write_foot_track
 from echostep.messages import Identify
-from echostep.picture import draw_track, write_track
+from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
 from echostep.settings import parse_settings, read_settings
@@ -121,6 +123,17 @@ def replay(
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
     _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+
+
+def foot(path: Path, out: Path, *, plot: bool) -> None:
+    """Track a recorded foot IMU."""
+    imu = load_imu(path)
+    track = walk_track(imu.t_s, imu.accel, imu.gyro)
+    write_foot_track(out, track)
+    console.print(f"{path.name}: {describe_track(track)}")
+    if plot:
+        draw_foot(out.with_suffix(".png"), track, path.name)
+        console.print(f"{out} and {out.with_suffix('.png')}")
 
 
 def decode(path: Path) -> None:
