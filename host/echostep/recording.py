@@ -39,7 +39,7 @@ class Recorder:
         except OSError as error:
             raise EchostepError(f"{path}: cannot write the recording: {error.strerror}") from error
         self._writer = Writer(
-            self._file, compression=CompressionType.NONE, index_types=IndexType.NONE, use_chunking=False
+            self._file, compression=CompressionType.NONE, index_types=IndexType.ALL, use_chunking=False
         )
         self._writer.start(profile="", library="echostep")
         self._writer.add_metadata(METADATA_NAME, dict(about))
