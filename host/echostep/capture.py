@@ -13,11 +13,10 @@ from typing import Any
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader
 from echostep.messages import BY_ID, Message
-from echostep.recording import open_recording
+from echostep.recording import MCAP_MAGIC, open_recording
 from echostep.sources import BOARD, MTX
 from echostep.xsens import MtSample, MtxReader
 
-MCAP_MAGIC = b"\x89MCAP0\r\n"
 PIECE = 1 << 16
 
 

@@ -10,13 +10,15 @@ import os
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import Self, TypeVar
 
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.records import Channel, Message, Metadata
-from mcap.stream_reader import StreamReader
+from mcap.opcode import Opcode
+from mcap.records import Channel, Metadata
 from mcap.writer import CompressionType, IndexType, Writer
 
 from echostep.errors import EchostepError
@@ -25,7 +27,11 @@ from echostep.sources import Chunk
 METADATA_NAME = "echostep"
 FLUSH_NS = 1_000_000_000
 RECORD_LIMIT = 1 << 24
-MAGIC_SIZE = 8
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+_HEAD = struct.Struct("<BQ")  # opcode, length
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; the bytes follow
+
+Record = TypeVar("Record", Channel, Metadata)
 
 
 class Recorder:
@@ -85,49 +91,51 @@ class Recording:
     def chunks(self) -> Iterator[Chunk]:
         """Chunks in the order in which they were recorded."""
         ports: dict[int, str] = {}
-        for record in self._records():
-            if isinstance(record, Channel):
-                ports[record.id] = record.topic.removeprefix("/").removesuffix("/bytes")
-            elif isinstance(record, Message) and record.channel_id in ports:
-                yield Chunk(ports[record.channel_id], record.log_time, record.data)
+        for opcode, body in self._records():
+            if opcode == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
+                channel, _, t_arrival_ns, _ = _MESSAGE.unpack_from(body)
+                if channel in ports:
+                    yield Chunk(ports[channel], t_arrival_ns, body[_MESSAGE.size :])
+            elif opcode == Opcode.CHANNEL and (found := _parsed(Channel, body)):
+                ports[found.id] = found.topic.removeprefix("/").removesuffix("/bytes")
         self.fraction = 1.0
 
-    def _records(self) -> Iterator[object]:
+    def _records(self) -> Iterator[tuple[int, bytes]]:
+        """Opcode and body of each record up to the footer, or to where the file ends in the middle of one [MCAP specification]."""
         with self.path.open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            reader = StreamReader(file, record_size_limit=RECORD_LIMIT)
-            start = 0
-            try:
-                for record in reader.records:
-                    end = file.tell()
-                    if end >= size and not _whole(file, start, size):
-                        break
-                    self.fraction = end / size
-                    yield record
-                    start = end
-                else:
-                    return
-            except (McapError, struct.error, UnicodeDecodeError, MemoryError, OverflowError):
-                pass
+            size = max(1, os.fstat(file.fileno()).st_size)
+            place = len(file.read(len(MCAP_MAGIC)))
             self.truncated = True
+            while len(head := file.read(_HEAD.size)) == _HEAD.size:
+                opcode, length = _HEAD.unpack(head)
+                if length > RECORD_LIMIT or len(body := file.read(length)) < length:
+                    return
+                place += _HEAD.size + length
+                self.fraction = place / size
+                if opcode == Opcode.FOOTER:
+                    self.truncated = False
+                    return
+                yield opcode, body
 
 
-def _whole(file: IO[bytes], start: int, size: int) -> bool:
-    """Whether the record at `start` ends within the file: the library takes what is left for a whole record."""
-    file.seek(max(start, MAGIC_SIZE) + 1)
-    length = int.from_bytes(file.read(8), "little")
-    file.seek(size)
-    return max(start, MAGIC_SIZE) + 9 + length <= size
+def _parsed(kind: type[Record], body: bytes) -> Record | None:
+    """A record by the library's own reader; None when the body is damaged."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(body)))
+    except (McapError, struct.error, UnicodeDecodeError):
+        return None
 
 
 def open_recording(path: Path | str) -> Recording:
     """A recording and its metadata; raises EchostepError when the file is missing or is none of ours."""
     recording = Recording(Path(path))
     try:
-        for record in recording._records():
-            if isinstance(record, Metadata) and record.name == METADATA_NAME:
-                recording.about = dict(record.metadata)
-            if isinstance(record, Message):
+        with recording.path.open("rb") as file:
+            ours = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
+        for opcode, body in recording._records() if ours else ():
+            if opcode == Opcode.METADATA and (found := _parsed(Metadata, body)) and found.name == METADATA_NAME:
+                recording.about = dict(found.metadata)
+            if opcode == Opcode.MESSAGE:
                 return recording
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the recording: {error.strerror}") from error
