@@ -53,7 +53,8 @@ class Step:
 class FootCounts:
     """Samples that came; `impossible` (not finite, or beyond any foot) and `not_later` ones were skipped, `saturated` ones trusted less.
 
-    After each of the `gaps` the foot waits for a new level. `forced` stances contradicted the filter, which gave in.
+    `forced` samples of rest contradicted the filter, which gave in. After each of the `gaps`, and when all rests contradict the filter, the
+    foot waits for a new level.
     """
 
     samples: int

@@ -30,8 +30,10 @@ MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
 STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # equal readings beyond these are a sensor at its limit, not a coincidence
 LOST_SHARE = 0.3  # of such a reading may be missing
 LEVEL_S = 0.1  # still for long enough to take gravity from
-IMPATIENT_S = 3.0  # without such a moment, start all the same
-UNSURE_TILT_RAD, UNSURE_YAW_RAD2_S = 0.5, 1.0
+IMPATIENT_S = 3.0  # without such a moment, the next one at which the foot may rest at all has to do
+STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
+UNSURE_YAW_RAD2_S = 1.0
+DOUBT_S = 0.1  # of rests that the filter could not believe: its level is wrong
 ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
 FLAT_M, FLAT_SD_M = 0.04, 0.01  # floors are level: a step that rises less is no stair, kerb or ramp
 
@@ -52,6 +54,7 @@ class Footing(Protocol):
     waited_s: float  # for a level
     still_s: float
     lasting_s: float
+    doubt_s: float  # at rest against the filter's belief
     force_sum: Floats
     force_count: int
     lost_s: float  # since samples were missing
@@ -132,7 +135,7 @@ def _usable(s: Footing, t_s: float, accel: Floats, gyro: Floats) -> bool:
 
 @njit(cache=True)
 def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: int) -> int:
-    """Samples are missing, or the clock was set: the stance is over, the level lost, and what the foot does until the next one unknown."""
+    """Samples are missing, or the clock or the level is wrong: the stance is over, and what the foot does until the next level unknown."""
     s.gaps += 1
     span_s = min(max(dt, GAP_S), 3600.0)
     s.lost_s += span_s
@@ -143,35 +146,35 @@ def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: in
         s.yaw_rad = ins.heading(nav)
     stance.end_rest(rest)
     s.levelled = 0
-    s.still_s = s.lasting_s = s.waited_s = s.rest_s = 0.0
+    s.still_s = s.lasting_s = s.doubt_s = s.waited_s = s.rest_s = 0.0
     return found
 
 
 @njit(cache=True)
 def _find_level(s: Footing, nav: Nav, window: Window, dt: float, t_s: float, events: Floats, found: int) -> int:
     """Wait for a still moment to take the level from; after a while, start without."""
-    rate2, force2 = stance.activity(window, nav.gyro_bias)
+    unrest = stance.unrest(*stance.activity(window, nav.gyro_bias))
     s.waited_s += dt
-    s.still_s = s.still_s + dt if stance.unrest(rate2, force2) < stance.STILL else 0.0
+    s.still_s = s.still_s + dt if unrest < stance.STILL else 0.0
     if s.still_s == 0.0:
         s.force_sum[:] = 0.0
         s.force_count = 0
     s.force_sum += stance.mean_force(window)
     s.force_count += 1
     if s.still_s >= LEVEL_S - 1e-6:
-        _begin(s, nav, t_s, 0.005 + math.sqrt(force2) / ins.GRAVITY_M_S2, 0.02)
+        ins.set_level(nav, s.force_sum / s.force_count, s.yaw_rad, True)
+        _begin(s, nav, t_s, STILL_TILT_RAD, 0.02)
         found = _land(s, nav, t_s - s.still_s, events, found)
-    elif s.waited_s >= IMPATIENT_S:
+    elif s.waited_s >= IMPATIENT_S and unrest < 1.0:
+        ins.set_level(nav, stance.mean_force(window), s.yaw_rad, False)
         _begin(s, nav, t_s, UNSURE_TILT_RAD, WALK_M_S)
-        s.left_s = s.left_s if s.under_way else t_s
-        s.under_way = 1
+        found = _land(s, nav, t_s, events, found)
     return found
 
 
 @njit(cache=True)
 def _begin(s: Footing, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
     """Navigate from here on; whatever the foot did while nobody watched goes into the position's covariance."""
-    ins.set_level(nav, s.force_sum / s.force_count, s.yaw_rad)
     ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, GYRO_BIAS_RAD_S, ACCEL_BIAS_M_S2)
     lost_s = s.lost_s + s.waited_s if s.lost_s > 0.0 else 0.0
     for i in range(3):
@@ -195,6 +198,8 @@ def _navigate(
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
             found = _leave(s, nav, events, found)
         return found
+    if s.doubt_s > DOUBT_S:
+        return _lose(s, nav, rest, dt, events, found)
     s.rest_s += dt
     s.rest_end_s = t_s
     s.rest_yaw_rad = ins.heading(nav)
@@ -223,7 +228,10 @@ def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s
         if s.lasting_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
+        s.doubt_s += dt
         stance.distrust(nav, since_s)
+    else:
+        s.doubt_s = 0.0
     stance.hold(nav, expected, variance + stance.haste_variance(force2), dt)
     return True
 

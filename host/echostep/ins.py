@@ -113,10 +113,11 @@ def heading(nav: Nav) -> float:
 
 
 @njit(cache=True)
-def set_level(nav: Nav, force: Floats, yaw: float) -> None:
-    """Attitude from gravity, the mean specific force (3,) at rest: roll and pitch from its direction, bias from its size, yaw as given."""
+def set_level(nav: Nav, force: Floats, yaw: float, at_rest: bool) -> None:
+    """Attitude from gravity: roll and pitch from the direction of the mean specific force (3,), yaw as given; at rest, bias from its size."""
     size = max(_norm(force), 1e-9)
-    nav.accel_bias[:] = force * (1.0 - GRAVITY_M_S2 / size)
+    if at_rest:
+        nav.accel_bias[:] = force * (1.0 - GRAVITY_M_S2 / size)
     roll = turning(math.atan2(force[1], force[2]), 0.0, 0.0)
     pitch = turning(0.0, math.asin(min(max(-force[0] / size, -1.0), 1.0)), 0.0)
     flat = multiply(pitch, roll)
