@@ -197,6 +197,10 @@ class PtyTwin:
         for _ in range(100):
             self.run(10)
             found += reader.feed(port.read(port.in_waiting))
+        port.timeout = 0.3  # the kernel hands over the last bytes in its own time
+        while part := port.read(4096):
+            found += reader.feed(part)
+        port.timeout = 0
         return found
 
 
