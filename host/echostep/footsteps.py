@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 CONFIRM_S = 0.03  # a stance is told after so much rest
 SETTLE_S = 0.2  # by then it has corrected the step before it
-LEAVE_S = 0.1  # and it is over after so long without rest
+LEAVE_S = 0.15  # and it is over after so long without rest: no swing is shorter
 GAP_S = 0.25  # the filter carries on over shorter gaps
 STRAY_SAMPLES = 20  # so many samples in a row from the past: the clock has been set back
 WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
