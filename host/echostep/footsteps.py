@@ -3,6 +3,7 @@
 In: samples, and the states of `ins` and `stance`. Out: rows that `foot` turns into events. Owns the `Footing`.
 
 Until the foot has been still for a moment there is no level and no navigation; the same holds after samples were missing for too long.
+Position and yaw errors count from the last stance, so that every step comes with its own covariance; floors are taken as level.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ In: the latest samples and the navigation state. Out: verdicts, and corrections 
 One setting serves walking, running, stairs and shuffling at any rate, because a stance is decided by two witnesses. The sensors alone (SHOE
 [Skog et al. 2010], in physical units) are asked leniently, as a runner's foot never lies still; then the filter, which knows the foot's velocity
 to a few cm/s at the end of a swing, must find rest believable. In the middle of a swing it never does: the foot moves at metres a second.
-A standing foot rolls. The sensor, at a height above the point of contact, moves with the rate times that height [pivot of a rigid foot], and
-what remains unknown of the lever arm grows with the rate, too: so a calm mid-stance counts for much, a heel rise for little.
+A standing foot rolls about its contact with the floor: a sensor above it moves with the rate times its height, and what remains unknown of
+the lever arm matters in proportion to the rate, too. So a calm mid-stance counts for much, a heel rise for little, and strides are not short.
 """
 
 from __future__ import annotations
