@@ -1,0 +1,22 @@
+"""`echostep evaluate ...`: one command a study. Heavy imports wait until a command runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(no_args_is_help=True, help="The papers' experiments and ours, with figures and plots.")
+
+Seed = Annotated[int, typer.Option("--seed", help="Seed of the first run; run k has this plus k.", min=0)]
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the rows there.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for plots, journal and Parquet.")]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, not on this machine.")
+]
+
+
+@app.callback()
+def evaluate() -> None:
+    """The papers' experiments and ours, with figures and plots."""
