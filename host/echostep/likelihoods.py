@@ -1,6 +1,9 @@
-"""log p(echo | pose): one function, cited, for the cloud to call.
+"""log p(echo | pose): what a ranger may report where the plan has these echo sources; one function, for the cloud to call.
 
-In: a range and what the plan says would be heard. Out: a log-likelihood. Owns nothing.
+In: a range and the echo sources that the plan shows to the ranger, nearest first. Out: a log-likelihood. Owns nothing.
+
+An SRF02 reports the first echo that it hears. So each source answers if it is heard and no nearer one was; before all of them something that is
+not on the plan may stand, and after them a second reflection may come. The mixture is the beam model's [Thrun, Burgard, Fox 2005, 6.3] with that order.
 """
 
 from __future__ import annotations
@@ -9,40 +12,44 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from echostep.walls import FAR_M
+from echostep.walls import WALL
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class EchoSettings:
-    """The mixture of what an SRF02 may report; lengths in metres, probabilities of one ping.
+    """What an SRF02 may report; lengths in metres, probabilities of one ping.
 
-    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and as much again for the plan and the swaying trunk. `rim_deg`: off-axis angle at which half
-    of the echoes are lost, -6 dB [Girard 2011, 2.6.2]; `rim_width_deg` its softness. `maximum_m`, `minimum_m`: the
-    sensor's limits. `edge`: chance that a wall end before the wall answers first. `short`: something nearer that is not on the plan.
-    `stray`: a second reflection or the other ranger's echo where no wall answers. `outlier`: anything else.
+    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` toward the rim. A wall is heard while its level, spread
+    over the way there and back and through a beam that is `rim_db` down at 27.5 degrees each way [Girard 2011, 2.6.2, 2.6.3], exceeds that of a wall straight
+    ahead at `maximum_m`; `soft_db`: how sharply. A wall's end answers `edge_db` more weakly, and more so with distance. `short`: something nearer that is not on
+    the plan; `stray`: a second reflection where nothing on the plan was heard; `outlier`: anything else.
     `correlation_m`: travel over which errors of successive echoes become independent.
     """
 
-    sd_m: float = 0.06
-    rim_deg: float = 27.5
-    rim_width_deg: float = 2.5
+    sd_m: float = 0.05
+    slant_m: float = 0.05
+    rim_db: float = 6.0
     maximum_m: float = 6.0
     minimum_m: float = 0.15
-    fade_m: float = 0.3
-    edge: float = 0.15
-    short: float = 0.08
-    stray: float = 0.5
-    outlier: float = 0.05
-    correlation_m: float = 0.3
+    soft_db: float = 2.0
+    edge_db: float = 20.0
+    short: float = 0.1
+    stray: float = 0.3
+    outlier: float = 0.04
+    correlation_m: float = 0.07
 
     def __post_init__(self) -> None:
         """Raise ValueError for lengths of zero and for probabilities that are none."""
-        for name in ("sd_m", "rim_width_deg", "fade_m", "correlation_m", "outlier"):
+        for name in ("sd_m", "soft_db", "correlation_m", "outlier"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"[echo] {name}: must be greater than 0")
-        for name in ("edge", "short", "stray", "outlier"):
+        for name in ("short", "stray", "outlier"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(f"[echo] {name}: must be a probability below 1")
         if not 0.0 < self.minimum_m < 0.5 * self.maximum_m:
@@ -50,69 +57,69 @@ class EchoSettings:
 
 
 class EchoModel(NamedTuple):
-    """`EchoSettings` as the kernels take them."""
+    """`EchoSettings` as the kernels take them: levels as logit per dB, the beam per square radian."""
 
     sd_m: float
-    rim_rad: float
-    rim_width_rad: float
+    slant_m: float
+    reach: float
+    per_db: float
+    beam: float
+    edge: float
     maximum_m: float
     minimum_m: float
-    fade_m: float
-    edge: float
     short: float
     stray: float
     outlier: float
 
 
-def echo_model(settings: EchoSettings) -> EchoModel:
-    """The settings in radians."""
+def echo_model(s: EchoSettings) -> EchoModel:
+    """The settings in the kernels' units."""
+    per_db = 1.0 / s.soft_db
+    beam = 2.0 * s.rim_db / math.radians(27.5) ** 2
+    reach = per_db * (20.0 * math.log10(s.maximum_m) + ABSORPTION_DB_M * s.maximum_m)
     return EchoModel(
-        settings.sd_m,
-        math.radians(settings.rim_deg),
-        math.radians(settings.rim_width_deg),
-        settings.maximum_m,
-        settings.minimum_m,
-        settings.fade_m,
-        settings.edge,
-        settings.short,
-        settings.stray,
-        settings.outlier,
-    )
+        s.sd_m, s.slant_m, reach, per_db, per_db * beam, per_db * s.edge_db,
+        s.maximum_m, s.minimum_m, s.short, s.stray, s.outlier,
+    )  # fmt: skip
+
+
+ABSORPTION_DB_M = 2.6  # there and back, 40 kHz in air [ISO 9613-1]
+DB = 20.0 / math.log(10.0)
 
 
 @njit(cache=True, error_model="numpy")
-def log_echo(range_m: float, wall_m: float, off_axis_rad: float, edge_m: float, model: EchoModel) -> float:
-    """Log p(range | the wall at `wall_m`, `off_axis_rad` off the axis, a wall end at `edge_m`); range 0 means no echo.
-
-    A mixture in the manner of the beam model [Thrun, Burgard, Fox 2005, 6.3]: the wall or the end before it,
-    something short of it, a stray echo when the wall is not heard, and a uniform rest.
-    """
-    heard = detection(wall_m, off_axis_rad, model)
-    edge = model.edge * detection(edge_m, 0.0, model) if edge_m < wall_m else 0.0
-    span = model.maximum_m - model.minimum_m
+def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel) -> float:
+    """Log p(range | `count` sources, nearest first); range 0 means no echo."""
+    first = distance_m[0] if count else m.maximum_m
+    unheard, hit = 1.0, 0.0
+    for k in range(count):
+        heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
+        unheard -= heard
+        if range_m > 0.0:
+            hit += heard * normal(range_m - distance_m[k], m.sd_m + m.slant_m * off_axis_rad[k])
+    span = m.maximum_m - m.minimum_m
     if range_m <= 0.0:
-        silent = (1.0 - heard) * (1.0 - edge) * (1.0 - model.stray) * (1.0 - model.short)
-        return math.log((1.0 - model.outlier) * silent + model.outlier * 0.2)
-    hit = edge * normal(range_m, edge_m, 2.0 * model.sd_m) + (1.0 - edge) * heard * normal(range_m, wall_m, model.sd_m)
-    reach = min(max(wall_m, 2.0 * model.minimum_m), model.maximum_m)
-    short = 1.0 / (reach - model.minimum_m) if range_m < reach else 0.0
-    stray = (1.0 - heard) * model.stray / span
-    density = (1.0 - model.short) * (hit + stray) + model.short * short
-    return math.log((1.0 - model.outlier) * density + model.outlier / span)
+        return math.log((1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * 0.2)
+    before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
+    short = 1.0 / before if range_m < m.minimum_m + before else 0.0
+    density = (1.0 - m.short) * (hit + unheard * m.stray / span) + m.short * short
+    return math.log((1.0 - m.outlier) * density + m.outlier / span)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def detection(distance_m: float, off_axis_rad: float, model: EchoModel) -> float:
-    """Probability that a reflector is heard: falls off at the rim of the cone and at the end of the range."""
-    if distance_m >= FAR_M or distance_m < model.minimum_m:
+def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel) -> float:
+    """Probability that a source is heard: spreading, absorption, beam, and the weakness of a mere edge."""
+    if distance_m < 0.5 * m.minimum_m:
         return 0.0
-    rim = 1.0 / (1.0 + math.exp((off_axis_rad - model.rim_rad) / model.rim_width_rad))
-    fade = 1.0 / (1.0 + math.exp((distance_m - model.maximum_m) / model.fade_m))
-    return rim * fade
+    log_d = math.log(distance_m) * DB
+    margin = m.reach - m.per_db * (log_d + ABSORPTION_DB_M * distance_m) - m.beam * off_axis_rad * off_axis_rad
+    if kind != WALL:
+        margin -= m.edge + 0.5 * m.per_db * log_d
+    return 1.0 / (1.0 + math.exp(-margin))
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def normal(x: float, mean: float, sd: float) -> float:
-    """Normal density."""
-    z = (x - mean) / sd
+def normal(x: float, sd: float) -> float:
+    """Normal density about zero."""
+    z = x / sd
     return math.exp(-0.5 * z * z) / (sd * 2.5066282746310002)

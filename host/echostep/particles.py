@@ -1,7 +1,7 @@
 """The cloud: where the trunk may be, as weighted particles on the plan.
 
-In: pieces of the trunk's path (walk frame) and echoes. Out: a `Cloud` whose moments are the estimate. Owns the particles; draws from the generator
-that it is given. Only this module goes from the walk frame to the map.
+In: straight pieces of the trunk's path (walk frame) with the pings heard on them. Out: a `Cloud` whose moments are the estimate. Owns the particles;
+draws from the generator that it is given. Only this module goes from the walk frame to the map.
 
 A particle is (x, y) in the map, `turn` = rotation walk -> map, and `scale` = true length / measured length. Weights are logarithms.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from echostep.likelihoods import EchoModel, log_echo
 from echostep.plan import Pose
-from echostep.walls import WallIndex, crosses_wall, reflectors
+from echostep.walls import MOST_SOURCES, WallIndex, crosses_wall, echo_sources
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,21 +28,26 @@ Ints = NDArray[np.int64]
 class CloudSettings:
     """Size of the cloud, spread at the start, and what the path's own covariance leaves out.
 
-    `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`: of the walk frame's rotation, per square root of a
-    metre; `resample_below`: effective share of the cloud at which it is resampled (systematic). After a
-    move that nobody watched the cloud grows with its area, up to `largest`, until it has gathered again; meanwhile resampling roughens
-    it by `rough_m` and `rough_deg`.
+    `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation and of the lengths, likewise.
+    `resample_below`: effective share of the cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: so many
+    particles that the distribution over cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A cloud that
+    has been scattered is roughened by `rough_m` and `rough_deg` until it has gathered again. `wall_cost`: log-weight that going through a wall costs.
     """
 
-    size: int = 1000
+    size: int = 250
+    largest: int = 20_000
+    kld: float = 0.15
+    cell_m: float = 0.1
+    cell_deg: float = 5.0
     start_sd_m: float = 0.15
     start_turn_sd_deg: float = 5.0
     start_scale_sd: float = 0.02
     step_sd: float = 0.03
     turn_sd_deg: float = 0.3
+    scale_sd: float = 0.002
     resample_below: float = 0.5
+    wall_cost: float = 40.0
     rescue_sd_m: float = 0.5
-    largest: int = 20_000
     rough_m: float = 0.1
     rough_deg: float = 2.0
 
@@ -49,6 +55,33 @@ class CloudSettings:
         """Raise ValueError for a cloud without particles."""
         if not 1 <= self.size <= 10_000_000:
             raise ValueError(f"[cloud] size: {self.size} particles make no cloud")
+        for name in ("kld", "cell_m", "cell_deg"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"[cloud] {name}: must be greater than 0")
+
+
+class Move(NamedTuple):
+    """A straight piece of the path in the walk frame, and the standard deviations that it adds: per axis, of the rotation."""
+
+    dx_m: float
+    dy_m: float
+    sd_m: float
+    turn_sd_rad: float
+
+
+class Heard(NamedTuple):
+    """k pings on a move: share of the move at the trigger (ascending), axis of the ranger in the walk frame, range (0: none), power.
+
+    `power`: share of independent information in the ping, its log-likelihood counts with it.
+    """
+
+    share: Floats
+    axis_rad: Floats
+    range_m: Floats
+    power: Floats
+
+
+NOTHING = Heard(*(np.zeros(0) for _ in range(4)))
 
 
 class Cloud:
@@ -67,35 +100,48 @@ class Cloud:
         self.log_weight: Floats = np.zeros(n)
         self.rescues = 0
 
-    def move(self, dx_m: float, dy_m: float, sd_m: float, turn_sd_rad: float, walls: WallIndex) -> None:
-        """Propagate by a move in the walk frame; `sd_m` and `turn_sd_rad` come from the path's own covariance.
+    def follow(self, move: Move, heard: Heard, model: EchoModel, walls: WallIndex) -> Floats:
+        """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
 
-        Particles that cross a wall die. If all do, the plan or the path is wrong: the cloud moves through, wider.
+        Particles that cross a wall lose their weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns for each
+        ping the log of its probability under the cloud before it: how well the plan explains what was heard.
         """
-        length = math.hypot(dx_m, dy_m)
-        sd = math.hypot(sd_m, self._settings.step_sd * math.sqrt(length))
-        turn_sd = math.hypot(turn_sd_rad, math.radians(self._settings.turn_sd_deg) * math.sqrt(length))
-        noise = self._rng.standard_normal((3, len(self.x_m)))
-        noise *= np.array([[sd], [sd], [turn_sd]])
-        before = self.log_weight.copy()
-        died = _propagate(self.x_m, self.y_m, self.turn_rad, self.scale, self.log_weight, dx_m, dy_m, noise, walls)
-        if died and not np.isfinite(self.log_weight).any():
-            self.log_weight = before
-            self.rescues += 1
-            self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
-            self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
-        if died:
+        explained = np.zeros(len(heard.share))
+        done, k, settings = 0.0, 0, self._settings
+        while done < 1.0 or k < len(explained):
+            noise = self._noise(move, 1.0 - done)
+            k, done, top = _follow(
+                self.x_m, self.y_m, self.turn_rad, self.scale, self.log_weight, move.dx_m, move.dy_m, noise, done, k,
+                heard, settings.resample_below, settings.wall_cost, model, walls, explained,
+            )  # fmt: skip
+            if top < -0.5 * settings.wall_cost:
+                self._widen()
             self._renew()
+        return explained
 
-    def scatter(self, dx_m: float, dy_m: float, sd_m: float, turn_sd_rad: float) -> None:
+    def _noise(self, move: Move, share: float) -> Floats:
+        """What the rest of a move adds to x, y, turn and scale of each particle, (4, n)."""
+        s, length = self._settings, math.hypot(move.dx_m, move.dy_m)
+        sd = math.hypot(move.sd_m, s.step_sd * math.sqrt(length))
+        turn_sd = math.hypot(move.turn_sd_rad, math.radians(s.turn_sd_deg) * math.sqrt(length))
+        noise = self._rng.standard_normal((4, len(self.x_m)))
+        noise *= np.array([[sd], [sd], [turn_sd], [s.scale_sd * math.sqrt(length)]]) * math.sqrt(share)
+        return noise
+
+    def _widen(self) -> None:
+        """Every particle went through a wall."""
+        self.rescues += 1
+        self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
+        self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
+
+    def scatter(self, move: Move) -> None:
         """Spread by a move that nobody watched: he may have gone round any wall, so none can veto it."""
-        chosen = systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest)
-        noise = self._rng.standard_normal((3, len(chosen)))
-        self._take(chosen)
-        self.turn_rad += turn_sd_rad * noise[2]
+        self._take(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
+        noise = self._rng.standard_normal((3, len(self.x_m)))
+        self.turn_rad += move.turn_sd_rad * noise[2]
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
-        self.x_m += c * dx_m - s * dy_m + sd_m * noise[0]
-        self.y_m += s * dx_m + c * dy_m + sd_m * noise[1]
+        self.x_m += c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
+        self.y_m += s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
 
     def _take(self, chosen: Ints) -> None:
         """Keep these particles, with equal weights."""
@@ -103,58 +149,89 @@ class Cloud:
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
         self.log_weight = np.zeros(len(chosen))
 
-    def _wanted(self, weight: Floats) -> int:
-        """Size for the cloud's present spread: the usual one up to a metre, then as the area, never more than there are."""
-        w = weight / weight.sum()
-        spread2 = float(w @ self.x_m**2 - (w @ self.x_m) ** 2 + w @ self.y_m**2 - (w @ self.y_m) ** 2)
-        return int(
-            min(self._settings.size * max(spread2, 1.0), self._settings.largest, max(len(w), self._settings.size))
-        )
-
-    def weigh(
-        self, axis_walk_rad: float, range_m: float | None, power: float, model: EchoModel, walls: WallIndex
-    ) -> float:
-        """Reweight by an echo; `axis_walk_rad`: the ranger's axis in the walk frame, `power`: share of independent information.
-
-        Returns the log of the echo's probability under the cloud before it: how well the plan explains what was heard.
-        """
-        found = _reweight(
-            self.x_m, self.y_m, self.turn_rad, self.log_weight, axis_walk_rad, range_m or 0.0, power, model, walls
-        )
-        self._renew()
-        return found
-
     def _renew(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight."""
         if effective_size(self.log_weight) >= self._settings.resample_below * len(self.x_m):
             return
-        weight = np.exp(self.log_weight)
-        self._take(systematic(weight, float(self._rng.random()), self._wanted(weight)))
-        if len(self.x_m) > self._settings.size:
+        chosen = systematic(np.exp(self.log_weight), float(self._rng.random()), len(self.x_m))
+        self._take(chosen)
+        count = self._wanted()
+        if count != len(self.x_m):
+            self._take(systematic(np.ones(len(self.x_m)), float(self._rng.random()), count))
+        if count > ROUGHENED * self._settings.size:
             # Scattered: between the few that fit there are others that do [Gordon et al. 1993, roughening].
             noise = self._rng.standard_normal((3, len(self.x_m)))
             self.x_m += self._settings.rough_m * noise[0]
             self.y_m += self._settings.rough_m * noise[1]
             self.turn_rad += math.radians(self._settings.rough_deg) * noise[2]
 
+    def _wanted(self) -> int:
+        """Size for the present spread, from the number of cells that hold particles [Fox 2003, eq. 7 with z of 99 %]."""
+        s = self._settings
+        cells = np.floor(
+            np.column_stack([self.x_m / s.cell_m, self.y_m / s.cell_m, self.turn_rad / math.radians(s.cell_deg)])
+        )
+        k = len(np.unique(cells @ np.array([1.0, 1e6, 1e12]))) - 1
+        if k < 1:
+            return s.size
+        part = 2.0 / (9.0 * k)
+        wanted = k / (2.0 * s.kld) * (1.0 - part + math.sqrt(part) * 2.33) ** 3
+        return int(min(max(wanted, s.size), s.largest))
+
+
+NEGLIGIBLE = 1e-9  # particles of less weight go with the next resampling: not worth a look
+ROUGHENED = 10  # a cloud of so many times the usual size has been scattered
+
+
+@njit(cache=True, error_model="numpy")
+def _follow(
+    x: Floats, y: Floats, turn: Floats, scale: Floats, log_weight: Floats,
+    dx: float, dy: float, noise: Floats, done: float, k: int, heard: Heard, resample_below: float, wall_cost: float,
+    model: EchoModel, walls: WallIndex, explained: Floats,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Go on from share `done` and ping `k` until the cloud needs to be resampled or the move is over.
+
+    Returns both anew, and the least of the log-weights that the best particle had left after a piece of the way.
+    """
+    rest, least = 1.0 - done, 0.0
+    while done < 1.0 or k < len(heard.share):
+        until = max(heard.share[k], done) if k < len(heard.share) else 1.0
+        if until > done:
+            part = until - done
+            top = _propagate(x, y, turn, scale, log_weight, part * dx, part * dy, part / rest, noise, wall_cost, walls)
+            least = min(least, top)
+            done = until
+        if k < len(heard.share):
+            explained[k] = _reweight(
+                x, y, turn, log_weight, heard.axis_rad[k], heard.range_m[k], heard.power[k], model, walls
+            )
+            k += 1
+        if effective_size(log_weight) < resample_below * len(x):
+            break
+    return k, done, least
+
 
 @njit(cache=True, error_model="numpy")
 def _propagate(
     x: Floats, y: Floats, turn: Floats, scale: Floats, log_weight: Floats,
-    dx: float, dy: float, noise: Floats, walls: WallIndex,
-) -> int:  # fmt: skip
-    """Move every particle in place; a weight of -inf marks one that went through a wall. Returns how many did."""
-    died = 0
+    dx: float, dy: float, share: float, noise: Floats, wall_cost: float, walls: WallIndex,
+) -> float:  # fmt: skip
+    """Move every particle in place, with this share of its noise; returns the greatest log-weight and makes it 0 again."""
+    top = -np.inf
     for i in range(len(x)):
-        turn[i] += noise[2, i]
+        turn[i] += share * noise[2, i]
+        scale[i] += share * noise[3, i]
         c, s = math.cos(turn[i]), math.sin(turn[i])
-        to_x = x[i] + scale[i] * (c * dx - s * dy) + noise[0, i]
-        to_y = y[i] + scale[i] * (s * dx + c * dy) + noise[1, i]
-        if log_weight[i] > -np.inf and crosses_wall(x[i], y[i], to_x, to_y, walls):
-            log_weight[i] = -np.inf
-            died += 1
+        to_x = x[i] + scale[i] * (c * dx - s * dy) + share * noise[0, i]
+        to_y = y[i] + scale[i] * (s * dx + c * dy) + share * noise[1, i]
+        if crosses_wall(x[i], y[i], to_x, to_y, walls):
+            log_weight[i] -= wall_cost
+        top = max(top, log_weight[i])
         x[i], y[i] = to_x, to_y
-    return died
+    if top != 0.0:
+        for i in range(len(x)):
+            log_weight[i] -= top
+    return top
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,15 +240,17 @@ def _reweight(
     axis: float, range_m: float, power: float, model: EchoModel, walls: WallIndex,
 ) -> float:  # fmt: skip
     """Add each particle's log-likelihood and bring the greatest weight to 0; returns the log of the mean likelihood before."""
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
     top = -np.inf
     weight, explained = 0.0, 0.0
     for i in range(len(x)):
-        if log_weight[i] == -np.inf:
+        w = math.exp(log_weight[i])
+        if w < NEGLIGIBLE:
             continue
-        wall_m, off_axis, edge_m = reflectors(x[i], y[i], axis + turn[i], walls)
-        log_likelihood = log_echo(range_m, wall_m, off_axis, edge_m, model)
-        weight += math.exp(log_weight[i])
-        explained += math.exp(log_weight[i] + log_likelihood)
+        count = echo_sources(x[i], y[i], axis + turn[i], walls, distance_m, off_axis_rad, kind)
+        log_likelihood = log_echo(range_m, count, distance_m, off_axis_rad, kind, model)
+        weight += w
+        explained += w * math.exp(log_likelihood)
         log_weight[i] += power * log_likelihood
         top = max(top, log_weight[i])
     for i in range(len(x)):

@@ -26,6 +26,8 @@ CONE_RAD = math.radians(
     35.0
 )  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
 FAR_M = 1e9  # "no reflector"
+WALL, EDGE = 0.0, 1.0
+MOST_SOURCES = 8
 
 
 class WallIndex(NamedTuple):
@@ -220,3 +222,48 @@ def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats) -> bool:
         if segments_cross(px, py, ex, ey, walls, j):
             return True
     return False
+
+
+@njit(cache=True, error_model="numpy")
+def echo_sources(px: float, py: float, axis_rad: float, index: WallIndex, distance_m: Floats, off_axis_rad: Floats, kind: Floats) -> int:
+    """temporary"""
+    tile = _tile(px, py, index)
+    if tile < 0:
+        return 0
+    walls = index.ear[index.ear_start[tile] : index.ear_start[tile + 1]]
+    ends = index.ends[index.ends_start[tile] : index.ends_start[tile + 1]]
+    ax, ay = math.cos(axis_rad), math.sin(axis_rad)
+    cone = math.cos(CONE_RAD)
+    n = 0
+    for j in range(len(walls)):
+        wx, wy = walls[j, 0], walls[j, 1]
+        ux, uy = walls[j, 2] - wx, walls[j, 3] - wy
+        length2 = ux * ux + uy * uy
+        along = (px - wx) * ux + (py - wy) * uy
+        if not 0.0 <= along <= length2:
+            continue
+        s = along / length2
+        dx, dy = wx + s * ux - px, wy + s * uy - py
+        d = math.sqrt(dx * dx + dy * dy)
+        if d > EAR_REACH_M or d < 1e-6 or dx * ax + dy * ay < cone * d or n >= len(kind):
+            continue
+        if not _hidden(px, py, px + dx, py + dy, walls):
+            n = _insert(n, d, math.acos(min((dx * ax + dy * ay) / d, 1.0)), 0.0, distance_m, off_axis_rad, kind)
+    for j in range(len(ends)):
+        dx, dy = ends[j, 0] - px, ends[j, 1] - py
+        d = math.sqrt(dx * dx + dy * dy)
+        if d > EAR_REACH_M or d < 1e-6 or dx * ax + dy * ay < cone * d or n >= len(kind):
+            continue
+        if not _hidden(px, py, px + dx, py + dy, walls):
+            n = _insert(n, d, math.acos(min((dx * ax + dy * ay) / d, 1.0)), 1.0, distance_m, off_axis_rad, kind)
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _insert(n: int, d: float, off: float, k: float, distance_m: Floats, off_axis_rad: Floats, kind: Floats) -> int:
+    i = n
+    while i > 0 and distance_m[i - 1] > d:
+        distance_m[i], off_axis_rad[i], kind[i] = distance_m[i - 1], off_axis_rad[i - 1], kind[i - 1]
+        i -= 1
+    distance_m[i], off_axis_rad[i], kind[i] = d, off, k
+    return n + 1

@@ -1,0 +1,207 @@
+"""The experiment of [Girard 2011, 3.4 and 4] in simulation: the paper's three systems and ours on the same walks; and what the paper could not handle.
+
+In: seeds. Out: rows in the form of the paper's Table 1, and the clouds of its Figures 10-13. Everything here is simulated: building, walker, sensors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.calibration import Echo
+from echostep.estimate import Estimate
+from echostep.evaluate.study import Row, Study, print_table, summary, write_json, write_parquet
+from echostep.gait import Leg
+from echostep.girard2011 import Girard, GirardSettings
+from echostep.mapfilter import MapFilter
+from echostep.plan import Pose
+from echostep.simulation.markers import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
+from echostep.simulation.sites import (
+    Site,
+    angled,
+    displaced,
+    furnished,
+    hall,
+    mistaken,
+    otb,
+    parallel,
+    thousand,
+    with_doors,
+)
+from echostep.walls import build_index
+
+Floats = NDArray[np.float64]
+
+STEP_SD_M = 0.02  # of a careful step, per axis
+AFTER_HALL_S = 10.0
+HALL_X_M = 0.0
+SITES: dict[str, Callable[[int], Site]] = {
+    "furniture": furnished,
+    "doors": with_doors,
+    "hall": lambda seed: hall(),
+    "plan": mistaken,
+    "displaced": displaced,
+    "parallel": lambda seed: parallel(),
+    "angles": lambda seed: angled(),
+    "thousand": lambda seed: thousand(),
+}
+PAPER: tuple[Row, ...] = (  # [Girard 2011, Table 1]
+    {"name": "imu", "mean_m": 0.59, "sd_m": 0.35, "max_m": 1.47, "min_m": 0.01, "ending_m": 1.47},
+    {"name": "model", "mean_m": 0.47, "sd_m": 0.30, "max_m": 1.06, "min_m": 0.01, "ending_m": 1.06},
+    {"name": "ranging", "mean_m": 0.13, "sd_m": 0.07, "max_m": 0.40, "min_m": 0.03, "ending_m": 0.18},
+)
+COLUMNS = {
+    "name": "simulated", "mean_m": "mean", "sd_m": "sd", "max_m": "max", "min_m": "min", "ending_m": "ending", "worst_m": "worst of all",
+    "coverage95": "in 95 %", "lost": "lost", "paper": "paper: mean sd max min ending",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a system says after a step: the estimate, and its cloud (n, 2) for the pictures; `inside` is None where it states no ellipse."""
+
+    at_m: tuple[float, float]
+    inside: bool | None
+    cloud: Floats
+
+
+def evaluate_girard2011(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
+    """Run the study, print the table beside the paper's, and write JSON, Parquet and the pictures."""
+    from echostep.evaluate.pictures import draw_clouds
+
+    each = Study("girard2011", runs, seed, one_run, out, scheduler).rows()
+    names = list(dict.fromkeys(row["name"] for row in each))
+    rows = [_summary([row for row in each if row["name"] == name]) for name in names]
+    beside = {row["name"]: "  ".join(f"{row[k]:.2f}" for k in list(row)[1:]) for row in PAPER}
+    print_table(
+        f"Position error in metres, simulated, {runs} runs", [row | {"paper": beside.get(row["name"])} for row in rows], COLUMNS
+    )
+    write_parquet(out / "girard2011.parquet", [{k: v for k, v in row.items()} for row in each])
+    draw_clouds(out / "figures10-13.png", seed)
+    if json_path is not None:
+        write_json(json_path, "girard2011", runs, seed, rows)
+
+
+def one_run(seed: int) -> list[Row]:
+    """All systems on the walk of this seed, and ours on every other site."""
+    site = otb()
+    walk = _walk(site, seed)
+    rows = [_row(name, "girard2011", seed, walk, list(system(site, walk, seed))) for name, system in SYSTEMS.items()]
+    rows.append(_row("default", "default", seed, walk, list(default(site, walk, seed))))
+    for name, build in SITES.items():
+        site = build(seed)
+        walk = _walk(site, seed)
+        rows.append(_row(f"default/{name}", "default", seed, walk, list(default(site, walk, seed))))
+        if name == "hall":
+            rows[-1] |= _in_hall(walk, rows[-1]["errors_m"])
+    return rows
+
+
+def dead_reckoned(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
+    """Fixed steps in the measured directions [Girard 2011, Figure 10]."""
+    way = np.column_stack([np.cos(walk.heading_rad), np.sin(walk.heading_rad)]) * STEP_M
+    for x, y in (walk.trunk_m[0] + np.cumsum(way, axis=0)).tolist():
+        yield Seen((x, y), None, np.array([[x, y]]))
+
+
+def girard(site: Site, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True) -> Iterator[Seen]:
+    """The paper's filter: on its plan or without, with one pair of pings a step or without."""
+    walls = build_index(site.plan) if model else None
+    x0, y0 = walk.trunk_m[0].tolist()
+    filter_ = Girard(GirardSettings(), (x0, y0), walls, np.random.default_rng([seed, 20]))
+    for k, heading in enumerate(walk.heading_rad.tolist()):
+        pair = (float(walk.pair_m[k + 1, 0]), float(walk.pair_m[k + 1, 1])) if ranging else None
+        at = filter_.step(STEP_M * math.cos(heading), STEP_M * math.sin(heading), heading, pair)
+        yield Seen(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
+
+
+def default(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
+    """Ours: the same steps and headings, and every ping on the way."""
+    x0, y0 = walk.trunk_m[0].tolist()
+    start = Pose(x0, y0, walk.start_heading_rad)
+    ours = MapFilter(build_index(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
+    pings = _Pings(walk)
+    for k, (turning, step) in enumerate(_legs(walk)):
+        if turning is not None:
+            ours.follow(turning, pings.until(turning.t1_s))
+        found = ours.follow(step, pings.until(step.t1_s))
+        cloud = np.column_stack([ours.cloud.x_m, ours.cloud.y_m])
+        yield Seen((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
+
+
+SYSTEMS: dict[str, Callable[[Site, MarkerWalk, int], Iterator[Seen]]] = {
+    "imu": dead_reckoned,
+    "model": partial(girard, ranging=False),
+    "ranging": girard,
+}
+
+
+class _Pings:
+    """The pings of a walk, handed out in order of time."""
+
+    def __init__(self, walk: MarkerWalk) -> None:
+        p = walk.pings
+        self._left = [
+            Echo(t, r, None if math.isnan(z) else z)
+            for t, r, z in zip(p.t_s.tolist(), p.ranger.tolist(), p.range_m.tolist(), strict=True)
+        ]
+        self._given = 0
+
+    def until(self, t_s: float) -> list[Echo]:
+        first = self._given
+        while self._given < len(self._left) and self._left[self._given].t_s <= t_s:
+            self._given += 1
+        return self._left[first : self._given]
+
+
+def _legs(walk: MarkerWalk) -> Iterator[tuple[Leg | None, Leg]]:
+    """The turn on the spot before each step, if there is one, and the step, with the covariance that the unit states."""
+    sd_m = math.hypot(STEP_SD_M, STEP_M * math.radians(ImuModel().noise_deg))
+    before = walk.start_heading_rad
+    for k, heading in enumerate(walk.heading_rad.tolist()):
+        t0, leaves, t1 = float(walk.t_s[k]), float(walk.leaves_s[k]), float(walk.t_s[k + 1])
+        turn_sd = float(walk.turn_sd_rad[k])
+        turns = leaves > t0
+        turning = Leg(t0, leaves, 0.0, 0.0, before, heading, 0.0, turn_sd, k) if turns else None
+        dx, dy = STEP_M * math.cos(heading), STEP_M * math.sin(heading)
+        yield turning, Leg(leaves, t1, dx, dy, heading, heading, sd_m, 0.0 if turns else turn_sd, k + 1)
+        before = heading
+
+
+def _walk(site: Site, seed: int) -> MarkerWalk:
+    return walk_markers(lay_markers(site.route), site.built, seed, site.passers)
+
+
+def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[Seen]) -> Row:
+    errors = [math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)]
+    inside = [s.inside for s in seen if s.inside is not None]
+    return {"name": name, "profile": profile, "seed": seed, "errors_m": errors, "inside95": inside}
+
+
+def _in_hall(walk: MarkerWalk, errors_m: list[float]) -> Row:
+    """How the error grows where no wall is in range, against dead reckoning from the same step on, and when it is over."""
+    x = walk.trunk_m[1:, 0]
+    inside = np.flatnonzero(x > HALL_X_M)
+    first, last = int(inside[0]), int(inside[-1])
+    imu = np.array([s.at_m for s in dead_reckoned(hall(), walk, 0)]) - walk.trunk_m[1:]
+    foot = np.hypot(*(imu - imu[first])[first : last + 1].T)
+    after = walk.t_s[1:] >= walk.t_s[1 + last] + AFTER_HALL_S
+    return {
+        "hall_growth_m": max(errors_m[first : last + 1]) - errors_m[first],
+        "foot_growth_m": float(foot.max()),
+        "after_10s_m": max(e for e, late in zip(errors_m, after.tolist(), strict=True) if late),
+    }
+
+
+def _summary(runs: list[Row]) -> Row:
+    row = summary(runs[0]["name"], runs[0]["profile"], [r["errors_m"] for r in runs], [r["inside95"] for r in runs])
+    for key in ("hall_growth_m", "foot_growth_m", "after_10s_m"):
+        if key in runs[0]:
+            row[key] = round(sum(r[key] for r in runs) / len(runs), 4)
+    return row
