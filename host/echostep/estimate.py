@@ -51,6 +51,13 @@ class Estimate:
         """The 95 % ellipse of the covariance."""
         return ellipse95(self.xx_m2, self.xy_m2, self.yy_m2)
 
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a place lies in the 95 % ellipse."""
+        dx, dy = x_m - self.x_m, y_m - self.y_m
+        determinant = self.xx_m2 * self.yy_m2 - self.xy_m2**2
+        square = self.yy_m2 * dx * dx - 2.0 * self.xy_m2 * dx * dy + self.xx_m2 * dy * dy
+        return square <= CHI2_95 * determinant
+
 
 class Ellipse(NamedTuple):
     """Half axes in metres and the angle of the longer one from x."""

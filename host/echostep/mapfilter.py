@@ -59,7 +59,13 @@ class MapFilter:
             pings = self._pings(leg, heard)
             self._judge(self.cloud.follow(move, pings, self._model, self._walls), pings)
             self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) / REGAIN_M)
-        return estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, math.hypot(self._doubt_m, PLAN_SD_M * (1.0 - self._trust())))
+        return estimate(
+            self.cloud,
+            leg.t1_s,
+            leg.heading1_rad,
+            leg.step,
+            math.hypot(self._doubt_m, PLAN_SD_M * (1.0 - self._trust())),
+        )
 
     def _pings(self, leg: Leg, heard: Sequence[Echo]) -> Heard:
         if not heard:

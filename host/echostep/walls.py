@@ -225,7 +225,9 @@ def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def echo_sources(px: float, py: float, axis_rad: float, index: WallIndex, distance_m: Floats, off_axis_rad: Floats, kind: Floats) -> int:
+def echo_sources(
+    px: float, py: float, axis_rad: float, index: WallIndex, distance_m: Floats, off_axis_rad: Floats, kind: Floats
+) -> int:
     """temporary"""
     tile = _tile(px, py, index)
     if tile < 0:
@@ -267,3 +269,12 @@ def _insert(n: int, d: float, off: float, k: float, distance_m: Floats, off_axis
         i -= 1
     distance_m[i], off_axis_rad[i], kind[i] = d, off, k
     return n + 1
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def walls_near(px: float, py: float, index: WallIndex) -> Floats:
+    """The walls (n, 4) within earshot of a point."""
+    tile = _tile(px, py, index)
+    if tile < 0:
+        return index.ear[:0]
+    return index.ear[index.ear_start[tile] : index.ear_start[tile + 1]]

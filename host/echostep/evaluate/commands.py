@@ -20,3 +20,17 @@ Scheduler = Annotated[
 @app.callback()
 def evaluate() -> None:
     """The papers' experiments and ours, with figures and plots."""
+
+
+@app.command()
+def girard2011(
+    runs: Annotated[int, typer.Option("--runs", help="Walks to simulate.", min=1)] = 200,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/girard2011"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated)."""
+    from echostep.evaluate.girard2011 import evaluate_girard2011
+
+    evaluate_girard2011(runs, seed, json, out, scheduler)

@@ -80,12 +80,34 @@ def evaluate_girard2011(runs: int, seed: int, json_path: Path | None, out: Path,
     rows = [_summary([row for row in each if row["name"] == name]) for name in names]
     beside = {row["name"]: "  ".join(f"{row[k]:.2f}" for k in list(row)[1:]) for row in PAPER}
     print_table(
-        f"Position error in metres, simulated, {runs} runs", [row | {"paper": beside.get(row["name"])} for row in rows], COLUMNS
+        f"Position error in metres, simulated, {runs} runs",
+        [row | {"paper": beside.get(row["name"])} for row in rows],
+        COLUMNS,
     )
-    write_parquet(out / "girard2011.parquet", [{k: v for k, v in row.items()} for row in each])
-    draw_clouds(out / "figures10-13.png", seed)
+    write_parquet(out / "girard2011.parquet", each)
+    draw(out / "figures10-13.png", seed)
     if json_path is not None:
         write_json(json_path, "girard2011", runs, seed, rows)
+
+
+def draw(path: Path, seed: int) -> None:
+    """The clouds after 9, 21 and 52 steps: without the plan, with it, with ranging, and ours [Girard 2011, Figures 10-13]."""
+    from echostep.evaluate.pictures import draw_clouds
+
+    site = otb()
+    walk = _walk(site, seed)
+    systems = {
+        "IMU only": partial(girard, model=False, ranging=False),
+        "with model": SYSTEMS["model"],
+        "with ranging": girard,
+        "ours": default,
+    }
+    clouds, tracks = {}, {}
+    for name, system in systems.items():
+        seen = list(system(site, walk, seed))
+        clouds[name] = {step: seen[step - 1].cloud for step in (9, 21, 52)}
+        tracks[name] = np.vstack([walk.trunk_m[0], [s.at_m for s in seen]])
+    draw_clouds(path, site.plan, walk.trunk_m, clouds, tracks)
 
 
 def one_run(seed: int) -> list[Row]:
@@ -179,7 +201,9 @@ def _walk(site: Site, seed: int) -> MarkerWalk:
 
 
 def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[Seen]) -> Row:
-    errors = [math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)]
+    errors = [
+        math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
+    ]
     inside = [s.inside for s in seen if s.inside is not None]
     return {"name": name, "profile": profile, "seed": seed, "errors_m": errors, "inside95": inside}
 

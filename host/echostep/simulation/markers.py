@@ -31,7 +31,6 @@ PASSING_S = 1.0
 CARELESS_M = 0.015  # how exactly the trunk comes over a marker
 
 
-
 @dataclass(frozen=True, slots=True)
 class ImuModel:
     """Heading errors of the foot-mounted MTx, degrees.
@@ -89,7 +88,11 @@ def lay_markers(route_m: Floats) -> Floats:
 
 
 def walk_markers(
-    markers: Floats, built: Floats, seed: int, passers: float = 0.0, model: ImuModel | None = None,
+    markers: Floats,
+    built: Floats,
+    seed: int,
+    passers: float = 0.0,
+    model: ImuModel | None = None,
     acoustics: Acoustics = SRF02,
 ) -> MarkerWalk:
     """Walk over markers (n + 1, 2) between the walls that are there (m, 4); `passers`: share of the pings that meet somebody first."""

@@ -103,7 +103,18 @@ def angled() -> Site:
     bend = [(0.0, 0.0), (10.0, 0.0), (16.0, 6.0), (16.0, 14.0), (12.5, 15.5), (10.0, 13.0), (13.6, 11.5), (13.6, 7.0),
             (9.0, 2.4), (6.4, 2.4), (7.6, 7.5), (3.5, 8.5), (2.2, 5.5), (5.1, 2.4), (0.0, 2.4), (0.0, 0.0)]  # fmt: skip
     walls = [(*a, *b) for a, b in zip(bend, bend[1:], strict=False)]
-    route = [(1.0, 1.2), (5.9, 1.2), (5.4, 5.6), (5.9, 1.2), (9.6, 1.2), (14.8, 6.5), (14.8, 12.8), (14.8, 6.5), (9.6, 1.2), (1.0, 1.2)]
+    route = [
+        (1.0, 1.2),
+        (5.9, 1.2),
+        (5.4, 5.6),
+        (5.9, 1.2),
+        (9.6, 1.2),
+        (14.8, 6.5),
+        (14.8, 12.8),
+        (14.8, 6.5),
+        (9.6, 1.2),
+        (1.0, 1.2),
+    ]
     return Site("angles", np.array(walls), np.array(walls), np.array(route))
 
 
@@ -144,7 +155,13 @@ def _otb_walls(south: bool = False) -> list[tuple[float, ...]]:
             a, b = x - 0.5 * DOOR_M, x + 0.5 * DOOR_M
             left, right, far = x - 0.5 * ROOM_W, x + 0.5 * ROOM_W, back + up * ROOM_D
             walls += [(start, face, a, face), (a, face, a, back), (b, face, b, back)]
-            walls += [(left, back, a, back), (b, back, right, back), (left, back, left, far), (right, back, right, far), (left, far, right, far)]
+            walls += [
+                (left, back, a, back),
+                (b, back, right, back),
+                (left, back, left, far),
+                (right, back, right, far),
+                (left, far, right, far),
+            ]
             start = b
         walls.append((start, face, x1, face))
     return walls
@@ -181,7 +198,9 @@ def _moved(walls: Floats, rng: np.random.Generator) -> Floats:
     return np.delete(moved, rng.choice(np.flatnonzero(length > 2.5)), axis=0)
 
 
-def _box(x0: float, y0: float, x1: float, y1: float, gaps: Sequence[tuple[str, float, float]] = ()) -> list[tuple[float, ...]]:
+def _box(
+    x0: float, y0: float, x1: float, y1: float, gaps: Sequence[tuple[str, float, float]] = ()
+) -> list[tuple[float, ...]]:
     """Four walls; a gap is (side, middle, width)."""
     sides = {"bottom": (x0, y0, x1, y0), "top": (x0, y1, x1, y1), "left": (x0, y0, x0, y1), "right": (x1, y0, x1, y1)}
     walls: list[tuple[float, ...]] = []

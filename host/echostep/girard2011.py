@@ -1,0 +1,211 @@
+"""The particle filter of [Girard 2011], step by step as printed: profile `girard2011`.
+
+In: the motion vector and heading of each step, one ping of each ranger. Out: the position estimate. Owns its particles; draws from the generator
+that it is given. The numbers 1 to 8 are the paper's (section 3.2). Where the paper leaves something open:
+
+- A new particle inherits its parent's weight; with it step 5 decides who is the lighter. Step 6 then sets the weight anew, as printed, from this step's pings
+  alone; without rangers the inherited weights go on to step 8.
+- Merging goes from the heaviest particle down (of equal ones the older first): each particle that is closer than tau to one already kept gives its weight to the
+  first such one. "Closer than tau" is a distance, not a common cell.
+- When no particle survives the walls the paper asks the user to start again; here the step is made without walls, and `lost` counts it.
+- A position beyond the tracking area, or one that is not finite, sees no wall: its distances are the maximum range.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from echostep.walls import WallIndex, crosses_wall, walls_near
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+RANGER_AXES_RAD = (0.5 * math.pi, -0.5 * math.pi)
+
+
+@dataclass(frozen=True, slots=True)
+class GirardSettings:
+    """The five parameters [Girard 2011, 3.1, 3.3] and the SRF02's cone and range [2.6, 3.2]."""
+
+    nu: int = 150
+    epsilon_m: float = 0.25
+    kappa: int = 20
+    tau_m: float = 0.05
+    rays: int = 7
+    aperture_rad: float = math.radians(55.0)
+    maximum_m: float = 6.0
+
+
+class Girard:
+    """The cloud of one walk; `walls` None: without a model, as in the paper's Figure 11."""
+
+    def __init__(
+        self, settings: GirardSettings, start_xy: tuple[float, float], walls: WallIndex | None, rng: np.random.Generator
+    ) -> None:
+        """Step 1: a single particle where the user says he is."""
+        self.settings = settings
+        self.x_m: Floats = np.array([start_xy[0]])
+        self.y_m: Floats = np.array([start_xy[1]])
+        self.weight: Floats = np.ones(1)
+        self.lost = 0
+        self._walls = walls
+        self._rng = rng
+
+    def step(
+        self, dx_m: float, dy_m: float, heading_rad: float, ranges_m: tuple[float, float] | None
+    ) -> tuple[float, float]:
+        """Steps 2 to 8 for one motion event: the motion vector (map), the user's heading, ranges left and right (nan: no echo) or None."""
+        s = self.settings
+        vectors = np.array([dx_m, dy_m]) + disc(self._rng, s.kappa, s.epsilon_m)
+        x, y, weight = self._propagate(vectors)
+        x, y, weight = merge(x, y, weight, s.tau_m)
+        if ranges_m is not None:
+            weight = self._weigh(x, y, heading_rad, ranges_m)
+        kept = np.sort(np.argsort(-weight, kind="stable")[: s.nu])
+        self.x_m, self.y_m, self.weight = x[kept], y[kept], weight[kept]
+        return average(self.x_m, self.y_m, self.weight)
+
+    def _propagate(self, vectors: Floats) -> tuple[Floats, Floats, Floats]:
+        """Step 4: every vector applied to every particle; those that meet a wall on the way are gone."""
+        if self._walls is not None:
+            x, y, parent = moved(self.x_m, self.y_m, vectors, self._walls)
+            if len(x):
+                return x, y, self.weight[parent]
+            self.lost += 1
+        n = len(vectors)
+        return (
+            np.add.outer(self.x_m, vectors[:, 0]).ravel(),
+            np.add.outer(self.y_m, vectors[:, 1]).ravel(),
+            np.repeat(self.weight, n) / n,
+        )
+
+    def _weigh(self, x: Floats, y: Floats, heading_rad: float, ranges_m: tuple[float, float]) -> Floats:
+        """Step 6 for both rangers."""
+        s = self.settings
+        heard = np.array([s.maximum_m if math.isnan(r) else r for r in ranges_m])
+        if self._walls is None:
+            return np.ones(len(x))
+        modelled = np.column_stack(
+            [
+                readings(x, y, heading_rad + axis, self._walls, s.rays, s.aperture_rad, s.maximum_m)
+                for axis in RANGER_AXES_RAD
+            ]
+        )
+        return similarity(modelled, heard, s.maximum_m)
+
+
+def disc(rng: np.random.Generator, count: int, radius_m: float) -> Floats:
+    """Step 3: errors (count, 2), uniform in the disc of this radius [Girard 2011, Figure 6]."""
+    angle = rng.uniform(0.0, 2.0 * math.pi, count)
+    radius = radius_m * np.sqrt(rng.uniform(0.0, 1.0, count))
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def similarity(modelled_m: Floats, measured_m: Floats, maximum_m: float) -> Floats:
+    """Weights (n,) of distances in the model (n, rangers) against those measured (rangers,) [Girard 2011, eq. 1]."""
+    low = np.minimum(np.minimum(modelled_m, measured_m), maximum_m)
+    high = np.minimum(np.maximum(modelled_m, measured_m), maximum_m)
+    return np.mean(low / high, axis=1)
+
+
+def average(x_m: Floats, y_m: Floats, weight: Floats) -> tuple[float, float]:
+    """The position estimate: the weighted mean [Girard 2011, eq. 2]."""
+    total = weight.sum()
+    return float(weight @ x_m / total), float(weight @ y_m / total)
+
+
+@njit(cache=True, error_model="numpy")
+def moved(x: Floats, y: Floats, vectors: Floats, walls: WallIndex) -> tuple[Floats, Floats, Ints]:
+    """All particles by all vectors (k, 2), but for those that cross a wall: positions and the parent of each."""
+    room = len(x) * len(vectors)
+    to_x, to_y, parent = np.empty(room), np.empty(room), np.empty(room, np.int64)
+    n = 0
+    for i in range(len(x)):
+        for k in range(len(vectors)):
+            qx, qy = x[i] + vectors[k, 0], y[i] + vectors[k, 1]
+            if not crosses_wall(x[i], y[i], qx, qy, walls):
+                to_x[n], to_y[n], parent[n] = qx, qy, i
+                n += 1
+    return to_x[:n], to_y[:n], parent[:n]
+
+
+@njit(cache=True, error_model="numpy")
+def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, Floats, Floats]:
+    """Step 5: no two particles closer than `tau_m`; the lighter one gives its weight away. Keeps the order."""
+    n = len(x)
+    if n == 0:
+        return x, y, weight
+    columns, column, row = _cells(x, y, tau_m)
+    size = 1
+    while size < 2 * n:
+        size *= 2
+    first = np.full(size, -1, np.int64)  # of each hashed cell: a chain of kept particles
+    following = np.full(n, -1, np.int64)
+    total = weight.copy()
+    kept = np.zeros(n, np.bool_)
+    for i in np.argsort(-weight, kind="mergesort"):
+        host = -1
+        for c in range(column[i] - 1, column[i] + 2):
+            for r in range(row[i] - 1, row[i] + 2):
+                j = first[(r * columns + c) & (size - 1)]
+                while j >= 0 and host < 0:
+                    if (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 < tau_m * tau_m:
+                        host = j
+                    j = following[j]
+        if host >= 0:
+            total[host] += weight[i]
+            continue
+        kept[i] = True
+        cell = (row[i] * columns + column[i]) & (size - 1)
+        following[i], first[cell] = first[cell], i
+    return x[kept], y[kept], total[kept]
+
+
+@njit(cache=True, error_model="numpy")
+def _cells(x: Floats, y: Floats, side_m: float) -> tuple[int, Ints, Ints]:
+    """Columns of a grid over all points, and each point's column and row; one empty cell around."""
+    x0, y0 = x.min(), y.min()
+    columns = int((x.max() - x0) / side_m) + 3
+    return columns, ((x - x0) / side_m).astype(np.int64) + 1, ((y - y0) / side_m).astype(np.int64) + 1
+
+
+@njit(cache=True, error_model="numpy")
+def readings(
+    x: Floats, y: Floats, axis_rad: float, walls: WallIndex, rays: int, aperture_rad: float, maximum_m: float
+) -> Floats:
+    """Distance (n,) that the model shows to a ranger looking to `axis_rad` [Girard 2011, section 3.2, Figure 7].
+
+    Each of the rays stops at the first wall. It counts when it meets the wall within aperture / (2 rays) of the normal [eq. 3]; the shortest is kept.
+    """
+    found = np.full(len(x), maximum_m)
+    straight = math.cos(0.5 * aperture_rad / rays)
+    for k in range(rays):
+        angle = axis_rad + (k - 0.5 * (rays - 1)) * aperture_rad / rays
+        ux, uy = math.cos(angle), math.sin(angle)
+        for i in range(len(x)):
+            away, facing = _first_hit(x[i], y[i], ux, uy, maximum_m, walls_near(x[i], y[i], walls))
+            if facing >= straight:
+                found[i] = min(found[i], away)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _first_hit(px: float, py: float, ux: float, uy: float, reach: float, walls: Floats) -> tuple[float, float]:
+    """Way of a ray to the first wall, and the cosine between the ray and the wall's normal; (reach, 0) without one."""
+    best, facing = reach, 0.0
+    for j in range(len(walls)):
+        ex, ey = walls[j, 2] - walls[j, 0], walls[j, 3] - walls[j, 1]
+        across = ux * ey - uy * ex
+        if across == 0.0:
+            continue
+        wx, wy = walls[j, 0] - px, walls[j, 1] - py
+        t = (wx * ey - wy * ex) / across
+        s = (wx * uy - wy * ux) / across
+        if 0.0 < t < best and 0.0 <= s <= 1.0:
+            best, facing = t, abs(across) / math.hypot(ex, ey)
+    return best, facing
