@@ -64,10 +64,11 @@ class Intake:
 
     def take(self, portion: Portion) -> list[Passage | Silence]:
         """What a portion completes; raises StaleFirmwareError when the board has another schema."""
-        foreign = [k for k, port in enumerate(portion.ports) if port not in (BOARD, MTX)]
-        self._unknown_ports += int(np.isin(portion.port, foreign).sum()) if foreign else 0
+        self._count_unknown(portion)
         from_board, from_mtx = portion.of(BOARD), portion.of(MTX)
         frames, batch = self.board.frames(from_board.received), self.mtx.feed(from_mtx.received)
+        if not len(frames.id) and not len(batch.counter):
+            return []
         board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
         mtx = _mtx_arrivals(batch, from_mtx.rows_of(batch.end), portion.t_arrival_ns)
         times = self.timeline.times(board, mtx)
@@ -76,6 +77,11 @@ class Intake:
         self._hear(frames, times)
         self._follow(batch, times)
         return self._waiting.release(times.board_newest_s, times.mtx_newest_s)
+
+    def _count_unknown(self, portion: Portion) -> None:
+        for k, port in enumerate(portion.ports):
+            if port not in (BOARD, MTX):
+                self._unknown_ports += int((portion.port == k).sum())
 
     def _note(self, frames: Frames, times: Times) -> None:
         """Keep the board's last words about itself."""
@@ -87,6 +93,8 @@ class Intake:
     def _hear(self, frames: Frames, times: Times) -> None:
         """Pings that say something about walls wait for their leg."""
         place, pings = frames.rows(PING)
+        if not len(place):
+            return
         t_s = times.board_s[place]
         range_m = ranges(pings, self._ranger)
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
@@ -96,6 +104,8 @@ class Intake:
     def _follow(self, batch: MtxBatch, times: Times) -> None:
         """Samples go through the foot to the path, whose legs wait for their pings."""
         kept = np.flatnonzero(~np.isnan(times.mtx_s))
+        if not len(kept):
+            return
         t_s, at = times.mtx_s[kept], times.mtx_at[kept]
         fall = self.foot.follow(t_s, batch.accel[kept], batch.gyro[kept])
         begin = 0

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from importlib.resources import as_file, files
+from itertools import islice
 from pathlib import Path
 
 from rich.console import Console
@@ -35,6 +36,7 @@ from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 
 DEMO_PACE = 8.0
+HEADLESS_CHUNKS = 1000
 BAUD = {BOARD: 115200, MTX: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
@@ -60,7 +62,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
             chunks = scenario.chunks() if headless else _paced(scenario.chunks())
             estimates = _run(
                 tracker,
-                _singly(_kept(chunks, recorder)),
+                _portions(_kept(chunks, recorder), HEADLESS_CHUNKS if headless else 1),
                 "echostep demo (simulated)",
                 lambda: scenario.fraction,
                 headless,
@@ -84,7 +86,7 @@ def live(
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
-            chunks = _singly(_kept(_until(ports, seconds), recorder))
+            chunks = _portions(_kept(_until(ports, seconds), recorder), 1)
             estimates = _run(tracker, chunks, "echostep live", None, headless)
     finally:
         ports.close()
@@ -200,10 +202,11 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
         yield chunk
 
 
-def _singly(chunks: Iterable[Chunk]) -> Iterator[Portion]:
-    """Portions of one chunk: nobody waits for the next one."""
-    for chunk in chunks:
-        yield portion_of([chunk])
+def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
+    """Portions of so many chunks; with one, no chunk waits for the next."""
+    rest = iter(chunks)
+    while taken := list(islice(rest, most)):
+        yield portion_of(taken)
 
 
 def _until(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk]:

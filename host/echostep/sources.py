@@ -54,9 +54,15 @@ class PortBytes:
         return self.row[np.searchsorted(self.end, ends)]
 
 
+_NOTHING = PortBytes(b"", np.empty(0, np.int64), np.empty(0, np.int64))
+
+
 @dataclass(frozen=True, slots=True)
 class Portion:
-    """Chunks in order of arrival, as columns (n,): chunk k came from `ports[port[k]]` at `t_arrival_ns[k]` and is `received[start[k] : end[k]]`."""
+    """Chunks in order of arrival, as columns (n,): chunk k came from `ports[port[k]]` at `t_arrival_ns[k]` and is `received[start[k] : end[k]]`.
+
+    No name is twice in `ports`.
+    """
 
     ports: tuple[str, ...]
     port: Ints
@@ -73,12 +79,9 @@ class Portion:
 
     def of(self, name: str) -> PortBytes:
         """What the port of that name delivered."""
-        chosen = np.array([k for k, port in enumerate(self.ports) if port == name], np.int64)
-        row = (
-            np.flatnonzero(np.isin(self.port, chosen))
-            if len(self.ports) > 1 or not len(chosen)
-            else np.arange(len(self.port))
-        )
+        if name not in self.ports:
+            return _NOTHING
+        row = np.flatnonzero(self.port == self.ports.index(name))
         start, end = self.start[row], self.end[row]
         total = np.cumsum(end - start)
         joined = np.empty(int(total[-1]) if len(total) else 0, np.uint8)

@@ -64,8 +64,7 @@ class Waiting:
         self._pings = np.empty((MAX_WAITING + 1, 3))  # t_s, ranger, range_m; oldest first
         self._legs: list[Leg] = []
         self._leg_at: list[int] = []
-        self._new = np.empty((0, 3))
-        self._new_at = np.empty(0, np.int64)
+        self._new_at, self._new = np.empty(0, np.int64), np.empty((0, 3))
 
     @property
     def late(self) -> int:
@@ -105,6 +104,7 @@ class Waiting:
                 Passage(legs[k], heard[begin:end, 0], heard[begin:end, 1].astype(np.int64), heard[begin:end, 2])
             )
             begin, gone = end, k + 1
+        self._new_at, self._new = np.empty(0, np.int64), np.empty((0, 3))
         self._legs, self._leg_at = legs[gone:], [-1] * (len(legs) - gone)
         return pieces
 

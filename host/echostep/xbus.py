@@ -39,6 +39,10 @@ class MtxBatch:
     end: Ints
 
 
+_NONE, _NO_VECTORS = np.empty(0, np.int64), np.empty((0, 3))
+_NOTHING = MtxBatch(_NONE, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, np.empty((0, 4)), _NONE)
+
+
 class MtxReader:
     """Samples out of a byte stream; what fails a gate is counted by reason, nothing raises."""
 
@@ -65,7 +69,7 @@ class MtxReader:
             length,
             other,
         )
-        return self._gated(bodies[:found].view(_ROW)[:, 0], ends)
+        return self._gated(bodies[:found].view(_ROW)[:, 0], ends) if found else _NOTHING
 
     def _gated(self, rows: NDArray[np.void], ends: Ints) -> MtxBatch:
         """Every gate after the checksum: it is 8 bits wide and lets one damaged frame in 256 through."""
