@@ -102,7 +102,7 @@ class Frames:
 
     def rows(self, identifier: int) -> tuple[Ints, NDArray[np.void]]:
         """Which frames (k,) carry this id, and their bodies (k,) by the schema's dtype."""
-        at = np.flatnonzero(self.id == identifier)
+        at = (self.id == identifier).nonzero()[0]
         kind = ROWS[identifier]
         return at, np.ascontiguousarray(self.body[at, : kind.itemsize]).view(kind)[:, 0]
 

@@ -81,9 +81,9 @@ class Portion:
         """What the port of that name delivered."""
         if name not in self.ports:
             return _NOTHING
-        row = np.flatnonzero(self.port == self.ports.index(name))
+        row = (self.port == self.ports.index(name)).nonzero()[0]
         start, end = self.start[row], self.end[row]
-        total = np.cumsum(end - start)
+        total = (end - start).cumsum()
         joined = np.empty(int(total[-1]) if len(total) else 0, np.uint8)
         _join(np.frombuffer(self.received, np.uint8), start, end, joined)
         return PortBytes(joined.tobytes(), row, total)

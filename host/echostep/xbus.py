@@ -55,6 +55,8 @@ class MtxReader:
 
     def feed(self, received: bytes) -> MtxBatch:
         """Samples completed by these bytes."""
+        if not received:
+            return _NOTHING
         stream = self._rest + received
         bodies = np.empty((len(stream) // (BODY + 5), BODY), np.uint8)
         ends = np.empty(len(bodies), np.int64)
