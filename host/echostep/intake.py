@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from echostep.calibration import RangerSettings, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
-from echostep.frames import BoardReader, Frames
+from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, TrunkPath
-from echostep.messages import ROWS, Identity, Outcome, Status
-from echostep.sources import BOARD, MTX, Portion
+from echostep.messages import ROWS, Identity, Outcome, Ping, Status
+from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.waiting import Passage, Silence, Waiting
 from echostep.xbus import MtxBatch, MtxReader
+from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -77,6 +78,13 @@ class Intake:
         self._hear(frames, times)
         self._follow(batch, times)
         return self._waiting.release(times.board_newest_s, times.mtx_newest_s)
+
+    def warm_up(self) -> None:
+        """Compile the kernels, so that no chunk waits for it later; leaves the intake as it was."""
+        other = Intake(self.timeline.timing, self._ranger, FootSettings(), GaitSettings())
+        sample = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        said = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
+        other.take(portion_of([said, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
 
     def _count_unknown(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):

@@ -73,7 +73,7 @@ class Timeline:
     """`t_s` for everything that arrives; equal messages in equal order get equal times, in whatever portions they come."""
 
     def __init__(self, timing: MtxTiming) -> None:
-        self._timing = timing
+        self.timing = timing
         self._board = clocks.new_clock(TICK_S, 1 << 32)
         self._mtx = clocks.new_clock(1.0 / timing.rate_hz, 1 << 16)
         self._edges = sync.new_edges(1.0 / timing.rate_hz)
@@ -105,7 +105,7 @@ class Timeline:
             np.empty(nb + nm),
         )
         _tell(
-            self._board, self._mtx, self._edges, self._timing.latency_s,
+            self._board, self._mtx, self._edges, self.timing.latency_s,
             board.value, board.row, board.t_arrival_ns, board.kind, mtx.value, mtx.row, mtx.t_arrival_ns,
             found.board_s, found.mtx_s, found.board_at, found.mtx_at, found.board_newest_s, found.mtx_newest_s,
         )  # fmt: skip

@@ -41,7 +41,7 @@ class Tracker:
         self.settings = settings or Settings()
         self.plan = plan
         self.start = pose
-        self.intake = self._new_intake()
+        self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
         self.walls = build_index(plan.levels[0].walls)
         self.cloud: Cloud | None = None
         self._rng = np.random.default_rng(seed)
@@ -72,14 +72,11 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
-        self._new_intake().take(portion_of([]))
+        self.intake.warm_up()
         cloud = Cloud(self.settings.cloud, self.start, 0.0, np.random.default_rng(0))
         cloud.move(0.01, 0.0, 0.01, 0.0, self.walls)
         cloud.weigh(0.0, 1.0, 0.1, self._model, self.walls)
         systematic(np.ones(2), 0.5, 2)
-
-    def _new_intake(self) -> Intake:
-        return Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
 
     # legs and echoes -> cloud
 

@@ -88,21 +88,20 @@ class Waiting:
     def release(self, board_newest_s: Floats, mtx_newest_s: Floats) -> list[Passage | Silence]:
         """What is certain after these messages (n,), by how far either port has come with each of them; NaN: it has not spoken yet."""
         legs, most = self._legs, len(self._legs) + len(board_newest_s)
-        heard = np.empty((int(self._state["pings"][0]) + len(self._new), 3))
+        heard = np.empty((3, int(self._state["pings"][0]) + len(self._new)))
         leg, t_s, upto = np.empty(most, np.int64), np.empty(most), np.empty(most, np.int64)
         found = _release(
             self._state[0], self._pings, self._new_at, self._new, np.array(self._leg_at, np.int64),
             np.array([leg.t1_s for leg in legs], np.float64), board_newest_s, mtx_newest_s, heard, leg, t_s, upto,
         )  # fmt: skip
+        ping_s, ranger, range_m = heard[0], heard[1, : upto[found - 1] if found else 0].astype(np.int64), heard[2]
         pieces: list[Passage | Silence] = []
         begin = gone = 0
         for k, silent_s, end in zip(leg[:found].tolist(), t_s[:found].tolist(), upto[:found].tolist(), strict=True):
             if k < 0:
                 pieces.append(Silence(silent_s))
                 continue
-            pieces.append(
-                Passage(legs[k], heard[begin:end, 0], heard[begin:end, 1].astype(np.int64), heard[begin:end, 2])
-            )
+            pieces.append(Passage(legs[k], ping_s[begin:end], ranger[begin:end], range_m[begin:end]))
             begin, gone = end, k + 1
         self._new_at, self._new = np.empty(0, np.int64), np.empty((0, 3))
         self._legs, self._leg_at = legs[gone:], [-1] * (len(legs) - gone)
@@ -116,7 +115,7 @@ def _release(
 ) -> int:  # fmt: skip
     """Message by message: take in its ping, send off every leg that is complete, tell a silence.
 
-    Fills the rows of pings that have gone with their legs, and for each leg (its index) or silence (-1) its time and how many of them
+    Fills the columns of pings that have gone with their legs, and for each leg (its index) or silence (-1) its time and how many of them
     have gone; returns how many legs and silences there were.
     """
     found = next_ping = next_leg = out = 0
@@ -164,7 +163,7 @@ def _pop(s: _State, waiting: Floats, until_s: float, heard: Floats, out: int) ->
     """Pings up to a time go."""
     n = 0
     while n < s.pings and waiting[n, 0] <= until_s:
-        heard[out + n] = waiting[n]
+        heard[:, out + n] = waiting[n]
         n += 1
     for k in range(n, s.pings):
         waiting[k - n] = waiting[k]
