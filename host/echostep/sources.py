@@ -12,6 +12,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 import serial
@@ -91,14 +92,14 @@ class Portion:
 
 def portion_of(chunks: Sequence[Chunk]) -> Portion:
     """Chunks as a portion."""
-    ports = tuple(dict.fromkeys(chunk.port for chunk in chunks))
-    ends = np.cumsum(np.array([len(chunk.data) for chunk in chunks], np.int64))
+    place = {port: k for k, port in enumerate(dict.fromkeys(chunk.port for chunk in chunks))}
+    edges = [0, *accumulate(len(chunk.data) for chunk in chunks)]
     return Portion(
-        ports,
-        np.array([ports.index(chunk.port) for chunk in chunks], np.int64),
+        tuple(place),
+        np.array([place[chunk.port] for chunk in chunks], np.int64),
         np.array([min(max(chunk.t_arrival_ns, 0), LATEST_NS) for chunk in chunks], np.int64),
-        np.concatenate([np.zeros(1, np.int64), ends[:-1]]) if chunks else ends,
-        ends,
+        np.array(edges[:-1], np.int64),
+        np.array(edges[1:], np.int64),
         b"".join(chunk.data for chunk in chunks),
     )
 
