@@ -21,10 +21,10 @@ from cobs import cobs
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 CODES = {
-    "u8": ("B", 1, "uint8_t"),
-    "u16": ("H", 2, "uint16_t"),
-    "u32": ("I", 4, "uint32_t"),
-    "i16": ("h", 2, "int16_t"),
+    "u8": ("B", 1, "uint8_t", "u1"),
+    "u16": ("H", 2, "uint16_t", "<u2"),
+    "u32": ("I", 4, "uint32_t", "<u4"),
+    "i16": ("h", 2, "int16_t", "<i2"),
 }
 FIXED_SEED = 0xFFFF
 FIXED_SEED_NAMES = ("identity", "identify")
@@ -126,7 +126,8 @@ def python_code(messages: list[Message]) -> str:
     lines = [
         f'"""Messages of the board link. {NOTICE}',
         "",
-        "In: the body of a frame. Out: named tuples of raw integers; units stand beside each field. Owns nothing.",
+        "In: the body of a frame. Out: named tuples of raw integers; units stand beside each field. `ROWS` are the same bodies as numpy dtypes,",
+        "for many at once. Owns nothing.",
         '"""',
         "",
         "from __future__ import annotations",
@@ -134,6 +135,8 @@ def python_code(messages: list[Message]) -> str:
         "import struct",
         "from enum import IntEnum, IntFlag",
         "from typing import NamedTuple",
+        "",
+        "import numpy as np",
         "",
         f"SCHEMA_HASH = 0x{value:08X}",
         f"SCHEMA_SEED = 0x{seed_of(value):04X}",
@@ -151,7 +154,28 @@ def python_code(messages: list[Message]) -> str:
         "",
         "BY_ID: dict[int, type[Message]] = {" + ", ".join(f"0x{m.id:02X}: {m.class_name}" for m in messages) + "}",
     ]
-    return wrap_union("\n".join(lines) + "\n")
+    return wrap_union("\n".join(lines + python_rows(messages)) + "\n")
+
+
+def python_rows(messages: list[Message]) -> list[str]:
+    """The bodies as numpy dtypes, and the greatest values of their enumerations."""
+    lines = ["", "ROWS: dict[int, np.dtype[np.void]] = {"]
+    for m in messages:
+        if len(m.fields) > 1:
+            lines += [f"    0x{m.id:02X}: np.dtype(", "        ["]
+            lines += [f'            ("{f.name}", "{CODES[f.type][3]}"),' for f in m.fields]
+            lines += ["        ]", "    ),"]
+        else:
+            fields = ", ".join(f'("{f.name}", "{CODES[f.type][3]}")' for f in m.fields)
+            lines.append(f"    0x{m.id:02X}: np.dtype([{fields}]),")
+    lines += ["}", "GREATEST = (  # id, offset in the body, greatest value of the enumeration there"]
+    for m in messages:
+        offset = 0
+        for f in m.fields:
+            if f.enum:
+                lines.append(f"    (0x{m.id:02X}, {offset}, {len(f.enum) - 1}),  # {m.name}.{f.name}")
+            offset += f.size
+    return [*lines, ")"]
 
 
 def wrap_union(text: str) -> str:

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep import messages as m
-from echostep.frames import BoardReader, StaleFirmwareError, encode
+from echostep.frames import BoardReader, FrameCounts, StaleFirmwareError, encode
+from naive_frames import BoardReader as NaiveReader
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = [json.loads(line) for line in (ROOT / "protocol/vectors.jsonl").read_text().splitlines()]
@@ -87,6 +88,39 @@ def test_damage_costs_only_the_frames_it_touches(kind: str, draw: st.DataObject)
     assert len(found) >= 18  # a damaged closing zero joins two frames, never more
     assert set(found) <= {gyros(n) for n in range(20)}
     assert found == sorted(found)
+
+
+def seen(reader: BoardReader | NaiveReader, parts: list[bytes]) -> tuple[list[m.Message], FrameCounts, bool]:
+    """Messages and counts, and whether a stale firmware ended it."""
+    found: list[m.Message] = []
+    try:
+        for part in parts:
+            found += reader.feed(part)
+    except StaleFirmwareError:
+        return [], FrameCounts(), True
+    return found, reader.counts, False
+
+
+@given(
+    st.lists(st.one_of(st.sampled_from([v["frame"] for v in VECTORS if "message" in v]), st.none()), max_size=40),
+    st.lists(st.tuples(st.integers(0, 2_000), st.integers(0, 255)), max_size=8),
+    st.lists(st.integers(0, 2_000), max_size=5),
+)
+def test_like_the_naive_twin(frames: list[str | None], damage: list[tuple[int, int]], cuts: list[int]) -> None:
+    stream = bytearray(b"".join(encode(gyros(n), n) if f is None else bytes.fromhex(f) for n, f in enumerate(frames)))
+    for at, value in damage:
+        if at < len(stream):
+            stream[at] = value
+    edges = sorted({0, len(stream), *(min(c, len(stream)) for c in cuts)})
+    parts = [bytes(stream[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
+    assert seen(BoardReader(), parts) == seen(NaiveReader(), parts)
+
+
+def test_frames_end_where_their_zero_is() -> None:
+    stream = b"".join(encode(gyros(n), n) for n in range(5))
+    reader = BoardReader()
+    ends = reader.frames(stream[:30]).end.tolist() + (30 + reader.frames(stream[30:]).end).tolist()
+    assert ends == [at + 1 for at, octet in enumerate(stream) if octet == 0]
 
 
 @given(st.binary(max_size=4000))

@@ -14,7 +14,7 @@ from echostep.estimate import Estimate, Status, digest
 from echostep.plan import Plan, Pose, load_plan
 from echostep.simulation.board import BoardProcess, PythonBoard
 from echostep.simulation.scenario import Scenario, demo_scenario
-from echostep.sources import BOARD, MTX, Chunk
+from echostep.sources import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors
 from echostep.xsens import FrameReader, encode_frame
@@ -33,7 +33,7 @@ CHUNKS, TRUTH, SCENARIO = walk()
 
 def track(chunks: list[Chunk], seed: int = 0) -> tuple[Tracker, list[Estimate]]:
     tracker = Tracker(PLAN, SCENARIO.start, seed=seed)
-    return tracker, [e for chunk in chunks for e in tracker.feed(chunk)]
+    return tracker, tracker.take(portion_of(chunks))
 
 
 def test_the_walk_is_tracked() -> None:
@@ -43,8 +43,8 @@ def test_the_walk_is_tracked() -> None:
     assert off.mean_m < 0.2
     assert off.max_m < 0.6
     assert off.coverage95 > 0.8
-    assert tracker.timeline.synchronised
-    assert tracker.counts.late_pings == tracker.counts.bad_times == 0
+    assert tracker.intake.timeline.synchronised
+    assert tracker.intake.counts.late_pings == tracker.intake.counts.bad_times == 0
     assert {e.status for e in found} == {Status.TRACKING}
 
 
@@ -66,7 +66,8 @@ def test_chunks_may_be_cut_anywhere() -> None:
     for chunk in CHUNKS:
         at = rng.randrange(len(chunk.data) + 1)
         cut += [replace(chunk, data=part) for part in (chunk.data[:at], chunk.data[at:]) if part]
-    assert digest(track(cut)[1]) == digest(track(CHUNKS)[1])
+    tracker = Tracker(PLAN, SCENARIO.start)
+    assert digest(e for chunk in cut for e in tracker.feed(chunk)) == digest(track(CHUNKS)[1])
 
 
 def test_without_the_board_the_foot_goes_on_and_grows_less_sure() -> None:
@@ -92,7 +93,7 @@ def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
     tracker, found = track([c for c in CHUNKS if c.port == BOARD or c.t_arrival_ns < half_ns])
     assert found[-1].status == Status.LOST
     assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
-    assert tracker.status is not None
+    assert tracker.intake.status is not None
 
 
 def sure_but_wrong(found: list[Estimate], truth: Truth) -> list[Estimate]:
@@ -113,7 +114,7 @@ def test_after_a_silent_foot_no_wrong_place_is_shown_as_sure(
     chunks, truth, scenario = long_walk
     tracker = Tracker(PLAN, scenario.start, seed=1)
     silent = range(int((1 + start_s) * 1e9), int((1 + start_s + gap_s) * 1e9))
-    found = [e for c in chunks if c.port == BOARD or c.t_arrival_ns not in silent for e in tracker.feed(c)]
+    found = tracker.take(portion_of([c for c in chunks if c.port == BOARD or c.t_arrival_ns not in silent]))
     assert not sure_but_wrong(found, truth)
     assert found[-1].t_s > 55.0
 
@@ -125,7 +126,7 @@ def test_a_wrong_start_is_noticed(
     chunks, truth, scenario = long_walk
     there = scenario.start
     tracker = Tracker(PLAN, Pose(there.x_m + dx, there.y_m + dy, there.heading_rad + math.radians(degrees)), seed=1)
-    found = [e for c in chunks for e in tracker.feed(c)]
+    found = tracker.take(portion_of(chunks))
     sure = sure_but_wrong(found, truth)
     assert not [e for e in sure if e.t_s > 15.0]
 
@@ -161,8 +162,8 @@ def test_noise_on_both_ports_is_survived() -> None:
     off = errors(found, TRUTH)
     assert off is not None
     assert off.max_m < 1.5
-    assert tracker.board.counts.rejected > 50
-    assert tracker.mtx.counts.bad_checksum > 10
+    assert tracker.intake.board.counts.rejected > 50
+    assert tracker.intake.mtx.counts.bad_checksum > 10
 
 
 def test_strange_ports_and_pure_noise_are_counted() -> None:
@@ -171,8 +172,8 @@ def test_strange_ports_and_pure_noise_are_counted() -> None:
     for n in range(2_000):
         port = rng.choice([BOARD, MTX, "kettle"])
         assert tracker.feed(Chunk(port, n * 1_000_000, rng.randbytes(rng.randrange(200)))) == []
-    assert tracker.counts.unknown_ports > 500
-    assert tracker.board.counts.rejected > 100
+    assert tracker.intake.counts.unknown_ports > 500
+    assert tracker.intake.board.counts.rejected > 100
 
 
 @needs_twin
@@ -192,14 +193,14 @@ def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
     assert off is not None
     assert off.max_m < 0.8
     assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
-    assert tracker.timeline.board.restarts == (1 if fault == "reset=watchdog" else 0)
+    assert tracker.intake.timeline.board_restarts == (1 if fault == "reset=watchdog" else 0)
 
 
 @needs_twin
 def test_the_demo_runs_through_the_real_firmware() -> None:
     scenario = demo_scenario(PLAN, 1, BoardProcess([str(TWIN), "--elf", str(ELF)]))
     tracker = Tracker(PLAN, scenario.start, seed=1)
-    found = [e for chunk in scenario.chunks() for e in tracker.feed(chunk)]
+    found = tracker.take(portion_of(list(scenario.chunks())))
     scenario.close()
     off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
     assert off is not None

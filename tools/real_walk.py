@@ -167,7 +167,7 @@ def track(out: Path, seed: int) -> tuple[list[Estimate], float]:
     plan = load_plan(out / "plan.json")
     tracker = Tracker(plan, None, parse_settings(SETTINGS, "settings"), seed)
     began = time.perf_counter()
-    estimates = [e for chunk in open_recording(out / "walk.mcap").chunks() for e in tracker.feed(chunk)]
+    estimates = [e for portion in open_recording(out / "walk.mcap").portions() for e in tracker.take(portion)]
     return estimates, time.perf_counter() - began
 
 

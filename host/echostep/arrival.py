@@ -1,80 +1,128 @@
 """Arrival times -> a device's clock on the host's clock, by a lower envelope.
 
-In: device seconds and arrival times. Out: the mapping between both. Owns the least delayed arrival of each of the last seconds.
+In: device seconds and arrival times. Out: the mapping between both. Owns nothing: the least delayed arrival of each of the last seconds is in an
+`ArrivalClock` that the caller keeps.
 Delays only add: the true line lies below all points (device time, arrival - device time) and touches the least delayed ones, so the lower
 convex hull of each second's least delayed point holds both the offset and the drift [Moon, Skelly, Towsley 1999].
 """
 
 from __future__ import annotations
 
-from collections import deque
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 BUCKET_S = 1.0
 KEPT_BUCKETS = 60
 DRIFT_SPAN_S = 5.0  # below this span the drift is taken as zero
 MAX_DRIFT = 500e-6  # no crystal is worse
 
-Point = tuple[float, float]
+
+class ArrivalClock(Protocol):
+    """The line and what it is drawn through: of each of the last seconds (`bucket`) the device time and how late its bytes came."""
+
+    kept: int
+    bucket: Ints
+    device_s: Floats
+    late_s: Floats
+    begun: int
+    origin_ns: int
+    offset_s: float
+    drift: float
+    pivot_s: float
 
 
-class ArrivalClock:
-    """Ties device seconds to the arrival clock; about 1 us a call."""
-
-    def __init__(self) -> None:
-        self._buckets: deque[tuple[int, Point]] = deque(maxlen=KEPT_BUCKETS)
-        self._origin_ns: int | None = None
-        self._offset_s = 0.0
-        self._drift = 0.0
-        self._pivot_s = 0.0
-
-    def update(self, device_s: float, t_arrival_ns: int) -> None:
-        """One arrival; device seconds need not be in order."""
-        if self._origin_ns is None:
-            self._origin_ns = t_arrival_ns
-        late = (t_arrival_ns - self._origin_ns) * 1e-9 - device_s
-        bucket = int(device_s // BUCKET_S)
-        if not self._buckets or bucket > self._buckets[-1][0]:
-            self._buckets.append((bucket, (device_s, late)))
-            self._fit()
-        elif bucket == self._buckets[-1][0] and late < self._buckets[-1][1][1]:
-            self._buckets[-1] = (bucket, (device_s, late))
-            if late < self._offset_s + self._drift * (device_s - self._pivot_s):
-                self._fit()
-
-    def _fit(self) -> None:
-        """The line through the hull edge in the middle of the window."""
-        hull = lower_hull([point for _, point in self._buckets])
-        first, last = hull[0][0], hull[-1][0]
-        middle = 0.5 * (first + last)
-        left, right = hull[0], hull[-1]
-        for a, b in zip(hull, hull[1:], strict=False):
-            if a[0] <= middle <= b[0]:
-                left, right = a, b
-        slope = (right[1] - left[1]) / (right[0] - left[0]) if last - first >= DRIFT_SPAN_S else 0.0
-        self._drift = min(max(slope, -MAX_DRIFT), MAX_DRIFT)
-        self._pivot_s = right[0]
-        self._offset_s = min(y - self._drift * (x - self._pivot_s) for x, y in hull)
-
-    def to_arrival_s(self, device_s: float) -> float:
-        """Host seconds at which undelayed bytes of that device time arrive; 0 before the first update."""
-        late = self._offset_s + self._drift * (device_s - self._pivot_s)
-        return (self._origin_ns or 0) * 1e-9 + device_s + late
-
-    def to_device_s(self, arrival_s: float) -> float:
-        """Device seconds of bytes that arrive then and were not delayed."""
-        local = arrival_s - (self._origin_ns or 0) * 1e-9
-        return (local - self._offset_s + self._drift * self._pivot_s) / (1.0 + self._drift)
+FIELDS = [
+    ("kept", "i8"), ("bucket", "i8", KEPT_BUCKETS), ("device_s", "f8", KEPT_BUCKETS), ("late_s", "f8", KEPT_BUCKETS),
+    ("begun", "i8"), ("origin_ns", "i8"), ("offset_s", "f8"), ("drift", "f8"), ("pivot_s", "f8"),
+]  # fmt: skip
 
 
-def lower_hull(points: list[Point]) -> list[Point]:
-    """Lower convex hull of points in order of x (Andrew's monotone chain)."""
-    hull: list[Point] = []
-    for point in points:
-        while len(hull) > 1 and _turn(hull[-2], hull[-1], point) <= 0.0:
-            hull.pop()
-        hull.append(point)
-    return hull
+@njit(cache=True, error_model="numpy")
+def begin(clock: ArrivalClock) -> None:
+    """Forget everything."""
+    clock.kept = 0
+    clock.begun = 0
+    clock.origin_ns = 0
+    clock.offset_s = clock.drift = clock.pivot_s = 0.0
 
 
-def _turn(a: Point, b: Point, c: Point) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+@njit(cache=True, error_model="numpy")
+def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
+    """One arrival; device seconds need not be in order."""
+    if not clock.begun:
+        clock.begun = 1
+        clock.origin_ns = t_arrival_ns
+    late = (t_arrival_ns - clock.origin_ns) * 1e-9 - device_s
+    bucket = int(device_s // BUCKET_S)
+    last = clock.kept - 1
+    if last < 0 or bucket > clock.bucket[last]:
+        if clock.kept == KEPT_BUCKETS:
+            clock.bucket[:-1] = clock.bucket[1:].copy()
+            clock.device_s[:-1] = clock.device_s[1:].copy()
+            clock.late_s[:-1] = clock.late_s[1:].copy()
+        else:
+            clock.kept += 1
+            last += 1
+        clock.bucket[last], clock.device_s[last], clock.late_s[last] = bucket, device_s, late
+        _fit(clock)
+    elif bucket == clock.bucket[last] and late < clock.late_s[last]:
+        clock.device_s[last], clock.late_s[last] = device_s, late
+        if late < clock.offset_s + clock.drift * (device_s - clock.pivot_s):
+            _fit(clock)
+
+
+@njit(cache=True, error_model="numpy")
+def _fit(clock: ArrivalClock) -> None:
+    """The line through the hull edge in the middle of the window."""
+    x, y = clock.device_s, clock.late_s
+    hull = lower_hull(x[: clock.kept], y[: clock.kept])
+    first, last = x[hull[0]], x[hull[-1]]
+    middle = 0.5 * (first + last)
+    left, right = hull[0], hull[-1]
+    for k in range(len(hull) - 1):
+        if x[hull[k]] <= middle <= x[hull[k + 1]]:
+            left, right = hull[k], hull[k + 1]
+    slope = (y[right] - y[left]) / (x[right] - x[left]) if last - first >= DRIFT_SPAN_S else 0.0
+    clock.drift = min(max(slope, -MAX_DRIFT), MAX_DRIFT)
+    clock.pivot_s = x[right]
+    clock.offset_s = np.inf
+    for k in hull:
+        clock.offset_s = min(clock.offset_s, y[k] - clock.drift * (x[k] - clock.pivot_s))
+
+
+@njit(cache=True, error_model="numpy")
+def to_arrival_s(clock: ArrivalClock, device_s: float) -> float:
+    """Host seconds at which undelayed bytes of that device time arrive; 0 before the first update."""
+    late = clock.offset_s + clock.drift * (device_s - clock.pivot_s)
+    return clock.origin_ns * 1e-9 + device_s + late
+
+
+@njit(cache=True, error_model="numpy")
+def to_device_s(clock: ArrivalClock, arrival_s: float) -> float:
+    """Device seconds of bytes that arrive then and were not delayed."""
+    local = arrival_s - clock.origin_ns * 1e-9
+    return (local - clock.offset_s + clock.drift * clock.pivot_s) / (1.0 + clock.drift)
+
+
+@njit(cache=True, error_model="numpy")
+def lower_hull(x: Floats, y: Floats) -> Ints:
+    """Indices of the lower convex hull of points (n,) in order of x (Andrew's monotone chain)."""
+    hull = np.empty(len(x), np.int64)
+    n = 0
+    for k in range(len(x)):
+        while n > 1 and _turn(x, y, hull[n - 2], hull[n - 1], k) <= 0.0:
+            n -= 1
+        hull[n] = k
+        n += 1
+    return hull[:n]
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(x: Floats, y: Floats, a: int, b: int, c: int) -> float:
+    return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])

@@ -9,7 +9,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from echostep.messages import Outcome, Ping
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.messages import Outcome
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
 ADIS16100_RAD_S = math.radians(0.2439)  # per count [ADIS16100 datasheet, sensitivity]
@@ -31,10 +34,8 @@ class RangerSettings:
     delay_s: float = 0.0
 
 
-def echo(ping: Ping, t_s: float, settings: RangerSettings) -> Echo | None:
-    """The ping as a range (half the way of the sound); None for a bus error, which says nothing about walls."""
-    if ping.outcome == Outcome.BUS_ERROR:
-        return None
-    if ping.outcome == Outcome.NO_ECHO or ping.time_of_flight_us == 0:
-        return Echo(t_s, ping.ranger, None)
-    return Echo(t_s, ping.ranger, 0.5e-6 * ping.time_of_flight_us * settings.speed_of_sound_m_s)
+def ranges(pings: NDArray[np.void], settings: RangerSettings) -> NDArray[np.float64]:
+    """Ranges (n,) of pings (n,) by the schema's dtype: half the way of the sound; NaN when nothing was heard."""
+    range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
+    range_m[(pings["outcome"] != Outcome.ECHO) | (pings["time_of_flight_us"] == 0)] = np.nan
+    return range_m

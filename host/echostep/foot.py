@@ -82,6 +82,16 @@ class Track:
         return [event for event in self.events if isinstance(event, Step)]
 
 
+@dataclass(frozen=True, slots=True)
+class Footfall:
+    """What samples (n,) told: `events`, `told` (k,) = the sample that told each, and the foot after each sample: `heading_rad`, `stance` (n,)."""
+
+    events: list[Step | Stance]
+    told: NDArray[np.int64]
+    heading_rad: Floats
+    stance: NDArray[np.bool_]
+
+
 class Foot:
     """Feed it samples in any portions; equal samples give equal events, bit for bit."""
 
@@ -116,6 +126,13 @@ class Foot:
     def feed(self, t_s: Floats, accel: Floats, gyro: Floats) -> list[Step | Stance]:
         """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame; raises ValueError for other shapes."""
         return self._run(t_s, accel, gyro, np.empty((0, footsteps.ROW_SIZE)))
+
+    def follow(self, t_s: Floats, accel: Floats, gyro: Floats) -> Footfall:
+        """The same, and when each event was told."""
+        rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
+        events = self._run(t_s, accel, gyro, rows)
+        told = np.searchsorted(rows[:, 5], np.arange(1, len(events) + 1))
+        return Footfall(events, told, rows[:, 3], rows[:, 4] > 0.0)
 
     def _run(self, t_s: Floats, accel: Floats, gyro: Floats, rows: Floats) -> list[Step | Stance]:
         t_s, accel, gyro = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro))

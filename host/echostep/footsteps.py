@@ -41,7 +41,7 @@ FLAT_M, FLAT_SD_M = 0.04, 0.01  # floors are level: a step that rises less is no
 STEP, STANCE = 0.0, 1.0
 EVENT_SIZE = 17  # kind, start, end, move (3), covariance (9), heading, heading sd
 EVENTS_PER_SAMPLE = 2
-ROW_SIZE = 5  # position (3), heading, in stance
+ROW_SIZE = 6  # position (3), heading, in stance, events so far
 
 
 class Footing(Protocol):
@@ -112,6 +112,7 @@ def walk(
             rows[k, 0:3] = nav.position
             rows[k, 3] = ins.heading(nav)
             rows[k, 4] = s.in_stance
+            rows[k, 5] = found
     return found
 
 

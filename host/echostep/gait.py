@@ -13,7 +13,12 @@ from collections import deque
 from dataclasses import dataclass
 from statistics import median
 
+import numpy as np
+from numpy.typing import NDArray
+
 from echostep.foot import Stance, Step
+
+Floats = NDArray[np.float64]
 
 STANDING_PIECE_S = 0.5
 UNWATCHED_SD_M = 0.75
@@ -77,17 +82,20 @@ class TrunkPath:
         """Heading of the trunk in the walk frame at the last anchor."""
         return None if self._anchor is None else self._anchor[3]
 
-    def stand(self, t_s: float, foot_heading_rad: float) -> list[Leg]:
-        """The foot is still at `t_s`: what is now known of the trunk."""
-        if self._anchor is None:
-            self._stance_begin_s = t_s
-            heading = foot_heading_rad + self._toe.angle_rad
-            self._anchor = (t_s, *self._trunk(heading), heading)
-            return []
+    def stand(self, t_s: Floats, foot_heading_rad: Floats) -> list[tuple[int, Leg]]:
+        """The foot is still at all of `t_s` (n,): what becomes known of the trunk, and at which of them."""
+        if self._anchor is None and len(t_s):
+            self._stance_begin_s = float(t_s[0])
+            heading = float(foot_heading_rad[0]) + self._toe.angle_rad
+            self._anchor = (self._stance_begin_s, *self._trunk(heading), heading)
+        found: list[tuple[int, Leg]] = []
         until = t_s - self._half_s()
-        if until - self._anchor[0] < STANDING_PIECE_S:
-            return []
-        return [self._stay(until)]
+        while self._anchor is not None:
+            at = int(np.searchsorted(until - self._anchor[0], STANDING_PIECE_S))
+            if at == len(t_s):
+                break
+            found.append((at, self._stay(float(until[at]))))
+        return found
 
     def stance(self, stance: Stance) -> list[Leg]:
         """A stance is over."""

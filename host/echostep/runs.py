@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from importlib.resources import as_file, files
+from itertools import islice
 from pathlib import Path
 
 from rich.console import Console
@@ -29,12 +30,13 @@ from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
 from echostep.settings import parse_settings, read_settings
-from echostep.sources import BOARD, MTX, Chunk, SerialPorts
+from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 
 DEMO_PACE = 8.0
+HEADLESS_CHUNKS = 1000
 BAUD = {BOARD: 115200, MTX: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
@@ -59,7 +61,11 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
         with Recorder(out / "walk.mcap", about) as recorder:
             chunks = scenario.chunks() if headless else _paced(scenario.chunks())
             estimates = _run(
-                tracker, _kept(chunks, recorder), "echostep demo (simulated)", lambda: scenario.fraction, headless
+                tracker,
+                _portions(_kept(chunks, recorder), HEADLESS_CHUNKS if headless else 1),
+                "echostep demo (simulated)",
+                lambda: scenario.fraction,
+                headless,
             )
     finally:
         scenario.close()
@@ -80,7 +86,7 @@ def live(
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
-            chunks = _kept(_until(ports, seconds), recorder)
+            chunks = _portions(_kept(_until(ports, seconds), recorder), 1)
             estimates = _run(tracker, chunks, "echostep live", None, headless)
     finally:
         ports.close()
@@ -117,8 +123,11 @@ def replay(
     out = _folder(out)
     if note := about.get("note"):
         console.print(f"Recording: {note}")
+    tracker.warm_up()
     began = time.perf_counter()
-    estimates = _run(tracker, recording.chunks(), f"echostep replay {path.name}", lambda: recording.fraction, headless)
+    estimates = _run(
+        tracker, recording.portions(), f"echostep replay {path.name}", lambda: recording.fraction, headless
+    )
     elapsed_s = time.perf_counter() - began
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
@@ -157,7 +166,7 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, chunks: Iterable[Chunk], title: str, progress: Callable[[], float] | None, headless: bool
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool
 ) -> list[Estimate]:
     """Feed everything; Ctrl-C ends a run like its last chunk does."""
     view = None if headless else TerminalView(tracker, title, progress, console)
@@ -165,8 +174,8 @@ def _run(
     shown: AbstractContextManager[object] = view or nullcontext()
     with shown:
         try:
-            for chunk in chunks:
-                new = tracker.feed(chunk)
+            for portion in portions:
+                new = tracker.take(portion)
                 estimates += new
                 if view:
                     view.show(new)
@@ -191,6 +200,13 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
     for chunk in chunks:
         recorder.write(chunk)
         yield chunk
+
+
+def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
+    """Portions of so many chunks; with one, no chunk waits for the next."""
+    rest = iter(chunks)
+    while taken := list(islice(rest, most)):
+        yield portion_of(taken)
 
 
 def _until(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk]:

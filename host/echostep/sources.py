@@ -1,6 +1,7 @@
 """Where bytes come from: the only place where live and replay differ.
 
-In: serial ports (pyserial URLs), a recording, or a simulation. Out: `Chunk`s in order of arrival. Owns the ports and the wall clock.
+In: serial ports (pyserial URLs), a recording, or a simulation. Out: `Chunk`s in order of arrival, or many of them as a `Portion`. Owns the
+ports and the wall clock.
 """
 
 from __future__ import annotations
@@ -9,10 +10,14 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
+import numpy as np
 import serial
+from numba import njit
+from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
 
@@ -22,6 +27,10 @@ WRITE_TIMEOUT_S = 0.5
 REOPEN_S = 0.5
 BOARD = "board"
 MTX = "mtx"
+LATEST_NS = 1 << 62  # later arrivals (damage in a recording) count as this one
+
+Ints = NDArray[np.int64]
+Octets = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +40,78 @@ class Chunk:
     port: str
     t_arrival_ns: int
     data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class PortBytes:
+    """What one port delivered in a portion: `received`, and of its chunk k the row `row[k]` in the portion and the end `end[k]` in `received`."""
+
+    received: bytes
+    row: Ints
+    end: Ints
+
+    def rows_of(self, ends: Ints) -> Ints:
+        """Rows of the chunks that brought the last byte before each of these ends (ascending) in `received`."""
+        return self.row[np.searchsorted(self.end, ends)]
+
+
+_NOTHING = PortBytes(b"", np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+@dataclass(frozen=True, slots=True)
+class Portion:
+    """Chunks in order of arrival, as columns (n,): chunk k came from `ports[port[k]]` at `t_arrival_ns[k]` and is `received[start[k] : end[k]]`.
+
+    No name is twice in `ports`.
+    """
+
+    ports: tuple[str, ...]
+    port: Ints
+    t_arrival_ns: Ints
+    start: Ints
+    end: Ints
+    received: bytes
+
+    def chunks(self) -> Iterator[Chunk]:
+        """The chunks one by one."""
+        columns = (self.port.tolist(), self.t_arrival_ns.tolist(), self.start.tolist(), self.end.tolist())
+        for port, t_arrival_ns, start, end in zip(*columns, strict=True):
+            yield Chunk(self.ports[port], t_arrival_ns, self.received[start:end])
+
+    def of(self, name: str) -> PortBytes:
+        """What the port of that name delivered."""
+        if name not in self.ports:
+            return _NOTHING
+        row = (self.port == self.ports.index(name)).nonzero()[0]
+        start, end = self.start[row], self.end[row]
+        total = (end - start).cumsum()
+        joined = np.empty(int(total[-1]) if len(total) else 0, np.uint8)
+        _join(np.frombuffer(self.received, np.uint8), start, end, joined)
+        return PortBytes(joined.tobytes(), row, total)
+
+
+def portion_of(chunks: Sequence[Chunk]) -> Portion:
+    """Chunks as a portion."""
+    place = {port: k for k, port in enumerate(dict.fromkeys(chunk.port for chunk in chunks))}
+    edges = [0, *accumulate(len(chunk.data) for chunk in chunks)]
+    return Portion(
+        tuple(place),
+        np.array([place[chunk.port] for chunk in chunks], np.int64),
+        np.array([min(max(chunk.t_arrival_ns, 0), LATEST_NS) for chunk in chunks], np.int64),
+        np.array(edges[:-1], np.int64),
+        np.array(edges[1:], np.int64),
+        b"".join(chunk.data for chunk in chunks),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _join(received: Octets, start: Ints, end: Ints, joined: Octets) -> None:
+    """Copy received[start[k] : end[k]] for each k, one after the other."""
+    at = 0
+    for k in range(len(start)):
+        for i in range(start[k], end[k]):
+            joined[at] = received[i]
+            at += 1
 
 
 class SerialPorts:

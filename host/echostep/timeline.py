@@ -1,7 +1,7 @@
 """One clock: board ticks, the MTx sample counter and arrival times -> `t_s`.
 
-In: board messages and MTx samples with their time of arrival. Out: `t_s`, seconds of the board's clock since its first reset (without a
-board: of the MTx's counter). Owns every clock; nothing else converts time, and nothing here waits for a timer.
+In: board messages and MTx samples with their time of arrival, many at once. Out: `t_s`, seconds of the board's clock since its first reset
+(without a board: of the MTx's counter). Owns every clock; nothing else converts time, and nothing here waits for a timer.
 
 The board's ticks are the clock. MTx samples are tied to it by SyncOut edges when the wire is there, else by the lower envelopes of both
 ports' arrival times. A device that restarts gets a new epoch, placed by arrival times.
@@ -9,82 +9,22 @@ ports' arrival times. A device that restarts gets a new epoch, placed by arrival
 
 from __future__ import annotations
 
-from collections import Counter, deque
 from dataclasses import dataclass
 
-from echostep.arrival import ArrivalClock
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from echostep import arrival, clocks, sync
+from echostep.clocks import DeviceClock
+from echostep.sync import SyncEdges
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 TICK_S = 0.5e-6
-AHEAD_S = 1.0  # a device cannot be further ahead of the arrival of its bytes than this: it restarted, or the bytes lie
-BEHIND_S = 1.0  # messages may be this much older than the newest one (a ping is sent when its ranging is over)
-JUMPS_TO_RESTART = 3
 BOARD_LATENCY_S = 0.001  # a frame waits for the next USB millisecond at best
-
-
-class DeviceClock:
-    """A wrapping device counter -> device seconds that never wrap; follows restarts by arrival times."""
-
-    def __init__(self, unit_s: float, modulus: int) -> None:
-        self._unit_s = unit_s
-        self._modulus = modulus
-        self._newest: int | None = None  # unwrapped
-        self._newest_arrival_ns = 0
-        self._epoch_s = 0.0
-        self._arrival = ArrivalClock()
-        self._jumps = 0
-        self.restarts = 0
-        self.jumps = 0
-
-    @property
-    def newest_s(self) -> float | None:
-        """Device time of the newest value."""
-        return None if self._newest is None else self._epoch_s + self._newest * self._unit_s
-
-    def at(self, value: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
-        """Device seconds of a counter value; None when it cannot be true (a jump, counted)."""
-        if self._newest is None:
-            return self._begin(value, t_arrival_ns, value * self._unit_s)
-        delta = self._delta(value, t_arrival_ns)
-        if delta is None:
-            self._jumps += 1
-            if not restarted and self._jumps < JUMPS_TO_RESTART:
-                self.jumps += 1
-                return None
-            self.restarts += 1
-            return self._begin(value, t_arrival_ns, self.to_device_s(t_arrival_ns))
-        self._jumps = 0
-        unwrapped = self._newest + delta
-        seconds = self._epoch_s + unwrapped * self._unit_s
-        if delta > 0:
-            self._newest, self._newest_arrival_ns = unwrapped, t_arrival_ns
-            self._arrival.update(seconds, t_arrival_ns)
-        return seconds
-
-    def _delta(self, value: int, t_arrival_ns: int) -> int | None:
-        """Counts since the newest value, or None when no true count can explain the value."""
-        assert self._newest is not None
-        back = int(BEHIND_S / self._unit_s)
-        back = min(back, self._modulus // 2)
-        delta = (value - self._newest + back) % self._modulus - back
-        elapsed_s = (t_arrival_ns - self._newest_arrival_ns) * 1e-9
-        wraps = round((elapsed_s - delta * self._unit_s) / (self._modulus * self._unit_s))
-        delta += max(wraps, 0) * self._modulus
-        return delta if delta * self._unit_s <= elapsed_s + AHEAD_S else None
-
-    def _begin(self, value: int, t_arrival_ns: int, seconds: float) -> float:
-        self._newest, self._newest_arrival_ns, self._jumps = value, t_arrival_ns, 0
-        self._epoch_s = seconds - value * self._unit_s
-        self._arrival = ArrivalClock()
-        self._arrival.update(seconds, t_arrival_ns)
-        return seconds
-
-    def to_arrival_s(self, device_s: float) -> float:
-        """When bytes of that device time would have arrived at best, seconds of the host's clock."""
-        return self._arrival.to_arrival_s(device_s)
-
-    def to_device_s(self, t_arrival_ns: float) -> float:
-        """Device time of bytes that arrive now and were not delayed."""
-        return self._arrival.to_device_s(t_arrival_ns * 1e-9)
+SILENT, PLAIN, FIRST_WORD = -3, -2, -1  # kinds of board messages; a kind from 0 on is a SyncOut edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,130 +40,130 @@ class MtxTiming:
             raise ValueError(f"[mtx] rate_hz: {self.rate_hz} is not a rate of an MTx")
 
 
+@dataclass(frozen=True, slots=True)
+class Arrivals:
+    """Messages of one port in order: `value` (n,) ticks or counter, `row` (n,) of the chunk that completed each, `t_arrival_ns` (n,) of that.
+
+    `kind` (n,): `SILENT` (no time in it), `PLAIN`, `FIRST_WORD` of a board that may have restarted, or the count of a SyncOut edge.
+    """
+
+    value: Ints
+    row: Ints
+    t_arrival_ns: Ints
+    kind: Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """`board_s`, `mtx_s`: `t_s` of each message, NaN for one that cannot be true or has no time.
+
+    `board_at`, `mtx_at`: place of each among the messages of both ports in order of arrival. By that place, `board_newest_s` and
+    `mtx_newest_s`: how far either port has come once this message is in, NaN before its first one.
+    """
+
+    board_s: Floats
+    mtx_s: Floats
+    board_at: Ints
+    mtx_at: Ints
+    board_newest_s: Floats
+    mtx_newest_s: Floats
+
+
 class Timeline:
-    """`t_s` for everything that arrives."""
+    """`t_s` for everything that arrives; equal messages in equal order get equal times, in whatever portions they come."""
 
     def __init__(self, timing: MtxTiming) -> None:
-        self._timing = timing
-        self.board = DeviceClock(TICK_S, 1 << 32)
-        self.mtx = DeviceClock(1.0 / timing.rate_hz, 1 << 16)
-        self._edges = SyncEdges(1.0 / timing.rate_hz)
-        self._mtx_newest_s: float | None = None
-
-    @property
-    def board_newest_s(self) -> float | None:
-        """Board time of the newest board message."""
-        return self.board.newest_s
-
-    @property
-    def mtx_newest_s(self) -> float | None:
-        """Time of the newest MTx sample."""
-        return self._mtx_newest_s
+        self.timing = timing
+        self._board = clocks.new_clock(TICK_S, 1 << 32)
+        self._mtx = clocks.new_clock(1.0 / timing.rate_hz, 1 << 16)
+        self._edges = sync.new_edges(1.0 / timing.rate_hz)
 
     @property
     def synchronised(self) -> bool:
         """Whether SyncOut edges time the MTx samples."""
-        return self._edges.locked
-
-    def board_time(self, ticks: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
-        """`t_s` of a board message; None when its ticks cannot be true. `restarted`: it is the board's first word."""
-        restarts = self.board.restarts
-        t_s = self.board.at(ticks, t_arrival_ns, restarted=restarted)
-        if self.board.restarts != restarts:
-            self._edges.forget()
-        return t_s
-
-    def sync_edge(self, edge: int, t_s: float) -> None:
-        """A SyncOut edge that the board saw."""
-        self._edges.add(edge, t_s)
-
-    def mtx_time(self, counter: int, t_arrival_ns: int) -> float | None:
-        """`t_s` of an MTx sample, always later than the one before; None for a counter that cannot be true."""
-        restarts = self.mtx.restarts
-        device_s = self.mtx.at(counter, t_arrival_ns)
-        if device_s is None:
-            return None
-        if self.mtx.restarts != restarts:
-            self._edges.forget()
-        t_s = self._on_board_clock(device_s, counter)
-        if self._mtx_newest_s is not None and t_s <= self._mtx_newest_s:
-            t_s = self._mtx_newest_s + 1e-6
-        self._mtx_newest_s = t_s
-        return t_s
-
-    def _on_board_clock(self, device_s: float, counter: int) -> float:
-        if self.board.newest_s is None:
-            return device_s
-        sampled_s = self.mtx.to_arrival_s(device_s) - self._timing.latency_s
-        by_arrival_s = self.board.to_device_s((sampled_s + BOARD_LATENCY_S) * 1e9)
-        by_edge_s = self._edges.time_of(counter, by_arrival_s)
-        return by_arrival_s if by_edge_s is None else by_edge_s
-
-
-class SyncEdges:
-    """SyncOut edges and which sample belongs to which.
-
-    Edges and samples come in equal steps; only the number between them is unknown. Every sample votes for the edge
-    nearest to its time by arrival, and the vote of the last `VOTES` samples decides. From there on a sample's time is
-    its edge's, or follows from the newest edge and the measured period when that edge has not been seen.
-    """
-
-    VOTES = 50
-    KEPT = 256
-
-    def __init__(self, period_s: float) -> None:
-        self._nominal_s = period_s
-        self.forget()
-
-    def forget(self) -> None:
-        """Start anew after a restart of either side."""
-        self._times: dict[int, float] = {}
-        self._order: deque[int] = deque()
-        self._votes: deque[int] = deque(maxlen=self.VOTES)
-        self._offset: int | None = None
-        self._period_s = self._nominal_s
-        self._first: tuple[int, float] | None = None
-        self._newest: tuple[int, float] | None = None  # unwrapped edge, time
+        return bool(self._edges["locked"])
 
     @property
-    def locked(self) -> bool:
-        """Whether the vote has been decided."""
-        return self._offset is not None
+    def board_restarts(self) -> int:
+        """How often the board's clock has begun anew."""
+        return int(self._board["restarts"])
 
-    def add(self, edge: int, t_s: float) -> None:
-        """Keep an edge (u16 count) and its time."""
-        if self._newest is None:
-            unwrapped = edge
-            self._first = (unwrapped, t_s)
+    @property
+    def board_jumps(self) -> int:
+        """Board messages whose ticks could not be true."""
+        return int(self._board["jumps"])
+
+    def times(self, board: Arrivals, mtx: Arrivals) -> Times:
+        """Times of a portion's messages; a board message comes before a sample of the same row."""
+        nb, nm = len(board.value), len(mtx.value)
+        found = Times(
+            np.empty(nb),
+            np.empty(nm),
+            np.empty(nb, np.int64),
+            np.empty(nm, np.int64),
+            np.empty(nb + nm),
+            np.empty(nb + nm),
+        )
+        _tell(
+            self._board, self._mtx, self._edges, self.timing.latency_s,
+            board.value, board.row, board.t_arrival_ns, board.kind, mtx.value, mtx.row, mtx.t_arrival_ns,
+            found.board_s, found.mtx_s, found.board_at, found.mtx_at, found.board_newest_s, found.mtx_newest_s,
+        )  # fmt: skip
+        return found
+
+
+@njit(cache=True, error_model="numpy")
+def _tell(
+    board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, latency_s: float,
+    ticks: Ints, board_row: Ints, board_ns: Ints, kind: Ints, counter: Ints, mtx_row: Ints, mtx_ns: Ints,
+    board_s: Floats, mtx_s: Floats, board_at: Ints, mtx_at: Ints, board_newest_s: Floats, mtx_newest_s: Floats,
+) -> None:  # fmt: skip
+    """Fill the columns of `Times`, message by message in order of arrival."""
+    b, m = 0, 0
+    for at in range(len(ticks) + len(counter)):
+        if m == len(counter) or (b < len(ticks) and board_row[b] <= mtx_row[m]):
+            board_s[b] = _board_time(board, edges, ticks[b], board_ns[b], kind[b])
+            board_at[b] = at
+            b += 1
         else:
-            unwrapped = self._newest[0] + ((edge - self._newest[0]) & 0xFFFF)
-        self._newest = (unwrapped, t_s)
-        self._times[unwrapped & 0xFFFF] = t_s
-        self._order.append(unwrapped & 0xFFFF)
-        if len(self._order) > self.KEPT:
-            self._times.pop(self._order.popleft(), None)
-        if self._first is not None and unwrapped - self._first[0] >= self.VOTES:
-            self._period_s = (t_s - self._first[1]) / (unwrapped - self._first[0])
+            mtx_s[m] = _mtx_time(board, mtx, edges, counter[m], mtx_ns[m], latency_s)
+            mtx_at[m] = at
+            m += 1
+        board_newest_s[at] = clocks.now_s(board)
+        mtx_newest_s[at] = mtx.newest_s
 
-    def time_of(self, counter: int, by_arrival_s: float) -> float | None:
-        """Time of the sample with this u16 counter; None until the vote is decided or when edges are long gone."""
-        if self._newest is None or abs(by_arrival_s - self._newest[1]) > 1e3 * self._nominal_s:
-            return None
-        self._vote(counter, by_arrival_s)
-        if self._offset is None:
-            return None
-        edge = (counter - self._offset) & 0xFFFF
-        if edge in self._times and abs(self._times[edge] - by_arrival_s) < 100 * self._nominal_s:
-            return self._times[edge]
-        ahead = ((edge - self._newest[0] + 0x8000) & 0xFFFF) - 0x8000
-        return self._newest[1] + ahead * self._period_s
 
-    def _vote(self, counter: int, by_arrival_s: float) -> None:
-        assert self._newest is not None
-        ahead = round((by_arrival_s - self._newest[1]) / self._period_s)
-        vote = (counter - self._newest[0] - ahead) & 0xFFFF
-        self._votes.append(vote)
-        if vote != self._offset and len(self._votes) == self.VOTES:
-            offset, support = Counter(self._votes).most_common(1)[0]
-            if support > self.VOTES // 2:
-                self._offset = offset
+@njit(cache=True, error_model="numpy")
+def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: int, kind: int) -> float:
+    if kind == SILENT:
+        return np.nan
+    restarts = board.restarts
+    t_s = clocks.read(board, ticks, t_arrival_ns, kind == FIRST_WORD)
+    if board.restarts != restarts:
+        sync.forget(edges)
+    if kind >= 0 and not np.isnan(t_s):
+        sync.add(edges, kind, t_s)
+    return t_s
+
+
+@njit(cache=True, error_model="numpy")
+def _mtx_time(
+    board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, counter: int, t_arrival_ns: int, latency_s: float
+) -> float:
+    """`t_s` of an MTx sample, always later than the one before; NaN for a counter that cannot be true."""
+    restarts = mtx.restarts
+    device_s = clocks.read(mtx, counter, t_arrival_ns, False)
+    if np.isnan(device_s):
+        return np.nan
+    if mtx.restarts != restarts:
+        sync.forget(edges)
+    t_s = device_s
+    if board.started:
+        sampled_s = arrival.to_arrival_s(mtx, device_s) - latency_s
+        by_arrival_s = arrival.to_device_s(board, (sampled_s + BOARD_LATENCY_S) * 1e9 * 1e-9)
+        by_edge_s = sync.time_of(edges, counter, by_arrival_s)
+        t_s = by_arrival_s if np.isnan(by_edge_s) else by_edge_s
+    if t_s <= mtx.newest_s:
+        t_s = mtx.newest_s + 1e-6
+    mtx.newest_s = t_s
+    return t_s

@@ -138,7 +138,7 @@ def describe(e: Estimate | None) -> str:
 
 def health(tracker: Tracker) -> str:
     """The streams in words: what was rejected, lost or dropped."""
-    board, status = tracker.board.counts, tracker.status
+    board, status = tracker.intake.board.counts, tracker.intake.status
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
-    sync = "SyncOut" if tracker.timeline.synchronised else "arrival times"
+    sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
     return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}"

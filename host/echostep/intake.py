@@ -1,0 +1,152 @@
+"""The intake: chunks -> the trunk's legs, each with the pings that were heard until its end.
+
+In: portions of chunks in order of arrival. Out: `Passage`s and `Silence`s in order of time, as they become certain. Owns the readers, the timeline,
+the foot, the path, and the pings and legs that still wait for each other (`waiting`).
+
+What comes out depends on the chunks alone: on their bytes and arrival times, not on how many of them come in one portion, nor on where bytes
+that arrived together were cut. Every decision is taken message by message, at the message that makes it possible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.calibration import RangerSettings, ranges
+from echostep.foot import Foot, Footfall, FootSettings, Step
+from echostep.frames import BoardReader, Frames, encode
+from echostep.gait import GaitSettings, TrunkPath
+from echostep.messages import ROWS, Identity, Outcome, Ping, Status
+from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
+from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
+from echostep.waiting import Passage, Silence, Waiting
+from echostep.xbus import MtxBatch, MtxReader
+from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+IDENTITY, PING, SYNC, STATUS = 0x01, 0x02, 0x06, 0x07
+_TIMED = np.array([identifier in ROWS and "ticks" in (ROWS[identifier].names or ()) for identifier in range(256)])
+
+
+@dataclass(slots=True)
+class IntakeCounts:
+    """What did not become a leg or a ping, and why."""
+
+    unknown_ports: int = 0
+    late_pings: int = 0
+    dropped_pings: int = 0
+    bad_times: int = 0
+
+
+class Intake:
+    """Feed it every chunk; it returns what the chunks make certain."""
+
+    def __init__(self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings) -> None:
+        self.board = BoardReader()
+        self.mtx = MtxReader()
+        self.timeline = Timeline(mtx)
+        self.foot = Foot(foot)
+        self.path = TrunkPath(gait)
+        self.status: Status | None = None
+        self.identity: Identity | None = None
+        self._ranger = ranger
+        self._waiting = Waiting()
+        self._unknown_ports = 0
+        self._bad_times = 0
+
+    @property
+    def counts(self) -> IntakeCounts:
+        """What was not used so far."""
+        return IntakeCounts(self._unknown_ports, self._waiting.late, self._waiting.dropped, self._bad_times)
+
+    def take(self, portion: Portion) -> list[Passage | Silence]:
+        """What a portion completes; raises StaleFirmwareError when the board has another schema."""
+        self._count_unknown(portion)
+        from_board, from_mtx = portion.of(BOARD), portion.of(MTX)
+        frames, batch = self.board.frames(from_board.received), self.mtx.feed(from_mtx.received)
+        if not len(frames.id) and not len(batch.counter):
+            return []
+        board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
+        mtx = _mtx_arrivals(batch, from_mtx.rows_of(batch.end), portion.t_arrival_ns)
+        times = self.timeline.times(board, mtx)
+        self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
+        self._note(frames, times)
+        self._hear(frames, times)
+        self._follow(batch, times)
+        return self._waiting.release(times.board_newest_s, times.mtx_newest_s)
+
+    def warm_up(self) -> None:
+        """Compile the kernels, so that no chunk waits for it later; leaves the intake as it was."""
+        other = Intake(self.timeline.timing, self._ranger, FootSettings(), GaitSettings())
+        sample = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        said = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
+        other.take(portion_of([said, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
+
+    def _count_unknown(self, portion: Portion) -> None:
+        for k, port in enumerate(portion.ports):
+            if port not in (BOARD, MTX):
+                self._unknown_ports += int((portion.port == k).sum())
+
+    def _note(self, frames: Frames, times: Times) -> None:
+        """Keep the board's last words about itself."""
+        if (status := _last(frames, times, STATUS)) is not None:
+            self.status = Status.unpack(status)
+        if (identity := _last(frames, times, IDENTITY)) is not None:
+            self.identity = Identity.unpack(identity)
+
+    def _hear(self, frames: Frames, times: Times) -> None:
+        """Pings that say something about walls wait for their leg."""
+        place, pings = frames.rows(PING)
+        if not len(place):
+            return
+        t_s = times.board_s[place]
+        range_m = ranges(pings, self._ranger)
+        kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
+        rows = np.column_stack([t_s[kept], pings["ranger"][kept], range_m[kept]])
+        self._waiting.hear(times.board_at[place[kept]], rows)
+
+    def _follow(self, batch: MtxBatch, times: Times) -> None:
+        """Samples go through the foot to the path, whose legs wait for their pings."""
+        kept = np.flatnonzero(~np.isnan(times.mtx_s))
+        if not len(kept):
+            return
+        t_s, at = times.mtx_s[kept], times.mtx_at[kept]
+        fall = self.foot.follow(t_s, batch.accel[kept], batch.gyro[kept])
+        begin = 0
+        for event, told in zip(fall.events, fall.told.tolist(), strict=True):
+            self._stand(fall, t_s, at, begin, told)
+            legs = self.path.step(event) if isinstance(event, Step) else self.path.stance(event)
+            self._waiting.go(int(at[told]), legs)
+            begin = told
+        self._stand(fall, t_s, at, begin, len(t_s))
+
+    def _stand(self, fall: Footfall, t_s: Floats, at: Ints, begin: int, end: int) -> None:
+        """What the samples [begin, end) between two events say of a trunk that stands."""
+        still = begin + np.flatnonzero(fall.stance[begin:end])
+        for k, leg in self.path.stand(t_s[still], fall.heading_rad[still]):
+            self._waiting.go(int(at[still[k]]), [leg])
+
+
+def _board_arrivals(frames: Frames, row: Ints, t_arrival_ns: Ints) -> Arrivals:
+    """The board's messages for the timeline; their bodies begin with the ticks."""
+    ticks = np.ascontiguousarray(frames.body[:, :4]).view("<u4")[:, 0].astype(np.int64)
+    kind = np.where(_TIMED[frames.id], PLAIN, SILENT)
+    kind[frames.id == IDENTITY] = FIRST_WORD
+    place, edges = frames.rows(SYNC)
+    kind[place] = edges["edge"]
+    return Arrivals(ticks, row, t_arrival_ns[row], kind)
+
+
+def _mtx_arrivals(batch: MtxBatch, row: Ints, t_arrival_ns: Ints) -> Arrivals:
+    return Arrivals(batch.counter, row, t_arrival_ns[row], np.full(len(row), PLAIN))
+
+
+def _last(frames: Frames, times: Times, identifier: int) -> bytes | None:
+    """Body of the last message with this id and a believable time."""
+    place, rows = frames.rows(identifier)
+    kept = np.flatnonzero(~np.isnan(times.board_s[place]))
+    return rows[kept[-1]].tobytes() if len(kept) else None

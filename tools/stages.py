@@ -1,0 +1,87 @@
+"""Where the time of a replay goes: seconds of each stage, the least of some rounds.
+
+In: a recording and its plan. Out: a table on the terminal. Kernels are compiled and loaded before the clock starts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from echostep.plan import load_plan
+from echostep.recording import open_recording
+from echostep.tracker import Tracker
+
+Spent = dict[str, float]
+
+
+def clocked(stage: str, work: Callable[..., Any], spent: Spent) -> Callable[..., Any]:
+    """The same work, its time added to a stage."""
+
+    def run(*arguments: Any) -> Any:
+        began = time.perf_counter()
+        found = work(*arguments)
+        spent[stage] = spent.get(stage, 0.0) + time.perf_counter() - began
+        return found
+
+    return run
+
+
+def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
+    """Seconds of each stage, and the span of the estimates."""
+    tracker, spent = Tracker(load_plan(plan_path)), Spent()
+    tracker.warm_up()
+    recording, intake = open_recording(path), tracker.intake
+    for stage, owner, name in (
+        ("board frames", intake.board, "frames"),
+        ("MTx samples", intake.mtx, "feed"),
+        ("timeline", intake.timeline, "times"),
+        ("foot and path", intake, "_follow"),
+        ("all of the intake", intake, "take"),
+    ):
+        setattr(owner, name, clocked(stage, getattr(owner, name), spent))
+    began = time.perf_counter()
+    estimates = [e for portion in recording.portions() for e in tracker.take(portion)]
+    spent["replay"] = time.perf_counter() - began
+    return spent, estimates[-1].t_s - estimates[0].t_s
+
+
+def reading(path: Path) -> float:
+    """Seconds to read the recording."""
+    recording, began = open_recording(path), time.perf_counter()
+    for _ in recording.portions():
+        pass
+    return time.perf_counter() - began
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("--plan", type=Path, default=Path("host/echostep/plans/demo.json"))
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    runs = [replay(options.recording, options.plan) for _ in range(options.rounds)]
+    least = {stage: min(spent[stage] for spent, _ in runs) for stage in runs[0][0]}
+    read_s, span_s = min(reading(options.recording) for _ in range(options.rounds)), runs[0][1]
+    inner = ("board frames", "MTx samples", "timeline", "foot and path")
+    rows = {"reading the recording": read_s} | {stage: least[stage] for stage in inner}
+    rows["ports, pings, waiting"] = least["all of the intake"] - sum(least[stage] for stage in inner)
+    rows["bytes to legs and pings"] = read_s + least["all of the intake"]
+    rows["cloud and estimates"] = least["replay"] - rows["bytes to legs and pings"]
+    rows["replay"] = least["replay"]
+    table = Table(
+        "stage", "ms", "x real time", title=f"{options.recording}: {span_s:.0f} s of walk, least of {options.rounds}"
+    )
+    for stage, seconds in rows.items():
+        table.add_row(stage, f"{1e3 * seconds:.1f}", f"{span_s / seconds:.0f}", end_section=stage == inner[-1])
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()
