@@ -26,17 +26,21 @@ UNWATCHED_SD_M = 0.75
 
 @dataclass(frozen=True, slots=True)
 class GaitSettings:
-    """Where the foot is: `foot_left_m` to the left of the trunk (negative: right foot); `half_stance_s` until it has been observed."""
+    """Where the foot is: `foot_left_m` to the left of the trunk (negative: right foot); `half_stance_s` until it has been observed.
+
+    `anchor_sd_m`: how exactly the trunk passes over the foot, per axis; not the same for every person, but from step to step.
+    """
 
     foot_left_m: float = -0.08
     half_stance_s: float = 0.25
+    anchor_sd_m: float = 0.025
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
     """The trunk moves evenly by (dx, dy) in the walk frame, from `t0_s` to `t1_s`, turning from `heading0_rad` to `heading1_rad`.
 
-    `sd_m` is the move's standard deviation per axis, `turn_sd_rad` the growth of the yaw error. `step` counts steps so far.
+    `sd_m` is the move's standard deviation per axis, `turn_sd_rad` the growth of the yaw error. `step` counts steps so far. `anchor_sd_m`: of both ends, alike.
     """
 
     t0_s: float
@@ -48,6 +52,7 @@ class Leg:
     sd_m: float
     turn_sd_rad: float
     step: int
+    anchor_sd_m: float = 0.0
 
     @property
     def unwatched(self) -> bool:
@@ -124,13 +129,13 @@ class TrunkPath:
         t0, x0, y0, heading0 = self._anchor or (t_s - 1.0, x, y, heading)
         t_s = max(t_s, t0)
         self._anchor = (t_s, x, y, heading)
-        return Leg(t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps)
+        return Leg(t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m)
 
     def _stay(self, t_s: float) -> Leg:
         assert self._anchor is not None
         t0, x, y, heading = self._anchor
         self._anchor = (t_s, x, y, heading)
-        return Leg(t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps)
+        return Leg(t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps, self._settings.anchor_sd_m)
 
     def _trunk(self, heading: float) -> tuple[float, float]:
         """Where the trunk is above this foot; left of the heading is (-sin, cos)."""

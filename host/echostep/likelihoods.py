@@ -32,7 +32,7 @@ class EchoSettings:
     `correlation_m`: travel over which errors of successive echoes become independent.
     """
 
-    sd_m: float = 0.05
+    sd_m: float = 0.045
     slant_m: float = 0.05
     rim_db: float = 6.0
     maximum_m: float = 6.0
@@ -41,8 +41,8 @@ class EchoSettings:
     edge_db: float = 20.0
     short: float = 0.1
     stray: float = 0.3
-    outlier: float = 0.04
-    correlation_m: float = 0.07
+    outlier: float = 0.05
+    correlation_m: float = 0.06
 
     def __post_init__(self) -> None:
         """Raise ValueError for lengths of zero and for probabilities that are none."""

@@ -1,34 +1,36 @@
 """The map filter: legs of the trunk's path and the echoes heard on them in, estimates out.
 
-In: `Leg`s in order of time, each with all pings triggered on it. Out: an `Estimate` at the end of each leg. Owns the cloud and what is known beside it:
+In: `Passage`s, a leg each with the pings triggered on it, in order of time. Out: an `Estimate` at the end of each leg. Owns the cloud and what is known beside it:
 how much news an echo brings, and how far the plan explains what is heard.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.calibration import Echo
 from echostep.estimate import Estimate, estimate
-from echostep.gait import Leg
+from echostep.gait import wrap
 from echostep.likelihoods import EchoSettings, echo_model
-from echostep.particles import NOTHING, Cloud, CloudSettings, Heard, Move
+from echostep.particles import Cloud, CloudSettings, Heard, Move
 from echostep.plan import Pose
+from echostep.waiting import Passage
 from echostep.walls import WallIndex
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
-RANGER_AXES_RAD = (0.5 * math.pi, -0.5 * math.pi)
+RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])
 EXPLAINED_SHARE = 0.1
 UNEXPLAINED = -1.5  # a tracked walk has +1, an echo that fits nowhere -5: the plan does not explain what is heard
 LOST_SD_M = 3.0
 REGAIN_M = 10.0
-BELIEVED, DISBELIEVED = 1.2, -2.0  # of `explained`: echoes count in full, and with a fifth
-LEAST_TRUST = 0.2
+BELIEVED, DISBELIEVED = 1.2, -1.0  # of `explained`: echoes count in full, and with a tenth
+LEAST_TRUST = 0.1
+TURNING_RAD = math.radians(15.0)  # a leg that turns more than this is no straight line, and its headings are guesses in between
+EXACT_SD_M = 0.01  # no plan is more exact
 PLAN_SD_M = 0.15  # how far off a plan may be that explains little of what is heard
 
 
@@ -49,48 +51,50 @@ class MapFilter:
         self._gone_m = 0.0
         self._last_m = [-math.inf, -math.inf]
 
-    def follow(self, leg: Leg, heard: Sequence[Echo]) -> Estimate:
-        """Move along a leg and weigh by its pings, in order of their times."""
+    def follow(self, passage: Passage) -> Estimate:
+        """Move along a leg and weigh by its pings."""
+        leg = passage.leg
         move = Move(leg.dx_m, leg.dy_m, leg.sd_m, leg.turn_sd_rad)
         if leg.unwatched:
             self.cloud.scatter(move)
             self._doubt_m = math.hypot(self._doubt_m, leg.sd_m)
         else:
-            pings = self._pings(leg, heard)
-            self._judge(self.cloud.follow(move, pings, self._model, self._walls), pings)
+            heard = self._heard(passage)
+            self._judge(self.cloud.follow(move, heard, self._model, self._walls), heard.power)
             self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) / REGAIN_M)
-        return estimate(
-            self.cloud,
-            leg.t1_s,
-            leg.heading1_rad,
-            leg.step,
-            math.hypot(self._doubt_m, PLAN_SD_M * (1.0 - self._trust())),
-        )
+        doubt_m = math.hypot(self._doubt_m, leg.anchor_sd_m, PLAN_SD_M * (1.0 - self._trust()), EXACT_SD_M)
+        return estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, doubt_m)
 
-    def _pings(self, leg: Leg, heard: Sequence[Echo]) -> Heard:
-        if not heard:
-            return NOTHING
+    def _heard(self, passage: Passage) -> Heard:
+        """The pings with their place on the leg, the axis that they were sent along, and the news that they bring."""
+        leg = passage.leg
         length, span_s = math.hypot(leg.dx_m, leg.dy_m), leg.t1_s - leg.t0_s
-        rows = []
-        for ping in heard:
-            share = min(max((ping.t_s - leg.t0_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
-            axis = leg.heading_rad(ping.t_s) + RANGER_AXES_RAD[ping.ranger]
-            rows.append((share, axis, ping.range_m or 0.0, self._news(ping.ranger, self._gone_m + share * length)))
+        share = np.clip((passage.t_s - leg.t0_s) / span_s, 0.0, 1.0) if span_s > 0.0 else np.ones(len(passage.t_s))
+        axis = leg.heading0_rad + share * wrap(leg.heading1_rad - leg.heading0_rad) + RANGER_AXES_RAD[passage.ranger]
+        range_m = np.where(np.isnan(passage.range_m), 0.0, passage.range_m)
+        power = self._news(passage.ranger, self._gone_m + share * length)
+        power /= 1.0 + (wrap(leg.heading1_rad - leg.heading0_rad) / TURNING_RAD) ** 2
         self._gone_m += length
-        return Heard(*np.array(rows).T.copy())
+        return Heard(share, axis, range_m, power)
 
-    def _news(self, ranger: int, at_m: float) -> float:
-        """Share of independent information in this ranger's next echo: errors are correlated over some travel."""
-        travel, self._last_m[ranger] = at_m - self._last_m[ranger], at_m
-        return min(travel / self._echo.correlation_m, 1.0) * self._trust()
+    def _news(self, ranger: Ints, at_m: Floats) -> Floats:
+        """Share of independent information in each ping: errors of one ranger's echoes are correlated over some travel."""
+        power = np.zeros(len(at_m))
+        for which in (0, 1):
+            mine = np.flatnonzero(ranger == which)
+            if len(mine):
+                travel = np.diff(at_m[mine], prepend=self._last_m[which])
+                power[mine] = np.minimum(travel / self._echo.correlation_m, 1.0)
+                self._last_m[which] = float(at_m[mine[-1]])
+        return power * self._trust()
 
     def _trust(self) -> float:
         """Echoes are believed as far as the plan has explained them lately: furniture, passers-by and wrong plans repeat themselves."""
         return min(max((self.explained - DISBELIEVED) / (BELIEVED - DISBELIEVED), LEAST_TRUST), 1.0)
 
-    def _judge(self, explained: Floats, pings: Heard) -> None:
+    def _judge(self, explained: Floats, news: Floats) -> None:
         """A running mean of how well the plan explains the echoes; below a threshold nobody should trust the cloud."""
-        for value, power in zip(explained.tolist(), pings.power.tolist(), strict=True):
+        for value, power in zip(explained.tolist(), news.tolist(), strict=True):
             self.explained += power * EXPLAINED_SHARE * (value - self.explained)
             if self.explained < UNEXPLAINED:
                 self._doubt_m = max(self._doubt_m, LOST_SD_M)

@@ -14,8 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.calibration import Echo
-from echostep.estimate import Estimate
 from echostep.evaluate.study import Row, Study, print_table, summary, write_json, write_parquet
 from echostep.gait import Leg
 from echostep.girard2011 import Girard, GirardSettings
@@ -34,6 +32,7 @@ from echostep.simulation.sites import (
     thousand,
     with_doors,
 )
+from echostep.waiting import Passage
 from echostep.walls import build_index
 
 Floats = NDArray[np.float64]
@@ -44,12 +43,12 @@ HALL_X_M = 0.0
 SITES: dict[str, Callable[[int], Site]] = {
     "furniture": furnished,
     "doors": with_doors,
-    "hall": lambda seed: hall(),
+    "hall": lambda _: hall(),
     "plan": mistaken,
     "displaced": displaced,
-    "parallel": lambda seed: parallel(),
-    "angles": lambda seed: angled(),
-    "thousand": lambda seed: thousand(),
+    "parallel": lambda _: parallel(),
+    "angles": lambda _: angled(),
+    "thousand": lambda _: thousand(),
 }
 PAPER: tuple[Row, ...] = (  # [Girard 2011, Table 1]
     {"name": "imu", "mean_m": 0.59, "sd_m": 0.35, "max_m": 1.47, "min_m": 0.01, "ending_m": 1.47},
@@ -148,11 +147,13 @@ def default(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
     x0, y0 = walk.trunk_m[0].tolist()
     start = Pose(x0, y0, walk.start_heading_rad)
     ours = MapFilter(build_index(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
-    pings = _Pings(walk)
+    since_s = -math.inf
     for k, (turning, step) in enumerate(_legs(walk)):
         if turning is not None:
-            ours.follow(turning, pings.until(turning.t1_s))
-        found = ours.follow(step, pings.until(step.t1_s))
+            ours.follow(_passage(turning, walk, since_s))
+            since_s = turning.t1_s
+        found = ours.follow(_passage(step, walk, since_s))
+        since_s = step.t1_s
         cloud = np.column_stack([ours.cloud.x_m, ours.cloud.y_m])
         yield Seen((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
 
@@ -164,22 +165,11 @@ SYSTEMS: dict[str, Callable[[Site, MarkerWalk, int], Iterator[Seen]]] = {
 }
 
 
-class _Pings:
-    """The pings of a walk, handed out in order of time."""
-
-    def __init__(self, walk: MarkerWalk) -> None:
-        p = walk.pings
-        self._left = [
-            Echo(t, r, None if math.isnan(z) else z)
-            for t, r, z in zip(p.t_s.tolist(), p.ranger.tolist(), p.range_m.tolist(), strict=True)
-        ]
-        self._given = 0
-
-    def until(self, t_s: float) -> list[Echo]:
-        first = self._given
-        while self._given < len(self._left) and self._left[self._given].t_s <= t_s:
-            self._given += 1
-        return self._left[first : self._given]
+def _passage(leg: Leg, walk: MarkerWalk, since_s: float) -> Passage:
+    """A leg with the pings since the one before it."""
+    p = walk.pings
+    on_it = (p.t_s > since_s) & (p.t_s <= leg.t1_s)
+    return Passage(leg, p.t_s[on_it], p.ranger[on_it], p.range_m[on_it])
 
 
 def _legs(walk: MarkerWalk) -> Iterator[tuple[Leg | None, Leg]]:
