@@ -29,9 +29,8 @@ class OnBoardFilter:
     specific force may be, then it counts half. `calm_field`: the same for the field's strength, as a share of the first one.
     """
 
-    level_s: float = 5.0
+    level_s: float = 6.0
     north_s: float = 5.0
-    calm_m_s2: float = 5.0
     calm_field: float = 0.5
 
 
@@ -45,17 +44,16 @@ def orientations(
     settings = settings or OnBoardFilter()
     field = np.zeros((len(t_s), 3)) if mag is None else np.asarray(mag, np.float64)
     found = np.empty((len(t_s), 3, 3))
-    arrays = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro, field))
-    _follow(*arrays, settings.level_s, settings.north_s, settings.calm_m_s2, settings.calm_field, found)
+    t_s, accel, gyro, field = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro, field))
+    gains = np.array([settings.level_s, settings.north_s, settings.calm_field])
+    _follow(t_s, accel, gyro, field, gains, found)
     return found
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(
-    t_s: Floats, accel: Floats, gyro: Floats, mag: Floats,
-    level_s: float, north_s: float, calm_m_s2: float, calm_field: float, found: Floats,
-) -> None:  # fmt: skip
-    """Fill `found`; see `orientations`."""
+def _follow(t_s: Floats, accel: Floats, gyro: Floats, mag: Floats, gains: Floats, found: Floats) -> None:
+    """Fill `found`; see `orientations`. `gains` (3,): the settings in their order."""
+    level_s, north_s, calm_field = gains
     r, strength = np.eye(3), 0.0
     for k in range(len(t_s)):
         field = math.sqrt(mag[k, 0] ** 2 + mag[k, 1] ** 2 + mag[k, 2] ** 2)
@@ -65,10 +63,11 @@ def _follow(
         else:
             dt = t_s[k] - t_s[k - 1]
             r = r @ _turned(0.5 * dt * (gyro[k - 1] + gyro[k]))
-            r = _turned(_lean(r, accel[k], calm_m_s2) * min(dt / level_s, 1.0)) @ r
+            pull = _lean(r, accel[k]) * min(dt / level_s, 1.0)
             if field > 0.0:
                 off = (field - strength) / (calm_field * strength)
-                r = _turned(_astray(r, mag[k]) * min(dt / north_s, 1.0) / (1.0 + off * off)) @ r
+                pull += _astray(r, mag[k]) * min(dt / north_s, 1.0) / (1.0 + off * off)
+            r = _turned(pull) @ r
         found[k] = r
 
 
@@ -103,12 +102,10 @@ def _turned(v: Floats) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
-def _lean(r: Floats, accel: Floats, calm_m_s2: float) -> Floats:
+def _lean(r: Floats, accel: Floats) -> Floats:
     """Rotation vector (3,) in the world that would stand the specific force upright, less where its size is not that of gravity."""
-    size = max(math.sqrt(np.sum(accel**2)), 1e-9)
-    up = r @ accel / size
-    off = (size - GRAVITY_M_S2) / calm_m_s2
-    return np.array([up[1], -up[0], 0.0]) / (1.0 + off * off)
+    up = r @ accel / GRAVITY_M_S2
+    return np.array([up[1], -up[0], 0.0])
 
 
 @njit(cache=True, error_model="numpy")
