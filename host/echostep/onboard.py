@@ -29,7 +29,7 @@ class OnBoardFilter:
     specific force may be, then it counts half. `calm_field`: the same for the field's strength, as a share of the first one.
     """
 
-    level_s: float = 6.0
+    level_s: float = 10.0
     north_s: float = 5.0
     calm_field: float = 0.5
 

@@ -19,6 +19,7 @@ from echostep.simulation.walker import Person, Walk, Waypoint, walk
 
 BUILDING = 2008  # seed of the field that the steel of every building makes; the people differ from run to run, the buildings do not
 LANE_M = 0.5  # from the middle of a corridor
+HEIGHT_M = 0.6
 STAND_S = 5.0
 STRIDE_M, STRIDE_S = (1.3, 0.08), (1.1, 0.05)  # mean and standard deviation over people [Perry 1992]
 
@@ -68,6 +69,14 @@ def _round_the_machines() -> tuple[Waypoint, ...]:
     return (*there, *back)
 
 
+def _row(
+    first_m: tuple[float, float], step_m: tuple[float, float], count: int, moment_a_m2: tuple[float, float, float]
+) -> tuple[Machine, ...]:
+    """Equal machines in a row, their middles `HEIGHT_M` above the floor."""
+    (x, y), (dx, dy) = first_m, step_m
+    return tuple(Machine((x + k * dx, y + k * dy, HEIGHT_M), moment_a_m2) for k in range(count))
+
+
 TRAILS = (
     Trail("line", 88.0, ((0.0, 0.0), (44.0, 0.0), (0.0, 0.0)), (), 2.0, "Figure 3: +2 %"),
     Trail(
@@ -76,7 +85,10 @@ TRAILS = (
     Trail("rectangle", 11.5, ((0.0, 0.0), (3.5, 0.0), (3.5, 2.25), (0.0, 2.25), (0.0, 0.0)), (), -7.0, "-7 %, closed"),
     Trail(
         "offices", 140.0, _corridor_with_offices(),
-        (Machine((25.0, -2.0, 0.6), (-1000.0, -500.0, 0.0)), Machine((43.0, 2.0, 0.6), (1000.0, -500.0, 0.0))),
+        (
+            *_row((23.0, -1.7), (2.0, 0.0), 3, (-1200.0, -1200.0, 0.0)),
+            *_row((41.0, 1.7), (2.0, 0.0), 3, (1200.0, -1200.0, 0.0)),
+        ),
         None, "Figure 5: drifts off after 40 m",
     ),
     Trail(
@@ -86,14 +98,16 @@ TRAILS = (
             (12.0, 24.0), (12.0, 12.0), (24.0, 12.0), (24.0, 4.0), (0.0, 4.0), (0.0, 0.0),
         ),
         (
-            Machine((12.0, 6.0, 0.8), (800.0, 800.0, -300.0)), Machine((30.0, 10.0, 0.8), (-1200.0, 0.0, 300.0)),
-            Machine((18.0, 18.0, 0.8), (0.0, -1200.0, 0.0)), Machine((30.0, 22.0, 0.8), (900.0, 600.0, -400.0)),
+            *_row((14.0, 1.6), (3.0, 0.0), 2, (1000.0, -1000.0, -300.0)),
+            *_row((27.0, 9.6), (3.0, 0.0), 2, (-1000.0, -1000.0, 300.0)),
+            *_row((20.0, 17.6), (3.0, 0.0), 2, (1000.0, -1000.0, 0.0)),
+            *_row((13.6, 19.0), (0.0, 3.0), 2, (1000.0, 500.0, -300.0)),
         ),
         None, "strong errors at places",
     ),
     Trail(
         "machinery", 220.0, _round_the_machines(),
-        tuple(Machine((2.0, 10.0 + 2.5 * k, 0.6), (800.0, 0.0, -200.0)) for k in range(9)),
+        _row((2.0, 10.0), (0.0, 2.5), 12, (1500.0, 0.0, -400.0)),
         None, "Figure 6: unusable",
     ),
 )  # fmt: skip
