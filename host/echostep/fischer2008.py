@@ -7,8 +7,9 @@ acceleration and rate of turn has been below a threshold for more than 0.2 s; in
 (Figure 2). What it leaves open is decided here, in the simplest way, and nothing is added that would correct its errors:
 
 - Gravity is 9.81 m/s2 along the world's z axis, and is taken away after the rotation.
-- The product is of the raw readings, gravity included, in m/s2 times rad/s: near rest it is 9.81 times the rate.
-- The threshold, "empirically determined", is 5: about 30 deg/s of a standing foot. Of 3, 5 and 8 it lost the fewest stances of the simulated line.
+- The product is of the raw readings, gravity included, in m/s2 times rad/s: near rest it is 9.81 times the rate, so 16 is 93 deg/s.
+- The threshold, "empirically determined", is 16 here: the lowest even number with which none of 200 real stances is missed (both feet of six walks
+  with an Xsens MTw at 100 Hz, xsens_mtw_voisard; the footfalls there are marked by hand). It calls 6 of the swings a stance too early.
 - A stance is known only when the 0.2 s are over, for their implementation was on-line: until then the velocity's error is still integrated.
 - What velocity has drifted by the end of a swing is dropped, not spread back over the swing.
 - Integrals are trapezoids, from sample to sample. Over a gap nothing is integrated, and the velocity begins at zero after it.
@@ -33,7 +34,7 @@ Flags = NDArray[np.bool_]
 class Fischer2008:
     """`threshold`: of the product, m/s2 times rad/s (open in the paper). `stance_s`: how long it stays below (printed)."""
 
-    threshold: float = 5.0
+    threshold: float = 16.0
     stance_s: float = 0.2
 
 
@@ -125,14 +126,15 @@ def events(t_s: Floats, position: Floats, heading: Floats, stance: Flags) -> lis
     return found
 
 
-def usable(t_s: Floats, accel: Floats, gyro: Floats, orientation: Floats) -> tuple[Flags, FootCounts]:
+def usable(t_s: Floats, accel: Floats, gyro: Floats, orientation: Floats | None = None) -> tuple[Flags, FootCounts]:
     """Which samples are samples (n,), and the counts of those that are not; raises ValueError for arrays of other shapes."""
-    shapes = np.shape(t_s), np.shape(accel), np.shape(gyro), np.shape(orientation)
     n = len(t_s)
+    matrices = np.zeros((n, 3, 3)) if orientation is None else orientation
+    shapes = np.shape(t_s), np.shape(accel), np.shape(gyro), np.shape(matrices)
     if shapes != ((n,), (n, 3), (n, 3), (n, 3, 3)):
         raise ValueError(f"samples of shapes {shapes}; expected (n,), (n, 3), (n, 3), (n, 3, 3)")
     with np.errstate(invalid="ignore"):
-        possible = np.isfinite(t_s) & np.isfinite(orientation).all(axis=(1, 2))
+        possible = np.isfinite(t_s) & np.isfinite(matrices).all(axis=(1, 2))
         possible &= (np.abs(accel) < MAX_ACCEL_M_S2).all(axis=1) & (np.abs(gyro) < MAX_RATE_RAD_S).all(axis=1)
     good = _advancing(np.asarray(t_s, np.float64), possible)
     gaps = int(_gap(np.asarray(t_s)[good]).sum())

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep import fischer2008
-from echostep.evaluate.study import Row, Study, print_table, summary, write_json
+from echostep.evaluate.study import Row, Study, console, print_table, summary, write_json
 from echostep.foot import Track, walk_track
 from echostep.simulation.mtx import MtxSamples
 from echostep.simulation.trails import TRAILS, Trail, measure_trail, walk_trail
@@ -26,16 +26,12 @@ Floats = NDArray[np.float64]
 RATES_HZ = (100, 50)
 METHODS = ("fischer2008", "default")
 COLUMNS = {
-    "name": "trail / method",
-    "distance_m": "walked m",
-    "distance_error_percent": "distance %",
+    "name": "trail/method",
+    "distance_error_percent": "way %",
     "printed": "printed",
-    "heading_error_deg": "heading rms deg",
-    "heading_max_deg": "max",
-    "mean_m": "mean m",
-    "sd_m": "sd",
+    "heading_error_deg": "turned",
     "max_m": "max",
-    "ending_m": "end",
+    "ending_m": "end m",
     "lost": "lost",
 }
 
@@ -59,7 +55,13 @@ def trails(runs: int, seed: int, folder: Path, json_path: Path | None, scheduler
     rows = summaries(study.rows())
     if json_path:
         write_json(json_path, "trails", runs, seed, rows)
-    print_table(f"Trails of Fischer et al. 2008, simulated, {runs} runs", rows, COLUMNS)
+    for rate_hz in RATES_HZ:
+        shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in rows if row["rate_hz"] == rate_hz]
+        print_table(f"Trails of Fischer et al. 2008, simulated: {runs} runs at {rate_hz} Hz", shown, COLUMNS)
+    console.print(
+        "way: error of the distance walked; printed: the paper's own; turned: rms error of the heading, degrees; max, end: error of the "
+        "position, metres; lost: runs that end more than 3 m off."
+    )
     draw_trails(folder, seed)
     return rows
 

@@ -26,7 +26,7 @@ STRIDE_M, STRIDE_S = (1.3, 0.08), (1.1, 0.05)  # mean and standard deviation ove
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """A way from a start back to it. `printed`: what the paper says of it; `printed_percent`: its distance error, where it gives one."""
+    """A way from a start back to it. `printed`: what the paper says of it, in short; `printed_percent`: its distance error."""
 
     name: str
     length_m: float
@@ -78,18 +78,18 @@ def _row(
 
 
 TRAILS = (
-    Trail("line", 88.0, ((0.0, 0.0), (44.0, 0.0), (0.0, 0.0)), (), 2.0, "Figure 3: +2 %"),
+    Trail("line", 88.0, ((0.0, 0.0), (44.0, 0.0), (0.0, 0.0)), (), 2.0, "+2 %"),
     Trail(
-        "l", 54.0, ((0.0, 0.0), (17.0, 0.0), (17.0, 10.0), (17.0, 0.0), (0.0, 0.0)), (), -8.0, "Figure 4: -8 %"
+        "l", 54.0, ((0.0, 0.0), (17.0, 0.0), (17.0, 10.0), (17.0, 0.0), (0.0, 0.0)), (), -8.0, "-8 %"
     ),
-    Trail("rectangle", 11.5, ((0.0, 0.0), (3.5, 0.0), (3.5, 2.25), (0.0, 2.25), (0.0, 0.0)), (), -7.0, "-7 %, closed"),
+    Trail("rectangle", 11.5, ((0.0, 0.0), (3.5, 0.0), (3.5, 2.25), (0.0, 2.25), (0.0, 0.0)), (), -7.0, "-7 %"),
     Trail(
         "offices", 140.0, _corridor_with_offices(),
         (
             *_row((23.0, -1.7), (2.0, 0.0), 3, (-1200.0, -1200.0, 0.0)),
             *_row((41.0, 1.7), (2.0, 0.0), 3, (1200.0, -1200.0, 0.0)),
         ),
-        None, "Figure 5: drifts off after 40 m",
+        None, "drifts off",
     ),
     Trail(
         "workshop", 200.0,
@@ -103,11 +103,11 @@ TRAILS = (
             *_row((20.0, 17.6), (3.0, 0.0), 2, (1000.0, -1000.0, 0.0)),
             *_row((13.6, 19.0), (0.0, 3.0), 2, (1000.0, 500.0, -300.0)),
         ),
-        None, "strong errors at places",
+        None, "at places",
     ),
     Trail(
         "machinery", 220.0, _round_the_machines(),
         _row((2.0, 10.0), (0.0, 2.5), 12, (1500.0, 0.0, -400.0)),
-        None, "Figure 6: unusable",
+        None, "unusable",
     ),
 )  # fmt: skip
