@@ -81,7 +81,8 @@ def _follow(t_s: Floats, accel: Floats, gyro: Floats, mag: Floats, gains: Floats
 @njit(cache=True, error_model="numpy")
 def _at_rest(accel: Floats, mag: Floats) -> Floats:
     """The attitude of a sensor at rest from one sample, (3, 3); without a field the sensor's x axis is north."""
-    up = accel / max(math.sqrt(np.sum(accel**2)), 1e-9)
+    force = math.sqrt(np.sum(accel**2))
+    up = accel / force if force > 1e-6 else np.array([0.0, 0.0, 1.0])
     ahead = mag if np.sum(mag**2) > 0.0 else np.array([1.0, 0.0, 0.0])
     north = ahead - up * np.sum(up * ahead)
     size = math.sqrt(np.sum(north**2))
