@@ -58,6 +58,7 @@ def trails(runs: int, seed: int, folder: Path, json_path: Path | None, scheduler
     for rate_hz in RATES_HZ:
         shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in rows if row["rate_hz"] == rate_hz]
         print_table(f"Trails of Fischer et al. 2008, simulated: {runs} runs at {rate_hz} Hz", shown, COLUMNS)
+    console.print("Printed and simulated error of the way: " + "; ".join(_ranges(rows)))
     console.print(
         "way: error of the distance walked; printed: the paper's own; turned: rms error of the heading, degrees; max, end: error of the "
         "position, metres; lost: runs that end more than 3 m off."
@@ -107,6 +108,15 @@ def summaries(rows: list[Row]) -> list[Row]:
     """One row for each trail, method and rate, over all runs."""
     names = dict.fromkeys(row["name"] for row in rows)
     return [_summary([row for row in rows if row["name"] == name]) for name in names]
+
+
+def _ranges(rows: list[Row]) -> list[str]:
+    """The printed distance errors, each with the range of the simulated walkers."""
+    return [
+        f"{row['name']} {row['printed']}, {row['distance_error_min_percent']:+.1f} to {row['distance_error_max_percent']:+.1f} %"
+        for row in rows
+        if row.get("printed_distance_error_percent") is not None
+    ]
 
 
 def _summary(rows: list[Row]) -> Row:
