@@ -109,12 +109,15 @@ def replay(
 def foot(
     imu: Annotated[Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    profile: Annotated[
+        str, typer.Option("--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning.")
+    ] = "default",
     plot: Annotated[bool, typer.Option("--plot", help="Draw it beside the track, as PNG.")] = False,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
     from echostep import runs
 
-    runs.foot(imu, out, plot=plot)
+    runs.foot(imu, out, profile, plot=plot)
 
 
 @app.command()

@@ -20,6 +20,7 @@ from echostep.foot import Track
 Floats = NDArray[np.float64]
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
+FIELD_COLUMNS = ("mx", "my", "mz")
 TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
 GRAVITY_RANGE_M_S2 = (7.0, 13.0)  # the middle reading of any foot, standing or running
 G_RANGE = (0.7, 1.3)
@@ -30,11 +31,12 @@ MOST_BAD = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """`t_s` (n,), `accel` (n, 3) m/s2, `gyro` (n, 3) rad/s; NaN where the file has no number."""
+    """`t_s` (n,), `accel` (n, 3) m/s2, `gyro` (n, 3) rad/s, `mag` (n, 3) in any unit, None without; NaN where the file has no number."""
 
     t_s: Floats
     accel: Floats
     gyro: Floats
+    mag: Floats | None = None
 
 
 def load_imu(path: Path | str) -> Imu:
@@ -46,7 +48,7 @@ def load_imu(path: Path | str) -> Imu:
         raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
     except (ValueError, csv.Error) as error:
         raise EchostepError(f"{path}: {error}") from error
-    imu = Imu(table[:, 0], table[:, 1:4], table[:, 4:7])
+    imu = Imu(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10] if table.shape[1] > len(COLUMNS) else None)
     if complaint := _complaint(imu):
         raise EchostepError(f"{path}: {complaint}")
     return imu
@@ -56,7 +58,8 @@ def _table(rows: Iterator[list[str]]) -> Floats:
     header = [name.strip() for name in next(rows, [])]
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(f"no column {', '.join(missing)}; expected {','.join(COLUMNS)}[,mx,my,mz]")
-    places = [header.index(name) for name in COLUMNS]
+    optional = FIELD_COLUMNS if all(name in header for name in FIELD_COLUMNS) else ()
+    places = [header.index(name) for name in COLUMNS + optional]
     found = [[_number(row[k]) if k < len(row) else np.nan for k in places] for row in rows if row]
     if len(found) < 2:
         raise ValueError("no samples")

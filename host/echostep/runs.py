@@ -17,15 +17,18 @@ from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
+from echostep import fischer2008
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
-from echostep.foot import walk_track
+from echostep.foot import Track, walk_track
 from echostep.frames import encode
-from echostep.imu import describe_track, load_imu, write_foot_track
+from echostep.imu import Imu, describe_track, load_imu, write_foot_track
 from echostep.messages import Identify
+from echostep.onboard import orientations
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
@@ -134,15 +137,35 @@ def replay(
     _finish(out, tracker, estimates, truth, path.name, elapsed_s)
 
 
-def foot(path: Path, out: Path, *, plot: bool) -> None:
-    """Track a recorded foot IMU."""
+def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
+    """Track a recorded foot IMU by our own method or a paper's."""
+    if profile not in FOOT_PROFILES:
+        raise EchostepError(f"--profile {profile}: the foot has no such profile; it has {', '.join(FOOT_PROFILES)}")
     imu = load_imu(path)
-    track = walk_track(imu.t_s, imu.accel, imu.gyro)
+    track = FOOT_PROFILES[profile](imu)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if plot:
         draw_foot(out.with_suffix(".png"), track, path.name)
         console.print(f"{out} and {out.with_suffix('.png')}")
+
+
+def _own_track(imu: Imu) -> Track:
+    return walk_track(imu.t_s, imu.accel, imu.gyro)
+
+
+def _fischer2008_track(imu: Imu) -> Track:
+    """The paper's method needs the MTx's own matrices, which no CSV holds: a model of its filter makes them."""
+    if imu.mag is None:
+        console.print("Note: no columns mx,my,mz: the MTx's filter is modelled without its magnetometer.")
+    good = fischer2008.usable(imu.t_s, imu.accel, imu.gyro)[0]
+    matrices = np.full((len(imu.t_s), 3, 3), np.nan)
+    mag = None if imu.mag is None else imu.mag[good]
+    matrices[good] = orientations(imu.t_s[good], imu.accel[good], imu.gyro[good], mag)
+    return fischer2008.walk_track(imu.t_s, imu.accel, imu.gyro, matrices)
+
+
+FOOT_PROFILES = {"default": _own_track, "fischer2008": _fischer2008_track}
 
 
 def decode(path: Path) -> None:

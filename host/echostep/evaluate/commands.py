@@ -34,3 +34,17 @@ def girard2011(
     from echostep.evaluate.girard2011 import evaluate_girard2011
 
     evaluate_girard2011(runs, seed, json, out, scheduler)
+
+
+@app.command()
+def trails(
+    runs: Annotated[int, typer.Option("--runs", help="Walks of each trail, each by another person.", min=1)] = 10,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/trails"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated)."""
+    from echostep.evaluate.trails import trails as study
+
+    study(runs, seed, out, json, scheduler)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.onboard import OnBoardFilter, orientations
 from echostep.simulation.attitude import quaternions, rotations, turns
 from echostep.simulation.delivery import deliver
 from echostep.simulation.magnetism import EARTH, Magnetism
@@ -33,6 +34,7 @@ class MtxModel:
     """Errors after the MTx manual (noise densities; biases as left by its calibration), its crystal, its mounting and its cable.
 
     `drift_ppm`: its period against the board's clock. `mounting_rpy_rad`: sensor -> foot. `timer_s`: latency timer of the USB adapter.
+    `filter`: its on-board filter, fed with what it measures; None: a well-behaved one, that only follows the field and leans a little.
     """
 
     rate_hz: float = 100.0
@@ -47,11 +49,23 @@ class MtxModel:
     jitter_s: float = 0.0003
     timer_s: float = 0.001
     first_counter: int = 65_000  # so that it wraps within a short walk
+    filter: OnBoardFilter | None = None
 
     @property
     def baud(self) -> int:
         """What the frames need of the MTx's rates."""
         return 115_200 if self.rate_hz <= 120.0 else 460_800
+
+
+@dataclass(frozen=True, slots=True)
+class MtxSamples:
+    """What an MTx measures: `t_s` (n,); `accel` m/s2, `gyro` rad/s, `mag` earth fields (n, 3) in its axes; `orientation` (n, 3, 3) -> MT world."""
+
+    t_s: Floats
+    accel: Floats
+    gyro: Floats
+    mag: Floats
+    orientation: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,22 +94,21 @@ def feelings(walk: Walk, mounting: Floats | None = None) -> tuple[Floats, Floats
 
 def stream(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: Magnetism | None = None) -> MtxStream:
     """All samples of a walk, each the mean over its interval, as an MTx gives them."""
-    period = (1.0 + model.drift_ppm * 1e-6) / model.rate_hz
-    count = int((walk.t_s[-1] - 2.0 * FIRST_S) / period)
-    t: Floats = FIRST_S + period * np.arange(1, count, dtype=np.float64)
-    accel, gyro, mag, q = _measured(walk, model, t, period, rng, magnetism)
+    found = measure(walk, model, rng, magnetism)
+    t, q = found.t_s, quaternions(found.orientation)
     counters = ((model.first_counter + np.arange(len(t))) & 0xFFFF).tolist()
-    rows = zip(counters, accel.tolist(), gyro.tolist(), mag.tolist(), q.tolist(), strict=True)
+    rows = zip(counters, found.accel.tolist(), found.gyro.tolist(), found.mag.tolist(), q.tolist(), strict=True)
     frames = [encode_frame(MTDATA, pack_mtdata(MtSample(*row))) for row in rows]
     begin_s = t + COMPUTING_S + model.jitter_s * rng.exponential(size=len(t))
     portion_s, portions, arrival_s = deliver(frames, begin_s, model.baud, model.timer_s, rng)
     return MtxStream(t, arrival_s, frames, portion_s, portions)
 
 
-def _measured(
-    walk: Walk, model: MtxModel, t: Floats, period: float, rng: np.random.Generator, magnetism: Magnetism | None
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Specific force, angular rate, magnetic field (n, 3) and quaternion (n, 4) with their errors."""
+def measure(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: Magnetism | None = None) -> MtxSamples:
+    """All samples of a walk, each the mean over its interval, with their errors, before they become bytes."""
+    period = (1.0 + model.drift_ppm * 1e-6) / model.rate_hz
+    count = int((walk.t_s[-1] - 2.0 * FIRST_S) / period)
+    t: Floats = FIRST_S + period * np.arange(1, count, dtype=np.float64)
     mounting = rotations(np.array([model.mounting_rpy_rad]))[0]
     force, rate = (_means(v, t, period) for v in feelings(walk, mounting))
     root = math.sqrt(model.rate_hz)
@@ -113,13 +126,15 @@ def _measured(
     r = rotations(walk.foot_rpy_rad[at]) @ mounting
     field = magnetism.field(walk.foot_m[at, :2]) if magnetism else np.tile(EARTH, (len(t), 1))
     mag = np.einsum("nji,nj->ni", r, field) + model.mag_noise * rng.standard_normal(r.shape[:2])
-    believed = _believed(r, field, model, period, rng)
-    return (
+    if model.filter is None:
+        world = _mt_world(_believed(r, field, model, period, rng))
+    accel, gyro = (
         np.clip(accel, -ACCEL_LIMIT_M_S2, ACCEL_LIMIT_M_S2),
         np.clip(gyro, -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S),
-        mag,
-        quaternions(_mt_world(believed)),
     )
+    if model.filter is not None:
+        world = orientations(t, accel, gyro, mag, model.filter)
+    return MtxSamples(t, accel, gyro, mag, world)
 
 
 def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.random.Generator) -> Floats:
