@@ -106,7 +106,7 @@ class Intake:
         place, pings = frames.rows(PING)
         if not len(place):
             return
-        t_s = times.board_s[place]
+        t_s = times.board_s[place] + self._ranger.delay_s
         range_m = ranges(pings, self._ranger)
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
         rows = np.column_stack([t_s[kept], pings["ranger"][kept], range_m[kept]])
