@@ -31,19 +31,21 @@ PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 
 
 def recorded() -> list[Chunk]:
-    """A short walk whose foot falls silent for a while, with damage on both ports and a port that nobody knows."""
+    """A short walk whose foot is held up for a while and later falls silent, with damage on both ports and a port that nobody knows."""
     rng = random.Random(8)
     chunks = []
     for n, chunk in enumerate(Scenario(PLAN, ((2.0, 7.5), (9.5, 7.5)), 5, PythonBoard(5)).chunks()):
         if chunk.port == MTX and 6_000_000_000 < chunk.t_arrival_ns < 8_500_000_000:
             continue
+        if chunk.port == MTX and 3_000_000_000 < chunk.t_arrival_ns < 5_000_000_000:
+            chunk = replace(chunk, t_arrival_ns=5_000_000_000)
         damaged = bytearray(chunk.data)
         if rng.random() < 0.01:
             damaged[rng.randrange(len(damaged))] = rng.choice([0, 0xFA, 0xFF, 0x32])
         chunks.append(replace(chunk, data=bytes(damaged)))
         if n % 1000 == 0:
             chunks.append(Chunk("kettle", chunk.t_arrival_ns, b"?"))
-    return chunks
+    return sorted(chunks, key=lambda chunk: chunk.t_arrival_ns)
 
 
 CHUNKS = recorded()
@@ -195,7 +197,11 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
     naive, ours, end_s = NaiveWaiting(), Waiting(), 0.0
     n = 400
     board = np.where(np.arange(n) < 5, np.nan, np.cumsum(rng.exponential(0.05, n)))
-    mtx = np.where(np.arange(n) < 9, np.nan, np.minimum(board + rng.normal(0.0, 0.1, n), rng.choice([5.0, 99.0])))
+    mtx = np.where(
+        np.arange(n) < 9,
+        np.nan,
+        np.minimum(board + rng.normal(0.0, rng.choice([0.1, 1.0]), n), rng.choice([5.0, 99.0])),
+    )
     pings: list[list[tuple[float, float, float]]] = []
     legs: list[list[Leg]] = []
     for k in range(n):
@@ -222,3 +228,13 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
                 found.append((piece.t_s,))
     assert found == expected
     assert (ours.late, ours.dropped) == (naive.late, naive.dropped)
+
+
+def test_the_rangers_delay_moves_their_pings() -> None:
+    late = Intake(MtxTiming(), RangerSettings(delay_s=0.01), FootSettings(), GaitSettings())
+    times = [
+        np.concatenate([piece.t_s for piece in ours.take(portion_of(CHUNKS)) if isinstance(piece, Passage)])
+        for ours in (intake(), late)
+    ]
+    both = min(map(len, times)) - 10
+    assert np.allclose(times[1][:both] - times[0][:both], 0.01)

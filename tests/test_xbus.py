@@ -39,7 +39,7 @@ def stream(seed: int) -> bytes:
     return bytes(octets)
 
 
-def columns(batch: xbus.MtxBatch) -> list[xsens.MtSample]:
+def columns(batch: xbus.MtBatch) -> list[xsens.MtSample]:
     rows = zip(*(getattr(batch, name).tolist() for name in xsens.MtSample._fields), strict=True)
     return [xsens.MtSample(c, *(tuple(v) for v in vectors)) for c, *vectors in rows]
 
@@ -49,7 +49,7 @@ def test_like_the_reader_that_takes_frame_after_frame(seed: int, cuts: list[int]
     octets = stream(seed)
     edges = sorted({0, len(octets), *(min(c, len(octets)) for c in cuts)})
     one, many = xsens.MtxReader(), xbus.MtxReader()
-    found = [s for a, b in zip(edges, edges[1:], strict=False) for s in columns(many.feed(octets[a:b]))]
+    found = [s for a, b in zip(edges, edges[1:], strict=False) for s in columns(many.feed_batch(octets[a:b]))]
     assert found == one.feed(octets)
     assert many.counts == one.counts
 
@@ -57,13 +57,13 @@ def test_like_the_reader_that_takes_frame_after_frame(seed: int, cuts: list[int]
 @given(st.integers(0, 1 << 32))
 def test_a_sample_is_known_with_the_byte_at_its_end_and_not_before(seed: int) -> None:
     octets = stream(seed)
-    whole, reader = xbus.MtxReader().feed(octets), xbus.MtxReader()
-    known = [at + 1 for at in range(len(octets)) for _ in reader.feed(octets[at : at + 1]).counter]
+    whole, reader = xbus.MtxReader().feed_batch(octets), xbus.MtxReader()
+    known = [at + 1 for at in range(len(octets)) for _ in reader.feed_batch(octets[at : at + 1]).counter]
     assert whole.end.tolist() == known
 
 
 @given(st.binary(max_size=4_000))
 def test_noise_never_raises_and_memory_is_bounded(noise: bytes) -> None:
     reader = xbus.MtxReader()
-    reader.feed(noise)
+    reader.feed_batch(noise)
     assert len(reader._rest) <= xsens.MAX_LENGTH + 7

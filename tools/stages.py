@@ -40,7 +40,7 @@ def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
     recording, intake = open_recording(path), tracker.intake
     for stage, owner, name in (
         ("board frames", intake.board, "frames"),
-        ("MTx samples", intake.mtx, "feed"),
+        ("MTx samples", intake.mtx, "feed_batch"),
         ("timeline", intake.timeline, "times"),
         ("foot and path", intake, "_follow"),
         ("all of the intake", intake, "take"),

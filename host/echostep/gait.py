@@ -82,11 +82,6 @@ class TrunkPath:
         self._toe = ToeAngle()
         self.steps = 0
 
-    @property
-    def heading_rad(self) -> float | None:
-        """Heading of the trunk in the walk frame at the last anchor."""
-        return None if self._anchor is None else self._anchor[3]
-
     def stand(self, t_s: Floats, foot_heading_rad: Floats) -> list[tuple[int, Leg]]:
         """The foot is still at all of `t_s` (n,): what becomes known of the trunk, and at which of them."""
         if self._anchor is None and len(t_s):

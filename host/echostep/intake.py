@@ -18,18 +18,21 @@ from echostep.calibration import RangerSettings, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, TrunkPath
-from echostep.messages import ROWS, Identity, Outcome, Ping, Status
+from echostep.messages import BY_ID, ROWS, Identity, Outcome, Ping, Status, Sync
 from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.waiting import Passage, Silence, Waiting
-from echostep.xbus import MtxBatch, MtxReader
+from echostep.xbus import MtBatch, MtxReader
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-IDENTITY, PING, SYNC, STATUS = 0x01, 0x02, 0x06, 0x07
-_TIMED = np.array([identifier in ROWS and "ticks" in (ROWS[identifier].names or ()) for identifier in range(256)])
+_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
+IDENTITY, PING, SYNC, STATUS = (_IDS[kind] for kind in (Identity, Ping, Sync, Status))
+_TIMED = np.array(
+    [i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)]
+)  # the body begins with them
 
 
 @dataclass(slots=True)
@@ -67,7 +70,7 @@ class Intake:
         """What a portion completes; raises StaleFirmwareError when the board has another schema."""
         self._count_unknown(portion)
         from_board, from_mtx = portion.of(BOARD), portion.of(MTX)
-        frames, batch = self.board.frames(from_board.received), self.mtx.feed(from_mtx.received)
+        frames, batch = self.board.frames(from_board.received), self.mtx.feed_batch(from_mtx.received)
         if not len(frames.id) and not len(batch.counter):
             return []
         board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
@@ -103,13 +106,13 @@ class Intake:
         place, pings = frames.rows(PING)
         if not len(place):
             return
-        t_s = times.board_s[place]
+        t_s = times.board_s[place] + self._ranger.delay_s
         range_m = ranges(pings, self._ranger)
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
         rows = np.column_stack([t_s[kept], pings["ranger"][kept], range_m[kept]])
         self._waiting.hear(times.board_at[place[kept]], rows)
 
-    def _follow(self, batch: MtxBatch, times: Times) -> None:
+    def _follow(self, batch: MtBatch, times: Times) -> None:
         """Samples go through the foot to the path, whose legs wait for their pings."""
         kept = np.flatnonzero(~np.isnan(times.mtx_s))
         if not len(kept):
@@ -132,7 +135,7 @@ class Intake:
 
 
 def _board_arrivals(frames: Frames, row: Ints, t_arrival_ns: Ints) -> Arrivals:
-    """The board's messages for the timeline; their bodies begin with the ticks."""
+    """The board's messages for the timeline."""
     ticks = np.ascontiguousarray(frames.body[:, :4]).view("<u4")[:, 0].astype(np.int64)
     kind = np.where(_TIMED[frames.id], PLAIN, SILENT)
     kind[frames.id == IDENTITY] = FIRST_WORD
@@ -141,7 +144,7 @@ def _board_arrivals(frames: Frames, row: Ints, t_arrival_ns: Ints) -> Arrivals:
     return Arrivals(ticks, row, t_arrival_ns[row], kind)
 
 
-def _mtx_arrivals(batch: MtxBatch, row: Ints, t_arrival_ns: Ints) -> Arrivals:
+def _mtx_arrivals(batch: MtBatch, row: Ints, t_arrival_ns: Ints) -> Arrivals:
     return Arrivals(batch.counter, row, t_arrival_ns[row], np.full(len(row), PLAIN))
 
 

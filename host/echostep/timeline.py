@@ -88,11 +88,6 @@ class Timeline:
         """How often the board's clock has begun anew."""
         return int(self._board["restarts"])
 
-    @property
-    def board_jumps(self) -> int:
-        """Board messages whose ticks could not be true."""
-        return int(self._board["jumps"])
-
     def times(self, board: Arrivals, mtx: Arrivals) -> Times:
         """Times of a portion's messages; a board message comes before a sample of the same row."""
         nb, nm = len(board.value), len(mtx.value)

@@ -1,7 +1,7 @@
 """The tracker: bytes in, estimates out. The one place where the stages meet.
 
-In: chunks in order of arrival. Out: estimates. Owns the random generator and one of each stage. Live, replay and simulation all come through
-`Tracker.feed`; nothing in here looks at a wall clock, so equal chunks give equal estimates, bit for bit.
+In: chunks in order of arrival. Out: estimates. Owns the intake, the cloud and the random generator. Live, replay and simulation all come through
+`Tracker.take`; nothing in here looks at a wall clock, so equal chunks give equal estimates, bit for bit, in whatever portions they come.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """MTx samples, many at once: bytes from the MTx's port -> columns.
 
-In: bytes in any split. Out: `MtxBatch`. Owns the unfinished frame, the last counter and the counts. Default message only (54 bytes of MTData).
+In: bytes in any split. Out: `MtBatch`. Owns the unfinished frame, the last counter and the counts. Default message only (54 bytes of MTData).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SKIPPED, _BAD_CHECKSUM, _BAD_LENGTH, _OTHER, _TALLY = range(5)
 
 
 @dataclass(frozen=True, slots=True)
-class MtxBatch:
+class MtBatch:
     """Samples as columns: `counter` (n,), `accel` m/s2, `gyro` rad/s, `mag` (n, 3), `quaternion` (n, 4) w x y z, and `end` (n,).
 
     `end`: how many of the bytes fed had to come until the sample was known: up to the end of its frame, or of a damaged one that hid it.
@@ -40,7 +40,7 @@ class MtxBatch:
 
 
 _NONE, _NO_VECTORS = np.empty(0, np.int64), np.empty((0, 3))
-_NOTHING = MtxBatch(_NONE, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, np.empty((0, 4)), _NONE)
+_NOTHING = MtBatch(_NONE, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, np.empty((0, 4)), _NONE)
 
 
 class MtxReader:
@@ -53,7 +53,7 @@ class MtxReader:
         self._tally = np.zeros(_TALLY, np.int64)
         self._counter = -1
 
-    def feed(self, received: bytes) -> MtxBatch:
+    def feed_batch(self, received: bytes) -> MtBatch:
         """Samples completed by these bytes."""
         if not received:
             return _NOTHING
@@ -73,12 +73,12 @@ class MtxReader:
         )
         return self._gated(bodies[:found].view(_ROW)[:, 0], ends) if found else _NOTHING
 
-    def _gated(self, rows: NDArray[np.void], ends: Ints) -> MtxBatch:
+    def _gated(self, rows: NDArray[np.void], ends: Ints) -> MtBatch:
         """Every gate after the checksum: it is 8 bits wide and lets one damaged frame in 256 through."""
         limits, counts = self._limits, self.counts
-        accel, gyro, mag, q = (rows[name].astype(np.float64) for name in ("accel", "gyro", "mag", "quaternion"))
         counter = rows["counter"].astype(np.int64)
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):  # a damaged float may be a signalling NaN
+            accel, gyro, mag, q = (rows[name].astype(np.float64) for name in ("accel", "gyro", "mag", "quaternion"))
             finite = np.isfinite(np.hstack([accel, gyro, mag, q])).all(1)
             unit = np.abs(np.sqrt((q * q).sum(1)) - 1.0) <= limits.quaternion_error
         near = (np.abs(accel) <= limits.accel_m_s2).all(1) & (np.abs(gyro) <= limits.gyro_rad_s).all(1)
@@ -88,7 +88,7 @@ class MtxReader:
         counts.out_of_range += int((finite & unit & ~near).sum())
         kept = np.flatnonzero(finite & unit & near)
         kept = kept[self._in_order(counter[kept])]
-        return MtxBatch(counter[kept], accel[kept], gyro[kept], mag[kept], q[kept], ends[kept])
+        return MtBatch(counter[kept], accel[kept], gyro[kept], mag[kept], q[kept], ends[kept])
 
     def _in_order(self, counter: Ints) -> NDArray[np.bool_]:
         """Which samples are no repetitions; counts gaps by the sample counter, which wraps after 65535."""
