@@ -124,7 +124,9 @@ class TrunkPath:
         t0, x0, y0, heading0 = self._anchor or (t_s - 1.0, x, y, heading)
         t_s = max(t_s, t0)
         self._anchor = (t_s, x, y, heading)
-        return Leg(t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m)
+        return Leg(
+            t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m
+        )
 
     def _stay(self, t_s: float) -> Leg:
         assert self._anchor is not None

@@ -29,7 +29,9 @@ LOST_SD_M = 3.0
 REGAIN_M = 10.0
 BELIEVED, DISBELIEVED = 1.2, -1.0  # of `explained`: echoes count in full, and with a tenth
 LEAST_TRUST = 0.1
-TURNING_RAD = math.radians(15.0)  # a leg that turns more than this is no straight line, and its headings are guesses in between
+TURNING_RAD = math.radians(
+    15.0
+)  # a leg that turns more than this is no straight line, and its headings are guesses in between
 EXACT_SD_M = 0.01  # no plan is more exact
 PLAN_SD_M = 0.15  # how far off a plan may be that explains little of what is heard
 

@@ -20,6 +20,7 @@ from echostep.sources import Chunk, Portion, portion_of
 from echostep.waiting import Passage
 from echostep.walls import build_index
 
+
 class Tracker:
     """Feed it every chunk; it returns the estimates that the chunk completes."""
 
