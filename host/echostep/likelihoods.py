@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.walls import WALL
+from echostep.reflectors import WALL
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from echostep.gait import Leg
 from echostep.likelihoods import EchoSettings, echo_model
 from echostep.particles import NOTHING, Cloud, CloudSettings, Heard, Move
 from echostep.plan import Pose
-from echostep.walls import WallIndex
+from echostep.reflectors import Walls
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class MapFilter:
     """A cloud on a plan, from a start on."""
 
     def __init__(
-        self, walls: WallIndex, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
+        self, walls: Walls, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
         cloud: CloudSettings | None = None, echo: EchoSettings | None = None,
     ) -> None:  # fmt: skip
         """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`."""

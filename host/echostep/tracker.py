@@ -26,7 +26,7 @@ from echostep.plan import Plan, Pose
 from echostep.settings import Settings
 from echostep.sources import BOARD, MTX, Chunk
 from echostep.timeline import Timeline
-from echostep.walls import build_index
+from echostep.reflectors import Walls
 from echostep.xsens import MtSample, MtxReader
 
 PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
@@ -67,7 +67,7 @@ class Tracker:
         self.timeline = Timeline(self.settings.mtx)
         self.foot = Foot(self.settings.foot)
         self.path = TrunkPath(self.settings.gait)
-        self.walls = build_index(plan.levels[0].walls)
+        self.walls = Walls(plan.levels[0].walls)
         self.cloud: Cloud | None = None
         self.counts = TrackerCounts()
         self.status: Status | None = None

@@ -34,7 +34,7 @@ from echostep.simulation.sites import (
     thousand,
     with_doors,
 )
-from echostep.walls import build_index
+from echostep.reflectors import Walls
 
 Floats = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def dead_reckoned(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
 
 def girard(site: Site, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True) -> Iterator[Seen]:
     """The paper's filter: on its plan or without, with one pair of pings a step or without."""
-    walls = build_index(site.plan) if model else None
+    walls = Walls(site.plan) if model else None
     x0, y0 = walk.trunk_m[0].tolist()
     filter_ = Girard(GirardSettings(), (x0, y0), walls, np.random.default_rng([seed, 20]))
     for k, heading in enumerate(walk.heading_rad.tolist()):
@@ -125,7 +125,7 @@ def default(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
     """Ours: the same steps and headings, and every ping on the way."""
     x0, y0 = walk.trunk_m[0].tolist()
     start = Pose(x0, y0, walk.start_heading_rad)
-    ours = MapFilter(build_index(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
+    ours = MapFilter(Walls(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
     pings = _Pings(walk)
     for k, (turning, step) in enumerate(_legs(walk)):
         if turning is not None:
