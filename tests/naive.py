@@ -17,24 +17,59 @@ def crosses(ax: float, ay: float, bx: float, by: float, walls: Floats) -> bool:
     return any(move.intersects(shapely.LineString(w.reshape(2, 2))) for w in walls)
 
 
-def facing_wall(
-    px: float, py: float, axis_rad: float, walls: Floats, cone_rad: float, reach_m: float
-) -> tuple[float, float]:
-    """Distance and off-axis angle of the nearest unhidden perpendicular in the cone; (inf, 0) when there is none."""
-    here = shapely.Point(px, py)
-    lines = [shapely.LineString(w.reshape(2, 2)) for w in walls]
+def hidden(px: float, py: float, qx: float, qy: float, short_m: float, walls: Floats, but: int = -1) -> bool:
+    """Whether any wall but one meets the sight line from p to `short_m` before q."""
+    length = math.hypot(qx - px, qy - py)
+    if length <= short_m:
+        return False
+    share = 1.0 - short_m / length
+    sight = shapely.LineString([(px, py), (px + share * (qx - px), py + share * (qy - py))])
+    met = shapely.intersects(sight, shapely.linestrings(walls.reshape(-1, 2, 2)))
+    return bool(np.any(met[np.arange(len(walls)) != but]))
+
+
+def echo_sources(px: float, py: float, axis_rad: float, walls: Floats) -> list[tuple[float, float, float]]:
+    """Every (distance, off axis, kind) within 35 degrees and 6.3 m, nearest first; kind 0 wall, 1 edge, 2 corner."""
     found = []
-    for line in lines:
-        (ax, ay), (bx, by) = line.coords
-        along = ((px - ax) * (bx - ax) + (py - ay) * (by - ay)) / line.length
-        if not 0.0 <= along <= line.length:
+    for j, (ax, ay, bx, by) in enumerate(walls.tolist()):
+        length = math.hypot(bx - ax, by - ay)
+        share = ((px - ax) * (bx - ax) + (py - ay) * (by - ay)) / length**2
+        foot = (ax + share * (bx - ax), ay + share * (by - ay))
+        if 0.0 <= share <= 1.0 and not hidden(px, py, *foot, 1e-3, walls, j):
+            found.append((*foot, 0.0))
+    points = corners_and_edges(px, py, walls)
+    heard = []
+    for x, y, kind in found + points:
+        distance = math.hypot(x - px, y - py)
+        off_axis = abs(math.remainder(math.atan2(y - py, x - px) - axis_rad, 2 * math.pi))
+        if not 1e-6 < distance <= 6.3 or off_axis > math.radians(35.0):
             continue
-        foot = line.interpolate(along)
-        distance = here.distance(foot)
-        if distance > reach_m:
+        if kind == 0.0 or not hidden(px, py, x, y, 0.01, walls):
+            heard.append((distance, off_axis, kind))
+    return sorted(heard)
+
+
+def segment_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance of a point from a segment."""
+    share = ((px - ax) * (bx - ax) + (py - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2)
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(ax + share * (bx - ax) - px, ay + share * (by - ay) - py)
+
+
+def corners_and_edges(px: float, py: float, walls: Floats) -> list[tuple[float, float, float]]:
+    """Ends of walls as (x, y, kind) for a listener at p, of those within 1 cm of each other the least, hidden or not."""
+    found = []
+    ends = sorted(set(map(tuple, walls.reshape(-1, 2).tolist())))
+    for x, y in ends:
+        if any(math.hypot(x - u, y - v) <= 0.01 for u, v in ends if (u, v) < (x, y)):
             continue
-        angle = math.remainder(math.atan2(foot.y - py, foot.x - px) - axis_rad, 2 * math.pi)
-        sight = shapely.LineString([(px, py), (px + (foot.x - px) * 0.9999, py + (foot.y - py) * 0.9999)])
-        if abs(angle) <= cone_rad and not any(sight.intersects(other) for other in lines):
-            found.append((distance, abs(angle)))
-    return min(found, default=(math.inf, 0.0))
+        sides = []
+        for ax, ay, bx, by in walls.tolist():
+            if segment_distance(x, y, ax, ay, bx, by) <= 0.01:
+                sides += [math.atan2(v - y, u - x) for u, v in ((ax, ay), (bx, by)) if math.hypot(u - x, v - y) > 0.01]
+        # The sector of the listener: the first wall counter-clockwise and the first wall clockwise.
+        here = math.atan2(py - y, px - x)
+        width = min((a - here) % (2 * math.pi) for a in sides) + min((here - a) % (2 * math.pi) for a in sides)
+        if abs(width - math.pi) >= math.radians(3.0) and width >= math.radians(3.0):
+            found.append((x, y, 2.0 if abs(width - math.pi / 2) <= math.radians(30.0) else 1.0))
+    return found

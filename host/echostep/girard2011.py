@@ -20,7 +20,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.walls import WallIndex, crosses_wall, walls_near
+from echostep.reflectors import Walls
+from echostep.walls import WallIndex, crosses_wall
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,7 +46,7 @@ class Girard:
     """The cloud of one walk; `walls` None: without a model, as in the paper's Figure 11."""
 
     def __init__(
-        self, settings: GirardSettings, start_xy: tuple[float, float], walls: WallIndex | None, rng: np.random.Generator
+        self, settings: GirardSettings, start_xy: tuple[float, float], walls: Walls | None, rng: np.random.Generator
     ) -> None:
         """Step 1: a single particle where the user says he is."""
         self.settings = settings
@@ -73,7 +74,7 @@ class Girard:
     def _propagate(self, vectors: Floats) -> tuple[Floats, Floats, Floats]:
         """Step 4: every vector applied to every particle; those that meet a wall on the way are gone."""
         if self._walls is not None:
-            x, y, parent = moved(self.x_m, self.y_m, vectors, self._walls)
+            x, y, parent = moved(self.x_m, self.y_m, vectors, self._walls.near(self.x_m, self.y_m))
             if len(x):
                 return x, y, self.weight[parent]
             self.lost += 1
@@ -90,9 +91,10 @@ class Girard:
         heard = np.array([s.maximum_m if math.isnan(r) else r for r in ranges_m])
         if self._walls is None:
             return np.ones(len(x))
+        index = self._walls.near(x, y)
         modelled = np.column_stack(
             [
-                readings(x, y, heading_rad + axis, self._walls, s.rays, s.aperture_rad, s.maximum_m)
+                readings(x, y, heading_rad + axis, index, s.rays, s.aperture_rad, s.maximum_m)
                 for axis in RANGER_AXES_RAD
             ]
         )
@@ -188,7 +190,7 @@ def readings(
         angle = axis_rad + (k - 0.5 * (rays - 1)) * aperture_rad / rays
         ux, uy = math.cos(angle), math.sin(angle)
         for i in range(len(x)):
-            away, facing = _first_hit(x[i], y[i], ux, uy, maximum_m, walls_near(x[i], y[i], walls))
+            away, facing = _first_hit(x[i], y[i], ux, uy, maximum_m, walls.walls)
             if facing >= straight:
                 found[i] = min(found[i], away)
     return found

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.walls import WALL
+from echostep.sightlines import CORNER, EDGE
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +39,7 @@ class EchoSettings:
     minimum_m: float = 0.15
     soft_db: float = 2.0
     edge_db: float = 20.0
+    corner_db: float = 3.0
     short: float = 0.1
     stray: float = 0.3
     outlier: float = 0.05
@@ -65,6 +66,7 @@ class EchoModel(NamedTuple):
     per_db: float
     beam: float
     edge: float
+    corner: float
     maximum_m: float
     minimum_m: float
     short: float
@@ -78,13 +80,15 @@ def echo_model(s: EchoSettings) -> EchoModel:
     beam = 2.0 * s.rim_db / math.radians(27.5) ** 2
     reach = per_db * (20.0 * math.log10(s.maximum_m) + ABSORPTION_DB_M * s.maximum_m)
     return EchoModel(
-        s.sd_m, s.slant_m, reach, per_db, per_db * beam, per_db * s.edge_db,
+        s.sd_m, s.slant_m, reach, per_db, per_db * beam, per_db * s.edge_db, per_db * s.corner_db,
         s.maximum_m, s.minimum_m, s.short, s.stray, s.outlier,
     )  # fmt: skip
 
 
 ABSORPTION_DB_M = 2.6  # there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)
+DEAF = 1e-4  # of a probability: nothing behind is worth a look
+NEVER = -8.0  # of a logit, likewise
 
 
 @njit(cache=True, error_model="numpy")
@@ -95,8 +99,11 @@ def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Float
     for k in range(count):
         heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
         unheard -= heard
-        if range_m > 0.0:
-            hit += heard * normal(range_m - distance_m[k], m.sd_m + m.slant_m * off_axis_rad[k])
+        sd = m.sd_m + m.slant_m * off_axis_rad[k]
+        if heard > 0.0 and abs(range_m - distance_m[k]) < 6.0 * sd:
+            hit += heard * normal(range_m - distance_m[k], sd)
+        if unheard < DEAF:
+            break
     span = m.maximum_m - m.minimum_m
     if range_m <= 0.0:
         return math.log((1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * 0.2)
@@ -113,9 +120,11 @@ def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel)
         return 0.0
     log_d = math.log(distance_m) * DB
     margin = m.reach - m.per_db * (log_d + ABSORPTION_DB_M * distance_m) - m.beam * off_axis_rad * off_axis_rad
-    if kind != WALL:
+    if kind == EDGE:
         margin -= m.edge + 0.5 * m.per_db * log_d
-    return 1.0 / (1.0 + math.exp(-margin))
+    elif kind == CORNER:
+        margin -= m.corner
+    return 1.0 / (1.0 + math.exp(-margin)) if margin > NEVER else 0.0
 
 
 @njit(cache=True, error_model="numpy", inline="always")

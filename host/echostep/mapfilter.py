@@ -16,14 +16,15 @@ from echostep.gait import wrap
 from echostep.likelihoods import EchoSettings, echo_model
 from echostep.particles import Cloud, CloudSettings, Heard, Move
 from echostep.plan import Pose
+from echostep.reflectors import Walls
 from echostep.waiting import Passage
-from echostep.walls import WallIndex
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])
 EXPLAINED_SHARE = 0.1
+NO_NEWS = 0.01  # a ping with less is not worth a look
 UNEXPLAINED = -1.5  # a tracked walk has +1, an echo that fits nowhere -5: the plan does not explain what is heard
 LOST_SD_M = 3.0
 REGAIN_M = 10.0
@@ -40,7 +41,7 @@ class MapFilter:
     """A cloud on a plan, from a start on."""
 
     def __init__(
-        self, walls: WallIndex, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
+        self, walls: Walls, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
         cloud: CloudSettings | None = None, echo: EchoSettings | None = None,
     ) -> None:  # fmt: skip
         """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`."""
@@ -77,7 +78,8 @@ class MapFilter:
         power = self._news(passage.ranger, self._gone_m + share * length)
         power /= 1.0 + (wrap(leg.heading1_rad - leg.heading0_rad) / TURNING_RAD) ** 2
         self._gone_m += length
-        return Heard(share, axis, range_m, power)
+        new = power > NO_NEWS
+        return Heard(share[new], axis[new], range_m[new], power[new])
 
     def _news(self, ranger: Ints, at_m: Floats) -> Floats:
         """Share of independent information in each ping: errors of one ranger's echoes are correlated over some travel."""

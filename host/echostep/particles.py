@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from echostep.likelihoods import EchoModel, log_echo
 from echostep.plan import Pose
-from echostep.walls import MOST_SOURCES, WallIndex, crosses_wall, echo_sources
+from echostep.reflectors import MOST_SOURCES, Walls, echo_sources
+from echostep.walls import WallIndex, crosses_wall
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -100,7 +101,7 @@ class Cloud:
         self.log_weight: Floats = np.zeros(n)
         self.rescues = 0
 
-    def follow(self, move: Move, heard: Heard, model: EchoModel, walls: WallIndex) -> Floats:
+    def follow(self, move: Move, heard: Heard, model: EchoModel, walls: Walls) -> Floats:
         """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
 
         Particles that cross a wall lose their weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns for each
@@ -110,9 +111,10 @@ class Cloud:
         done, k, settings = 0.0, 0, self._settings
         while done < 1.0 or k < len(explained):
             noise = self._noise(move, 1.0 - done)
+            index = walls.near(self.x_m, self.y_m, (1.0 - done) * math.hypot(move.dx_m, move.dy_m))
             k, done, top = _follow(
                 self.x_m, self.y_m, self.turn_rad, self.scale, self.log_weight, move.dx_m, move.dy_m, noise, done, k,
-                heard, settings.resample_below, settings.wall_cost, model, walls, explained,
+                heard, settings.resample_below, settings.wall_cost, model, index, explained,
             )  # fmt: skip
             if top < -0.5 * settings.wall_cost:
                 self._widen()

@@ -15,10 +15,10 @@ from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
 from echostep.plan import Plan, Pose
+from echostep.reflectors import Walls
 from echostep.settings import Settings
 from echostep.sources import Chunk, Portion, portion_of
 from echostep.waiting import Passage
-from echostep.walls import build_index
 
 
 class Tracker:
@@ -33,7 +33,7 @@ class Tracker:
         self.plan = plan
         self.start = pose
         self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
-        self.walls = build_index(plan.levels[0].walls)
+        self.walls = Walls(plan.levels[0].walls)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self._rng = np.random.default_rng(seed)
         self._last: Estimate | None = None

@@ -19,6 +19,7 @@ from echostep.gait import Leg
 from echostep.girard2011 import Girard, GirardSettings
 from echostep.mapfilter import MapFilter
 from echostep.plan import Pose
+from echostep.reflectors import Walls
 from echostep.simulation.markers import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
 from echostep.simulation.sites import (
     Site,
@@ -33,7 +34,6 @@ from echostep.simulation.sites import (
     with_doors,
 )
 from echostep.waiting import Passage
-from echostep.walls import build_index
 
 Floats = NDArray[np.float64]
 
@@ -72,8 +72,6 @@ class Seen:
 
 def evaluate_girard2011(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
     """Run the study, print the table beside the paper's, and write JSON, Parquet and the pictures."""
-    from echostep.evaluate.pictures import draw_clouds
-
     each = Study("girard2011", runs, seed, one_run, out, scheduler).rows()
     names = list(dict.fromkeys(row["name"] for row in each))
     rows = [_summary([row for row in each if row["name"] == name]) for name in names]
@@ -133,7 +131,7 @@ def dead_reckoned(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
 
 def girard(site: Site, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True) -> Iterator[Seen]:
     """The paper's filter: on its plan or without, with one pair of pings a step or without."""
-    walls = build_index(site.plan) if model else None
+    walls = Walls(site.plan) if model else None
     x0, y0 = walk.trunk_m[0].tolist()
     filter_ = Girard(GirardSettings(), (x0, y0), walls, np.random.default_rng([seed, 20]))
     for k, heading in enumerate(walk.heading_rad.tolist()):
@@ -146,7 +144,7 @@ def default(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
     """Ours: the same steps and headings, and every ping on the way."""
     x0, y0 = walk.trunk_m[0].tolist()
     start = Pose(x0, y0, walk.start_heading_rad)
-    ours = MapFilter(build_index(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
+    ours = MapFilter(Walls(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
     since_s = -math.inf
     for k, (turning, step) in enumerate(_legs(walk)):
         if turning is not None:

@@ -1,0 +1,225 @@
+"""What a ranger hears from a place: the echo sources of the plan, and the range that the cone of rays of a published filter gives.
+
+In: walls (n, 4) and places. Out: `Walls.near` gives the `WallIndex` for kernels; `echo_sources` and `lambda_ray_ranges` are such kernels.
+`Walls` owns the tables of the tiles that a cloud has reached; they are made when it first comes near.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from echostep.sightlines import CORNER, EDGE, in_sector, tile_sources
+from echostep.walls import EAR_REACH_M, JOIN_M, TILE_M, SourceTable, WallIndex, build_index, segments_cross, tile_at
+
+__all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+CONE_RAD = math.radians(
+    35.0
+)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
+WALL = 0.0
+MOST_SOURCES = 8
+FOOT_M = 1e-3  # what stands so close to a wall does not hide it: walls drawn twice
+NEAREST_M = 1e-6
+CONE = math.cos(CONE_RAD)
+
+
+class Walls:
+    """A plan's walls, and the tables of the tiles that were looked at so far."""
+
+    def __init__(self, walls: Floats, slant_rad: float = 0.0) -> None:
+        """`slant_rad`: greatest angle of a ray to a wall's normal for which the tables must hold; 0 serves `echo_sources`."""
+        self._index = build_index(walls, slant_rad)
+        self._count = 0
+
+    def near(self, x_m: Floats, y_m: Floats, reach_m: float = 0.0) -> WallIndex:
+        """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most a tile) of them."""
+        tiles = _unseen(np.asarray(x_m, np.float64), np.asarray(y_m, np.float64), min(reach_m, TILE_M), self._index)
+        if len(tiles):
+            self._index = _look(tiles, self._count, self._index)
+            self._count += len(tiles)
+        return self._index
+
+
+@njit(cache=True, error_model="numpy")
+def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex) -> Ints:
+    """Tiles near these places that were not looked at, each once, in order of appearance."""
+    tiles, count = np.empty(16, np.int32), 0
+    for i in range(len(x)):
+        for k in range(4 if reach > 0.0 else 1):
+            tile = tile_at(x[i] + (reach if k & 1 else -reach), y[i] + (reach if k & 2 else -reach), index)
+            if tile < 0 or index.seen[tile] != 0:
+                continue
+            if count == len(tiles):
+                tiles = np.concatenate((tiles, tiles))
+            tiles[count] = tile
+            index.seen[tile] = -1
+            count += 1
+    for k in range(count):
+        index.seen[tiles[k]] = 0
+    return tiles[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _look(tiles: Ints, count: int, index: WallIndex) -> WallIndex:
+    """Append the tables of these tiles to those of the first `count`."""
+    faces, points = index.faces, index.points
+    for k in range(len(tiles)):
+        more_faces, more_points = tile_sources(tiles[k], index, index.slant)
+        faces = _appended(faces, count + k, more_faces)
+        points = _appended(points, count + k, more_points)
+    for k in range(len(tiles)):
+        index.seen[tiles[k]] = count + k + 1
+    return WallIndex(
+        index.x0_m, index.y0_m, index.columns, index.rows, index.walls, index.start, index.ids, index.slant, index.seen,
+        faces, points,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
+    """`table` of `tile` tiles with one more, in arrays that are at least doubled when they grow."""
+    rows = table.start[tile]
+    used = table.screen_start[rows]
+    added, screens = len(more.rows), len(more.screens)
+    start, screen_start = _room(table.start, tile + 2), _room(table.screen_start, rows + added + 1)
+    kept, hiding = table.rows, _room(table.screens, used + screens)
+    if len(kept) < rows + added:
+        kept = np.empty((2 * (rows + added), more.rows.shape[1]))
+        kept[:rows] = table.rows[:rows]
+    kept[rows : rows + added] = more.rows
+    hiding[used : used + screens] = more.screens
+    screen_start[rows : rows + added + 1] = more.screen_start + used
+    start[tile + 1] = rows + added
+    return SourceTable(start, kept, screen_start, hiding)
+
+
+@njit(cache=True, error_model="numpy")
+def _room(numbers: Ints, size: int) -> Ints:
+    """The same numbers in an array that holds at least `size`."""
+    if len(numbers) >= size:
+        return numbers
+    larger = np.zeros(2 * size, np.int32)
+    larger[: len(numbers)] = numbers
+    return larger
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def echo_sources(
+    px: float, py: float, axis_rad: float, index: WallIndex, distance_m: Floats, off_axis_rad: Floats, kind: Floats
+) -> int:
+    """Unhidden echo sources within half a cone of CONE_RAD and EAR_REACH_M, nearest first, at most MOST_SOURCES; their number.
+
+    WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
+    place where a wall ends or walls turn.
+    """
+    tile = tile_at(px, py, index)
+    if tile < 0 or not math.isfinite(axis_rad):
+        return 0
+    k = index.seen[tile] - 1
+    ax, ay = math.cos(axis_rad), math.sin(axis_rad)
+    if k < 0:
+        return _sources_unseen(px, py, ax, ay, tile, index, distance_m, off_axis_rad, kind)
+    n = _add_faces(px, py, ax, ay, index.walls, index.faces, k, distance_m, off_axis_rad, kind)
+    n = _add_points(px, py, ax, ay, index.walls, index.points, k, n, distance_m, off_axis_rad, kind)
+    for i in range(n):
+        off_axis_rad[i] = _angle(off_axis_rad[i])
+    return n
+
+
+@njit(cache=True, error_model="numpy", _nrt=True)  # it allocates, its caller must not
+def _sources_unseen(
+    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex,
+    distance_m: Floats, off_axis_rad: Floats, kind: Floats,
+) -> int:  # fmt: skip
+    """The same for a tile that nobody looked at before."""
+    faces, points = tile_sources(tile, index, 0.0)
+    n = _add_faces(px, py, ax, ay, index.walls, faces, 0, distance_m, off_axis_rad, kind)
+    n = _add_points(px, py, ax, ay, index.walls, points, 0, n, distance_m, off_axis_rad, kind)
+    for i in range(n):
+        off_axis_rad[i] = _angle(off_axis_rad[i])
+    return n
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _add_faces(
+    px: float, py: float, ax: float, ay: float, walls: Floats, faces: SourceTable, k: int,
+    distance_m: Floats, off_axis: Floats, kind: Floats,
+) -> int:  # fmt: skip
+    """The walls of the k-th tile; `off_axis` gets cosines."""
+    n = 0
+    for i in range(faces.start[k], faces.start[k + 1]):
+        dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
+        tx, ty = faces.rows[i, 2], faces.rows[i, 3]
+        s, h = dx * tx + dy * ty, dy * tx - dx * ty
+        d = abs(h)
+        ahead = (ax * ty - ay * tx) * h
+        if not (ahead >= CONE * d and 0.0 <= s <= faces.rows[i, 4] and NEAREST_M < d <= EAR_REACH_M):
+            continue
+        share = 1.0 - FOOT_M / d
+        qx, qy = px + share * h * ty, py - share * h * tx
+        if d > FOOT_M and _hidden(px, py, qx, qy, walls, faces, i):
+            continue
+        n = _insert(n, d, ahead / d, WALL, distance_m, off_axis, kind)
+    return n
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _add_points(
+    px: float, py: float, ax: float, ay: float, walls: Floats, points: SourceTable, k: int, n: int,
+    distance_m: Floats, off_axis: Floats, kind: Floats,
+) -> int:  # fmt: skip
+    """The corners and edges of the k-th tile, after n walls."""
+    for i in range(points.start[k], points.start[k + 1]):
+        dx, dy = points.rows[i, 0] - px, points.rows[i, 1] - py
+        ahead, d2 = dx * ax + dy * ay, dx * dx + dy * dy
+        if not (ahead > 0.0 and ahead * ahead >= CONE * CONE * d2 and d2 <= EAR_REACH_M * EAR_REACH_M):
+            continue
+        row = points.rows[i]
+        if not in_sector(-dx, -dy, row[3], row[4], row[5], row[6]):
+            continue
+        d = math.sqrt(d2)
+        share = 1.0 - JOIN_M / d
+        if d <= NEAREST_M or (share > 0.0 and _hidden(px, py, px + share * dx, py + share * dy, walls, points, i)):
+            continue
+        n = _insert(n, d, ahead / d, row[2], distance_m, off_axis, kind)
+    return n
+
+
+@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: SourceTable, i: int) -> bool:
+    """Whether one of the walls that can hide row i stands between p and q."""
+    for j in range(table.screen_start[i], table.screen_start[i + 1]):  # noqa: SIM110 (numba)
+        if segments_cross(px, py, qx, qy, walls, table.screens[j]):
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+def _angle(cosine: float) -> float:
+    """Arc cosine within the cone, to 1e-8: its series in 1 - cosine."""
+    x = max(1.0 - cosine, 0.0)
+    series = 35.0 / 18432.0 + x * (63.0 / 90112.0 + x * (231.0 / 851968.0))
+    series = 1.0 + x * (1.0 / 12.0 + x * (3.0 / 160.0 + x * (5.0 / 896.0 + x * series)))
+    return math.sqrt(2.0 * x) * series
+
+
+@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_axis: Floats, kind: Floats) -> int:
+    """Sort a source in among n, nearest first; beyond MOST_SOURCES the farthest goes."""
+    i = n
+    if n == MOST_SOURCES:
+        if d >= distance_m[n - 1]:
+            return n
+        i = n - 1
+    while i > 0 and distance_m[i - 1] > d:
+        distance_m[i], off_axis[i], kind[i] = distance_m[i - 1], off_axis[i - 1], kind[i - 1]
+        i -= 1
+    distance_m[i], off_axis[i], kind[i] = d, off, what
+    return min(n + 1, MOST_SOURCES)
