@@ -18,6 +18,7 @@ from echostep.walls import (
     CONE_RAD,
     EAR_REACH_M,
     JOIN_M,
+    LEAN,
     TILE_M,
     SourceTable,
     WallIndex,
