@@ -73,3 +73,26 @@ def corners_and_edges(px: float, py: float, walls: Floats) -> list[tuple[float, 
         if abs(width - math.pi) >= math.radians(3.0) and width >= math.radians(3.0):
             found.append((x, y, 2.0 if abs(width - math.pi / 2) <= math.radians(30.0) else 1.0))
     return found
+
+
+def cone_reading(
+    px: float, py: float, axis_rad: float, walls: Floats, rays: int, aperture_rad: float, maximum_m: float
+) -> float:
+    """The shortest of so many rays in a cone that meet their first wall within half their spacing of its normal."""
+    shortest = maximum_m
+    for k in range(rays):
+        angle = axis_rad + ((k + 0.5) / rays - 0.5) * aperture_rad
+        ux, uy = math.cos(angle), math.sin(angle)
+        first, counts = maximum_m, False
+        for ax, ay, bx, by in walls.tolist():
+            across = ux * (by - ay) - uy * (bx - ax)
+            if across == 0.0:
+                continue
+            length = ((ax - px) * (by - ay) - (ay - py) * (bx - ax)) / across
+            place = ((ax - px) * uy - (ay - py) * ux) / across
+            if 0.0 <= place <= 1.0 and 0.0 < length < first:
+                slant = math.asin(min(abs(ux * (bx - ax) + uy * (by - ay)) / math.hypot(bx - ax, by - ay), 1.0))
+                first, counts = length, slant <= 0.5 * aperture_rad / rays
+        if counts:
+            shortest = min(shortest, first)
+    return shortest

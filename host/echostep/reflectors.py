@@ -13,21 +13,31 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep.sightlines import CORNER, EDGE, in_sector, tile_sources
-from echostep.walls import EAR_REACH_M, JOIN_M, TILE_M, SourceTable, WallIndex, build_index, segments_cross, tile_at
+from echostep.walls import (
+    BEARINGS,
+    CONE_RAD,
+    EAR_REACH_M,
+    JOIN_M,
+    LEAN,
+    TILE_M,
+    SourceTable,
+    WallIndex,
+    build_index,
+    segments_cross,
+    tile_at,
+)
 
-__all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
+__all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources", "lambda_ray_ranges"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-CONE_RAD = math.radians(
-    35.0
-)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
 WALL = 0.0
 MOST_SOURCES = 8
 FOOT_M = 1e-3  # what stands so close to a wall does not hide it: walls drawn twice
 NEAREST_M = 1e-6
 CONE = math.cos(CONE_RAD)
+ALLOCATES = {**LEAN, "_nrt": True}  # called by a kernel that must not
 
 
 class Walls:
@@ -69,9 +79,9 @@ def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex) -> Ints:
 @njit(cache=True, error_model="numpy")
 def _look(tiles: Ints, count: int, index: WallIndex) -> WallIndex:
     """Append the tables of these tiles to those of the first `count`."""
-    faces, points = index.faces, index.points
+    faces, points, numbers = index.faces, index.points, tiles.astype(np.int64)
     for k in range(len(tiles)):
-        more_faces, more_points = tile_sources(tiles[k], index, index.slant)
+        more_faces, more_points = tile_sources(numbers[k], index, index.slant)
         faces = _appended(faces, count + k, more_faces)
         points = _appended(points, count + k, more_points)
     for k in range(len(tiles)):
@@ -85,10 +95,11 @@ def _look(tiles: Ints, count: int, index: WallIndex) -> WallIndex:
 @njit(cache=True, error_model="numpy")
 def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     """`table` of `tile` tiles with one more, in arrays that are at least doubled when they grow."""
-    rows = table.start[tile]
-    used = table.screen_start[rows]
+    unit, rows = tile * BEARINGS, table.tile_start[tile]
+    ordered, used = table.start[unit], table.screen_start[rows]
     added, screens = len(more.rows), len(more.screens)
-    start, screen_start = _room(table.start, tile + 2), _room(table.screen_start, rows + added + 1)
+    start, screen_start = _room(table.start, unit + BEARINGS + 1), _room(table.screen_start, rows + added + 1)
+    tile_start, order = _room(table.tile_start, tile + 2), _room(table.order, ordered + len(more.order))
     kept, hiding = table.rows, _room(table.screens, used + screens)
     if len(kept) < rows + added:
         kept = np.empty((2 * (rows + added), more.rows.shape[1]))
@@ -96,8 +107,10 @@ def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     kept[rows : rows + added] = more.rows
     hiding[used : used + screens] = more.screens
     screen_start[rows : rows + added + 1] = more.screen_start + used
-    start[tile + 1] = rows + added
-    return SourceTable(start, kept, screen_start, hiding)
+    tile_start[tile + 1] = rows + added
+    order[ordered : ordered + len(more.order)] = more.order + rows
+    start[unit : unit + BEARINGS + 1] = more.start + ordered
+    return SourceTable(tile_start, start, order, kept, screen_start, hiding)
 
 
 @njit(cache=True, error_model="numpy")
@@ -110,7 +123,7 @@ def _room(numbers: Ints, size: int) -> Ints:
     return larger
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(**LEAN)
 def echo_sources(
     px: float, py: float, axis_rad: float, index: WallIndex, distance_m: Floats, off_axis_rad: Floats, kind: Floats
 ) -> int:
@@ -123,38 +136,48 @@ def echo_sources(
     if tile < 0 or not math.isfinite(axis_rad):
         return 0
     k = index.seen[tile] - 1
+    u = bearing(axis_rad)
     ax, ay = math.cos(axis_rad), math.sin(axis_rad)
     if k < 0:
-        return _sources_unseen(px, py, ax, ay, tile, index, distance_m, off_axis_rad, kind)
-    n = _add_faces(px, py, ax, ay, index.walls, index.faces, k, distance_m, off_axis_rad, kind)
-    n = _add_points(px, py, ax, ay, index.walls, index.points, k, n, distance_m, off_axis_rad, kind)
+        return _sources_unseen(px, py, ax, ay, tile, u, index, distance_m, off_axis_rad, kind)
+    u += k * BEARINGS
+    n = _add_faces(px, py, ax, ay, index.walls, index.faces, u, distance_m, off_axis_rad, kind)
+    n = _add_points(px, py, ax, ay, index.walls, index.points, u, n, distance_m, off_axis_rad, kind)
     for i in range(n):
         off_axis_rad[i] = _angle(off_axis_rad[i])
     return n
 
 
-@njit(cache=True, error_model="numpy", _nrt=True)  # it allocates, its caller must not
+@njit(**LEAN, inline="always")
+def bearing(axis_rad: float) -> int:
+    """Which of the BEARINGS of `SourceTable` an axis has."""
+    turns = axis_rad * (0.5 / math.pi)
+    return min(int((turns - math.floor(turns)) * BEARINGS), BEARINGS - 1)
+
+
+@njit(**ALLOCATES)
 def _sources_unseen(
-    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex,
+    px: float, py: float, ax: float, ay: float, tile: int, u: int, index: WallIndex,
     distance_m: Floats, off_axis_rad: Floats, kind: Floats,
 ) -> int:  # fmt: skip
     """The same for a tile that nobody looked at before."""
     faces, points = tile_sources(tile, index, 0.0)
-    n = _add_faces(px, py, ax, ay, index.walls, faces, 0, distance_m, off_axis_rad, kind)
-    n = _add_points(px, py, ax, ay, index.walls, points, 0, n, distance_m, off_axis_rad, kind)
+    n = _add_faces(px, py, ax, ay, index.walls, faces, u, distance_m, off_axis_rad, kind)
+    n = _add_points(px, py, ax, ay, index.walls, points, u, n, distance_m, off_axis_rad, kind)
     for i in range(n):
         off_axis_rad[i] = _angle(off_axis_rad[i])
     return n
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(**LEAN, inline="always")
 def _add_faces(
-    px: float, py: float, ax: float, ay: float, walls: Floats, faces: SourceTable, k: int,
+    px: float, py: float, ax: float, ay: float, walls: Floats, faces: SourceTable, u: int,
     distance_m: Floats, off_axis: Floats, kind: Floats,
 ) -> int:  # fmt: skip
-    """The walls of the k-th tile; `off_axis` gets cosines."""
+    """The walls of unit u; `off_axis` gets cosines."""
     n = 0
-    for i in range(faces.start[k], faces.start[k + 1]):
+    for at in range(faces.start[u], faces.start[u + 1]):
+        i = faces.order[at]
         dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
         tx, ty = faces.rows[i, 2], faces.rows[i, 3]
         s, h = dx * tx + dy * ty, dy * tx - dx * ty
@@ -170,29 +193,29 @@ def _add_faces(
     return n
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(**LEAN, inline="always")
 def _add_points(
-    px: float, py: float, ax: float, ay: float, walls: Floats, points: SourceTable, k: int, n: int,
+    px: float, py: float, ax: float, ay: float, walls: Floats, points: SourceTable, u: int, n: int,
     distance_m: Floats, off_axis: Floats, kind: Floats,
 ) -> int:  # fmt: skip
-    """The corners and edges of the k-th tile, after n walls."""
-    for i in range(points.start[k], points.start[k + 1]):
+    """The corners and edges of unit u, after n walls."""
+    for at in range(points.start[u], points.start[u + 1]):
+        i = points.order[at]
         dx, dy = points.rows[i, 0] - px, points.rows[i, 1] - py
         ahead, d2 = dx * ax + dy * ay, dx * dx + dy * dy
         if not (ahead > 0.0 and ahead * ahead >= CONE * CONE * d2 and d2 <= EAR_REACH_M * EAR_REACH_M):
             continue
-        row = points.rows[i]
-        if not in_sector(-dx, -dy, row[3], row[4], row[5], row[6]):
+        if not in_sector(-dx, -dy, points.rows[i, 3], points.rows[i, 4], points.rows[i, 5], points.rows[i, 6]):
             continue
         d = math.sqrt(d2)
         share = 1.0 - JOIN_M / d
         if d <= NEAREST_M or (share > 0.0 and _hidden(px, py, px + share * dx, py + share * dy, walls, points, i)):
             continue
-        n = _insert(n, d, ahead / d, row[2], distance_m, off_axis, kind)
+        n = _insert(n, d, ahead / d, points.rows[i, 2], distance_m, off_axis, kind)
     return n
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@njit(**LEAN, inline="always")
 def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: SourceTable, i: int) -> bool:
     """Whether one of the walls that can hide row i stands between p and q."""
     for j in range(table.screen_start[i], table.screen_start[i + 1]):  # noqa: SIM110 (numba)
@@ -201,7 +224,7 @@ def _hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: So
     return False
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@njit(**LEAN, inline="always")
 def _angle(cosine: float) -> float:
     """Arc cosine within the cone, to 1e-8: its series in 1 - cosine."""
     x = max(1.0 - cosine, 0.0)
@@ -210,7 +233,7 @@ def _angle(cosine: float) -> float:
     return math.sqrt(2.0 * x) * series
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
+@njit(**LEAN, inline="always")
 def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_axis: Floats, kind: Floats) -> int:
     """Sort a source in among n, nearest first; beyond MOST_SOURCES the farthest goes."""
     i = n
@@ -223,3 +246,87 @@ def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_a
         i -= 1
     distance_m[i], off_axis[i], kind[i] = d, off, what
     return min(n + 1, MOST_SOURCES)
+
+
+RANGER_AXES_RAD = (0.5 * math.pi, -0.5 * math.pi)
+SAME_M = 1e-9  # a ray meets walls so close together at once
+
+
+@njit(cache=True, error_model="numpy")
+def lambda_ray_ranges(
+    x: Floats, y: Floats, heading_rad: Floats, index: WallIndex,
+    rays: int = 7, aperture_rad: float = math.radians(55.0), maximum_m: float = 6.0,
+) -> Floats:  # fmt: skip
+    """What each of n poses reads with rangers to the left and to the right, (n, 2) [Girard 2011, eq. 3].
+
+    Each ranger sends `rays` rays, `aperture_rad` / `rays` apart about its axis. A ray ends at the first wall it meets, and counts if it meets that
+    within half the spacing from its normal. The reading is the shortest ray that counts, `maximum_m` (at most EAR_REACH_M) if there is none.
+    No ray is cast: a wall can only answer on the ray that is nearest to its normal. Fast where `Walls` was made for half the spacing.
+    """
+    ranges = np.full((len(x), 2), maximum_m)
+    for i in range(len(x)):
+        tile = tile_at(x[i], y[i], index)
+        if tile < 0 or not math.isfinite(heading_rad[i]):
+            continue
+        for ranger in range(2):
+            axis = heading_rad[i] + RANGER_AXES_RAD[ranger]
+            ranges[i, ranger] = _lambda_ray_range(x[i], y[i], axis, tile, index, rays, aperture_rad, maximum_m)
+    return ranges
+
+
+@njit(**LEAN)
+def _lambda_ray_range(
+    px: float, py: float, axis: float, tile: int, index: WallIndex, rays: int, aperture: float, maximum_m: float
+) -> float:
+    k, slant = index.seen[tile] - 1, math.tan(0.5 * aperture / rays)
+    if k < 0 or slant > index.slant * (1.0 + 1e-12) or 0.5 * aperture > CONE_RAD:
+        return _lambda_ray_unseen(px, py, axis, tile, index, rays, aperture, maximum_m)
+    u = k * BEARINGS + bearing(axis)
+    return _shortest_ray(px, py, axis, index.walls, index.faces, u, rays, aperture, maximum_m)
+
+
+@njit(**ALLOCATES)
+def _lambda_ray_unseen(
+    px: float, py: float, axis: float, tile: int, index: WallIndex, rays: int, aperture: float, maximum_m: float
+) -> float:
+    """The same where the tables do not hold."""
+    faces, _ = tile_sources(tile, index, math.tan(0.5 * aperture / rays))
+    shortest = maximum_m
+    for u in range(BEARINGS):
+        shortest = min(shortest, _shortest_ray(px, py, axis, index.walls, faces, u, rays, aperture, maximum_m))
+    return shortest
+
+
+@njit(**LEAN, inline="always")
+def _shortest_ray(
+    px: float, py: float, axis: float, walls: Floats, faces: SourceTable, u: int,
+    rays: int, aperture: float, maximum_m: float,
+) -> float:  # fmt: skip
+    """The shortest ray that counts, among the walls of unit u."""
+    ax, ay = math.cos(axis), math.sin(axis)
+    spacing, shortest, cone = aperture / rays, maximum_m, math.cos(min(0.5 * aperture, math.pi))
+    for at in range(faces.start[u], faces.start[u + 1]):
+        i = faces.order[at]
+        dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
+        tx, ty = faces.rows[i, 2], faces.rows[i, 3]
+        s, h = dx * tx + dy * ty, dy * tx - dx * ty
+        d = abs(h)
+        ahead = (ax * ty - ay * tx) * h
+        if d >= shortest or d <= SAME_M or ahead < cone * d - SAME_M:
+            continue
+        # Angle of the normal from the axis, and of the nearest ray from the normal.
+        aside = -(ax * tx + ay * ty) * h
+        normal = math.atan2(aside, ahead)
+        ray = math.floor(normal / spacing + 0.5 * rays)
+        if ray < 0 or ray >= rays:
+            continue
+        slope = math.tan((ray + 0.5 - 0.5 * rays) * spacing - normal)
+        length = d * math.sqrt(1.0 + slope * slope)
+        foot = s + h * slope
+        if length >= shortest or not 0.0 <= foot <= faces.rows[i, 4]:
+            continue
+        share = 1.0 - SAME_M / length
+        qx, qy = px + share * ((foot - s) * tx + h * ty), py + share * ((foot - s) * ty - h * tx)
+        if not _hidden(px, py, qx, qy, walls, faces, i):
+            shortest = length
+    return shortest

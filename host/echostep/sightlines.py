@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.walls import EAR_REACH_M, FACE, JOIN_M, POINT, TILE_M, SourceTable, WallIndex
+from echostep.walls import BEARINGS, CONE_RAD, EAR_REACH_M, FACE, JOIN_M, POINT, TILE_M, SourceTable, WallIndex
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -63,6 +63,7 @@ def _walls_near(tile: int, index: WallIndex) -> Ints:
 @njit(cache=True, error_model="numpy")
 def _faces(corners: Floats, near: Ints, walls: Floats, slant: float) -> SourceTable:
     faces, starts = np.empty((len(near), FACE)), np.zeros(len(near) + 1, np.int32)
+    centre, spread = np.empty(len(near)), np.empty(len(near))
     screens, used, count = np.empty(256, np.int32), 0, 0
     spans = np.empty((len(near), 4))
     for w in near:
@@ -95,11 +96,13 @@ def _faces(corners: Floats, near: Ints, walls: Floats, slant: float) -> SourceTa
             used = before
             continue
         faces[count, 0], faces[count, 1], faces[count, 2], faces[count, 3], faces[count, 4] = x, y, tx, ty, length
+        centre[count] = math.atan2(-tx, ty) if low > 0.0 else math.atan2(tx, -ty)
+        spread[count] = math.atan(slant) if nearest > 0.0 else math.pi
         count += 1
         starts[count] = used
-    return SourceTable(
-        np.array([0, count], np.int32), faces[:count].copy(), starts[: count + 1].copy(), screens[:used].copy()
-    )
+    bearings, order = _by_bearing(centre[:count], spread[:count])
+    total = np.array([0, count], np.int32)
+    return SourceTable(total, bearings, order, faces[:count].copy(), starts[: count + 1].copy(), screens[:used].copy())
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -158,7 +161,7 @@ def _covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _points(corners: Floats, near: Ints, index: WallIndex) -> SourceTable:
-    points, starts = np.empty((8, POINT)), np.zeros(9, np.int32)
+    points, starts = np.empty((8, POINT + 2)), np.zeros(9, np.int32)
     screens, used, count = np.empty(256, np.int32), 0, 0
     sectors, rays = np.empty((64, 5)), np.empty((64, 2))
     walls = index.walls
@@ -174,7 +177,7 @@ def _points(corners: Floats, near: Ints, index: WallIndex) -> SourceTable:
                 continue
             if len(screens) < used + len(near):
                 screens = np.concatenate((screens, screens, near))
-            more = _point_screens(x, y, corners, near, walls, screens[used:])
+            more, centre, spread = _point_screens(x, y, corners, near, walls, screens[used:])
             if more < 0:
                 continue
             for k in range(kinds):
@@ -182,15 +185,16 @@ def _points(corners: Floats, near: Ints, index: WallIndex) -> SourceTable:
                     points, starts = np.concatenate((points, points)), np.concatenate((starts, starts))
                 if len(screens) < used + more:
                     screens = np.concatenate((screens, screens))
-                points[count, 0], points[count, 1], points[count, 2:] = x, y, sectors[k]
+                points[count, 0], points[count, 1], points[count, 2:POINT] = x, y, sectors[k]
+                points[count, POINT], points[count, POINT + 1] = centre, spread
                 if k > 0:
                     screens[used : used + more] = screens[used - more : used]
                 used += more
                 count += 1
                 starts[count] = used
-    return SourceTable(
-        np.array([0, count], np.int32), points[:count].copy(), starts[: count + 1].copy(), screens[:used].copy()
-    )
+    bearings, order = _by_bearing(points[:count, POINT], points[:count, POINT + 1])
+    rows, total = points[:count, :POINT].copy(), np.array([0, count], np.int32)
+    return SourceTable(total, bearings, order, rows, starts[: count + 1].copy(), screens[:used].copy())
 
 
 @njit(cache=True, error_model="numpy")
@@ -231,11 +235,14 @@ def _stands_for(walls: Floats, u: int, its_end: int, x: float, y: float, end: in
 @njit(cache=True, error_model="numpy")
 def _kinds(x: float, y: float, rays: Floats, corners: Floats, sectors: Floats) -> int:
     """The sectors between the walls that leave a place and what it is to a listener there: kind, from, to."""
-    angles = np.empty(len(rays))
+    angles, order, count = np.empty(len(rays)), np.empty(len(rays), np.int32), 0
     for k in range(len(rays)):
         angles[k] = math.atan2(rays[k, 1], rays[k, 0])
-    order = np.argsort(angles)
-    count = 0
+        place = k
+        while place > 0 and angles[order[place - 1]] > angles[k]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
     for i in range(len(order)):
         a, b = order[i], order[(i + 1) % len(order)]
         width = angles[b] - angles[a]
@@ -272,8 +279,13 @@ def _sector_meets(x: float, y: float, a: Floats, b: Floats, corners: Floats) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def _point_screens(x: float, y: float, corners: Floats, near: Ints, walls: Floats, screens: Ints) -> int:
-    """Walls that may stand between x, y and a place in the tile, into `screens`; their number, -1 if they hide it from everywhere."""
+def _point_screens(
+    x: float, y: float, corners: Floats, near: Ints, walls: Floats, screens: Ints
+) -> tuple[int, float, float]:
+    """Walls that may stand between x, y and a place in the tile, into `screens`: their number, -1 if they hide it from everywhere.
+
+    And the bearing of x, y from the tile, with the most that it differs from that.
+    """
     inside = corners[0, 0] <= x <= corners[2, 0] and corners[0, 1] <= y <= corners[2, 1]
     mx, my = 0.5 * (corners[0, 0] + corners[2, 0]) - x, 0.5 * (corners[0, 1] + corners[2, 1]) - y
     length = math.hypot(mx, my)
@@ -305,8 +317,24 @@ def _point_screens(x: float, y: float, corners: Floats, near: Ints, walls: Float
         screens[count] = u
         count += 1
     if narrow and _covered(spans[:covering], low, high, 0.0):
-        return -1
-    return count
+        return -1, 0.0, 0.0
+    return count, math.atan2(-my, -mx), math.atan(max(high, -low)) if narrow else math.pi
+
+
+@njit(cache=True, error_model="numpy")
+def _by_bearing(centre: Floats, spread: Floats) -> tuple[Ints, Ints]:
+    """For each bearing of an axis, the rows of which some part may be within CONE_RAD of it, as starts and row numbers."""
+    start, order, count = np.zeros(BEARINGS + 1, np.int32), np.empty(BEARINGS * len(centre), np.int32), 0
+    width = 2.0 * math.pi / BEARINGS
+    for b in range(BEARINGS):
+        for i in range(len(centre)):
+            off = (b + 0.5) * width - centre[i]
+            off = abs(off - 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5))
+            if off <= CONE_RAD + 0.5 * width + spread[i] + SLACK_M:
+                order[count] = i
+                count += 1
+        start[b + 1] = count
+    return start, order[:count].copy()
 
 
 @njit(cache=True, error_model="numpy")

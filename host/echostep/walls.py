@@ -8,7 +8,7 @@ the index, what a ranger may hear from a tile, is filled by `reflectors.Walls`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,17 +22,26 @@ Ints = NDArray[np.int32]
 TILE_M = 1.0
 EAR_REACH_M = 6.3  # a little more than the rangers' 6 m
 JOIN_M = 0.01  # walls that miss each other by no more than this are joined
+CONE_RAD = math.radians(
+    35.0
+)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
 MAX_TILES = 40_000_000
+# Options of a kernel that runs once per particle: it counts no references, which takes as long as its work; so it must not allocate.
+LEAN: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 SHORTEST_M = 1e-6  # shorter walls are points, they bound nothing
 
 
 class SourceTable(NamedTuple):
-    """Places that may throw sound back, by tile: those of the k-th tile that was looked at are rows[start[k] : start[k + 1]].
+    """Places that may throw sound back, by tile and bearing of the ranger's axis.
 
-    The walls that can hide row i from somewhere in the tile are walls[screens[screen_start[i] : screen_start[i + 1]]].
+    With u = k * BEARINGS + bearing, the k-th tile that was looked at has rows[order[start[u] : start[u + 1]]] within CONE_RAD of that bearing; all
+    its rows are rows[tile_start[k] : tile_start[k + 1]]. The walls that can hide row i from somewhere in the tile are
+    walls[screens[screen_start[i] : screen_start[i + 1]]].
     """
 
+    tile_start: Ints
     start: Ints
+    order: Ints
     rows: Floats
     screen_start: Ints
     screens: Ints
@@ -41,10 +50,10 @@ class SourceTable(NamedTuple):
 class WallIndex(NamedTuple):
     """A grid of tiles over the walls, and what may be heard from those tiles that were looked at.
 
-    Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `seen[t]` is k + 1 for the k-th tile that was looked at, else 0. Rows of `faces` (walls):
-    a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of walls): x, y, kind, and the sector in which they
-    are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that leaves a wall at up to `slant` (tangent) from
-    its normal.
+    Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `seen[t]` is k + 1 for the k-th tile that was looked at, else 0.
+    Rows of `faces` (walls): a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of walls): x, y, kind, and the
+    sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that leaves a wall at up to
+    `slant` (tangent) from its normal.
     """
 
     x0_m: float
@@ -61,12 +70,13 @@ class WallIndex(NamedTuple):
 
 
 FACE, POINT = 5, 7  # columns of the rows
+BEARINGS = 16
 
 
 def no_sources(columns: int) -> SourceTable:
     """A table without rows."""
     none = np.zeros(1, np.int32)
-    return SourceTable(none, np.zeros((0, columns)), none, none[:0])
+    return SourceTable(none, none, none[:0], np.zeros((0, columns)), none, none[:0])
 
 
 def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
@@ -160,9 +170,7 @@ def segments_cross(ax: float, ay: float, bx: float, by: float, walls: Floats, j:
     return (vx * (ay - cy) - vy * (ax - cx)) * (vx * (by - cy) - vy * (bx - cx)) <= 0.0
 
 
-@njit(
-    cache=True, error_model="numpy", _nrt=False
-)  # called per particle: without counting references it takes half the time
+@njit(**LEAN)
 def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -> bool:
     """Whether a move from a to b goes through any wall; never for a move that is not finite."""
     walls, start, ids, x0, y0 = index.walls, index.start, index.ids, index.x0_m, index.y0_m
