@@ -40,7 +40,8 @@ class GaitSettings:
 class Leg:
     """The trunk moves evenly by (dx, dy) in the walk frame, from `t0_s` to `t1_s`, turning from `heading0_rad` to `heading1_rad`.
 
-    `sd_m` is the move's standard deviation per axis, `turn_sd_rad` the growth of the yaw error. `step` counts steps so far. `anchor_sd_m`: of both ends, alike.
+    `sd_m` is the move's standard deviation per axis, `turn_sd_rad` the growth of the yaw error. `step` counts steps so far. `anchor_sd_m`: of
+    both ends, alike.
     """
 
     t0_s: float

@@ -3,12 +3,11 @@
 In: the motion vector and heading of each step, one ping of each ranger. Out: the position estimate. Owns its particles; draws from the generator
 that it is given. The numbers 1 to 8 are the paper's (section 3.2). Where the paper leaves something open:
 
-- A new particle inherits its parent's weight; with it step 5 decides who is the lighter. Step 6 then sets the weight anew, as printed, from this step's pings
-  alone; without rangers the inherited weights go on to step 8.
-- Merging goes from the heaviest particle down (of equal ones the older first): each particle that is closer than tau to one already kept gives its weight to the
-  first such one. "Closer than tau" is a distance, not a common cell.
+- A new particle inherits its parent's weight; with it step 5 decides who is the lighter. Step 6 then sets the weight anew, as printed, from this
+  step's pings alone; without rangers the inherited weights go on to step 8.
+- Merging goes from the heaviest particle down (of equal ones the older first): each particle that is closer than tau to one already kept gives
+  its weight to such a one. "Closer than tau" is a distance, not a common cell.
 - When no particle survives the walls the paper asks the user to start again; here the step is made without walls, and `lost` counts it.
-- A position beyond the tracking area, or one that is not finite, sees no wall: its distances are the maximum range.
 """
 
 from __future__ import annotations
@@ -20,13 +19,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.reflectors import Walls
+from echostep.reflectors import Walls, lambda_ray_ranges
 from echostep.walls import WallIndex, crosses_wall
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-RANGER_AXES_RAD = (0.5 * math.pi, -0.5 * math.pi)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +40,10 @@ class GirardSettings:
 
 
 class Girard:
-    """The cloud of one walk; `walls` None: without a model, as in the paper's Figure 11."""
+    """The cloud of one walk; `walls` (n, 4), or None: without a model, as in the paper's Figure 11."""
 
     def __init__(
-        self, settings: GirardSettings, start_xy: tuple[float, float], walls: Walls | None, rng: np.random.Generator
+        self, settings: GirardSettings, start_xy: tuple[float, float], walls: Floats | None, rng: np.random.Generator
     ) -> None:
         """Step 1: a single particle where the user says he is."""
         self.settings = settings
@@ -54,7 +51,7 @@ class Girard:
         self.y_m: Floats = np.array([start_xy[1]])
         self.weight: Floats = np.ones(1)
         self.lost = 0
-        self._walls = walls
+        self._walls = None if walls is None else Walls(walls, 0.5 * settings.aperture_rad / settings.rays)
         self._rng = rng
 
     def step(
@@ -91,13 +88,8 @@ class Girard:
         heard = np.array([s.maximum_m if math.isnan(r) else r for r in ranges_m])
         if self._walls is None:
             return np.ones(len(x))
-        index = self._walls.near(x, y)
-        modelled = np.column_stack(
-            [
-                readings(x, y, heading_rad + axis, index, s.rays, s.aperture_rad, s.maximum_m)
-                for axis in RANGER_AXES_RAD
-            ]
-        )
+        heading = np.full(len(x), heading_rad)
+        modelled = lambda_ray_ranges(x, y, heading, self._walls.near(x, y), s.rays, s.aperture_rad, s.maximum_m)
         return similarity(modelled, heard, s.maximum_m)
 
 
@@ -174,40 +166,3 @@ def _cells(x: Floats, y: Floats, side_m: float) -> tuple[int, Ints, Ints]:
     x0, y0 = x.min(), y.min()
     columns = int((x.max() - x0) / side_m) + 3
     return columns, ((x - x0) / side_m).astype(np.int64) + 1, ((y - y0) / side_m).astype(np.int64) + 1
-
-
-@njit(cache=True, error_model="numpy")
-def readings(
-    x: Floats, y: Floats, axis_rad: float, walls: WallIndex, rays: int, aperture_rad: float, maximum_m: float
-) -> Floats:
-    """Distance (n,) that the model shows to a ranger looking to `axis_rad` [Girard 2011, section 3.2, Figure 7].
-
-    Each of the rays stops at the first wall. It counts when it meets the wall within aperture / (2 rays) of the normal [eq. 3]; the shortest is kept.
-    """
-    found = np.full(len(x), maximum_m)
-    straight = math.cos(0.5 * aperture_rad / rays)
-    for k in range(rays):
-        angle = axis_rad + (k - 0.5 * (rays - 1)) * aperture_rad / rays
-        ux, uy = math.cos(angle), math.sin(angle)
-        for i in range(len(x)):
-            away, facing = _first_hit(x[i], y[i], ux, uy, maximum_m, walls.walls)
-            if facing >= straight:
-                found[i] = min(found[i], away)
-    return found
-
-
-@njit(cache=True, error_model="numpy")
-def _first_hit(px: float, py: float, ux: float, uy: float, reach: float, walls: Floats) -> tuple[float, float]:
-    """Way of a ray to the first wall, and the cosine between the ray and the wall's normal; (reach, 0) without one."""
-    best, facing = reach, 0.0
-    for j in range(len(walls)):
-        ex, ey = walls[j, 2] - walls[j, 0], walls[j, 3] - walls[j, 1]
-        across = ux * ey - uy * ex
-        if across == 0.0:
-            continue
-        wx, wy = walls[j, 0] - px, walls[j, 1] - py
-        t = (wx * ey - wy * ex) / across
-        s = (wx * uy - wy * ux) / across
-        if 0.0 < t < best and 0.0 <= s <= 1.0:
-            best, facing = t, abs(across) / math.hypot(ex, ey)
-    return best, facing

@@ -1,7 +1,7 @@
 """The map filter: legs of the trunk's path and the echoes heard on them in, estimates out.
 
-In: `Passage`s, a leg each with the pings triggered on it, in order of time. Out: an `Estimate` at the end of each leg. Owns the cloud and what is known beside it:
-how much news an echo brings, and how far the plan explains what is heard.
+In: `Passage`s, a leg each with the pings triggered on it, in order of time. Out: an `Estimate` at the end of each leg. Owns the cloud and what is
+known beside it: how much news an echo brings, and how far the plan explains what is heard.
 """
 
 from __future__ import annotations

@@ -29,10 +29,11 @@ Ints = NDArray[np.int64]
 class CloudSettings:
     """Size of the cloud, spread at the start, and what the path's own covariance leaves out.
 
-    `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation and of the lengths, likewise.
-    `resample_below`: effective share of the cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: so many
-    particles that the distribution over cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A cloud that
-    has been scattered is roughened by `rough_m` and `rough_deg` until it has gathered again. `wall_cost`: log-weight that going through a wall costs.
+    `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation and of the lengths,
+    likewise. `resample_below`: effective share of the cloud at which it is resampled (systematic). The size follows the spread [Fox 2003,
+    KLD-sampling]: so many particles that the distribution over cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at
+    most `largest`. A cloud that has been scattered is roughened by `rough_m` and `rough_deg` until it has gathered again. `wall_cost`: log-weight
+    that going through a wall costs.
     """
 
     size: int = 250
@@ -104,8 +105,8 @@ class Cloud:
     def follow(self, move: Move, heard: Heard, model: EchoModel, walls: Walls) -> Floats:
         """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
 
-        Particles that cross a wall lose their weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns for each
-        ping the log of its probability under the cloud before it: how well the plan explains what was heard.
+        Particles that cross a wall lose their weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns
+        for each ping the log of its probability under the cloud before it: how well the plan explains what was heard.
         """
         explained = np.zeros(len(heard.share))
         done, k, settings = 0.0, 0, self._settings

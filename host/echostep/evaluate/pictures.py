@@ -26,7 +26,10 @@ BLACK, ORANGE, BLUE, GREEN, RED, PURPLE = "#000000", "#e69f00", "#0072b2", "#009
 def draw_clouds(
     path: Path, walls: Floats, truth: Floats, clouds: Mapping[str, Mapping[int, Floats]], tracks: Mapping[str, Floats]
 ) -> None:
-    """[Girard 2011, Figures 10-13]: a row a system, a column a number of steps; `clouds[system][step]` (n, 2), `tracks[system]` and `truth` (steps + 1, 2)."""
+    """[Girard 2011, Figures 10-13]: a row a system, a column a number of steps.
+
+    `clouds[system][step]` is (n, 2), `tracks[system]` and `truth` are (steps + 1, 2).
+    """
     steps = sorted({step for seen in clouds.values() for step in seen})
     figure, axes = _axes(len(clouds), len(steps), (4.6 * len(steps), 3.6 * len(clouds)))
     for row, (system, seen) in zip(axes, clouds.items(), strict=True):

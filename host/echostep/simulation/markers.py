@@ -1,6 +1,6 @@
 """A careful walk from floor marker to floor marker, as in [Girard 2011, 3.4]: steps, headings and echoes without the electronics.
 
-In: a route, the walls that are really there, a seed. Out: `MarkerWalk`: what the foot, the compass and the rangers measured, and the truth. Owns nothing.
+In: a route, the walls that are really there, a seed. Out: `MarkerWalk`: what foot, compass and rangers measured, and the truth. Owns nothing.
 
 The MTx's heading is wrong in three ways [Girard 2011, Figure 10: quite accurate at first, then drifting]: the iron of the shoe turns it one
 way or the other with the direction of walking, the on-board filter's reference wanders, and each step has noise. `ImuModel` has one size for each.
@@ -36,8 +36,8 @@ class ImuModel:
     """Heading errors of the foot-mounted MTx, degrees.
 
     `iron_deg`: mean amplitude of a deviation that goes with the sine of the direction and grows along the walk, from 0.15 to 1.85 of it;
-    `wander_deg`: random walk, per step; `noise_deg`: each step anew. The three sizes and the growth were chosen once, on a grid, so that dead reckoning over the
-    paper's 52 steps has the paper's mean, deviation, maximum and end (tests/test_girard_study.py holds them to 10 %).
+    `wander_deg`: random walk, per step; `noise_deg`: each step anew. The three sizes and the growth were chosen once, on a grid, so that dead
+    reckoning over the paper's 52 steps has the paper's mean, deviation, maximum and end (tests/test_girard_study.py holds them to 15 %).
     """
 
     iron_deg: float = 2.0
