@@ -25,11 +25,13 @@ from echostep.foot import walk_track
 from echostep.frames import encode
 from echostep.imu import describe_track, load_imu, write_foot_track
 from echostep.messages import Identify
+from echostep.mtx_start import MtxStart
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, SerialPorts
+from echostep.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
@@ -80,7 +82,7 @@ def live(
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
-            chunks = _kept(_until(ports, seconds), recorder)
+            chunks = _until(ports, recorder, tracker.settings.mtx.rate_hz, seconds)
             estimates = _run(tracker, chunks, "echostep live", None, headless)
     finally:
         ports.close()
@@ -94,7 +96,7 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
-            for chunk in _kept(_until(ports, seconds), recorder):
+            for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
                 count[chunk.port] += len(chunk.data)
     finally:
         ports.close()
@@ -193,13 +195,17 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
         yield chunk
 
 
-def _until(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk]:
-    """Chunks of the ports, for so long or until Ctrl-C; what happens to the ports is said."""
+def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None) -> Iterator[Chunk]:
+    """Chunks of the ports, for so long or until Ctrl-C, each recorded before anything looks at it; the MTx is set up on the way, and what happens is said."""
     end = math.inf if seconds is None else time.monotonic() + seconds
+    start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:
         for chunk in ports.chunks():
             while ports.notices:
                 console.print(ports.notices.popleft())
+            if chunk is not None:
+                recorder.write(chunk)
+            start.follow(chunk)
             if chunk is not None:
                 yield chunk
             if time.monotonic() >= end:
