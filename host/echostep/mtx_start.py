@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from echostep.errors import EchostepError
 from echostep.sources import MTX, Chunk
+from echostep.xsens.reader import warm_up
 from echostep.xsens.requests import project_requests
 from echostep.xsens.setup import MtxSetup, State
 
@@ -23,6 +24,7 @@ class MtxStart:
             requests = project_requests(rate_hz)
         except ValueError as error:
             raise EchostepError(str(error)) from error
+        warm_up()
         self._setup = MtxSetup(requests, rate_hz)
         self._send, self._say = send, say
         self._usable = False

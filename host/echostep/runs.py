@@ -196,7 +196,10 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
 
 
 def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None) -> Iterator[Chunk]:
-    """Chunks of the ports, for so long or until Ctrl-C, each recorded before anything looks at it; the MTx is set up on the way, and what happens is said."""
+    """Chunks of the ports, for so long or until Ctrl-C, each recorded before anything looks at it; the MTx is set up on the way.
+
+    What happens to the ports and to the MTx is said.
+    """
     end = math.inf if seconds is None else time.monotonic() + seconds
     start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:

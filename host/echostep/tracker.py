@@ -28,6 +28,7 @@ from echostep.sources import BOARD, MTX, Chunk
 from echostep.timeline import Timeline
 from echostep.walls import build_index
 from echostep.xsens import MtSample, MtxReader
+from echostep.xsens.reader import warm_up
 
 PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
 BLIND_S = 1.0
@@ -101,6 +102,7 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
+        warm_up()
         still = np.tile([0.0, 0.0, 9.81], (3, 1))
         Foot(self.settings.foot).feed(np.array([0.0, 0.01, 0.02]), still, np.zeros((3, 3)))
         cloud = Cloud(self.settings.cloud, self.start, 0.0, np.random.default_rng(0))

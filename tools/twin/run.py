@@ -1,8 +1,8 @@
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
-In: the ELF and the twin; the MTx begins as it is sold, and answers its
-configuration. Out: two ports that `echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port
-is opened, and starts anew when it is over, until Ctrl-C. Simulated hardware, real firmware.
+In: the ELF and the twin; the MTx begins as it is sold, and answers its configuration. Out: two ports that
+`echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port is opened, and starts anew when it is over,
+until Ctrl-C. Simulated hardware, real firmware.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from echostep.simulation.mtx_device import MtxDevice
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.simulation.stimulus import NO_SYNC, ROW
 from echostep.xsens import MtxReader
+from echostep.xsens.reader import warm_up
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]
@@ -90,6 +91,7 @@ class PtyMtx:
         os.set_blocking(self._ours, False)
         self.port = os.ttyname(theirs)
         self.device = MtxDevice()
+        warm_up()
 
     def listen(self) -> None:
         """Answer what the host asked."""

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, Frames, Ints, payloads_at
+from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, Frames, Ints, encode_frame, payloads_at
 from echostep.xsens.mtdata import (
     ACCEL,
     ATTITUDE,
@@ -25,7 +25,8 @@ from echostep.xsens.mtdata import (
     Decoded,
     OutputFormat,
     decode_mtdata,
-)
+    pack_mtdata,
+)  # fmt: skip
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
 
 Floats = NDArray[np.float64]
@@ -227,3 +228,9 @@ def _verdict(row: Floats, sent: NDArray[np.bool_], limits: Floats) -> int:
 EMPTY = MtBatch(
     np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0), np.zeros(0, np.int64)
 )  # fmt: skip
+
+
+def warm_up() -> None:
+    """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later."""
+    still = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    MtxReader().feed_batch(encode_frame(MTDATA, pack_mtdata(still)) + encode_frame(MTDATA2, b"\x10\x20\x02\x00\x00"))
