@@ -2,7 +2,8 @@
 
 In: device seconds and arrival times. Out: the mapping between both. Owns the least delayed arrival of each of the last seconds.
 Delays only add: the true line lies below all points (device time, arrival - device time) and touches the least delayed ones, so the lower
-convex hull of each second's least delayed point holds both the offset and the drift [Moon, Skelly, Towsley 1999].
+convex hull of each second's least delayed point holds both the offset and the drift [Moon, Skelly, Towsley 1999]. Among the lines that touch
+it, the one of the most probable drift is taken: few undelayed points say little about a drift, and what crystals do is known.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from collections import deque
 
 BUCKET_S = 1.0
 KEPT_BUCKETS = 60
-DRIFT_SPAN_S = 5.0  # below this span the drift is taken as zero
-MAX_DRIFT = 500e-6  # no crystal is worse
+DRIFT_SD = 130e-6  # between two crystals
+LEAST_DELAY_S = 20e-6  # no delay is known better
 
 Point = tuple[float, float]
 
@@ -42,18 +43,21 @@ class ArrivalClock:
                 self._fit()
 
     def _fit(self) -> None:
-        """The line through the hull edge in the middle of the window."""
-        hull = lower_hull([point for _, point in self._buckets])
-        first, last = hull[0][0], hull[-1][0]
-        middle = 0.5 * (first + last)
-        left, right = hull[0], hull[-1]
-        for a, b in zip(hull, hull[1:], strict=False):
-            if a[0] <= middle <= b[0]:
-                left, right = a, b
-        slope = (right[1] - left[1]) / (right[0] - left[0]) if last - first >= DRIFT_SPAN_S else 0.0
-        self._drift = min(max(slope, -MAX_DRIFT), MAX_DRIFT)
-        self._pivot_s = right[0]
+        """The most probable line under all points: exponential delays, and a drift that is a crystal's."""
+        points = [point for _, point in self._buckets]
+        hull = lower_hull(points)
+        self._pivot_s = sum(x for x, _ in points) / len(points)
+        excess_s = sum(y for _, y in points) / len(points) - self._height(hull)
+        weight = len(points) / max(excess_s, LEAST_DELAY_S)
+        self._drift = most_probable_slope(hull, self._pivot_s, weight)
         self._offset_s = min(y - self._drift * (x - self._pivot_s) for x, y in hull)
+
+    def _height(self, hull: list[Point]) -> float:
+        """Of the hull at the pivot."""
+        for a, b in zip(hull, hull[1:], strict=False):
+            if b[0] >= self._pivot_s:
+                return a[1] + (b[1] - a[1]) * (self._pivot_s - a[0]) / (b[0] - a[0])
+        return hull[-1][1]
 
     def to_arrival_s(self, device_s: float) -> float:
         """Host seconds at which undelayed bytes of that device time arrive; 0 before the first update."""
@@ -74,6 +78,21 @@ def lower_hull(points: list[Point]) -> list[Point]:
             hull.pop()
         hull.append(point)
     return hull
+
+
+def most_probable_slope(hull: list[Point], pivot: float, weight: float) -> float:
+    """Slope that maximises weight * (height at the pivot of the line touching the hull from below) - slope^2 / (2 DRIFT_SD^2).
+
+    Under a line through the vertex x the height falls by slope * (x - pivot), so each vertex has its own best slope, within those of its edges.
+    """
+    best, found = -float("inf"), 0.0
+    slopes = [-1.0, *((b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(hull, hull[1:], strict=False)), 1.0]
+    for (x, y), low, high in zip(hull, slopes, slopes[1:], strict=False):
+        slope = min(max(-(DRIFT_SD**2) * weight * (x - pivot), low), high)
+        gain = weight * (y - slope * (x - pivot)) - 0.5 * (slope / DRIFT_SD) ** 2
+        if gain > best:
+            best, found = gain, slope
+    return found
 
 
 def _turn(a: Point, b: Point, c: Point) -> float:

@@ -38,7 +38,9 @@ class Frame(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """Complete frames: `stream` holds them; `mid`, `body` and `length` of each payload, `end` of each frame, counted in the bytes just fed (n,)."""
+    """Complete frames: `stream` holds them; `mid`, `body` and `length` of each payload (n,); `end` (n,): after which of
+    the bytes just fed it was clear that it is a frame: its last one, or that of a false frame which began before it.
+    """
 
     stream: Bytes
     mid: Ints
@@ -71,6 +73,11 @@ class FrameReader:
     counts: FrameCounts = field(default_factory=FrameCounts)
     _rest: bytes = b""
 
+    @property
+    def pending(self) -> int:
+        """Bytes of the unfinished frame."""
+        return len(self._rest)
+
     def scan(self, received: bytes) -> Frames:
         """Frames completed by these bytes."""
         stream = np.frombuffer(self._rest + received, np.uint8)
@@ -102,8 +109,9 @@ def payloads_at(stream: Bytes, begin: Ints, length: int) -> Bytes:
 
 @njit(cache=True, error_model="numpy")
 def _scan(stream: Bytes, found: Ints, counted: Ints) -> tuple[int, int]:
-    """Fill rows (message, body, length, end) of `found`; returns their number, and where the unfinished frame begins.
+    """Fill rows (message, body, length, known) of `found`; returns their number, and where the unfinished frame begins.
 
+    `known` is the byte after which it is clear that the frame is one: its end, or the end of a false frame that began before it.
     Running sums make every checksum two look-ups: noise full of preambles costs no more than frames.
     """
     size = len(stream)
@@ -113,10 +121,11 @@ def _scan(stream: Bytes, found: Ints, counted: Ints) -> tuple[int, int]:
         sums[k] = running
         running = (running + stream[k]) & 0xFF
     sums[size] = running
-    count, at = 0, 0
+    count, at, known = 0, 0, 0
     while at < size:
         have = size - at
         if stream[at] != PREAMBLE or (have > 1 and stream[at + 1] != BUS_ID):
+            known = max(known, at + 1 + (stream[at] == PREAMBLE))
             counted[SKIPPED] += 1
             at += 1
             continue
@@ -128,18 +137,20 @@ def _scan(stream: Bytes, found: Ints, counted: Ints) -> tuple[int, int]:
                 break
             length, head = (int(stream[at + 4]) << 8) | int(stream[at + 5]), 6
             if length < EXTENDED or length > MAX_LENGTH:
+                known = max(known, at + 6)
                 counted[SKIPPED] += 1
                 at += 1
                 continue
         end = at + head + length + 1
         if end > size:
             break
+        known = max(known, end)
         if sums[end] != sums[at + 1]:
             counted[BAD_CHECKSUM] += 1
             counted[SKIPPED] += 1
             at += 1
             continue
-        found[count, 0], found[count, 1], found[count, 2], found[count, 3] = stream[at + 2], at + head, length, end
+        found[count, 0], found[count, 1], found[count, 2], found[count, 3] = stream[at + 2], at + head, length, known
         count += 1
         at = end
     return count, at

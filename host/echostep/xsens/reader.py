@@ -34,7 +34,9 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 # Verdicts, in the order of the gates; also rows of the reader's tally.
-GOOD, INCOMPLETE, NOT_FINITE, BAD_QUATERNION, OUT_OF_RANGE, REPEATED, LOST = range(7)
+GOOD, INCOMPLETE, NOT_FINITE, BAD_QUATERNION, OUT_OF_RANGE, REPEATED, BAD_COUNTER, LOST = range(8)
+
+MAX_GAP = 500  # a counter that is further ahead, or behind, is believed when the next one follows it
 
 
 class MtSample(NamedTuple):
@@ -49,7 +51,7 @@ class MtSample(NamedTuple):
 
 class MtBatch(NamedTuple):
     """Measurements in order: counter (n,) u16; accel m/s2, gyro rad/s, mag in units of the earth's field (n, 3); quaternion w x y z,
-    sensor -> MT world (n, 4); temperature degC (n,); `end` (n,): where each one's frame ends in the bytes just fed. Mag, quaternion and
+    sensor -> MT world (n, 4); temperature degC (n,); `end` (n,): after which of the bytes just fed each one was complete. Mag, quaternion and
     temperature are NaN when the device does not send them.
     """
 
@@ -72,7 +74,9 @@ class MtBatch(NamedTuple):
 
 @dataclass(slots=True)
 class MtxCounts:
-    """What an `MtxReader` has seen; `lost` counts sample numbers that never came, `incomplete` samples without counter, accel or gyro."""
+    """What an `MtxReader` has seen; `lost` counts sample numbers that never came, `incomplete` samples without counter, accel or gyro;
+    `bad_counter` those whose counter jumps, which are dropped until the next one confirms the jump.
+    """
 
     good: int = 0
     skipped_bytes: int = 0
@@ -83,6 +87,7 @@ class MtxCounts:
     not_finite: int = 0
     out_of_range: int = 0
     repeated: int = 0
+    bad_counter: int = 0
     other_messages: int = 0
     wake_ups: int = 0
     device_errors: int = 0
@@ -111,7 +116,7 @@ class MtxReader:
         self._output = output
         self._limits = np.array([limits.accel_m_s2, limits.gyro_rad_s, limits.mag, limits.quaternion_error])
         self._tally = np.zeros(LOST + 1, np.int64)
-        self._counter = -1
+        self._last = np.full(2, -1, np.int64)  # the last counter that was believed, and one that jumped since
         self._bad_length = self._other = self._wake_ups = self._errors = 0
 
     @property
@@ -128,11 +133,17 @@ class MtxReader:
             not_finite=tally[NOT_FINITE],
             out_of_range=tally[OUT_OF_RANGE],
             repeated=tally[REPEATED],
+            bad_counter=tally[BAD_COUNTER],
             other_messages=self._other,
             wake_ups=self._wake_ups,
             device_errors=self._errors,
             lost=tally[LOST],
         )
+
+    @property
+    def pending(self) -> int:
+        """Bytes of the unfinished frame."""
+        return self._frames.pending
 
     def feed(self, received: bytes) -> list[MtSample]:
         """Measurements completed by these bytes, one by one."""
@@ -144,7 +155,7 @@ class MtxReader:
         if not len(frames.mid):
             return EMPTY
         (values, counter, sent), end = self._decoded(frames)
-        kept, self._counter = _judge(values, counter, sent, self._limits, self._counter, self._tally)
+        kept = _judge(values, counter, sent, self._limits, self._last, self._tally)
         if not kept.all():
             values, counter, end = values[kept], counter[kept], end[kept]
         return MtBatch(
@@ -186,9 +197,9 @@ def _fill(found: Decoded, which: Ints, part: Decoded) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _judge(
-    values: Floats, counter: Ints, sent: NDArray[np.bool_], limits: Floats, last: int, tally: Ints
-) -> tuple[NDArray[np.bool_], int]:
-    """Which samples pass every gate after the checksum, and the last counter; `tally` gets the verdicts and the lost samples.
+    values: Floats, counter: Ints, sent: NDArray[np.bool_], limits: Floats, last: Ints, tally: Ints
+) -> NDArray[np.bool_]:
+    """Which samples pass every gate after the checksum; `last` is carried on, `tally` gets the verdicts and the lost samples.
 
     The checksum is 8 bits wide and lets one damaged frame in 256 through.
     """
@@ -196,16 +207,27 @@ def _judge(
     for k in range(len(values)):
         complete = counter[k] >= 0 and sent[k, 0] and sent[k, 1]
         verdict = _verdict(values[k], sent[k], limits) if complete else INCOMPLETE
-        if verdict == GOOD and last >= 0:
-            gap = (counter[k] - last) & 0xFFFF
-            if gap == 0:
-                verdict = REPEATED
-            elif gap < 0x8000:
-                tally[LOST] += gap - 1
+        if verdict == GOOD and last[0] >= 0:
+            verdict = _continuity(counter[k], last, tally)
         tally[verdict] += 1
         if verdict == GOOD:
-            kept[k], last = True, counter[k]
-    return kept, last
+            kept[k], last[0], last[1] = True, counter[k], -1
+    return kept
+
+
+@njit(cache=True, error_model="numpy")
+def _continuity(counter: int, last: Ints, tally: Ints) -> int:
+    """Whether a counter follows the last one; what is missing between them is counted as lost."""
+    gap = (counter - last[0]) & 0xFFFF
+    if gap == 0:
+        return REPEATED
+    confirmed = last[1] >= 0 and 0 < ((counter - last[1]) & 0xFFFF) <= MAX_GAP
+    if gap > MAX_GAP and not confirmed:
+        last[1] = counter
+        return BAD_COUNTER
+    if gap < 0x8000:
+        tally[LOST] += gap - 1
+    return GOOD
 
 
 @njit(cache=True, error_model="numpy")
