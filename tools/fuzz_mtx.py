@@ -1,4 +1,4 @@
-"""Fuzz the MTx decoder with mutated frames: nothing may raise, memory stays bounded, what passes is a measurement, every frame is accounted for.
+"""Fuzz the MTx decoder with mutated frames: nothing may raise, memory stays bounded, what passes is a measurement.
 
 In: a number of frames and a seed. Out: the rate and what became of the frames; status 1 when anything is wrong.
 """

@@ -66,7 +66,7 @@ def _find(
                 if identifier & 0xFFF0 == types[j]:
                     form = identifier & 3
                     width = 2 if types[j] == 0x1020 else (4 if form < 2 else 2 + 2 * form)
-                    fits = fits and size == width * values[j]
+                    fits = fits and size == width * values[j] and identifier & 0xC != 0xC  # there is no fourth world
                     at[k, j], bits[k, j] = here, identifier & 0xF
             here += size
         whole[k] = fits and here == end
