@@ -77,4 +77,9 @@ def as_json(message: Message | MtSample) -> dict[str, Any]:
 
 def _fields(sample: Any) -> dict[str, Any]:
     names = sample._fields if hasattr(sample, "_fields") else sample.__dataclass_fields__
-    return {name: getattr(sample, name) for name in names if getattr(sample, name) is not None}
+    return {name: value for name in names if (value := getattr(sample, name)) is not None and not _is_absent(value)}
+
+
+def _is_absent(value: Any) -> bool:
+    """A quantity that the device did not send."""
+    return isinstance(value, tuple) and all(v != v for v in value)
