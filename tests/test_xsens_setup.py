@@ -208,3 +208,14 @@ def test_messages_are_the_ones_of_the_manual() -> None:
     assert frames["SetOutputMode"] == "faffd00200 0629".replace(" ", "")
     assert encode_frame(0x10).hex() == "faff1000f1"
     assert encode_frame(reset_heading().mid, reset_heading().payload).hex() == "faffa40200015a"
+
+
+def test_what_waited_in_the_system_is_no_rate() -> None:
+    """A hundred frames at once, then 100 Hz: the right mode."""
+    setup = MtxSetup(project_requests(100.0), 100.0)
+    made = MtxDevice(PROJECT)
+    waiting = b"".join(made.measure(SAMPLE._replace(counter=n)) for n in range(100))
+    setup.advance(waiting, 1.0)
+    for k in range(150):
+        setup.advance(made.measure(SAMPLE._replace(counter=100 + k)), 1.01 + k * STEP_S)
+    assert setup.state is State.UNANSWERED

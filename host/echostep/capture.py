@@ -5,6 +5,7 @@ In: a file: what came from the board's port, what came from the MTx's (Xbus byte
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,4 +83,4 @@ def _fields(sample: Any) -> dict[str, Any]:
 
 def _is_absent(value: Any) -> bool:
     """A quantity that the device did not send."""
-    return isinstance(value, tuple) and all(v != v for v in value)
+    return isinstance(value, tuple) and all(map(math.isnan, value))

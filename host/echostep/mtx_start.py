@@ -10,7 +10,6 @@ from collections.abc import Callable
 
 from echostep.errors import EchostepError
 from echostep.sources import MTX, Chunk
-from echostep.xsens.reader import warm_up
 from echostep.xsens.requests import project_requests
 from echostep.xsens.setup import MtxSetup, State
 
@@ -24,7 +23,6 @@ class MtxStart:
             requests = project_requests(rate_hz)
         except ValueError as error:
             raise EchostepError(str(error)) from error
-        warm_up()
         self._setup = MtxSetup(requests, rate_hz)
         self._send, self._say = send, say
         self._usable = False
@@ -33,8 +31,11 @@ class MtxStart:
         """Take the next chunk of any port; None when nothing came."""
         was_busy = not self._setup.finished
         wakes = self._setup.wake_ups
-        received = chunk.data if chunk is not None and chunk.port == MTX else b""
-        if sent := self._setup.advance(received, time.monotonic()):
+        now_s = time.monotonic()
+        received, arrived_s = b"", now_s
+        if chunk is not None and chunk.port == MTX:
+            received, arrived_s = chunk.data, chunk.t_arrival_ns * 1e-9
+        if sent := self._setup.advance(received, now_s, arrived_s):
             self._send(sent)
         if self._setup.wake_ups > wakes and self._usable:
             self._say("MTx: it started anew")

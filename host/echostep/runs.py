@@ -35,6 +35,7 @@ from echostep.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
+from echostep.xsens.reader import warm_up
 
 DEMO_PACE = 8.0
 BAUD = {BOARD: 115200, MTX: 115200}
@@ -91,6 +92,7 @@ def live(
 
 def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
     """Record from two serial ports until Ctrl-C."""
+    warm_up()
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     count = {BOARD: 0, MTX: 0}
     try:

@@ -23,7 +23,9 @@ from echostep.xsens.requests import (
 TRIES = 4  # of each request; three is what Xsens' own library gives GoToConfig [CMT]
 TIMEOUT_S = 0.25  # for an acknowledgement; before it come what the line and the host still hold of the measurements
 MAX_WAKE_UPS = 20  # a device that wakes up more often has a bad supply
-RATE_ERROR = 0.2  # share by which a rate that is seen over a second may be off
+RATE_ERROR = 0.3  # share by which a rate that is seen for so short may be off
+RATE_SPAN_S = 0.5
+BACKLOG_S = 0.2  # what was waiting in the system when the port was opened comes at once
 
 BY_HAND = "set it once with Xsens' MT Manager to calibrated data + orientation as quaternion + sample counter, float, {rate:g} Hz, 115200 Bd"
 
@@ -72,25 +74,25 @@ class MtxSetup:
         """Whether nothing more will be sent unless the device wakes up."""
         return self.state is not State.BUSY
 
-    def advance(self, received: bytes, now_s: float) -> bytes:
-        """Take what came; returns what to send now."""
+    def advance(self, received: bytes, now_s: float, arrived_s: float | None = None) -> bytes:
+        """Take what came, at `arrived_s` if that was not just now; returns what to send now."""
         self._received += len(received)
         for frame in self._frames.feed(received):
-            self._take(frame, now_s)
+            self._take(frame, now_s, now_s if arrived_s is None else arrived_s)
         if not self.finished and now_s >= self._deadline_s:
             self._send_again(now_s)
         sent = b"".join(self._out)
         self._out.clear()
         return sent
 
-    def _take(self, frame: Frame, now_s: float) -> None:
+    def _take(self, frame: Frame, now_s: float, arrived_s: float) -> None:
         if frame.mid == WAKE_UP:
             self._woken(now_s)
         elif frame.mid in (MTDATA, MTDATA2):
             if self.state is State.SILENT:
                 self._restart(now_s)
             if len(self._streamed) < 1000:
-                self._streamed.append((frame.mid, len(frame.payload), now_s))
+                self._streamed.append((frame.mid, len(frame.payload), arrived_s))
         elif not self.finished:
             request = self._queue[0]
             if frame.mid == ERROR and self._tries:
@@ -163,8 +165,9 @@ class MtxSetup:
         mid, length, _ = self._streamed[-1]
         if mid == MTDATA and length != PROJECT.length:
             return f"MTData of {length} bytes instead of {PROJECT.length}"
-        span_s = self._streamed[-1][2] - self._streamed[0][2]
-        rate_hz = (len(self._streamed) - 1) / span_s if span_s > 0.5 else self._rate_hz
+        times = [t for _, _, t in self._streamed if t > self._streamed[0][2] + BACKLOG_S]
+        span_s = times[-1] - times[0] if times else 0.0
+        rate_hz = (len(times) - 1) / span_s if span_s > RATE_SPAN_S else self._rate_hz
         if abs(rate_hz / self._rate_hz - 1.0) > RATE_ERROR:
             return f"about {rate_hz:.0f} Hz instead of {self._rate_hz:g}"
         return ""
