@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 
-from echostep.arrival import BUCKET_S, DRIFT_SPAN_S, KEPT_BUCKETS, MAX_DRIFT
+from echostep.arrival import BUCKET_S, DRIFT_SD, KEPT_BUCKETS, LEAST_DELAY_S
 from echostep.clocks import AHEAD_S, BEHIND_S, JUMPS_TO_RESTART
 from echostep.timeline import BOARD_LATENCY_S, TICK_S, MtxTiming
 
@@ -36,18 +36,22 @@ class ArrivalClock:
                 self._fit()
 
     def _fit(self) -> None:
-        """The line through the hull edge in the middle of the window."""
-        hull = lower_hull([point for _, point in self._buckets])
-        first, last = hull[0][0], hull[-1][0]
-        middle = 0.5 * (first + last)
-        left, right = hull[0], hull[-1]
-        for a, b in zip(hull, hull[1:], strict=False):
-            if a[0] <= middle <= b[0]:
-                left, right = a, b
-        slope = (right[1] - left[1]) / (right[0] - left[0]) if last - first >= DRIFT_SPAN_S else 0.0
-        self._drift = min(max(slope, -MAX_DRIFT), MAX_DRIFT)
-        self._pivot_s = right[0]
+        """The most probable line under all points: exponential delays, and a drift that is a crystal's."""
+        points = [point for _, point in self._buckets]
+        hull = lower_hull(points)
+        total_x = total_y = 0.0
+        for x, y in points:
+            total_x, total_y = total_x + x, total_y + y
+        self._pivot_s = total_x / len(points)
+        excess_s = total_y / len(points) - self._height(hull)
+        self._drift = most_probable_slope(hull, self._pivot_s, len(points) / max(excess_s, LEAST_DELAY_S))
         self._offset_s = min(y - self._drift * (x - self._pivot_s) for x, y in hull)
+
+    def _height(self, hull: list[Point]) -> float:
+        for a, b in zip(hull, hull[1:], strict=False):
+            if b[0] >= self._pivot_s:
+                return a[1] + (b[1] - a[1]) * (self._pivot_s - a[0]) / (b[0] - a[0])
+        return hull[-1][1]
 
     def to_arrival_s(self, device_s: float) -> float:
         """Host seconds at which undelayed bytes of that device time arrive; 0 before the first update."""
@@ -68,6 +72,18 @@ def lower_hull(points: list[Point]) -> list[Point]:
             hull.pop()
         hull.append(point)
     return hull
+
+
+def most_probable_slope(hull: list[Point], pivot: float, weight: float) -> float:
+    """Vertex by vertex."""
+    best, found = -float("inf"), 0.0
+    slopes = [-1.0, *((b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(hull, hull[1:], strict=False)), 1.0]
+    for (x, y), low, high in zip(hull, slopes, slopes[1:], strict=False):
+        slope = min(max(-(DRIFT_SD * DRIFT_SD) * weight * (x - pivot), low), high)
+        gain = weight * (y - slope * (x - pivot)) - 0.5 * (slope / DRIFT_SD) * (slope / DRIFT_SD)
+        if gain > best:
+            best, found = gain, slope
+    return found
 
 
 def _turn(a: Point, b: Point, c: Point) -> float:

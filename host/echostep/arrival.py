@@ -3,7 +3,8 @@
 In: device seconds and arrival times. Out: the mapping between both. Owns nothing: the least delayed arrival of each of the last seconds is in an
 `ArrivalClock` that the caller keeps.
 Delays only add: the true line lies below all points (device time, arrival - device time) and touches the least delayed ones, so the lower
-convex hull of each second's least delayed point holds both the offset and the drift [Moon, Skelly, Towsley 1999].
+convex hull of each second's least delayed point holds both the offset and the drift [Moon, Skelly, Towsley 1999]. Among the lines that touch
+it, the one of the most probable drift is taken: few undelayed points say little about a drift, and what crystals do is known.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ Ints = NDArray[np.int64]
 
 BUCKET_S = 1.0
 KEPT_BUCKETS = 60
-DRIFT_SPAN_S = 5.0  # below this span the drift is taken as zero
-MAX_DRIFT = 500e-6  # no crystal is worse
+DRIFT_SD = 130e-6  # between two crystals
+LEAST_DELAY_S = 20e-6  # no delay is known better
 
 
 class ArrivalClock(Protocol):
@@ -79,21 +80,52 @@ def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _fit(clock: ArrivalClock) -> None:
-    """The line through the hull edge in the middle of the window."""
-    x, y = clock.device_s, clock.late_s
-    hull = lower_hull(x[: clock.kept], y[: clock.kept])
-    first, last = x[hull[0]], x[hull[-1]]
-    middle = 0.5 * (first + last)
-    left, right = hull[0], hull[-1]
-    for k in range(len(hull) - 1):
-        if x[hull[k]] <= middle <= x[hull[k + 1]]:
-            left, right = hull[k], hull[k + 1]
-    slope = (y[right] - y[left]) / (x[right] - x[left]) if last - first >= DRIFT_SPAN_S else 0.0
-    clock.drift = min(max(slope, -MAX_DRIFT), MAX_DRIFT)
-    clock.pivot_s = x[right]
+    """The most probable line under all points: exponential delays, and a drift that is a crystal's."""
+    n = clock.kept
+    x, y = clock.device_s[:n], clock.late_s[:n]
+    hull = lower_hull(x, y)
+    total_x, total_y = 0.0, 0.0
+    for k in range(n):
+        total_x += x[k]
+        total_y += y[k]
+    pivot = total_x / n
+    excess_s = total_y / n - _height(x, y, hull, pivot)
+    slope = most_probable_slope(x, y, hull, pivot, n / max(excess_s, LEAST_DELAY_S))
+    clock.pivot_s, clock.drift = pivot, slope
     clock.offset_s = np.inf
     for k in hull:
-        clock.offset_s = min(clock.offset_s, y[k] - clock.drift * (x[k] - clock.pivot_s))
+        clock.offset_s = min(clock.offset_s, y[k] - slope * (x[k] - pivot))
+
+
+@njit(cache=True, error_model="numpy")
+def _height(x: Floats, y: Floats, hull: Ints, pivot: float) -> float:
+    """Of the hull at the pivot."""
+    for k in range(len(hull) - 1):
+        a, b = hull[k], hull[k + 1]
+        if x[b] >= pivot:
+            return y[a] + (y[b] - y[a]) * (pivot - x[a]) / (x[b] - x[a])
+    return y[hull[-1]]
+
+
+@njit(cache=True, error_model="numpy")
+def most_probable_slope(x: Floats, y: Floats, hull: Ints, pivot: float, weight: float) -> float:
+    """Slope that maximises weight * (height at the pivot of the line touching the hull from below) - slope^2 / (2 DRIFT_SD^2).
+
+    Under a line through the vertex x the height falls by slope * (x - pivot), so each vertex has its own best slope, within those of its edges.
+    """
+    best, found, low = -np.inf, 0.0, -1.0
+    for k in range(len(hull)):
+        a = hull[k]
+        high = 1.0
+        if k + 1 < len(hull):
+            b = hull[k + 1]
+            high = (y[b] - y[a]) / (x[b] - x[a])
+        slope = min(max(-(DRIFT_SD * DRIFT_SD) * weight * (x[a] - pivot), low), high)
+        gain = weight * (y[a] - slope * (x[a] - pivot)) - 0.5 * (slope / DRIFT_SD) * (slope / DRIFT_SD)
+        if gain > best:
+            best, found = gain, slope
+        low = high
+    return found
 
 
 @njit(cache=True, error_model="numpy")

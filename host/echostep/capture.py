@@ -5,6 +5,7 @@ In: a file: what came from the board's port, what came from the MTx's (Xbus byte
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,4 +78,9 @@ def as_json(message: Message | MtSample) -> dict[str, Any]:
 
 def _fields(sample: Any) -> dict[str, Any]:
     names = sample._fields if hasattr(sample, "_fields") else sample.__dataclass_fields__
-    return {name: getattr(sample, name) for name in names if getattr(sample, name) is not None}
+    return {name: value for name in names if (value := getattr(sample, name)) is not None and not _is_absent(value)}
+
+
+def _is_absent(value: Any) -> bool:
+    """A quantity that the device did not send."""
+    return isinstance(value, tuple) and all(map(math.isnan, value))

@@ -22,8 +22,7 @@ from echostep.messages import BY_ID, ROWS, Identity, Outcome, Ping, Status, Sync
 from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.waiting import Passage, Silence, Waiting
-from echostep.xbus import MtBatch, MtxReader
-from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, pack_mtdata
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -28,15 +28,18 @@ from echostep.foot import Track, walk_track
 from echostep.frames import encode
 from echostep.imu import Imu, describe_track, load_imu, write_foot_track
 from echostep.messages import Identify
+from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
+from echostep.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
+from echostep.xsens.reader import warm_up
 
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
@@ -89,7 +92,7 @@ def live(
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
-            chunks = _portions(_kept(_until(ports, seconds), recorder), 1)
+            chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
             estimates = _run(tracker, chunks, "echostep live", None, headless)
     finally:
         ports.close()
@@ -98,12 +101,13 @@ def live(
 
 def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
     """Record from two serial ports until Ctrl-C."""
+    warm_up()
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     count = {BOARD: 0, MTX: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
-            for chunk in _kept(_until(ports, seconds), recorder):
+            for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
                 count[chunk.port] += len(chunk.data)
     finally:
         ports.close()
@@ -232,13 +236,20 @@ def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
         yield portion_of(taken)
 
 
-def _until(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk]:
-    """Chunks of the ports, for so long or until Ctrl-C; what happens to the ports is said."""
+def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None) -> Iterator[Chunk]:
+    """Chunks of the ports, for so long or until Ctrl-C, each recorded before anything looks at it; the MTx is set up on the way.
+
+    What happens to the ports and to the MTx is said.
+    """
     end = math.inf if seconds is None else time.monotonic() + seconds
+    start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:
         for chunk in ports.chunks():
             while ports.notices:
                 console.print(ports.notices.popleft())
+            if chunk is not None:
+                recorder.write(chunk)
+            start.follow(chunk)
             if chunk is not None:
                 yield chunk
             if time.monotonic() >= end:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
 
-IDLE_S = 0.2
+IDLE_S = 0.05  # no longer, so that the MTx is asked again in time
 READ_TIMEOUT_S = 0.1
 WRITE_TIMEOUT_S = 0.5
 REOPEN_S = 0.5

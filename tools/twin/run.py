@@ -1,7 +1,8 @@
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
-In: the ELF and the twin. Out: two ports that `echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port
-is opened, and starts anew when it is over, until Ctrl-C. Simulated hardware, real firmware.
+In: the ELF and the twin; the MTx begins as it is sold, and answers its configuration. Out: two ports that
+`echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port is opened, and starts anew when it is over,
+until Ctrl-C. Simulated hardware, real firmware.
 """
 
 from __future__ import annotations
@@ -23,8 +24,11 @@ import numpy as np
 
 from echostep.plan import load_plan
 from echostep.simulation.board import Sent
+from echostep.simulation.mtx_device import MtxDevice
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.simulation.stimulus import NO_SYNC, ROW
+from echostep.xsens import MtxReader
+from echostep.xsens.reader import warm_up
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]
@@ -78,34 +82,59 @@ class PtyBoard:
         self._child.wait()
 
 
-def open_mtx() -> tuple[int, str]:
-    """A pseudo terminal for the MTx: the end to write to, and the name of the other."""
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    os.set_blocking(ours, False)
-    return ours, os.ttyname(theirs)
+class PtyMtx:
+    """An MTx on a pseudo terminal, which answers."""
+
+    def __init__(self) -> None:
+        self._ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        os.set_blocking(self._ours, False)
+        self.port = os.ttyname(theirs)
+        self.device = MtxDevice()
+        warm_up()
+
+    def listen(self) -> None:
+        """Answer what the host asked."""
+        received = b""
+        with contextlib.suppress(BlockingIOError):
+            received = os.read(self._ours, 4096)
+        self._write(self.device.feed(received, time.monotonic()))
+
+    def measure(self, frame: bytes) -> None:
+        """Send a measurement, given as a frame in the project's format, as the device is set."""
+        for sample in MtxReader().feed(frame):
+            self._write(self.device.measure(sample))
+
+    def _write(self, sent: bytes) -> None:
+        with contextlib.suppress(BlockingIOError):  # nobody reads: as with a cable that leads nowhere
+            if sent:
+                os.write(self._ours, sent)
 
 
-def wait_for_listener(board: PtyBoard) -> None:
+def wait_for_listener(board: PtyBoard, mtx: PtyMtx) -> None:
     """Let the board idle, at the pace of the wall clock, until somebody opens its port."""
     idle = np.zeros(IDLE_MS, ROW)
     idle["sync_us"] = NO_SYNC
     while not board.is_open:
         board.advance(idle)
+        mtx.listen()
         time.sleep(IDLE_MS * 1e-3)
 
 
-def play(scenario: Scenario, board: PtyBoard, mtx: int) -> None:
+def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
     """One walk at the pace of the wall clock."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
     began = time.monotonic()
     for start in range(0, len(scenario.walk.t_s), BLOCK_MS):
-        board.advance(scenario.sensors.rows(start, start + BLOCK_MS))
+        rows = scenario.sensors.rows(start, start + BLOCK_MS).copy()
+        if not mtx.device.pulses:
+            rows["sync_us"] = NO_SYNC
+        board.advance(rows)
+        mtx.listen()
         now_s = (start + BLOCK_MS) * 1e-3
         while waiting is not None and waiting[0] <= now_s:
-            with contextlib.suppress(BlockingIOError):  # nobody reads: as with a cable that leads nowhere
-                os.write(mtx, waiting[1])
+            mtx.measure(waiting[1])
             waiting = next(frames, None)
         ahead = began + now_s - time.monotonic()
         if ahead > 0:
@@ -126,14 +155,14 @@ def main() -> int:
     with as_file(files("echostep") / "plans" / "demo.json") as path:
         plan = load_plan(path)
         board = PtyBoard()
-        mtx, mtx_port = open_mtx()
+        mtx = PtyMtx()
         options.out.mkdir(parents=True, exist_ok=True)
-        print(f"board {board.port}\nmtx   {mtx_port}\n\nIn another terminal:\n"
-              f"  .venv/bin/echostep live --plan {path} --board {board.port} --mtx {mtx_port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
+        print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n"
+              f"  .venv/bin/echostep live --plan {path} --board {board.port} --mtx {mtx.port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
     try:
         while True:
             scenario = demo_scenario(plan, options.seed, board)
-            wait_for_listener(board)
+            wait_for_listener(board, mtx)
             scenario.write_truth(options.out / "truth.csv", board.t_s)
             play(scenario, board, mtx)
             if options.once:

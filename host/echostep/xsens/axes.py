@@ -1,0 +1,100 @@
+"""Orientations as an MT gives them -> one quaternion, and the MT world -> the project's map frame. Nothing else turns MT axes.
+
+In: Euler angles, matrices or quaternions in one of the MT's worlds. Out: quaternions w x y z, sensor -> MT world or sensor -> map.
+MT world: x magnetic north, y west, z up [Manual 2.2, the default of the MTx]. Map: x east, y north, z up.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+ENU, NED, NWU = 0x0, 0x4, 0x8  # coordinate bits of an MTData2 identifier [LLCP, MTData2]
+EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees, and some rounding
+ROTATION_ERROR = 0.02
+IDENTITY = np.eye(3).ravel()
+_HALF = math.sqrt(0.5)
+TO_MAP = np.array([_HALF, 0.0, 0.0, _HALF])  # north, west, up -> east, north, up: a quarter turn about up
+FROM_WORLD = {  # some world -> north, west, up
+    ENU: np.array([_HALF, 0.0, 0.0, -_HALF]),
+    NED: np.array([0.0, 1.0, 0.0, 0.0]),
+    NWU: np.array([1.0, 0.0, 0.0, 0.0]),
+}
+
+
+def to_map(q: Floats) -> Floats:
+    """Sensor -> MT world (n, 4) into sensor -> map (n, 4); the map's y is magnetic north."""
+    return product(TO_MAP, q)
+
+
+def to_mt_world(q: Floats, world: int) -> Floats:
+    """Sensor -> ENU, NED or NWU (n, 4) into sensor -> MT world (north, west, up)."""
+    return q if world == NWU else product(FROM_WORLD[world], q)
+
+
+def product(p: Floats, q: Floats) -> Floats:
+    """Hamilton product p q of one quaternion (4,) with many (n, 4): first q's rotation, then p's."""
+    w, x, y, z = p
+    a, b, c, d = q[:, 0], q[:, 1], q[:, 2], q[:, 3]
+    return np.stack(
+        [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c - x * d + y * a + z * b,
+            w * d + x * c - y * b + z * a,
+        ],
+        axis=1,
+    )
+
+
+def from_euler(degrees: Floats) -> Floats:
+    """Quaternions of roll, pitch, yaw (n, 3) in degrees, R = Rz(yaw) Ry(pitch) Rx(roll) [Manual 2.3, aerospace sequence].
+
+    Angles that are none give 0, which no gate takes for a quaternion.
+    """
+    possible = np.all(np.abs(degrees) <= EULER_LIMITS, axis=1)
+    half = np.radians(np.where(possible[:, None], degrees, 0.0)) * 0.5
+    cr, cp, cy = np.cos(half).T
+    sr, sp, sy = np.sin(half).T
+    return possible[:, None] * np.stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ],
+        axis=1,
+    )
+
+
+def from_matrix(columns: Floats) -> Floats:
+    """Quaternions of rotation matrices sent column by column (n, 9) [Manual, definition of a to i]; what is no rotation gives 0.
+
+    The branch with the largest component, so that nothing small is divided by [Shepperd 1978].
+    """
+    rotation = _are_rotations(columns)
+    columns = np.where(rotation[:, None], columns, IDENTITY)
+    a, b, c, d, e, f, g, h, i = columns.T
+    squares = np.stack([1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i], axis=1)
+    best = np.argmax(squares, axis=1)
+    rows = np.empty((4, len(columns), 4))
+    rows[0] = np.stack([squares[:, 0], f - h, g - c, b - d], axis=1)
+    rows[1] = np.stack([f - h, squares[:, 1], b + d, c + g], axis=1)
+    rows[2] = np.stack([g - c, b + d, squares[:, 2], f + h], axis=1)
+    rows[3] = np.stack([b - d, c + g, f + h, squares[:, 3]], axis=1)
+    index = np.arange(len(columns))
+    return rotation[:, None] * rows[best, index] / (2.0 * np.sqrt(squares[index, best]))[:, None]
+
+
+def _are_rotations(columns: Floats) -> NDArray[np.bool_]:
+    """Whether the columns (n, 9) are orthonormal and right-handed."""
+    with np.errstate(all="ignore"):
+        first, second, third = columns[:, 0:3], columns[:, 3:6], columns[:, 6:9]
+        off = np.abs(np.cross(first, second) - third).max(axis=1)
+        off = np.maximum(off, np.abs(np.einsum("ni,ni->n", first, second)))
+        off = np.maximum(off, np.abs(np.einsum("ni,ni->n", first, first) - 1.0))
+        return off <= ROTATION_ERROR

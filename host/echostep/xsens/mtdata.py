@@ -1,0 +1,147 @@
+"""MTData (0x32), the measurement message of the MTi and the MTx, in every output mode and setting of an MTx.
+
+In: payloads and the output format that the device was set to; the message does not say it. Out: values in SI units. Owns nothing.
+Order: temperature, calibrated (accel, gyro, mag), orientation, auxiliary, status, sample counter [Manual 5.3.3, MTData].
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.xsens.axes import from_euler, from_matrix
+from echostep.xsens.frames import Bytes
+
+if TYPE_CHECKING:
+    from echostep.xsens.reader import MtSample
+
+Floats = NDArray[np.float64]
+
+# Output mode [Manual 5.3.3, SetOutputMode; status: CMT].
+TEMPERATURE, CALIBRATED, ORIENTATION, AUXILIARY, STATUS, RAW = 0x0001, 0x0002, 0x0004, 0x0008, 0x0800, 0x4000
+# Output settings [Manual 5.3.3, SetOutputSettings; the second analog input: CMT].
+SAMPLE_COUNTER = 0x0001
+QUATERNION, EULER, MATRIX, ORIENTATION_MASK = 0x0000, 0x0004, 0x0008, 0x000C
+NO_ACCEL, NO_GYRO, NO_MAG = 0x0010, 0x0020, 0x0040
+FLOAT, FIXED_12_20, FORMAT_MASK = 0x0000, 0x0100, 0x0300
+NO_ANALOG_1, NO_ANALOG_2 = 0x0400, 0x0800
+
+_MODES = TEMPERATURE | CALIBRATED | ORIENTATION | AUXILIARY | STATUS | RAW
+_SETTINGS = 0x0003 | ORIENTATION_MASK | NO_ACCEL | NO_GYRO | NO_MAG | FORMAT_MASK | NO_ANALOG_1 | NO_ANALOG_2
+_UNIT_12_20 = 2.0**-20
+_ORIENTATION_VALUES = {QUATERNION: 4, EULER: 3, MATRIX: 9}
+RAW_BYTES = 20  # accel, gyro, mag and temperature as u16, not calibrated
+
+# Columns of decoded values, common to both measurement messages; a quantity that was not sent is NaN.
+ACCEL, GYRO, MAG, ATTITUDE, CELSIUS, COLUMNS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13), 13, 14
+
+
+class Decoded(NamedTuple):
+    """`values` (n, 14): accel m/s2, gyro rad/s, mag, quaternion (sensor -> MT world), temperature degC; `counter` (n,), -1 without one;
+    `sent` (n, 4): whether the message has accel, gyro, mag, orientation.
+    """
+
+    values: Floats
+    counter: NDArray[np.int64]
+    sent: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class OutputFormat:
+    """Output mode and settings as set by SetOutputMode and SetOutputSettings; raises ValueError for what no MTx has."""
+
+    mode: int
+    settings: int
+
+    def __post_init__(self) -> None:
+        """Refuse reserved bits, and raw data together with anything else."""
+        if self.mode & ~_MODES:
+            raise ValueError(f"output mode 0x{self.mode:04X} is not a mode of an MTx")
+        if self.settings & ~_SETTINGS or self.settings & 0x0003 > SAMPLE_COUNTER:
+            raise ValueError(f"output settings 0x{self.settings:08X} are not settings of an MTx")
+        if self.settings & ORIENTATION_MASK not in _ORIENTATION_VALUES:
+            raise ValueError("output settings: quaternion, Euler angles or matrix")
+        if self.settings & FORMAT_MASK not in (FLOAT, FIXED_12_20):
+            raise ValueError("output settings: an MTx sends floats or fixed point 12.20")
+        if self.mode & RAW and self.mode != RAW:
+            raise ValueError("output mode: raw data come alone")
+
+    @cached_property
+    def calibrated(self) -> tuple[slice, ...]:
+        """Columns of the calibrated quantities that are sent, in order."""
+        pairs = ((NO_ACCEL, ACCEL), (NO_GYRO, GYRO), (NO_MAG, MAG))
+        return tuple(columns for bit, columns in pairs if self.mode & CALIBRATED and not self.settings & bit)
+
+    @cached_property
+    def sent(self) -> NDArray[np.bool_]:
+        """Whether accel, gyro, mag and orientation are sent (4,)."""
+        return np.array([c in self.calibrated for c in (ACCEL, GYRO, MAG)] + [self.orientation_values > 0])
+
+    @cached_property
+    def orientation_values(self) -> int:
+        """How many values the orientation has: 0, 3, 4 or 9."""
+        return _ORIENTATION_VALUES[self.settings & ORIENTATION_MASK] if self.mode & ORIENTATION else 0
+
+    @cached_property
+    def numbers(self) -> int:
+        """How many 4-byte values come first."""
+        return (self.mode & TEMPERATURE > 0) + 3 * len(self.calibrated) + self.orientation_values
+
+    @cached_property
+    def length(self) -> int:
+        """Bytes of a payload."""
+        counter = 2 * (self.settings & SAMPLE_COUNTER)
+        if self.mode & RAW:
+            return RAW_BYTES + counter
+        analog = (not self.settings & NO_ANALOG_1) + (not self.settings & NO_ANALOG_2) if self.mode & AUXILIARY else 0
+        return 4 * self.numbers + 2 * analog + (self.mode & STATUS > 0) + counter
+
+
+PROJECT = OutputFormat(CALIBRATED | ORIENTATION, SAMPLE_COUNTER | QUATERNION | FLOAT)  # 54 bytes
+
+
+def decode_mtdata(rows: Bytes, output: OutputFormat) -> Decoded:
+    """Values of payloads (n, `output.length`); raw data are not calibrated and give NaN."""
+    count = len(rows)
+    values = np.full((count, COLUMNS), np.nan)
+    counter = np.full(count, -1, np.int64)
+    sent = np.repeat(output.sent[None, :], count, axis=0)
+    if output.settings & SAMPLE_COUNTER:
+        counter = np.ascontiguousarray(rows[:, -2:]).view(">u2")[:, 0].astype(np.int64)
+    if output.mode & RAW:
+        return Decoded(values, counter, sent)
+    fixed = bool(output.settings & FIXED_12_20)
+    bytewise = np.ascontiguousarray(rows[:, : 4 * output.numbers]).view(">i4" if fixed else ">f4")
+    with np.errstate(invalid="ignore"):  # a damaged float may be a signalling NaN
+        numbers: Floats = bytewise.astype(np.float64)
+    if fixed:
+        numbers *= _UNIT_12_20
+    at = 0
+    if output.mode & TEMPERATURE:
+        values[:, CELSIUS] = numbers[:, 0]
+        at = 1
+    for columns in output.calibrated:
+        values[:, columns] = numbers[:, at : at + 3]
+        at += 3
+    if output.orientation_values:
+        values[:, ATTITUDE] = _quaternions(numbers[:, at:])
+    return Decoded(values, counter, sent)
+
+
+def _quaternions(orientation: Floats) -> Floats:
+    if orientation.shape[1] == 4:
+        return orientation
+    return from_euler(orientation) if orientation.shape[1] == 3 else from_matrix(orientation)
+
+
+def pack_mtdata(sample: MtSample) -> bytes:
+    """MTData payload in the project's format: calibrated values, quaternion and sample counter as floats (54 bytes)."""
+    return _PROJECT.pack(*sample.accel, *sample.gyro, *sample.mag, *sample.quaternion, sample.counter & 0xFFFF)
+
+
+_PROJECT = struct.Struct(">13fH")

@@ -1,0 +1,152 @@
+"""Fuzz the MTx decoder with mutated frames: nothing may raise, memory stays bounded, what passes is a measurement.
+
+In: a number of frames and a seed. Out: the rate and what became of the frames; status 1 when anything is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+
+from echostep.simulation.mtx_device import pack
+from echostep.xsens import MTDATA, MTDATA2, PROJECT, MtBatch, MtSample, MtxLimits, MtxReader, OutputFormat, encode_frame
+from echostep.xsens.frames import MAX_LENGTH
+from echostep.xsens.packets import read_packets
+from echostep.xsens.requests import project_requests
+from echostep.xsens.setup import MtxSetup
+
+BLOCK = 20_000  # frames that are mutated together
+REST = MAX_LENGTH + 6  # the longest unfinished frame
+SETUP_SHARE = (
+    50  # one block in so many also goes through the configuration and the packet reader, which are not vectorised
+)
+OTHER_OUTPUTS = (OutputFormat(0x0004, 0x0001), OutputFormat(0x0007, 0x0108), OutputFormat(0x4000, 0x0001))
+SAMPLE = MtSample(0, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
+
+
+def mtdata2(form: int, counter: int) -> bytes:
+    """A frame of an MTi with counter, quaternion, accel and gyro in one of the number formats."""
+    number = (
+        lambda v: np.array(v, ">f4").tobytes(),
+        lambda v: np.array(round(v * 2**20), ">i4").tobytes(),
+        lambda v: (round(v * 2**32) & 0xFFFFFFFF).to_bytes(4, "big") + int(np.floor(v)).to_bytes(2, "big", signed=True),
+        lambda v: np.array(v, ">f8").tobytes(),
+    )[form]
+    payload = b"\x10\x20\x02" + counter.to_bytes(2, "big")
+    for identifier, values in ((0x2010, SAMPLE.quaternion), (0x4020, SAMPLE.accel), (0x8020, SAMPLE.gyro)):
+        content = b"".join(number(v) for v in values)
+        payload += (identifier | form).to_bytes(2, "big") + bytes([len(content)]) + content
+    return encode_frame(MTDATA2, payload)
+
+
+def frames(count: int, rng: np.random.Generator) -> list[bytes]:
+    """Frames of all kinds with running counters, most of them as the project sets the MTx."""
+    kinds = rng.choice(7, size=count, p=[0.6, 0.05, 0.05, 0.1, 0.1, 0.05, 0.05])
+    made = []
+    for n, kind in enumerate(kinds.tolist()):
+        if kind == 0:
+            made.append(encode_frame(MTDATA, pack(SAMPLE._replace(counter=n), PROJECT)))
+        elif kind == 1:
+            made.append(encode_frame(MTDATA, pack(SAMPLE._replace(counter=n), OTHER_OUTPUTS[n % 3])))
+        elif kind == 2:
+            made.append(encode_frame(n % 256, bytes(n % 400)))  # every message, also with extended length
+        else:
+            made.append(mtdata2(kind - 3, n & 0xFFFF))
+    return made
+
+
+def mutate(stream: bytes, rng: np.random.Generator, count: int) -> bytes:
+    """Bytes changed, lost, doubled, moved to the marks of the protocol; some frames get a checksum that fits again, so that the gates are reached."""
+    changed = np.frombuffer(stream, np.uint8).copy()
+    at = rng.integers(0, len(changed), count)
+    changed[at] ^= rng.integers(1, 256, count, dtype=np.uint8)
+    at = rng.integers(0, len(changed), count // 4)
+    changed[at] = rng.choice(np.array([0xFA, 0xFF, 0x00, 0x7F, 0x80, 0x32, 0x36], np.uint8), len(at))
+    at = rng.integers(0, len(changed), count // 4)
+    balance = rng.integers(1, 256, len(at), dtype=np.uint8)
+    np.add.at(changed, at, balance)  # two changes that the checksum does not see
+    np.subtract.at(changed, np.minimum(at + rng.integers(1, 8, len(at)), len(changed) - 1), balance)
+    changed = np.delete(changed, rng.integers(0, len(changed), count // 8))
+    at = rng.integers(0, len(changed), count // 8)
+    return np.insert(changed, at, rng.integers(0, 256, len(at), dtype=np.uint8)).tobytes()
+
+
+def check(batch: MtBatch, fed: int, limits: MtxLimits) -> None:
+    """Raise AssertionError when something passed that is no measurement."""
+    quaternion = batch.quaternion[~np.isnan(batch.quaternion).all(axis=1)]
+    mag = batch.mag[~np.isnan(batch.mag).all(axis=1)]
+    assert np.all(np.abs(batch.accel) <= limits.accel_m_s2), "accel"
+    assert np.all(np.abs(batch.gyro) <= limits.gyro_rad_s), "gyro"
+    assert np.all(np.abs(mag) <= limits.mag), "mag"
+    assert np.all(np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= limits.quaternion_error + 1e-12), "quaternion"
+    assert np.all((batch.counter >= 0) & (batch.counter < 1 << 16)), "counter"
+    assert np.all(np.diff(batch.counter) != 0), "repeated"
+    assert np.all(np.diff(batch.end) >= 0), "order"
+    assert not len(batch.end) or 0 < batch.end[0] <= batch.end[-1] <= fed, "end"
+
+
+def fuzz(count: int, seed: int) -> Counter[str]:
+    """Feed so many frames; returns what became of them. Raises whatever the decoder raises."""
+    rng = np.random.default_rng(seed)
+    blocks = [b"".join(frames(min(BLOCK, count), rng)) for _ in range(2)]
+    limits, reader = MtxLimits(), MtxReader()
+    total, fed, passed = 0, 0, 0
+    while total < count:
+        stream = mutate(blocks[total // BLOCK % 2], rng, min(BLOCK, count) // 2)
+        cuts = np.sort(rng.integers(0, len(stream), 40)).tolist()
+        for start, end in zip([0, *cuts], [*cuts, len(stream)], strict=True):
+            batch = reader.feed_batch(stream[start:end])
+            check(batch, end - start, limits)
+            passed += len(batch.counter)
+            assert reader.pending <= REST, "memory"
+        if total // BLOCK % SETUP_SHARE == 0:
+            converse(stream[:200_000])
+        fed += len(stream)
+        total += min(BLOCK, count)
+    counts = reader.counts
+    assert counts.good == passed, "counts"
+    found = Counter({name: getattr(counts, name) for name in counts.__dataclass_fields__})
+    found["frames"], found["bytes"] = total, fed
+    return found
+
+
+def converse(stream: bytes) -> None:
+    """The configuration hears the same; the packet reader may refuse a payload only by ValueError."""
+    setup = MtxSetup(project_requests(100.0), 100.0)
+    for k in range(0, len(stream), 997):
+        assert len(setup.advance(stream[k : k + 997], k * 1e-5)) < 1_000, "answers"
+        try:
+            read_packets(stream[k : k + 60])
+        except ValueError:
+            continue
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--frames", type=int, default=200_000)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    fuzz(2_000, 0)  # compile
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    try:
+        found = fuzz(options.frames, options.seed)
+    except Exception as error:  # the finding, whatever it is
+        print(f"FAILED: {type(error).__name__}: {error}")
+        return 1
+    elapsed_s = time.perf_counter() - began
+    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    print(
+        f"{found['frames']} mutated frames, {found['bytes']} bytes in {elapsed_s:.1f} s: {found['frames'] / elapsed_s:.0f} frames/s, no exception"
+    )
+    print(f"peak memory grew by {grown:.0f} MB; the reader held at most {REST} bytes")
+    print(", ".join(f"{name} {value}" for name, value in found.items() if name not in ("frames", "bytes")))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
