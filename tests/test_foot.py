@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from statistics import median
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-import feet
 import foot_walks as fw
 from echostep import ins
 from echostep.foot import Foot, FootSettings, Stance, Step, Track, walk_track
@@ -430,30 +428,3 @@ def test_wrong_shapes_are_refused_in_one_line() -> None:
     with pytest.raises(ValueError, match="expected"):
         Foot().feed(np.zeros(3), np.zeros((3, 3)), np.zeros((2, 3)))
     assert Foot().feed(np.empty(0), np.empty((0, 3)), np.empty((0, 3))) == []
-
-
-# Real recordings with truth.
-
-
-def test_real_recordings() -> None:
-    """What peers reach with a threshold for each data set, one setting reaches for all (tools/feet.py prints the table)."""
-    if not feet.data_folder().is_dir():
-        pytest.skip(f"no recordings in {feet.data_folder()} (set ECHOSTEP_DATA)")
-    found = feet.rows(feet.data_folder())
-
-    def values(group: str, metric: str) -> list[float]:
-        return [row.value for row in found if row.group == group and row.metric == metric]
-
-    vicon = values("vicon", "2D RMSE, aligned")
-    assert median(vicon) <= 0.055
-    assert max(vicon) <= 0.10
-    assert max(values("vicon", "stride length MAE")) <= 0.029  # the best of the peers' six
-    survey = values("hallway", "2D RMSE at strides, aligned")
-    assert survey[0] <= 0.35  # its last footprints are 0.7 m off every inertial track: 0.31 even for a perfect one
-    assert survey[1] <= 0.45
-    assert survey[2] <= 0.18
-    assert max(values("hallway", "stride length MAE")) <= 0.02
-    assert median(values("openshoe", "closure, horizontal")) <= 0.30
-    assert max(map(abs, values("openshoe", "closure, height"))) <= 0.5
-    assert values("xio", "closure, 3D")[0] <= 0.05
-    assert median(values("mtw", "outbound")) == pytest.approx(10.0, rel=0.03)

@@ -14,7 +14,7 @@ from echostep.errors import EchostepError
 from echostep.imu import load_imu
 from echostep.simulation.mtx import feelings
 from echostep.simulation.walker import Person, walk
-from feet import data_folder
+from foot_walks import data_folder
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
 

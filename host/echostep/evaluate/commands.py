@@ -20,3 +20,15 @@ Scheduler = Annotated[
 @app.callback()
 def evaluate() -> None:
     """The papers' experiments and ours, with figures and plots."""
+
+
+@app.command("feet")
+def feet_command(
+    folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
+    json: Json = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Draw the tracks there.")] = None,
+) -> None:
+    """The foot on real recordings, one setting for all, beside the peers' figures."""
+    from echostep.evaluate.feet import feet
+
+    feet(folder, json, out)
