@@ -38,7 +38,7 @@ def walking(steps: int = 5, rate_hz: int = 100, seed: int = 1) -> Samples:
 
 
 def some_nav(rng: np.random.Generator) -> ins.Nav:
-    nav = ins.new_nav()
+    nav = ins.new_nav(ins.Noise())
     for part in (nav.position, nav.velocity, nav.gyro_bias, nav.accel_bias):
         part[:] = rng.standard_normal(3)
     nav.attitude[:] = rng.standard_normal(4)
@@ -49,7 +49,7 @@ def some_nav(rng: np.random.Generator) -> ins.Nav:
 
 
 def copied(nav: ins.Nav) -> ins.Nav:
-    return ins.Nav(*(part.copy() for part in nav))
+    return ins.Nav(*(part.copy() for part in nav[:-1]), nav.noise)
 
 
 def cross(v: Floats) -> Floats:
@@ -107,7 +107,7 @@ def errors_between(a: ins.Nav, b: ins.Nav) -> Floats:
 def test_strapdown_follows_a_turning_and_accelerating_body_exactly() -> None:
     """A constant turn about a skew axis and a constant acceleration in the walk frame, integrated in closed form."""
     rate, accel, dt, n = np.array([0.7, -1.1, 2.0]), np.array([0.4, -0.2, 0.3]), 0.002, 1000
-    nav = ins.new_nav()
+    nav = ins.new_nav(ins.Noise())
     forces = [expm(cross(rate) * k * dt).T @ (accel + [0.0, 0.0, ins.GRAVITY_M_S2]) for k in range(n + 1)]
     for k in range(n):
         ins.predict(nav, dt, forces[k], forces[k + 1], rate, rate)
@@ -124,7 +124,7 @@ def test_attitude_is_right_to_second_order_when_the_axis_turns() -> None:
         return np.array([3.0 * math.cos(20.0 * t), 3.0 * math.sin(20.0 * t), 0.5])
 
     def integrate(dt: float, n: int) -> Floats:
-        nav, force = ins.new_nav(), np.zeros(3)
+        nav, force = ins.new_nav(ins.Noise()), np.zeros(3)
         for k in range(n):
             ins.predict(nav, dt, force, force, rate(k * dt), rate((k + 1) * dt))
         return ins.rotation(nav.attitude)

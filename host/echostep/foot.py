@@ -85,10 +85,10 @@ class Track:
 class Foot:
     """Feed it samples in any portions; equal samples give equal events, bit for bit."""
 
-    def __init__(self, settings: FootSettings | None = None) -> None:
+    def __init__(self, settings: FootSettings | None = None, noise: ins.Noise | None = None) -> None:
         self._height_m = (settings or FootSettings()).height_m
         self._footing = np.zeros(1, footsteps.FOOTING)
-        self._nav = ins.new_nav()
+        self._nav = ins.new_nav(noise or ins.Noise())
         self._window = stance.new_window()
         self._rest = stance.new_rest()
 
@@ -130,9 +130,11 @@ class Foot:
         return [_event(row) for row in events[:found]]
 
 
-def walk_track(t_s: Floats, accel: Floats, gyro: Floats, settings: FootSettings | None = None) -> Track:
+def walk_track(
+    t_s: Floats, accel: Floats, gyro: Floats, settings: FootSettings | None = None, noise: ins.Noise | None = None
+) -> Track:
     """The whole walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s at once: what `Foot` would have told live."""
-    foot = Foot(settings)
+    foot = Foot(settings, noise)
     rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
     events = foot._run(t_s, accel, gyro, rows)
     return Track(np.asarray(t_s, np.float64), rows[:, :3], rows[:, 3], rows[:, 4] > 0.0, events, foot.counts)

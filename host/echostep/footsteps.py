@@ -36,7 +36,7 @@ STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
 UNSURE_YAW_RAD2_S = 1.0
 DOUBT_S = 0.1  # of rests that the filter could not believe: its level is wrong
 ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
-FLAT_M, FLAT_SD_M = 0.04, 0.01  # floors are level: a step that rises less is no stair, kerb or ramp
+FLAT_M = 0.04  # floors are level: a step that rises less is no stair, kerb or ramp
 
 STEP, STANCE = 0.0, 1.0
 EVENT_SIZE = 17  # kind, start, end, move (3), covariance (9), heading, heading sd
@@ -209,7 +209,7 @@ def _navigate(
     if not s.in_stance and s.rest_s >= CONFIRM_S - 1e-6:
         rise_m = nav.position[2] - s.origin[2]
         if abs(rise_m) < FLAT_M:
-            ins.observe(nav, POS + 2, -rise_m, FLAT_SD_M**2)
+            ins.observe(nav, POS + 2, -rise_m, nav.noise.flat_m**2)
         found = _land(s, nav, t_s - s.rest_s, events, found)
     return found
 
@@ -223,14 +223,15 @@ def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s
     if unrest > 1.0:
         return False
     expected = stance.rolling(nav, gyro, height_m)
-    variance = stance.rest_variance(rate2)
-    if stance.surprise(nav, expected, variance, stance.mean_force(window)) > stance.BELIEF:
+    variance = stance.rest_variance(nav, rate2)
+    surprise = stance.surprise(nav, expected, variance, stance.mean_force(window))
+    if surprise > stance.BELIEF:
         since_s = t_s - s.rest_end_s
         if s.lasting_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
         s.doubt_s += dt
-        stance.distrust(nav, since_s)
+        stance.distrust(nav, surprise / stance.BELIEF)
     else:
         s.doubt_s = 0.0
     stance.hold(nav, expected, variance + stance.haste_variance(force2), dt)

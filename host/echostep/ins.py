@@ -21,19 +21,28 @@ Floats = NDArray[np.float64]
 GRAVITY_M_S2 = 9.81
 POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
-# Noise of an MTx-class sensor on a shoe, whatever the rate.
-ACCEL_NOISE = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
-GYRO_NOISE = 1e-3  # rad/s per root Hz
+MOTION_S = 0.1  # a foot keeps its motion for about so long: in that time its scale and alignment errors repeat
 ACCEL_WANDER = 1e-4  # m/s2 per root s
 GYRO_WANDER = 1e-5  # rad/s per root s
-# Scale and alignment errors act in proportion to the motion; a foot keeps its motion for about a tenth of a second.
-ACCEL_SHARE, GYRO_SHARE, MOTION_S = 0.01, 0.01, 0.1
-CHANGE_SHARE = 0.1  # of the change from one sample to the next is lost between them
+
+
+class Noise(NamedTuple):
+    """How wrong an MTx-class sensor on a shoe, and the models of it, are: one setting for everybody (`evaluate feet --leave-one-out`)."""
+
+    accel: float = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
+    gyro: float = 1e-3  # rad/s per root Hz
+    accel_share: float = 0.01  # of the acceleration, by scale and alignment
+    gyro_share: float = 0.01  # of the rate
+    change_share: float = 0.1  # of the change from one sample to the next is lost between them
+    lever_m: float = 0.1  # the foot's point of contact is known to within the foot
+    rest_m_s: float = 0.005
+    kept_s: float = 0.1  # a rest's velocity is wrong by the same for so long: more samples in that time say no more
+    flat_m: float = 0.01  # how level a floor is from step to step
 
 
 class Nav(NamedTuple):
     """Navigation state: `position` m, `velocity` m/s (walk frame), `attitude` (4,) quaternion w x y z body -> walk, biases (body frame),
-    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors.
+    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors, `noise` what they grow by.
     """
 
     position: Floats
@@ -43,12 +52,13 @@ class Nav(NamedTuple):
     accel_bias: Floats
     level: Floats
     P: Floats
+    noise: Noise
 
 
-def new_nav() -> Nav:
+def new_nav(noise: Noise) -> Nav:
     """At the origin, at rest, not levelled yet."""
     attitude = np.array([1.0, 0.0, 0.0, 0.0])
-    return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)))
+    return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)), noise)
 
 
 @njit(cache=True)
@@ -167,9 +177,9 @@ def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, 
     _carry(nav.P, f, r, dt)
     turn = apply(r, rate)
     hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
-    lost_m_s = CHANGE_SHARE * _norm(force1 - force0) * dt + _norm(accel) * hidden
-    lost_rad = CHANGE_SHARE * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
-    _add_noise(nav.P, dt, accel, turn, lost_m_s, lost_rad)
+    lost_m_s = nav.noise.change_share * _norm(force1 - force0) * dt + _norm(accel) * hidden
+    lost_rad = nav.noise.change_share * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
+    _add_noise(nav.P, nav.noise, dt, accel, turn, lost_m_s, lost_rad)
 
 
 @njit(cache=True)
@@ -196,22 +206,22 @@ def _carry(P: Floats, f: Floats, r: Floats, dt: float) -> None:
 
 
 @njit(cache=True)
-def _add_noise(P: Floats, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float) -> None:
+def _add_noise(P: Floats, noise: Noise, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float) -> None:
     """Process noise; scale errors of the gyros turn the foot about the axis about which it turns anyway."""
     moving = accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2
-    velocity = (ACCEL_NOISE**2 + ACCEL_SHARE**2 * moving * MOTION_S) * dt + lost_m_s**2
-    tilt = GYRO_NOISE**2 * dt + lost_rad**2
+    velocity = (noise.accel**2 + noise.accel_share**2 * moving * MOTION_S) * dt + lost_m_s**2
+    tilt = noise.gyro**2 * dt + lost_rad**2
     for i in range(3):
         P[VEL + i, VEL + i] += velocity
         P[GYRO_BIAS + i, GYRO_BIAS + i] += GYRO_WANDER**2 * dt
         P[ACCEL_BIAS + i, ACCEL_BIAS + i] += ACCEL_WANDER**2 * dt
         for j in range(3):
-            P[TILT + i, TILT + j] += GYRO_SHARE**2 * MOTION_S * dt * rate[i] * rate[j] + (tilt if i == j else 0.0)
+            P[TILT + i, TILT + j] += noise.gyro_share**2 * MOTION_S * dt * rate[i] * rate[j] + (tilt if i == j else 0.0)
     for i in range(2):
-        vertical = GYRO_SHARE**2 * MOTION_S * dt * rate[i] * rate[2]
+        vertical = noise.gyro_share**2 * MOTION_S * dt * rate[i] * rate[2]
         P[YAW, TILT + i] += vertical
         P[TILT + i, YAW] += vertical
-    vertical = GYRO_SHARE**2 * MOTION_S * dt * rate[2] * rate[2] + tilt
+    vertical = noise.gyro_share**2 * MOTION_S * dt * rate[2] * rate[2] + tilt
     P[YAW, TILT + 2] += vertical
     P[TILT + 2, YAW] += vertical
     P[YAW, YAW] += vertical
