@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 CONFIRM_S = 0.03  # a stance is told after so much rest
 SETTLE_S = 0.2  # by then it has corrected the step before it
 LEAVE_S = 0.15  # and it is over after so long without rest: no swing is shorter
+PERIOD_GAIN = 0.003  # a sample
 GAP_S = 0.25  # the filter carries on over shorter gaps
 STRAY_SAMPLES = 20  # so many samples in a row from the past: the clock has been set back
 WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
@@ -48,6 +49,7 @@ class Footing(Protocol):
     """What is known of the foot besides its navigation: the last sample, the level, the present rest, the last step, the counts."""
 
     t_s: float
+    period_s: float  # between samples, as a rule
     force: Floats
     rate: Floats
     levelled: int
@@ -100,6 +102,7 @@ def walk(
             if s.samples > 1 and not 0.0 < dt <= GAP_S:
                 found = _lose(s, nav, rest, dt, events, found)
                 dt = 0.0
+            _time(s, dt)
             stance.put(window, t_s[k], accel[k], gyro[k])
             if s.levelled:
                 found = _navigate(s, nav, window, rest, height_m, dt, t_s[k], accel[k], gyro[k], events, found)
@@ -132,6 +135,15 @@ def _usable(s: Footing, t_s: float, accel: Floats, gyro: Floats) -> bool:
     s.stray = 0
     s.samples += 1
     return True
+
+
+@njit(cache=True)
+def _time(s: Footing, dt: float) -> None:
+    """The period of the samples: a running median, so that missing ones do not count."""
+    if s.period_s == 0.0:
+        s.period_s = dt
+    elif dt > 0.0:
+        s.period_s *= 1.0 + PERIOD_GAIN if dt > s.period_s else 1.0 - PERIOD_GAIN
 
 
 @njit(cache=True)
@@ -191,7 +203,7 @@ def _navigate(
     events: Floats, found: int,
 ) -> int:  # fmt: skip
     """One sample of navigation: predict, decide whether the foot rests, correct, tell."""
-    ins.predict(nav, dt, s.force, accel, s.rate, gyro)
+    ins.predict(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
     _doubt_limits(s, nav, dt, accel, gyro)
     if not _rests(s, nav, window, height_m, dt, t_s, gyro):
         stance.end_rest(rest)

@@ -22,6 +22,7 @@ GRAVITY_M_S2 = 9.81
 POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
 MOTION_S = 0.1  # a foot keeps its motion for about so long: in that time its scale and alignment errors repeat
+MISSED_SHARE = 1.0  # of the change over a time without samples: a blow may have come and gone
 ACCEL_WANDER = 1e-4  # m/s2 per root s
 GYRO_WANDER = 1e-5  # rad/s per root s
 
@@ -156,19 +157,30 @@ def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: f
 
 
 @njit(cache=True)
-def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
-    """Strapdown step over `dt` between two samples of specific force and rate (3,), at the attitude in the middle."""
-    rate = 0.5 * (rate0 + rate1) - nav.gyro_bias
+def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
+    """Strapdown step over `dt` with the samples of specific force and rate (3,) at its beginning and its end.
+
+    A sample is the mean over the `period` before it; what is missing of `dt` is taken as straight between both. How the rates and forces change
+    from one sample to the next turns the axis (coning) and the force (sculling) within the step [Savage 1998, part 1 eq. 47, part 2 eq. 56].
+    """
+    seen = min(0.5 + 0.5 * period / dt, 1.0) if dt > 0.0 else 1.0
+    rate = seen * rate1 + (1.0 - seen) * rate0 - nav.gyro_bias
+    force = seen * force1 + (1.0 - seen) * force0 - nav.accel_bias
     half = turning(0.5 * dt * rate[0], 0.5 * dt * rate[1], 0.5 * dt * rate[2])
     r = rotation(multiply(nav.attitude, half))
-    c = dt * dt / 12.0  # coning: the axis turns within the interval [Magnus 1954]
+    c = dt * dt / 12.0
     whole = turning(
         dt * rate[0] + c * (rate0[1] * rate1[2] - rate0[2] * rate1[1]),
         dt * rate[1] + c * (rate0[2] * rate1[0] - rate0[0] * rate1[2]),
         dt * rate[2] + c * (rate0[0] * rate1[1] - rate0[1] * rate1[0]),
     )
     nav.attitude[:] = multiply(nav.attitude, whole)
-    f = apply(r, 0.5 * (force0 + force1) - nav.accel_bias)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        force[i] += (
+            dt / 12.0 * (rate0[j] * force1[k] - rate0[k] * force1[j] + force0[j] * rate1[k] - force0[k] * rate1[j])
+        )
+    f = apply(r, force)
     accel = f.copy()
     accel[2] -= GRAVITY_M_S2
     for i in range(3):
@@ -177,8 +189,9 @@ def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, 
     _carry(nav.P, f, r, dt)
     turn = apply(r, rate)
     hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
-    lost_m_s = nav.noise.change_share * _norm(force1 - force0) * dt + _norm(accel) * hidden
-    lost_rad = nav.noise.change_share * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
+    lost = nav.noise.change_share + MISSED_SHARE * (1.0 - seen)
+    lost_m_s = lost * _norm(force1 - force0) * dt + _norm(accel) * hidden
+    lost_rad = lost * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
     _add_noise(nav.P, nav.noise, dt, accel, turn, lost_m_s, lost_rad)
 
 
@@ -206,7 +219,9 @@ def _carry(P: Floats, f: Floats, r: Floats, dt: float) -> None:
 
 
 @njit(cache=True)
-def _add_noise(P: Floats, noise: Noise, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float) -> None:
+def _add_noise(
+    P: Floats, noise: Noise, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float
+) -> None:
     """Process noise; scale errors of the gyros turn the foot about the axis about which it turns anyway."""
     moving = accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2
     velocity = (noise.accel**2 + noise.accel_share**2 * moving * MOTION_S) * dt + lost_m_s**2
