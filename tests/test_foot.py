@@ -49,7 +49,8 @@ def some_nav(rng: np.random.Generator) -> ins.Nav:
 
 
 def copied(nav: ins.Nav) -> ins.Nav:
-    return ins.Nav(*(part.copy() for part in nav[:-1]), nav.noise)
+    parts = nav._asdict()
+    return ins.Nav(**{name: part if name == "noise" else part.copy() for name, part in parts.items()})
 
 
 def cross(v: Floats) -> Floats:

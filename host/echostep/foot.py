@@ -7,6 +7,7 @@ of the first rest; yaw is how far the foot has turned since.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,8 @@ class Step:
     """The foot left at `t_start_s`, landed at `t_end_s` and moved by `move_m` (walk frame) with `covariance` (3, 3) m2.
 
     `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's
-    error: its square is the growth of the variance. All moves together are the position.
+    error: its square is the growth of the variance. All moves together are the position. `toe_rad` is the angle from the yaw to the direction of the
+    toe, as known so far; None until the foot has tipped enough to tell.
     """
 
     t_start_s: float
@@ -47,6 +49,7 @@ class Step:
     covariance: Floats
     heading_rad: float
     heading_sd_rad: float
+    toe_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +70,10 @@ class FootCounts:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A whole walk: `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, the events and the counts."""
+    """A whole walk: `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, the events and the counts.
+
+    `toe_known`: yaw zero is the direction of the toe when the foot was levelled (`alignment.aligned`); otherwise it is arbitrary.
+    """
 
     t_s: Floats
     position_m: Floats
@@ -75,6 +81,7 @@ class Track:
     stance: NDArray[np.bool_]
     events: list[Step | Stance]
     counts: FootCounts
+    toe_known: bool = False
 
     @property
     def steps(self) -> list[Step]:
@@ -142,7 +149,9 @@ def walk_track(
 
 def _event(row: Floats) -> Step | Stance:
     kind, start, end, dx, dy, dz = row[:6].tolist()
-    heading, heading_sd = row[15:].tolist()
+    heading, heading_sd, toe = row[15:].tolist()
     if kind == footsteps.STANCE:
         return Stance(start, end, heading)
-    return Step(start, end, (dx, dy, dz), row[6:15].reshape(3, 3).copy(), heading, heading_sd)
+    return Step(
+        start, end, (dx, dy, dz), row[6:15].reshape(3, 3).copy(), heading, heading_sd, None if math.isnan(toe) else toe
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep import ins, stance
+from echostep import ins, mounting, stance
 from echostep.ins import POS, TILT, VEL, YAW, Nav
 from echostep.stance import Rest, Window
 
@@ -40,7 +40,7 @@ ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
 FLAT_M = 0.04  # floors are level: a step that rises less is no stair, kerb or ramp
 
 STEP, STANCE = 0.0, 1.0
-EVENT_SIZE = 17  # kind, start, end, move (3), covariance (9), heading, heading sd
+EVENT_SIZE = 18  # kind, start, end, move (3), covariance (9), heading, heading sd, toe
 EVENTS_PER_SAMPLE = 2
 ROW_SIZE = 5  # position (3), heading, in stance
 
@@ -68,6 +68,9 @@ class Footing(Protocol):
     rest_yaw_rad: float
     in_stance: int
     settled: int
+    stood: Floats  # tilt of the foot when it stood last
+    tilt_square: Floats  # of the swings, see `mounting`
+    tilt_cube: Floats
     began_s: float  # the stance
     left_s: float  # the stance before
     under_way: int  # there was a stance before
@@ -208,6 +211,8 @@ def _navigate(
     if not _rests(s, nav, window, height_m, dt, t_s, gyro):
         stance.end_rest(rest)
         s.rest_s = 0.0
+        if not s.in_stance:
+            mounting.watch(s.tilt_square, s.tilt_cube, mounting.tilt(nav) - s.stood, dt)
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
             found = _leave(s, nav, events, found)
         return found
@@ -281,6 +286,7 @@ def _land(s: Footing, nav: Nav, began_s: float, events: Floats, found: int) -> i
     s.settled = 0
     s.began_s = max(began_s, s.left_s) if s.under_way else began_s
     s.rest_yaw_rad = ins.heading(nav)
+    s.stood[:] = mounting.tilt(nav)
     if s.under_way:
         _write_step(s, nav, events[found])
         found += 1
@@ -299,6 +305,9 @@ def _write_step(s: Footing, nav: Nav, row: Floats) -> None:
             row[6 + 3 * i + j] = nav.P[POS + i, POS + j]
     row[15] = s.rest_yaw_rad
     row[16] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
+    row[17] = mounting.toe(s.tilt_square, s.tilt_cube)
+    s.tilt_square *= mounting.MEMORY
+    s.tilt_cube *= mounting.MEMORY
 
 
 @njit(cache=True)

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from echostep.alignment import aligned
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
@@ -128,7 +129,7 @@ def replay(
 def foot(path: Path, out: Path, *, plot: bool) -> None:
     """Track a recorded foot IMU."""
     imu = load_imu(path)
-    track = walk_track(imu.t_s, imu.accel, imu.gyro)
+    track = aligned(walk_track(imu.t_s, imu.accel, imu.gyro))
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if plot:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echostep.alignment import Alignment
 from echostep.calibration import Echo, echo
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, estimate, unwatched
@@ -66,6 +67,7 @@ class Tracker:
         self.mtx = MtxReader()
         self.timeline = Timeline(self.settings.mtx)
         self.foot = Foot(self.settings.foot)
+        self.alignment = Alignment()
         self.path = TrunkPath(self.settings.gait)
         self.walls = build_index(plan.levels[0].walls)
         self.cloud: Cloud | None = None
@@ -157,9 +159,9 @@ class Tracker:
         t_s = np.array([t for t, _ in samples])
         accel = np.array([s.accel for _, s in samples])
         gyro = np.array([s.gyro for _, s in samples])
-        for event in self.foot.feed(t_s, accel, gyro):
+        for event in self.alignment.feed(self.foot.feed(t_s, accel, gyro)):
             self._legs += self.path.step(event) if isinstance(event, Step) else self.path.stance(event)
-        if self.foot.in_stance:
+        if self.foot.in_stance and not self.alignment.waiting:
             self._legs += self.path.stand(samples[-1][0], self.foot.heading_rad)
         if self.cloud is None and self.path.heading_rad is not None:
             self.cloud = Cloud(self.settings.cloud, self.start, self.path.heading_rad, self._rng)

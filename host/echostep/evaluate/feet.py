@@ -11,9 +11,11 @@ from statistics import median
 
 from echostep.errors import EchostepError
 from echostep.evaluate.judges import Figure, align, places, way
+from echostep.evaluate.leave_one_out import add_left_out, leave_one_out, said
 from echostep.evaluate.recordings import Recording, read_recordings
 from echostep.evaluate.study import Row, console, print_table, write_json
 from echostep.foot import Track, walk_track
+from echostep.ins import Noise
 
 COLUMNS = {
     "set": "set",
@@ -25,17 +27,30 @@ COLUMNS = {
 }
 
 
-def feet(folder: Path, json: Path | None, out: Path | None) -> None:
+def feet(folder: Path, json: Path | None, out: Path | None, *, left_out: bool) -> None:
     """Print the table of all recordings in the folder; raises EchostepError when there is none."""
     recordings = recordings_in(folder)
     tracks = [track_of(recording) for recording in recordings]
     rows = [row for recording, track in zip(recordings, tracks, strict=True) for row in rows_of(recording, track)]
     rows += medians(rows)
-    print_table("The foot on real recordings, one setting", [_printed(row) for row in rows], COLUMNS)
+    columns = COLUMNS
+    if left_out:
+        choices = leave_one_out(recordings, track_of)
+        add_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
+        columns = COLUMNS | {"left_out": "left out, m"}
+        for group, noise in choices.items():
+            console.print(f"{group} left out, the others choose: {said(noise)}")
+    print_table("The foot on real recordings, one setting", [_printed(row) for row in rows], columns)
     if json:
         write_json(json, "feet", len(recordings), 0, rows)
     if out:
         draw_tracks(out / "feet.png", recordings, tracks)
+
+
+def _rows_under(recordings: list[Recording], group: str, noise: Noise) -> list[Row]:
+    """The rows of one set with other constants."""
+    rows = [row for r in recordings if r.group == group for row in rows_of(r, track_of(r, noise))]
+    return rows + medians(rows)
 
 
 def recordings_in(folder: Path) -> list[Recording]:
@@ -50,9 +65,9 @@ def recordings_in(folder: Path) -> list[Recording]:
     return recordings
 
 
-def track_of(recording: Recording) -> Track:
-    """The foot's track with the one setting."""
-    return walk_track(recording.t_s, recording.accel, recording.gyro)
+def track_of(recording: Recording, noise: Noise | None = None) -> Track:
+    """The foot's track, with the one setting unless other constants are given."""
+    return walk_track(recording.t_s, recording.accel, recording.gyro, noise=noise)
 
 
 def rows_of(recording: Recording, track: Track) -> list[Row]:
@@ -87,7 +102,8 @@ def _row(group: str, name: str, figure: Figure, way_m: float) -> Row:
 def _printed(row: Row) -> Row:
     """With three digits, and the peer's name beside its figure."""
     peer = "" if row["peer"] is None else f"{row['peer']:.3f} {row['peer_name']}"
-    return row | {"value": f"{row['value']:.3f}", "peer": peer}
+    digits = {key: f"{row[key]:.3f}" for key in ("value", "left_out") if row.get(key) is not None}
+    return row | digits | {"peer": peer}
 
 
 def draw_tracks(path: Path, recordings: list[Recording], tracks: list[Track]) -> None:
