@@ -24,7 +24,7 @@ from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import walk_track
 from echostep.frames import encode
-from echostep.imu import describe_track, load_imu, write_foot_track
+from echostep.imu import checked, describe_track, load_imu, write_foot_track
 from echostep.messages import Identify
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
@@ -129,7 +129,9 @@ def replay(
 def foot(path: Path, out: Path, *, plot: bool) -> None:
     """Track a recorded foot IMU."""
     imu = load_imu(path)
-    track = aligned(walk_track(imu.t_s, imu.accel, imu.gyro))
+    for note in imu.notes:
+        console.print(f"{path.name}: {note}")
+    track = checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro)), path)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if plot:
