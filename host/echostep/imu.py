@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
 from echostep.foot import Track
-from echostep.imu_checks import complaint, contradiction, notes, sorted_by_time, whole_rows
+from echostep.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
 Floats = NDArray[np.float64]
 
@@ -141,14 +141,3 @@ def describe_track(track: Track) -> str:
         f"{len(steps)} steps, {distance:.2f} m; the end is {np.hypot(end[0], end[1]):.2f} m from the beginning and {end[2]:+.2f} m in height, "
         f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{toe}"
     )
-
-
-def end_sd_m(track: Track) -> float:
-    """Standard deviation (m) of the end's horizontal distance from the truth, by the steps' covariances and the growth of the yaw's error."""
-    steps = track.steps
-    if not steps:
-        return 0.0
-    places = np.cumsum([step.move_m[:2] for step in steps], axis=0)
-    own = sum(float(step.covariance[0, 0] + step.covariance[1, 1]) for step in steps)
-    turns = np.array([step.heading_sd_rad for step in steps])
-    return math.sqrt(own + float(turns**2 @ ((places[-1] - places) ** 2).sum(axis=1)))

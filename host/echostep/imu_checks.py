@@ -6,6 +6,7 @@ used), notes (they can, with care). Owns nothing. A track from wrong units or a 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +16,8 @@ from echostep.foot import Track
 
 Floats = NDArray[np.float64]
 
-GRAVITY_RANGE_M_S2 = (7.0, 13.0)  # the middle reading of any foot, standing or running
+CALMEST_SHARE = 0.1  # of the samples: a foot that stands
+GRAVITY_RANGE_M_S2 = (7.0, 13.0)
 G_RANGE = (0.7, 1.3)
 FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s
 RATE_RANGE_HZ = (45.0, 550.0)
@@ -26,7 +28,7 @@ CLIPPED_SHARE = 1e-3
 DEAD_S = 2.0
 MOVING_RAD_S = 0.5
 FASTEST_WALK_M_S = 8.0
-FORCED_SHARE = 0.15
+FORCED_SAMPLES, LOST_SHARE = 5, 0.2  # rests against belief, and what that leaves unknown of the way
 HIGHEST_STEP_M = 1.0
 
 
@@ -81,6 +83,7 @@ def _time_complaint(t_s: Floats) -> str:
 
 def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
     """A column that never changes, or that stops changing while the foot moves."""
+    longest, dead = DEAD_S, ""
     for k, name in enumerate(columns[1:7], start=1):
         if len(table) > 100 and np.ptp(table[:, k]) == 0.0:
             return f"{name} is constant: is that sensor alive?"
@@ -88,9 +91,10 @@ def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
         moving = np.linalg.norm(table[:, others], axis=1) > MOVING_RAD_S
         for begin, end in _runs(np.diff(table[:, k]) == 0.0):
             span = float(table[end, 0] - table[begin, 0])
-            if span > DEAD_S and moving[begin:end].mean() > 0.1:
-                return f"{name} does not change for {span:.1f} s from {table[begin, 0]:.2f} s on, while the foot moves: is that sensor alive?"
-    return ""
+            if span > longest and moving[begin:end].mean() > 0.1:
+                longest, since = span, float(table[begin, 0])
+                dead = f"{name} does not change for {span:.1f} s from {since:.2f} s on, while the foot moves: is that sensor alive?"
+    return dead
 
 
 def _runs(same: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -100,15 +104,22 @@ def _runs(same: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _unit_complaint(table: Floats) -> str:
-    force = float(np.median(np.linalg.norm(table[:, 1:4], axis=1)))
+    force = _resting_force(table)
     if G_RANGE[0] <= force <= G_RANGE[1]:
-        return f"ax, ay, az look like g (their median is {force:.2f}): multiply them by 9.80665"
+        return f"ax, ay, az look like g (at rest they are {force:.2f}): multiply them by 9.80665"
     if not GRAVITY_RANGE_M_S2[0] <= force <= GRAVITY_RANGE_M_S2[1]:
-        return f"ax, ay, az have a median of {force:.3g}, gravity is 9.8 m/s2: wrong unit, or gravity was removed"
+        return f"ax, ay, az are {force:.3g} at rest, gravity is 9.8 m/s2: wrong unit, or gravity was removed"
     fastest = float(np.quantile(np.abs(table[:, 4:7]), 0.999))
     if fastest > FASTEST_FOOT_RAD_S:
         return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180"
     return ""
+
+
+def _resting_force(table: Floats) -> float:
+    """Specific force while the foot turns least: a runner's median is far above gravity."""
+    rate = np.linalg.norm(table[:, 4:7], axis=1)
+    calm = rate <= np.quantile(rate, CALMEST_SHARE)
+    return float(np.median(np.linalg.norm(table[calm, 1:4], axis=1)))
 
 
 def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:
@@ -153,6 +164,17 @@ def contradiction(track: Track) -> str:
         return f"half of the steps are faster than {np.median(speeds):.0f} m/s: are the units m/s2 and rad/s?"
     if steps and float(np.median([abs(s.move_m[2]) for s in steps])) > HIGHEST_STEP_M:
         return "half of the steps rise or fall by more than a metre: are the units m/s2 and rad/s, and the axes right-handed?"
-    if counts.forced > FORCED_SHARE * float(track.stance.sum()):
+    if counts.forced > FORCED_SAMPLES and end_sd_m(track) > LOST_SHARE * sum(np.hypot(*s.move_m[:2]) for s in steps):
         return "the foot stands where its motion says that it cannot: are the units m/s2 and rad/s, and the axes right-handed?"
     return ""
+
+
+def end_sd_m(track: Track) -> float:
+    """Standard deviation (m) of the end's horizontal distance from the truth, by the steps' covariances and the growth of the yaw's error."""
+    steps = track.steps
+    if not steps:
+        return 0.0
+    places = np.cumsum([step.move_m[:2] for step in steps], axis=0)
+    own = sum(float(step.covariance[0, 0] + step.covariance[1, 1]) for step in steps)
+    turns = np.array([step.heading_sd_rad for step in steps])
+    return math.sqrt(own + float(turns**2 @ ((places[-1] - places) ** 2).sum(axis=1)))
