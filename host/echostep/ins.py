@@ -23,6 +23,7 @@ POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
 MOTION_S = 0.1  # a foot keeps its motion for about so long: in that time its scale and alignment errors repeat
 MISSED_SHARE = 1.0  # of the change over a time without samples: a blow may have come and gone
+GYRO_CHANGE_SHARE = 0.01  # of the rate's: a mean over the period loses no angle, but for its axis
 ACCEL_WANDER = 1e-4  # m/s2 per root s
 GYRO_WANDER = 1e-5  # rad/s per root s
 
@@ -34,7 +35,7 @@ class Noise(NamedTuple):
     gyro: float = 1e-3  # rad/s per root Hz
     accel_share: float = 0.01  # of the acceleration, by scale and alignment
     gyro_share: float = 0.01  # of the rate
-    change_share: float = 0.1  # of the change from one sample to the next is lost between them
+    change_share: float = 0.1  # of the change of the force from one sample to the next is lost between them: a blow
     lever_m: float = 0.1  # the foot's point of contact is known to within the foot
     rest_m_s: float = 0.005
     kept_s: float = 0.1  # a rest's velocity is wrong by the same for so long: more samples in that time say no more
@@ -189,9 +190,9 @@ def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, 
     _carry(nav.P, f, r, dt)
     turn = apply(r, rate)
     hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
-    lost = nav.noise.change_share + MISSED_SHARE * (1.0 - seen)
-    lost_m_s = lost * _norm(force1 - force0) * dt + _norm(accel) * hidden
-    lost_rad = lost * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
+    missed = MISSED_SHARE * (1.0 - seen)
+    lost_m_s = (nav.noise.change_share + missed) * _norm(force1 - force0) * dt + _norm(accel) * hidden
+    lost_rad = (GYRO_CHANGE_SHARE + missed) * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
     _add_noise(nav.P, nav.noise, dt, accel, turn, lost_m_s, lost_rad)
 
 
