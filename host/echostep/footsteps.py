@@ -15,7 +15,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep import compass as magnetic
 from echostep import ins, mounting, stance
+from echostep.compass import Compass
 from echostep.ins import POS, TILT, VEL, YAW, Nav
 from echostep.stance import Rest, Window
 
@@ -91,24 +93,26 @@ FOOTING = np.dtype([(name, *_NUMPY[kind]) for name, kind in Footing.__annotation
 
 @njit(cache=True)
 def walk(
-    s: Footing, nav: Nav, window: Window, rest: Rest, height_m: float,
-    t_s: Floats, accel: Floats, gyro: Floats, events: Floats, rows: Floats,
+    s: Footing, nav: Nav, window: Window, rest: Rest, compass: Compass, height_m: float,
+    t_s: Floats, accel: Floats, gyro: Floats, mag: Floats, events: Floats, rows: Floats,
 ) -> int:  # fmt: skip
-    """Take samples t_s (n,), accel and gyro (n, 3) in turn; fills `events` (2n, EVENT_SIZE), and `rows` (n, ROW_SIZE) unless it is empty.
+    """Take samples t_s (n,), accel and gyro (n, 3), mag (n, 3) or (0, 3) in turn.
 
-    Returns the number of events.
+    Fills `events` (2n, EVENT_SIZE), and `rows` (n, ROW_SIZE) unless it is empty. Returns the number of events.
     """
     found = 0
     for k in range(len(t_s)):
         if _usable(s, t_s[k], accel[k], gyro[k]):
             dt = t_s[k] - s.t_s if s.samples > 1 else 0.0
             if s.samples > 1 and not 0.0 < dt <= GAP_S:
-                found = _lose(s, nav, rest, dt, events, found)
+                found = _lose(s, nav, rest, compass, dt, events, found)
                 dt = 0.0
             _time(s, dt)
             stance.put(window, t_s[k], accel[k], gyro[k])
             if s.levelled:
-                found = _navigate(s, nav, window, rest, height_m, dt, t_s[k], accel[k], gyro[k], events, found)
+                found = _navigate(s, nav, window, rest, compass, height_m, dt, t_s[k], accel[k], gyro[k], events, found)
+                if len(mag) and s.rest_s > 0.0:
+                    magnetic.gather(compass, nav, mag[k])
             else:
                 found = _find_level(s, nav, window, dt, t_s[k], events, found)
             s.t_s = t_s[k]
@@ -150,14 +154,14 @@ def _time(s: Footing, dt: float) -> None:
 
 
 @njit(cache=True)
-def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: int) -> int:
+def _lose(s: Footing, nav: Nav, rest: Rest, compass: Compass, dt: float, events: Floats, found: int) -> int:
     """Samples are missing, or the clock or the level is wrong: the stance is over, and what the foot does until the next level unknown."""
     s.gaps += 1
     span_s = min(max(dt, GAP_S), 3600.0)
     s.lost_s += span_s
     nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, math.pi**2 / 3.0)
     if s.in_stance:
-        found = _leave(s, nav, events, found)
+        found = _leave(s, nav, compass, events, found)
     if s.levelled:
         s.yaw_rad = ins.heading(nav)
     stance.end_rest(rest)
@@ -202,7 +206,7 @@ def _begin(s: Footing, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s
 
 @njit(cache=True)
 def _navigate(
-    s: Footing, nav: Nav, window: Window, rest: Rest, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats,
+    s: Footing, nav: Nav, window: Window, rest: Rest, compass: Compass, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats,
     events: Floats, found: int,
 ) -> int:  # fmt: skip
     """One sample of navigation: predict, decide whether the foot rests, correct, tell."""
@@ -214,10 +218,10 @@ def _navigate(
         if not s.in_stance:
             mounting.watch(s.tilt_square, s.tilt_cube, mounting.tilt(nav) - s.stood, dt)
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
-            found = _leave(s, nav, events, found)
+            found = _leave(s, nav, compass, events, found)
         return found
     if s.doubt_s > DOUBT_S:
-        return _lose(s, nav, rest, dt, events, found)
+        return _lose(s, nav, rest, compass, dt, events, found)
     s.rest_s += dt
     s.rest_end_s = t_s
     s.rest_yaw_rad = ins.heading(nav)
@@ -318,7 +322,7 @@ def _settle(s: Footing, nav: Nav) -> None:
 
 
 @njit(cache=True)
-def _leave(s: Footing, nav: Nav, events: Floats, found: int) -> int:
+def _leave(s: Footing, nav: Nav, compass: Compass, events: Floats, found: int) -> int:
     """The stance ended with its last rest."""
     row = events[found]
     row[0], row[1], row[2], row[15] = STANCE, s.began_s, max(s.rest_end_s, s.began_s), s.rest_yaw_rad
@@ -326,4 +330,10 @@ def _leave(s: Footing, nav: Nav, events: Floats, found: int) -> int:
     s.in_stance = 0
     if not s.settled:
         _settle(s, nav)
+    yaw = ins.heading(nav)
+    turn = magnetic.correction(compass, nav, s.rest_yaw_rad)
+    if turn != 0.0:
+        ins.turn(nav, s.origin, turn - (ins.heading(nav) - yaw))
+        s.rest_yaw_rad += turn
+        s.yaw_variance = min(s.yaw_variance, nav.P[YAW, YAW])
     return found + 1

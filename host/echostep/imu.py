@@ -137,7 +137,9 @@ def describe_track(track: Track) -> str:
     end = track.position_m[-1] - track.position_m[0]
     lost = track.counts.impossible + track.counts.not_later
     toe = "" if track.toe_known else "; the toe's direction is not known, heading_rad counts from the first rest"
+    trusted, read = track.compass
+    compass = f"; magnetometer trusted in {trusted} of {read} stances" if read else ""
     return (
         f"{len(steps)} steps, {distance:.2f} m; the end is {np.hypot(end[0], end[1]):.2f} m from the beginning and {end[2]:+.2f} m in height, "
-        f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{toe}"
+        f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{compass}{toe}"
     )

@@ -33,7 +33,7 @@ class Noise(NamedTuple):
 
     accel: float = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
     gyro: float = 1e-3  # rad/s per root Hz
-    accel_share: float = 0.01  # of the acceleration, by scale and alignment
+    accel_share: float = 0.005  # of the acceleration, by scale and alignment, as calibrated sensors have it
     gyro_share: float = 0.01  # of the rate
     change_share: float = 0.1  # of the change of the force from one sample to the next is lost between them: a blow
     lever_m: float = 0.1  # the foot's point of contact is known to within the foot
@@ -259,6 +259,17 @@ def observe(nav: Nav, at: int, error: float, variance: float) -> None:
     nav.gyro_bias[:] += row[GYRO_BIAS : GYRO_BIAS + 3]
     nav.accel_bias[:] += row[ACCEL_BIAS : ACCEL_BIAS + 3]
     nav.attitude[:] = multiply(turning(row[TILT], row[TILT + 1], row[TILT + 2]), nav.attitude)
+
+
+@njit(cache=True)
+def turn(nav: Nav, centre: Floats, angle: float) -> None:
+    """The yaw was wrong by this angle since the foot left `centre` (3,)."""
+    c, s = math.cos(angle), math.sin(angle)
+    x, y = nav.position[0] - centre[0], nav.position[1] - centre[1]
+    u, v = nav.velocity[0], nav.velocity[1]
+    nav.position[0], nav.position[1] = centre[0] + c * x - s * y, centre[1] + s * x + c * y
+    nav.velocity[0], nav.velocity[1] = c * u - s * v, s * u + c * v
+    nav.attitude[:] = multiply(turning(0.0, 0.0, angle), nav.attitude)
 
 
 @njit(cache=True)

@@ -131,7 +131,7 @@ def foot(path: Path, out: Path, *, plot: bool) -> None:
     imu = load_imu(path)
     for note in imu.notes:
         console.print(f"{path.name}: {note}")
-    track = checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro)), path)
+    track = checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro, mag=imu.mag)), path)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if plot:
