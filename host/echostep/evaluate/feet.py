@@ -12,6 +12,7 @@ from statistics import median
 from echostep.errors import EchostepError
 from echostep.evaluate.judges import Figure, align, places, way
 from echostep.evaluate.leave_one_out import add_left_out, leave_one_out, said
+from echostep.evaluate.pace import pace_rows
 from echostep.evaluate.recordings import Recording, read_recordings
 from echostep.evaluate.study import Row, console, print_table, write_json
 from echostep.foot import Track, walk_track
@@ -41,8 +42,11 @@ def feet(folder: Path, json: Path | None, out: Path | None, *, left_out: bool) -
         for group, noise in choices.items():
             console.print(f"{group} left out, the others choose: {said(noise)}")
     print_table("The foot on real recordings, one setting", [_printed(row) for row in rows], columns)
+    live = pace_rows(recordings)
+    for row in live:
+        console.print(f"{row['metric']}: {row['value']:.4f}")
     if json:
-        write_json(json, "feet", len(recordings), 0, rows)
+        write_json(json, "feet", len(recordings), 0, rows + live)
     if out:
         draw_tracks(out / "feet.png", recordings, tracks)
 
