@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import foot_walks as fw
+from board_runs import ROOT
 from echostep.alignment import Alignment, aligned
 from echostep.evaluate.recordings import read_recordings
 from echostep.foot import Foot, Step, Track, walk_track
+from echostep.plan import Plan, load_plan
+from echostep.simulation.board import PythonBoard
+from echostep.simulation.scenario import Scenario
+from echostep.sources import MTX, Chunk
+from echostep.tracker import Tracker
+from echostep.truth import Truth, errors
+from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
 
 Floats = NDArray[np.float64]
 
@@ -73,6 +82,35 @@ def test_live_the_first_steps_wait_for_the_toe_and_no_others() -> None:
     assert waited <= 2
     assert len(steps) == 6
     assert np.array([s.move_m[:2] for s in steps]) == pytest.approx(np.tile([1.3, 0.0], (6, 1)), abs=0.15)
+
+
+@pytest.fixture(scope="module")
+def live() -> tuple[Plan, Scenario, list[Chunk]]:
+    """A simulated walk, x of the MTx to the toe."""
+    plan = load_plan(ROOT / "host/echostep/plans/demo.json")
+    scenario = Scenario(plan, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5)), 5, PythonBoard(5))
+    return plan, scenario, list(scenario.chunks())
+
+
+@pytest.mark.parametrize("which", [0, 5, 11, 18, 22])
+def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]], which: int) -> None:
+    """The same bytes with the sensor's axes turned: as good a track."""
+    plan, scenario, chunks = live
+    mounting = axis_mountings()[which]
+    tracker, frames, found = Tracker(plan, scenario.start, seed=0), MtxReader(), []
+    for chunk in chunks:
+        if chunk.port == MTX:
+            samples = [
+                s._replace(accel=tuple((mounting @ s.accel).tolist()), gyro=tuple((mounting @ s.gyro).tolist()))
+                for s in frames.feed(chunk.data)
+            ]
+            chunk = replace(chunk, data=b"".join(encode_frame(MTDATA, pack_mtdata(s)) for s in samples))
+        found += tracker.feed(chunk)
+    off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
+    assert off is not None
+    assert off.mean_m < 0.2
+    assert off.max_m < 0.8
+    assert off.coverage95 > 0.8
 
 
 def test_a_foot_that_never_tips_is_taken_to_have_x_to_the_toe() -> None:
