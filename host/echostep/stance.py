@@ -36,7 +36,7 @@ PART_S, PARTS = 0.1, 5  # gyro bias: rest is cut into parts
 SWAY_S = 0.3  # the mean of a sway is as good as one part in so long
 BIAS_FLOOR_RAD_S = 1e-3
 BIAS_BELIEF = 16.0  # chi-square of one rate, four sigma
-BIAS_DOUBT = 0.2  # of the error, so that the third refusal in a row is none
+BIAS_DOUBT = 0.3  # of the error, from the second refusal in a row on, so that the third is none; a first one is a foot that gets going
 
 
 class Window(NamedTuple):
@@ -49,13 +49,17 @@ class Window(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """Sums over the present rest: `part` (3,) rad and `part_s` (1,), `whole` (3,) rad, `squares` (1,) rad2/s, `whole_s` (1,)."""
+    """Sums over the present rest: `part` (3,) rad and `part_s` (1,), `whole` (3,) rad, `squares` (1,) rad2/s, `whole_s` (1,).
+
+    `refused` (3,): how often in a row each axis was not believed; it outlives the rest.
+    """
 
     part: Floats
     part_s: Floats
     whole: Floats
     squares: Floats
     whole_s: Floats
+    refused: Floats
 
 
 def new_window() -> Window:
@@ -65,7 +69,7 @@ def new_window() -> Window:
 
 def new_rest() -> Rest:
     """No rest so far."""
-    return Rest(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1))
+    return Rest(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1), np.zeros(3))
 
 
 @njit(cache=True)
@@ -200,7 +204,7 @@ def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) ->
     if rest.whole_s[0] < PARTS * PART_S - 1e-6:
         return False
     mean = rest.whole / rest.whole_s[0]
-    _observe_bias(nav, mean, _bias_variance(rest, mean))
+    _observe_bias(nav, rest, mean, _bias_variance(rest, mean))
     end_rest(rest)
     return True
 
@@ -214,11 +218,14 @@ def _bias_variance(rest: Rest, mean: Floats) -> float:
 
 
 @njit(cache=True)
-def _observe_bias(nav: Nav, mean: Floats, variance: float) -> None:
-    """A mean rate that nobody believes (a foot that turns slowly) is refused, but makes the next one more credible."""
+def _observe_bias(nav: Nav, rest: Rest, mean: Floats, variance: float) -> None:
+    """A mean rate that nobody believes (a foot that turns slowly) is refused; refused again, it makes the next one more credible."""
     for i in range(3):
         error = mean[i] - nav.gyro_bias[i]
         if error * error < BIAS_BELIEF * (nav.P[GYRO_BIAS + i, GYRO_BIAS + i] + variance):
             ins.observe(nav, GYRO_BIAS + i, error, variance)
+            rest.refused[i] = 0.0
         else:
-            nav.P[GYRO_BIAS + i, GYRO_BIAS + i] += (BIAS_DOUBT * error) ** 2
+            rest.refused[i] += 1.0
+            if rest.refused[i] > 1.0:
+                nav.P[GYRO_BIAS + i, GYRO_BIAS + i] += (BIAS_DOUBT * error) ** 2
