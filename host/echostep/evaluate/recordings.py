@@ -72,7 +72,7 @@ def _vicon(path: Path) -> Iterator[Recording]:
     """Motion capture at every sample [Wagstaff et al. 2019]."""
     mat = _mat(path)
     t_s, imu, truth = mat["timestamps_all"].ravel(), mat["imu_data"], mat["gt"] * MIRROR
-    at = mat["strideIndex"].ravel().astype(int) - 1
+    at = np.minimum(mat["strideIndex"].ravel().astype(int) - 1, len(t_s) - 1)
     name = path.stem.removesuffix("_LLIO")
     judge = partial(mocap, t_s=t_s, truth_m=truth, at=at, peer=VICON_PEERS.get(name))
     yield Recording("vicon", name, t_s, imu[:, :3], imu[:, 3:], judge, None, t_s, truth)
@@ -81,7 +81,8 @@ def _vicon(path: Path) -> Iterator[Recording]:
 def _hallway(path: Path) -> Iterator[Recording]:
     """Every footprint surveyed with a ruler."""
     mat = _mat(path)
-    t_s, imu, truth = mat["timestamps"].ravel(), mat["imu_data"], mat["GCP_wcf"]
+    t_s, imu = mat["timestamps"].ravel(), mat["imu_data"]
+    truth = mat["GCP_wcf"] if "GCP_wcf" in mat else mat["GCP"][:, :2] * MIRROR
     at = np.minimum(mat["strideIndex"].ravel().astype(int) - 1, len(t_s) - 1)
     name = path.stem.removeprefix("SensorConnectData_").removesuffix("_LLIO")
     judge = partial(survey, name=name, t_s=t_s[at], truth_m=truth, peer=HALLWAY_PEERS.get(name))
