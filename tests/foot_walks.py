@@ -7,7 +7,9 @@ contact below the sensor, at heel rise and after heel strike.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,3 +140,8 @@ def any_rotation(rng: np.random.Generator) -> Floats:
     """A random rotation matrix (3, 3)."""
     q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     return np.asarray(q * np.sign(np.linalg.det(q)))
+
+
+def data_folder() -> Path:
+    """Where the public recordings are, if they are."""
+    return Path(os.environ.get("ECHOSTEP_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import csv
+import re
 import subprocess
 import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from echostep import cli
 from echostep.errors import EchostepError
 from echostep.imu import load_imu
 from echostep.simulation.mtx import feelings
 from echostep.simulation.walker import Person, walk
-from feet import data_folder
+from foot_walks import data_folder
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
+Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 
 
 @pytest.fixture(scope="module")
@@ -30,22 +36,53 @@ def table() -> np.ndarray:
 
 def write(folder: Path, table: np.ndarray, header: str = HEADER) -> Path:
     path = folder / "imu.csv"
-    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.7g")
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.13g")
     return path
 
 
 def run(path: Path, *options: object) -> subprocess.CompletedProcess[str]:
-    command = [
-        sys.executable,
-        "-m",
-        "echostep",
-        "foot",
-        str(path),
-        "--out",
-        str(path.with_name("track.csv")),
-        *map(str, options),
-    ]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    """The command, in a process of its own."""
+    command = [sys.executable, "-m", "echostep", "foot", str(path), "--out", str(path.with_name("track.csv"))]
+    return subprocess.run(command + [str(o) for o in options], capture_output=True, text=True, timeout=120, check=False)
+
+
+@dataclass
+class Told:
+    """How the command ended, and what it said."""
+
+    status: int
+    out: str
+    err: str
+    track: Path
+
+    def end_m(self) -> float:
+        """How far the end is from the beginning."""
+        rows = np.genfromtxt(self.track, delimiter=",", skip_header=1)
+        return float(np.hypot(*(rows[-1, 1:3] - rows[0, 1:3])))
+
+    def known_m(self) -> float:
+        """The standard deviation that the summary states."""
+        found = re.search(r"known to ([0-9.]+) m", self.out)
+        assert found
+        return float(found[1])
+
+
+Command = Callable[[Path], Told]
+
+
+@pytest.fixture
+def foot(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+    """The command, in this process."""
+
+    def call(path: Path) -> Told:
+        track = path.with_name("track.csv")
+        monkeypatch.setattr(sys, "argv", ["echostep", "foot", str(path), "--out", str(track)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        said = capsys.readouterr()
+        return Told(int(end.value.code or 0), said.out, said.err, track)
+
+    return call
 
 
 def test_a_walk_is_tracked_and_drawn(tmp_path: Path, table: np.ndarray) -> None:
@@ -71,36 +108,119 @@ def test_any_mounting_gives_the_same_way(tmp_path: Path, table: np.ndarray, moun
     assert np.hypot(float(rows[-1]["x"]), float(rows[-1]["y"])) == pytest.approx(13.0, rel=0.03)
 
 
-def test_missing_and_broken_rows_are_counted(tmp_path: Path, table: np.ndarray) -> None:
-    rng = np.random.default_rng(2)
-    broken = table[rng.random(len(table)) > 0.2].copy()
-    broken[rng.random(len(broken)) < 0.01, 2] = np.nan
-    done = run(write(tmp_path, broken))
-    assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))
-    assert np.hypot(float(rows[-1]["x"]), float(rows[-1]["y"])) == pytest.approx(13.0, rel=0.1)
+@pytest.mark.parametrize(
+    ("spoil", "note"),
+    [
+        (lambda t, r: t[r.random(len(t)) > 0.2], "% of the samples are missing"),
+        (lambda t, _r: t[(t[:, 0] % 5.0) > 0.5], "gaps"),
+        (lambda t, r: np.repeat(t, 1 + (r.random(len(t)) < 0.3), axis=0), "repeat the time before"),
+        (lambda t, r: r.permutation(t), "sorted by it"),
+        (
+            lambda t, r: np.where((r.random(len(t)) < 0.05)[:, None], np.array([1.0] + 6 * [np.nan]) * t, t),
+            "without a number",
+        ),
+        (lambda t, _r: np.column_stack([t[:, :4], np.clip(t[:, 4:], -4.5, 4.5)]), "is cut off at 4.5"),
+        (lambda t, _r: np.column_stack([t[:, 0], np.clip(t[:, 1:4], -25.0, 25.0), t[:, 4:]]), "is cut off at"),
+        (lambda t, _r: t * [1, 1, -1, -1, 1, -1, -1], "steps"),  # upside down
+        (lambda t, _r: t[150:], "steps"),
+        (lambda t, _r: t[:-150], "steps"),
+        (lambda t, _r: t + [1.7e9, 0, 0, 0, 0, 0, 0], "steps"),  # a clock that counts from 1970
+    ],
+)
+def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_certain(
+    tmp_path: Path, table: np.ndarray, foot: Command, spoil: Spoil, note: str
+) -> None:
+    told = foot(write(tmp_path, spoil(table, np.random.default_rng(2))))
+    assert told.status == 0, told.err
+    assert note in told.out
+    assert abs(told.end_m() - 13.0) < max(3.0 * told.known_m(), 0.4)
 
 
 @pytest.mark.parametrize(
     ("spoil", "named"),
     [
-        (lambda t: np.column_stack([t[:, 0], t[:, 1:4] / 9.80665, t[:, 4:]]), "look like g"),
-        (lambda t: np.column_stack([t[:, 0], t[:, 1:4] * 100, t[:, 4:]]), "gravity is 9.8"),
-        (lambda t: np.column_stack([t[:, :4], np.degrees(t[:, 4:])]), "deg/s"),
-        (lambda t: np.column_stack([t[:, 0] * 1000, t[:, 1:]]), "in seconds"),
-        (lambda t: np.column_stack([t[:, 0], t[:, 1:5], 0 * t[:, 5], t[:, 6]]), "gy is constant"),
-        (lambda t: np.random.default_rng(3).permutation(t), "shuffled"),
-        (lambda t: np.where(np.random.default_rng(4).random(t.shape) < 0.3, np.nan, t), "no number"),
-        (lambda t: t[:1], "no samples"),
+        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] / 9.80665, t[:, 4:]]), "look like g"),
+        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:4] * 100, t[:, 4:]]), "gravity is 9.8"),
+        (lambda t, _r: np.column_stack([t[:, :4], np.degrees(t[:, 4:])]), "deg/s"),
+        (lambda t, _r: np.column_stack([t[:, 0] * 1000, t[:, 1:]]), "milliseconds"),
+        (lambda t, _r: np.column_stack([t[:, 0] * 1e6, t[:, 1:]]), "microseconds"),
+        (lambda t, _r: t[::4], "a foot needs 50"),
+        (lambda t, _r: np.column_stack([t[:, 0] / 20, t[:, 1:]]), "average them down"),
+        (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:5], 0 * t[:, 5], t[:, 6]]), "gy is constant"),
+        (lambda t, _r: np.column_stack([t[:, :5], np.where(t[:, 0] > 6, 1.0, t[:, 5]), t[:, 6]]), "gy does not change"),
+        (lambda t, _r: np.column_stack([0 * t[:, 0], t[:, 1:]]), "does not advance"),
+        (lambda t, r: np.where(r.random(t.shape) < 0.3, np.nan, t), "no number"),
+        (lambda t, _r: np.column_stack([np.tile(t[:300, 0], 9)[: len(t)], t[:, 1:]]), "t_s"),
+        (lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0], "never stands"),
+        (lambda t, _r: t[:1], "no samples"),
     ],
 )
-def test_wrong_input_is_named(tmp_path: Path, table: np.ndarray, spoil: object, named: str) -> None:
-    assert callable(spoil)
-    done = run(write(tmp_path, spoil(table)))
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert named in done.stderr
-    assert "imu.csv" in done.stderr
-    assert not (tmp_path / "track.csv").exists()
+def test_wrong_input_is_named(tmp_path: Path, table: np.ndarray, foot: Command, spoil: Spoil, named: str) -> None:
+    told = foot(write(tmp_path, spoil(table, np.random.default_rng(4))))
+    assert (told.status, told.err.count("\n")) == (2, 1), told.err + told.out
+    assert named in told.err
+    assert "imu.csv" in told.err
+    assert not told.track.exists()
+
+
+def with_header(text: str, header: str | None) -> str:
+    lines = text.splitlines(keepends=True)
+    return "".join(([] if header is None else [header + "\n"]) + lines[1:])
+
+
+@pytest.mark.parametrize(
+    "spell",
+    [
+        lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "\t"),
+        lambda text: text.replace("\n", "\n\n"),
+        lambda text: text[:-20],
+        lambda text: with_header(text, "gz, gy,gx ,az,ay,ax,t_s,colour").replace("\n", ",7\n"),
+    ],
+)
+def test_every_spelling_of_a_table_is_read(tmp_path: Path, table: np.ndarray, spell: Callable[[str], str]) -> None:
+    plain = load_imu(write(tmp_path, table))
+    text = spell((tmp_path / "imu.csv").read_text())
+    if "colour" in text:
+        text = spell(
+            "\n".join(",".join(line.split(",")[::-1]) for line in (tmp_path / "imu.csv").read_text().splitlines())
+            + "\n"
+        )
+    (tmp_path / "imu.csv").write_bytes(text.encode())
+    read = load_imu(tmp_path / "imu.csv")
+    assert np.array_equal(read.accel[:-1], plain.accel[: len(read.accel) - 1])
+    assert np.array_equal(read.gyro[:-1], plain.gyro[: len(read.gyro) - 1])
+    assert len(read.t_s) in (len(plain.t_s), len(plain.t_s) - 1)
+
+
+def test_a_missing_header_is_named(tmp_path: Path, table: np.ndarray, foot: Command) -> None:
+    write(tmp_path, table)
+    (tmp_path / "imu.csv").write_text(with_header((tmp_path / "imu.csv").read_text(), None))
+    told = foot(tmp_path / "imu.csv")
+    assert told.status == 2
+    assert "the first line must name the columns" in told.err
+
+
+@pytest.mark.parametrize(
+    "garbage", [b"\x00" * 4096, bytes(range(256)) * 16, b"spam,eggs,ham\n" * 300, b"1,2,3,4,5,6,7\n" * 300]
+)
+def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, garbage: bytes) -> None:
+    """64 MB stand for it: what is read of them is bounded, so 1 GB takes no longer."""
+    path = tmp_path / "imu.csv"
+    for head in (b"", HEADER.encode() + b"\n"):
+        with path.open("wb") as file:
+            file.write(head)
+            for _ in range((64 << 20) // (len(garbage) * 64)):
+                file.write(garbage * 64)
+        if head and garbage.startswith(b"1,2"):
+            path.write_bytes(path.read_bytes()[: 1 << 20])  # these are rows: reading them takes what it takes
+        began = time.perf_counter()
+        with pytest.raises(EchostepError, match=r"imu\.csv"):
+            load_imu(path)
+        assert time.perf_counter() - began < 20.0
 
 
 @pytest.mark.parametrize("content", ["", "a,b,c\n1,2,3\n", "\x00\x01\x02", HEADER + "\n", HEADER + "\nx,y\n"])

@@ -59,10 +59,10 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
     assert len(done.stdout.splitlines()) > 40
 
 
-@pytest.mark.parametrize("command", ["demo", "live", "record", "replay", "foot", "decode"])
+@pytest.mark.parametrize("command", ["demo", "live", "record", "replay", "foot", "decode", "evaluate feet"])
 def test_every_option_that_is_named_exists(command: str) -> None:
     usage = subprocess.run(
-        [sys.executable, "-m", "echostep", command, "--help"],
+        [sys.executable, "-m", "echostep", *command.split(), "--help"],
         capture_output=True,
         text=True,
         check=True,

@@ -25,6 +25,7 @@ from scipy.io import loadmat
 
 from echostep import messages as m
 from echostep.estimate import Estimate, digest
+from echostep.evaluate.judges import align, rmse
 from echostep.foot import Step, walk_track
 from echostep.frames import encode
 from echostep.picture import draw_track, write_track
@@ -38,7 +39,6 @@ from echostep.sources import BOARD, MTX, Chunk
 from echostep.tracker import Tracker
 from echostep.truth import load_truth
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
-from feet import align, rmse
 
 Floats = NDArray[np.float64]
 NAME = "GX5 33"

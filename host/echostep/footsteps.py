@@ -15,7 +15,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep import ins, stance
+from echostep import compass as magnetic
+from echostep import ins, mounting, stance
+from echostep.compass import Compass
 from echostep.ins import POS, TILT, VEL, YAW, Nav
 from echostep.stance import Rest, Window
 
@@ -24,6 +26,7 @@ Floats = NDArray[np.float64]
 CONFIRM_S = 0.03  # a stance is told after so much rest
 SETTLE_S = 0.2  # by then it has corrected the step before it
 LEAVE_S = 0.15  # and it is over after so long without rest: no swing is shorter
+PERIOD_GAIN = 0.003  # a sample
 GAP_S = 0.25  # the filter carries on over shorter gaps
 STRAY_SAMPLES = 20  # so many samples in a row from the past: the clock has been set back
 WALK_M_S = 1.5  # a foot that nobody watches moves no faster, on the whole
@@ -36,10 +39,10 @@ STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
 UNSURE_YAW_RAD2_S = 1.0
 DOUBT_S = 0.1  # of rests that the filter could not believe: its level is wrong
 ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
-FLAT_M, FLAT_SD_M = 0.04, 0.01  # floors are level: a step that rises less is no stair, kerb or ramp
+FLAT_M = 0.04  # floors are level: a step that rises less is no stair, kerb or ramp
 
 STEP, STANCE = 0.0, 1.0
-EVENT_SIZE = 17  # kind, start, end, move (3), covariance (9), heading, heading sd
+EVENT_SIZE = 18  # kind, start, end, move (3), covariance (9), heading, heading sd, toe
 EVENTS_PER_SAMPLE = 2
 ROW_SIZE = 6  # position (3), heading, in stance, events so far
 
@@ -48,6 +51,7 @@ class Footing(Protocol):
     """What is known of the foot besides its navigation: the last sample, the level, the present rest, the last step, the counts."""
 
     t_s: float
+    period_s: float  # between samples, as a rule
     force: Floats
     rate: Floats
     levelled: int
@@ -66,6 +70,9 @@ class Footing(Protocol):
     rest_yaw_rad: float
     in_stance: int
     settled: int
+    stood: Floats  # tilt of the foot when it stood last
+    tilt_square: Floats  # of the swings, see `mounting`
+    tilt_cube: Floats
     began_s: float  # the stance
     left_s: float  # the stance before
     under_way: int  # there was a stance before
@@ -86,23 +93,26 @@ FOOTING = np.dtype([(name, *_NUMPY[kind]) for name, kind in Footing.__annotation
 
 @njit(cache=True)
 def walk(
-    s: Footing, nav: Nav, window: Window, rest: Rest, height_m: float,
-    t_s: Floats, accel: Floats, gyro: Floats, events: Floats, rows: Floats,
+    s: Footing, nav: Nav, window: Window, rest: Rest, compass: Compass, height_m: float,
+    t_s: Floats, accel: Floats, gyro: Floats, mag: Floats, events: Floats, rows: Floats,
 ) -> int:  # fmt: skip
-    """Take samples t_s (n,), accel and gyro (n, 3) in turn; fills `events` (2n, EVENT_SIZE), and `rows` (n, ROW_SIZE) unless it is empty.
+    """Take samples t_s (n,), accel and gyro (n, 3), mag (n, 3) or (0, 3) in turn.
 
-    Returns the number of events.
+    Fills `events` (2n, EVENT_SIZE), and `rows` (n, ROW_SIZE) unless it is empty. Returns the number of events.
     """
     found = 0
     for k in range(len(t_s)):
         if _usable(s, t_s[k], accel[k], gyro[k]):
             dt = t_s[k] - s.t_s if s.samples > 1 else 0.0
             if s.samples > 1 and not 0.0 < dt <= GAP_S:
-                found = _lose(s, nav, rest, dt, events, found)
+                found = _lose(s, nav, rest, compass, dt, events, found)
                 dt = 0.0
+            _time(s, dt)
             stance.put(window, t_s[k], accel[k], gyro[k])
             if s.levelled:
-                found = _navigate(s, nav, window, rest, height_m, dt, t_s[k], accel[k], gyro[k], events, found)
+                found = _navigate(s, nav, window, rest, compass, height_m, dt, t_s[k], accel[k], gyro[k], events, found)
+                if len(mag) and s.rest_s > 0.0:
+                    magnetic.gather(compass, nav, mag[k])
             else:
                 found = _find_level(s, nav, window, dt, t_s[k], events, found)
             s.t_s = t_s[k]
@@ -136,14 +146,23 @@ def _usable(s: Footing, t_s: float, accel: Floats, gyro: Floats) -> bool:
 
 
 @njit(cache=True)
-def _lose(s: Footing, nav: Nav, rest: Rest, dt: float, events: Floats, found: int) -> int:
+def _time(s: Footing, dt: float) -> None:
+    """The period of the samples: a running median, so that missing ones do not count."""
+    if s.period_s == 0.0:
+        s.period_s = dt
+    elif dt > 0.0:
+        s.period_s *= 1.0 + PERIOD_GAIN if dt > s.period_s else 1.0 - PERIOD_GAIN
+
+
+@njit(cache=True)
+def _lose(s: Footing, nav: Nav, rest: Rest, compass: Compass, dt: float, events: Floats, found: int) -> int:
     """Samples are missing, or the clock or the level is wrong: the stance is over, and what the foot does until the next level unknown."""
     s.gaps += 1
     span_s = min(max(dt, GAP_S), 3600.0)
     s.lost_s += span_s
     nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, math.pi**2 / 3.0)
     if s.in_stance:
-        found = _leave(s, nav, events, found)
+        found = _leave(s, nav, compass, events, found)
     if s.levelled:
         s.yaw_rad = ins.heading(nav)
     stance.end_rest(rest)
@@ -188,20 +207,22 @@ def _begin(s: Footing, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s
 
 @njit(cache=True)
 def _navigate(
-    s: Footing, nav: Nav, window: Window, rest: Rest, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats,
+    s: Footing, nav: Nav, window: Window, rest: Rest, compass: Compass, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats,
     events: Floats, found: int,
 ) -> int:  # fmt: skip
     """One sample of navigation: predict, decide whether the foot rests, correct, tell."""
-    ins.predict(nav, dt, s.force, accel, s.rate, gyro)
+    ins.predict(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
     _doubt_limits(s, nav, dt, accel, gyro)
     if not _rests(s, nav, window, height_m, dt, t_s, gyro):
         stance.end_rest(rest)
         s.rest_s = 0.0
+        if not s.in_stance:
+            mounting.watch(s.tilt_square, s.tilt_cube, mounting.tilt(nav) - s.stood, dt)
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
-            found = _leave(s, nav, events, found)
+            found = _leave(s, nav, compass, events, found)
         return found
     if s.doubt_s > DOUBT_S:
-        return _lose(s, nav, rest, dt, events, found)
+        return _lose(s, nav, rest, compass, dt, events, found)
     s.rest_s += dt
     s.rest_end_s = t_s
     s.rest_yaw_rad = ins.heading(nav)
@@ -210,7 +231,7 @@ def _navigate(
     if not s.in_stance and s.rest_s >= CONFIRM_S - 1e-6:
         rise_m = nav.position[2] - s.origin[2]
         if abs(rise_m) < FLAT_M:
-            ins.observe(nav, POS + 2, -rise_m, FLAT_SD_M**2)
+            ins.observe(nav, POS + 2, -rise_m, nav.noise.flat_m**2)
         found = _land(s, nav, t_s - s.rest_s, events, found)
     return found
 
@@ -224,14 +245,15 @@ def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s
     if unrest > 1.0:
         return False
     expected = stance.rolling(nav, gyro, height_m)
-    variance = stance.rest_variance(rate2)
-    if stance.surprise(nav, expected, variance, stance.mean_force(window)) > stance.BELIEF:
+    variance = stance.rest_variance(nav, rate2)
+    surprise = stance.surprise(nav, expected, variance, stance.mean_force(window))
+    if surprise > stance.BELIEF:
         since_s = t_s - s.rest_end_s
         if s.lasting_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
         s.doubt_s += dt
-        stance.distrust(nav, since_s)
+        stance.distrust(nav, surprise / stance.BELIEF)
     else:
         s.doubt_s = 0.0
     stance.hold(nav, expected, variance + stance.haste_variance(force2), dt)
@@ -269,6 +291,7 @@ def _land(s: Footing, nav: Nav, began_s: float, events: Floats, found: int) -> i
     s.settled = 0
     s.began_s = max(began_s, s.left_s) if s.under_way else began_s
     s.rest_yaw_rad = ins.heading(nav)
+    s.stood[:] = mounting.tilt(nav)
     if s.under_way:
         _write_step(s, nav, events[found])
         found += 1
@@ -287,6 +310,9 @@ def _write_step(s: Footing, nav: Nav, row: Floats) -> None:
             row[6 + 3 * i + j] = nav.P[POS + i, POS + j]
     row[15] = s.rest_yaw_rad
     row[16] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
+    row[17] = mounting.toe(s.tilt_square, s.tilt_cube)
+    s.tilt_square *= mounting.MEMORY
+    s.tilt_cube *= mounting.MEMORY
 
 
 @njit(cache=True)
@@ -297,7 +323,7 @@ def _settle(s: Footing, nav: Nav) -> None:
 
 
 @njit(cache=True)
-def _leave(s: Footing, nav: Nav, events: Floats, found: int) -> int:
+def _leave(s: Footing, nav: Nav, compass: Compass, events: Floats, found: int) -> int:
     """The stance ended with its last rest."""
     row = events[found]
     row[0], row[1], row[2], row[15] = STANCE, s.began_s, max(s.rest_end_s, s.began_s), s.rest_yaw_rad
@@ -305,4 +331,10 @@ def _leave(s: Footing, nav: Nav, events: Floats, found: int) -> int:
     s.in_stance = 0
     if not s.settled:
         _settle(s, nav)
+    yaw = ins.heading(nav)
+    turn = magnetic.correction(compass, nav, s.rest_yaw_rad)
+    if turn != 0.0:
+        ins.turn(nav, s.origin, turn - (ins.heading(nav) - yaw))
+        s.rest_yaw_rad += turn
+        s.yaw_variance = min(s.yaw_variance, nav.P[YAW, YAW])
     return found + 1

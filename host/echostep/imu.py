@@ -1,119 +1,119 @@
 """A recorded foot IMU as a CSV file, for researchers: read with suspicion, tracked by the same kernel as live.
 
-In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s), any rate from 50 to 500 Hz, any mounting. Out: `Imu`. Owns nothing.
-Wrong units, constant columns and disordered times are told by name: a track from them would look right and be wrong.
+In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s, any unit), 50 to 500 Hz, any mounting. Out: `Imu` with what had to be mended, or an
+EchostepError; the track as CSV and in words. Owns nothing. `imu_checks` knows what is wrong with samples.
 """
 
 from __future__ import annotations
 
 import csv
+import math
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
 from echostep.foot import Track
+from echostep.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
 Floats = NDArray[np.float64]
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
-FIELD_COLUMNS = ("mx", "my", "mz")
+MAG_COLUMNS = ("mx", "my", "mz")
 TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
-GRAVITY_RANGE_M_S2 = (7.0, 13.0)  # the middle reading of any foot, standing or running
-G_RANGE = (0.7, 1.3)
-FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s
-RATE_RANGE_HZ = (30.0, 2000.0)
-MOST_BAD = 0.5
+LONGEST_LINE = 10_000
+EARLY_ROWS, MOST_BAD = 2000, 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """`t_s` (n,), `accel` (n, 3) m/s2, `gyro` (n, 3) rad/s, `mag` (n, 3) in any unit, None without; NaN where the file has no number."""
+    """`t_s` (n,), `accel` (n, 3) m/s2, `gyro` (n, 3) rad/s, `mag` (n, 3) of any unit or None, NaN where it has no number.
+
+    `notes`: what was found and mended, a line each.
+    """
 
     t_s: Floats
     accel: Floats
     gyro: Floats
     mag: Floats | None = None
+    notes: tuple[str, ...] = ()
 
 
 def load_imu(path: Path | str) -> Imu:
     """Samples of a CSV file; raises EchostepError that names the file and what is wrong with which column."""
     try:
-        with Path(path).open(newline="", encoding="utf-8", errors="replace") as file:
-            table = _table(csv.reader(file))
+        with Path(path).open(newline=None, encoding="utf-8-sig", errors="replace") as file:
+            table, holes = whole_rows(_table(_lines(file)))
+        table, mended = sorted_by_time(table)
+        if wrong := complaint(table, COLUMNS):
+            raise ValueError(wrong)
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
-    except (ValueError, csv.Error) as error:
+    except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
-    imu = Imu(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10] if table.shape[1] > len(COLUMNS) else None)
-    if complaint := _complaint(imu):
-        raise EchostepError(f"{path}: {complaint}")
-    return imu
+    mag = table[:, 7:10] if table.shape[1] > len(COLUMNS) else None
+    return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*holes, *mended, *notes(table, COLUMNS)))
 
 
-def _table(rows: Iterator[list[str]]) -> Floats:
-    header = [name.strip() for name in next(rows, [])]
+def _lines(file: TextIO) -> Iterator[str]:
+    """Lines of a bounded length; raises ValueError for a longer one, which is no line of numbers."""
+    number = 0
+    while line := file.readline(LONGEST_LINE):
+        number += 1
+        if len(line) == LONGEST_LINE:
+            raise ValueError(f"line {number} is longer than {LONGEST_LINE} characters: is this a CSV file?")
+        yield line
+
+
+def _table(lines: Iterator[str]) -> Floats:
+    """The columns (n, 7) or (n, 10)."""
+    first = next(lines, "")
+    comma = max(",;\t", key=first.count)
+    header = [name.strip().strip('"') for name in first.split(comma)]
     if missing := [name for name in COLUMNS if name not in header]:
-        raise ValueError(f"no column {', '.join(missing)}; expected {','.join(COLUMNS)}[,mx,my,mz]")
-    optional = FIELD_COLUMNS if all(name in header for name in FIELD_COLUMNS) else ()
-    places = [header.index(name) for name in COLUMNS + optional]
-    found = [[_number(row[k]) if k < len(row) else np.nan for k in places] for row in rows if row]
-    if len(found) < 2:
+        hint = ": the first line must name the columns" if _is_numbers(header) else ""
+        raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]")
+    wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
+    places = [header.index(name) for name in wanted]
+    found, rows, bad = array("d"), 0, 0
+    for line in lines:
+        if not line.strip():
+            continue
+        cells = (line.replace(",", ".") if comma == ";" else line).split(comma)
+        numbers = [_number(cells[k]) if k < len(cells) else math.nan for k in places]
+        found.extend(numbers)
+        rows += 1
+        bad += not all(map(math.isfinite, numbers[: len(COLUMNS)]))
+        if rows == EARLY_ROWS and bad > MOST_BAD * rows:
+            break  # garbage, however long
+    if rows < 2:
         raise ValueError("no samples")
-    return np.array(found, dtype=np.float64)
+    if bad > MOST_BAD * rows:
+        raise ValueError(f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column")
+    return np.array(found).reshape(rows, len(wanted))
 
 
 def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        return float("nan")
+        return math.nan
 
 
-def _complaint(imu: Imu) -> str:
-    """What makes the samples unusable, in words; empty when nothing does."""
-    table = np.column_stack([imu.t_s, imu.accel, imu.gyro])
-    bad = 1.0 - np.isfinite(table).all(axis=1).mean()
-    if bad > MOST_BAD:
-        return f"{100 * bad:.0f} % of the rows have no number in some column"
-    return _time_complaint(imu.t_s) or _column_complaint(table) or _unit_complaint(imu)
+def _is_numbers(cells: list[str]) -> bool:
+    return all(math.isfinite(_number(cell)) for cell in cells)
 
 
-def _time_complaint(t_s: Floats) -> str:
-    steps = np.diff(t_s[np.isfinite(t_s)])
-    back = float((steps < 0).mean())
-    if back > 0.02:
-        return f"t_s goes back in {100 * back:.0f} % of the rows: are they shuffled?"
-    forward = steps[steps > 0]
-    if not len(forward):
-        return "t_s does not advance"
-    rate = 1.0 / float(np.median(forward))
-    if not RATE_RANGE_HZ[0] <= rate <= RATE_RANGE_HZ[1]:
-        return f"t_s gives {rate:.3g} samples a second: is it in seconds?"
-    return ""
-
-
-def _column_complaint(table: Floats) -> str:
-    for k, name in enumerate(COLUMNS[1:], start=1):
-        column = table[np.isfinite(table[:, k]), k]
-        if len(column) > 100 and np.ptp(column) == 0.0:
-            return f"{name} is constant: is that sensor alive?"
-    return ""
-
-
-def _unit_complaint(imu: Imu) -> str:
-    force = float(np.nanmedian(np.linalg.norm(imu.accel, axis=1)))
-    if G_RANGE[0] <= force <= G_RANGE[1]:
-        return f"ax, ay, az look like g (their median is {force:.2f}): multiply them by 9.80665"
-    if not GRAVITY_RANGE_M_S2[0] <= force <= GRAVITY_RANGE_M_S2[1]:
-        return f"ax, ay, az have a median of {force:.3g}, gravity is 9.8 m/s2: wrong unit, or gravity was removed"
-    fastest = float(np.nanquantile(np.abs(imu.gyro), 0.999))
-    if fastest > FASTEST_FOOT_RAD_S:
-        return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180"
-    return ""
+def checked(track: Track, path: Path | str) -> Track:
+    """The track; raises EchostepError when it contradicts itself, because then the samples are not what they are taken for."""
+    if wrong := contradiction(track):
+        raise EchostepError(f"{path}: {wrong}")
+    return track
 
 
 def write_foot_track(path: Path | str, track: Track) -> None:
@@ -131,12 +131,15 @@ def write_foot_track(path: Path | str, track: Track) -> None:
 
 
 def describe_track(track: Track) -> str:
-    """Distance, closure, steps and losses in words."""
+    """Distance, closure, how well the end is known, steps and losses in words."""
     steps = track.steps
     distance = sum(float(np.hypot(*step.move_m[:2])) for step in steps)
     end = track.position_m[-1] - track.position_m[0]
     lost = track.counts.impossible + track.counts.not_later
+    toe = "" if track.toe_known else "; the toe's direction is not known, heading_rad counts from the first rest"
+    trusted, read = track.compass
+    compass = f"; magnetometer trusted in {trusted} of {read} stances" if read else ""
     return (
-        f"{len(steps)} steps, {distance:.2f} m; the end is {np.hypot(end[0], end[1]):.2f} m from the beginning and {end[2]:+.2f} m in height; "
-        f"{track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps"
+        f"{len(steps)} steps, {distance:.2f} m; the end is {np.hypot(end[0], end[1]):.2f} m from the beginning and {end[2]:+.2f} m in height, "
+        f"known to {end_sd_m(track):.2f} m (1 sd); {track.counts.samples} samples, {lost} skipped, {track.counts.gaps} gaps{compass}{toe}"
     )

@@ -21,19 +21,30 @@ Floats = NDArray[np.float64]
 GRAVITY_M_S2 = 9.81
 POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
-# Noise of an MTx-class sensor on a shoe, whatever the rate.
-ACCEL_NOISE = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
-GYRO_NOISE = 1e-3  # rad/s per root Hz
+MOTION_S = 0.1  # a foot keeps its motion for about so long: in that time its scale and alignment errors repeat
+MISSED_SHARE = 1.0  # of the change over a time without samples: a blow may have come and gone
+GYRO_CHANGE_SHARE = 0.01  # of the rate's: a mean over the period loses no angle, but for its axis
 ACCEL_WANDER = 1e-4  # m/s2 per root s
 GYRO_WANDER = 1e-5  # rad/s per root s
-# Scale and alignment errors act in proportion to the motion; a foot keeps its motion for about a tenth of a second.
-ACCEL_SHARE, GYRO_SHARE, MOTION_S = 0.01, 0.01, 0.1
-CHANGE_SHARE = 0.1  # of the change from one sample to the next is lost between them
+
+
+class Noise(NamedTuple):
+    """How wrong an MTx-class sensor on a shoe, and the models of it, are: one setting for everybody (`evaluate feet --leave-one-out`)."""
+
+    accel: float = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
+    gyro: float = 1e-3  # rad/s per root Hz
+    accel_share: float = 0.005  # of the acceleration, by scale and alignment, as calibrated sensors have it
+    gyro_share: float = 0.01  # of the rate
+    change_share: float = 0.1  # of the change of the force from one sample to the next is lost between them: a blow
+    lever_m: float = 0.1  # the foot's point of contact is known to within the foot
+    rest_m_s: float = 0.005
+    kept_s: float = 0.1  # a rest's velocity is wrong by the same for so long: more samples in that time say no more
+    flat_m: float = 0.01  # how level a floor is from step to step
 
 
 class Nav(NamedTuple):
     """Navigation state: `position` m, `velocity` m/s (walk frame), `attitude` (4,) quaternion w x y z body -> walk, biases (body frame),
-    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors.
+    `level` (3, 3) the levelled attitude of yaw zero, `P` (16, 16) covariance of the errors, `noise` what they grow by.
     """
 
     position: Floats
@@ -43,12 +54,13 @@ class Nav(NamedTuple):
     accel_bias: Floats
     level: Floats
     P: Floats
+    noise: Noise
 
 
-def new_nav() -> Nav:
+def new_nav(noise: Noise) -> Nav:
     """At the origin, at rest, not levelled yet."""
     attitude = np.array([1.0, 0.0, 0.0, 0.0])
-    return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)))
+    return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)), noise)
 
 
 @njit(cache=True)
@@ -146,19 +158,30 @@ def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: f
 
 
 @njit(cache=True)
-def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
-    """Strapdown step over `dt` between two samples of specific force and rate (3,), at the attitude in the middle."""
-    rate = 0.5 * (rate0 + rate1) - nav.gyro_bias
+def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
+    """Strapdown step over `dt` with the samples of specific force and rate (3,) at its beginning and its end.
+
+    A sample is the mean over the `period` before it; what is missing of `dt` is taken as straight between both. How the rates and forces change
+    from one sample to the next turns the axis (coning) and the force (sculling) within the step [Savage 1998, part 1 eq. 47, part 2 eq. 56].
+    """
+    seen = min(0.5 + 0.5 * period / dt, 1.0) if dt > 0.0 else 1.0
+    rate = seen * rate1 + (1.0 - seen) * rate0 - nav.gyro_bias
+    force = seen * force1 + (1.0 - seen) * force0 - nav.accel_bias
     half = turning(0.5 * dt * rate[0], 0.5 * dt * rate[1], 0.5 * dt * rate[2])
     r = rotation(multiply(nav.attitude, half))
-    c = dt * dt / 12.0  # coning: the axis turns within the interval [Magnus 1954]
+    c = dt * dt / 12.0
     whole = turning(
         dt * rate[0] + c * (rate0[1] * rate1[2] - rate0[2] * rate1[1]),
         dt * rate[1] + c * (rate0[2] * rate1[0] - rate0[0] * rate1[2]),
         dt * rate[2] + c * (rate0[0] * rate1[1] - rate0[1] * rate1[0]),
     )
     nav.attitude[:] = multiply(nav.attitude, whole)
-    f = apply(r, 0.5 * (force0 + force1) - nav.accel_bias)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        force[i] += (
+            dt / 12.0 * (rate0[j] * force1[k] - rate0[k] * force1[j] + force0[j] * rate1[k] - force0[k] * rate1[j])
+        )
+    f = apply(r, force)
     accel = f.copy()
     accel[2] -= GRAVITY_M_S2
     for i in range(3):
@@ -167,9 +190,10 @@ def predict(nav: Nav, dt: float, force0: Floats, force1: Floats, rate0: Floats, 
     _carry(nav.P, f, r, dt)
     turn = apply(r, rate)
     hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
-    lost_m_s = CHANGE_SHARE * _norm(force1 - force0) * dt + _norm(accel) * hidden
-    lost_rad = CHANGE_SHARE * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
-    _add_noise(nav.P, dt, accel, turn, lost_m_s, lost_rad)
+    missed = MISSED_SHARE * (1.0 - seen)
+    lost_m_s = (nav.noise.change_share + missed) * _norm(force1 - force0) * dt + _norm(accel) * hidden
+    lost_rad = (GYRO_CHANGE_SHARE + missed) * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
+    _add_noise(nav.P, nav.noise, dt, accel, turn, lost_m_s, lost_rad)
 
 
 @njit(cache=True)
@@ -196,22 +220,24 @@ def _carry(P: Floats, f: Floats, r: Floats, dt: float) -> None:
 
 
 @njit(cache=True)
-def _add_noise(P: Floats, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float) -> None:
+def _add_noise(
+    P: Floats, noise: Noise, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float
+) -> None:
     """Process noise; scale errors of the gyros turn the foot about the axis about which it turns anyway."""
     moving = accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2
-    velocity = (ACCEL_NOISE**2 + ACCEL_SHARE**2 * moving * MOTION_S) * dt + lost_m_s**2
-    tilt = GYRO_NOISE**2 * dt + lost_rad**2
+    velocity = (noise.accel**2 + noise.accel_share**2 * moving * MOTION_S) * dt + lost_m_s**2
+    tilt = noise.gyro**2 * dt + lost_rad**2
     for i in range(3):
         P[VEL + i, VEL + i] += velocity
         P[GYRO_BIAS + i, GYRO_BIAS + i] += GYRO_WANDER**2 * dt
         P[ACCEL_BIAS + i, ACCEL_BIAS + i] += ACCEL_WANDER**2 * dt
         for j in range(3):
-            P[TILT + i, TILT + j] += GYRO_SHARE**2 * MOTION_S * dt * rate[i] * rate[j] + (tilt if i == j else 0.0)
+            P[TILT + i, TILT + j] += noise.gyro_share**2 * MOTION_S * dt * rate[i] * rate[j] + (tilt if i == j else 0.0)
     for i in range(2):
-        vertical = GYRO_SHARE**2 * MOTION_S * dt * rate[i] * rate[2]
+        vertical = noise.gyro_share**2 * MOTION_S * dt * rate[i] * rate[2]
         P[YAW, TILT + i] += vertical
         P[TILT + i, YAW] += vertical
-    vertical = GYRO_SHARE**2 * MOTION_S * dt * rate[2] * rate[2] + tilt
+    vertical = noise.gyro_share**2 * MOTION_S * dt * rate[2] * rate[2] + tilt
     P[YAW, TILT + 2] += vertical
     P[TILT + 2, YAW] += vertical
     P[YAW, YAW] += vertical
@@ -233,6 +259,17 @@ def observe(nav: Nav, at: int, error: float, variance: float) -> None:
     nav.gyro_bias[:] += row[GYRO_BIAS : GYRO_BIAS + 3]
     nav.accel_bias[:] += row[ACCEL_BIAS : ACCEL_BIAS + 3]
     nav.attitude[:] = multiply(turning(row[TILT], row[TILT + 1], row[TILT + 2]), nav.attitude)
+
+
+@njit(cache=True)
+def turn(nav: Nav, centre: Floats, angle: float) -> None:
+    """The yaw was wrong by this angle since the foot left `centre` (3,)."""
+    c, s = math.cos(angle), math.sin(angle)
+    x, y = nav.position[0] - centre[0], nav.position[1] - centre[1]
+    u, v = nav.velocity[0], nav.velocity[1]
+    nav.position[0], nav.position[1] = centre[0] + c * x - s * y, centre[1] + s * x + c * y
+    nav.velocity[0], nav.velocity[1] = c * u - s * v, s * u + c * v
+    nav.attitude[:] = multiply(turning(0.0, 0.0, angle), nav.attitude)
 
 
 @njit(cache=True)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.alignment import Alignment
 from echostep.calibration import RangerSettings, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
@@ -52,6 +53,7 @@ class Intake:
         self.mtx = MtxReader()
         self.timeline = Timeline(mtx)
         self.foot = Foot(foot)
+        self.alignment = Alignment()
         self.path = TrunkPath(gait)
         self.status: Status | None = None
         self.identity: Identity | None = None
@@ -117,17 +119,20 @@ class Intake:
         if not len(kept):
             return
         t_s, at = times.mtx_s[kept], times.mtx_at[kept]
-        fall = self.foot.follow(t_s, batch.accel[kept], batch.gyro[kept])
+        fall = self.foot.follow(t_s, batch.accel[kept], batch.gyro[kept], batch.mag[kept])
         begin = 0
         for event, told in zip(fall.events, fall.told.tolist(), strict=True):
             self._stand(fall, t_s, at, begin, told)
-            legs = self.path.step(event) if isinstance(event, Step) else self.path.stance(event)
-            self._waiting.go(int(at[told]), legs)
+            for known in self.alignment.feed([event]):
+                legs = self.path.step(known) if isinstance(known, Step) else self.path.stance(known)
+                self._waiting.go(int(at[told]), legs)
             begin = told
         self._stand(fall, t_s, at, begin, len(t_s))
 
     def _stand(self, fall: Footfall, t_s: Floats, at: Ints, begin: int, end: int) -> None:
         """What the samples [begin, end) between two events say of a trunk that stands."""
+        if self.alignment.waiting:
+            return
         still = begin + np.flatnonzero(fall.stance[begin:end])
         for k, leg in self.path.stand(t_s[still], fall.heading_rad[still]):
             self._waiting.go(int(at[still[k]]), [leg])

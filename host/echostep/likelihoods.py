@@ -25,11 +25,11 @@ Floats = NDArray[np.float64]
 class EchoSettings:
     """What an SRF02 may report; lengths in metres, probabilities of one ping.
 
-    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` a radian off the axis. A wall is heard while
-    its level, spread over the way there and back and through a beam that is `rim_db` down at 27.5 degrees each way [Girard 2011, 2.6.2, 2.6.3],
-    exceeds that of a wall straight ahead at `maximum_m`; `soft_db`: how sharply. The inside of a corner answers `corner_db` more weakly, any
-    other wall end `edge_db`, and more so with distance. `short`: something nearer that is not on the plan; `stray`: a second reflection where nothing on
-    the plan was heard; `outlier`: anything else.
+    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` a radian off the axis.
+    A wall is heard while its level, spread over the way there and back and through a beam that is `rim_db` down at 27.5 degrees each way
+    [Girard 2011, 2.6.2, 2.6.3], exceeds that of a wall straight ahead at `maximum_m`; `soft_db`: how sharply.
+    The inside of a corner answers `corner_db` more weakly, any other wall end `edge_db`, and more so with distance.
+    `short`: something nearer that is not on the plan; `stray`: a second reflection where nothing on the plan was heard; `outlier`: anything else.
     `correlation_m`: travel over which errors of successive echoes become independent.
     """
 

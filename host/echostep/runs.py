@@ -21,12 +21,13 @@ import numpy as np
 from rich.console import Console
 
 from echostep import fischer2008
+from echostep.alignment import aligned
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
-from echostep.imu import Imu, describe_track, load_imu, write_foot_track
+from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.messages import Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
@@ -146,7 +147,9 @@ def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
     if profile not in FOOT_PROFILES:
         raise EchostepError(f"--profile {profile}: the foot has no such profile; it has {', '.join(FOOT_PROFILES)}")
     imu = load_imu(path)
-    track = FOOT_PROFILES[profile](imu)
+    for note in imu.notes:
+        console.print(f"{path.name}: {note}")
+    track = FOOT_PROFILES[profile](imu, path.name)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if plot:
@@ -154,14 +157,14 @@ def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
         console.print(f"{out} and {out.with_suffix('.png')}")
 
 
-def _own_track(imu: Imu) -> Track:
-    return walk_track(imu.t_s, imu.accel, imu.gyro)
+def _own_track(imu: Imu, name: str) -> Track:
+    return checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro, mag=imu.mag)), name)
 
 
-def _fischer2008_track(imu: Imu) -> Track:
+def _fischer2008_track(imu: Imu, name: str) -> Track:
     """The paper's method needs the MTx's own matrices, which no CSV holds: a model of its filter makes them."""
     if imu.mag is None:
-        console.print("Note: no columns mx,my,mz: the MTx's filter is modelled without its magnetometer.")
+        console.print(f"{name}: no columns mx,my,mz: the MTx's filter is modelled without its magnetometer.")
     good = fischer2008.usable(imu.t_s, imu.accel, imu.gyro)[0]
     matrices = np.full((len(imu.t_s), 3, 3), np.nan)
     mag = None if imu.mag is None else imu.mag[good]

@@ -29,16 +29,14 @@ REST_RAD_S, REST_M_S2 = 1.6, 6.0  # rms over the window: `unrest` is 1 on the el
 CALM, STILL = 0.25, 0.03  # `unrest` of a foot that stands, and of one that nobody moves on purpose
 BELIEF = 16.8  # chi-square of three velocities and three accelerations, exceeded by one in a hundred
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
+MOST_EXCESS = 1e3
 LASTING_S = 0.15  # no swing is calm for so long: this stance is real, the velocity is not
 OVERDUE_S = 2.0  # nor does a swing last so long
-LEVER_M = 0.1  # the foot's point of contact is known to within the foot
-REST_M_S = 0.005
-KEPT_S = 0.1  # the velocity's error is the same for so long: more samples in that time say no more
 PART_S, PARTS = 0.1, 5  # gyro bias: rest is cut into parts
 SWAY_S = 0.3  # the mean of a sway is as good as one part in so long
 BIAS_FLOOR_RAD_S = 1e-3
 BIAS_BELIEF = 16.0  # chi-square of one rate, four sigma
-BIAS_DOUBT = 0.2  # of the error, so that the third refusal in a row is none
+BIAS_DOUBT = 0.3  # of the error, from the second refusal in a row on, so that the third is none; a first one is a foot that gets going
 
 
 class Window(NamedTuple):
@@ -51,13 +49,17 @@ class Window(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """Sums over the present rest: `part` (3,) rad and `part_s` (1,), `whole` (3,) rad, `squares` (1,) rad2/s, `whole_s` (1,)."""
+    """Sums over the present rest: `part` (3,) rad and `part_s` (1,), `whole` (3,) rad, `squares` (1,) rad2/s, `whole_s` (1,).
+
+    `refused` (3,): how often in a row each axis was not believed; it outlives the rest.
+    """
 
     part: Floats
     part_s: Floats
     whole: Floats
     squares: Floats
     whole_s: Floats
+    refused: Floats
 
 
 def new_window() -> Window:
@@ -67,7 +69,7 @@ def new_window() -> Window:
 
 def new_rest() -> Rest:
     """No rest so far."""
-    return Rest(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1))
+    return Rest(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1), np.zeros(3))
 
 
 @njit(cache=True)
@@ -146,9 +148,9 @@ def surprise(nav: Nav, expected: Floats, variance: float, force: Floats) -> floa
 
 
 @njit(cache=True)
-def rest_variance(rate2: float) -> float:
+def rest_variance(nav: Nav, rate2: float) -> float:
     """Variance (m/s)2 of the velocity of a standing foot about `rolling`."""
-    return REST_M_S**2 + LEVER_M**2 * rate2
+    return nav.noise.rest_m_s**2 + nav.noise.lever_m**2 * rate2
 
 
 @njit(cache=True)
@@ -160,20 +162,22 @@ def haste_variance(force2: float) -> float:
 @njit(cache=True)
 def hold(nav: Nav, expected: Floats, variance: float, dt: float) -> None:
     """Zero-velocity update; what it is worth depends on the time it covers, not on the number of samples."""
-    worth = max(1.0, KEPT_S / dt)
+    worth = max(1.0, nav.noise.kept_s / dt)
     for i in range(3):
         ins.observe(nav, VEL + i, expected[i] - nav.velocity[i], variance * worth)
 
 
 @njit(cache=True)
-def distrust(nav: Nav, since_s: float) -> None:
-    """The foot rests although the filter cannot believe it: then the filter's velocity, attitude and way since the last rest are wrong."""
-    speed2 = nav.velocity[0] ** 2 + nav.velocity[1] ** 2 + nav.velocity[2] ** 2
-    for i in range(3):
-        nav.P[ins.VEL + i, ins.VEL + i] += speed2
-        nav.P[ins.POS + i, ins.POS + i] += 0.25 * speed2 * since_s**2
-        nav.P[ins.TILT + i, ins.TILT + i] += 0.05**2
-    nav.P[ins.YAW, ins.YAW] += 0.05**2
+def distrust(nav: Nav, excess: float) -> None:
+    """The foot rests although the filter cannot believe it: whatever made velocity, attitude and way wrong since the last rest was worse
+    than the filter knew. Their covariance grows by the `excess`, so that they are corrected together, in the proportions in which they went wrong.
+    """
+    more = math.sqrt(min(excess, MOST_EXCESS))
+    for i in range(ins.GYRO_BIAS):
+        nav.P[i, :] *= more
+        nav.P[:, i] *= more
+    nav.P[ins.YAW, :] *= more
+    nav.P[:, ins.YAW] *= more
 
 
 @njit(cache=True)
@@ -200,7 +204,7 @@ def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) ->
     if rest.whole_s[0] < PARTS * PART_S - 1e-6:
         return False
     mean = rest.whole / rest.whole_s[0]
-    _observe_bias(nav, mean, _bias_variance(rest, mean))
+    _observe_bias(nav, rest, mean, _bias_variance(rest, mean))
     end_rest(rest)
     return True
 
@@ -214,11 +218,14 @@ def _bias_variance(rest: Rest, mean: Floats) -> float:
 
 
 @njit(cache=True)
-def _observe_bias(nav: Nav, mean: Floats, variance: float) -> None:
-    """A mean rate that nobody believes (a foot that turns slowly) is refused, but makes the next one more credible."""
+def _observe_bias(nav: Nav, rest: Rest, mean: Floats, variance: float) -> None:
+    """A mean rate that nobody believes (a foot that turns slowly) is refused; refused again, it makes the next one more credible."""
     for i in range(3):
         error = mean[i] - nav.gyro_bias[i]
         if error * error < BIAS_BELIEF * (nav.P[GYRO_BIAS + i, GYRO_BIAS + i] + variance):
             ins.observe(nav, GYRO_BIAS + i, error, variance)
+            rest.refused[i] = 0.0
         else:
-            nav.P[GYRO_BIAS + i, GYRO_BIAS + i] += (BIAS_DOUBT * error) ** 2
+            rest.refused[i] += 1.0
+            if rest.refused[i] > 1.0:
+                nav.P[GYRO_BIAS + i, GYRO_BIAS + i] += (BIAS_DOUBT * error) ** 2

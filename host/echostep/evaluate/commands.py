@@ -48,3 +48,19 @@ def trails(
     from echostep.evaluate.trails import trails as study
 
     study(runs, seed, out, json, scheduler)
+
+
+@app.command("feet")
+def feet_command(
+    folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
+    json: Json = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Draw the tracks there.")] = None,
+    left_out: Annotated[
+        bool,
+        typer.Option("--leave-one-out", help="Also with the constants that the other sets would choose (minutes)."),
+    ] = False,
+) -> None:
+    """The foot on real recordings, one setting for all, beside the peers' figures."""
+    from echostep.evaluate.feet import feet
+
+    feet(folder, json, out, left_out=left_out)
