@@ -34,6 +34,7 @@ Ints = NDArray[np.int32]
 
 WALL = 0.0
 MOST_SOURCES = 8
+FARTHEST_M = 3.0
 FOOT_M = 1e-3  # what stands so close to a wall does not hide it: walls drawn twice
 NEAREST_M = 1e-6
 CONE = math.cos(CONE_RAD)
@@ -49,31 +50,36 @@ class Walls:
         self._count = 0
 
     def near(self, x_m: Floats, y_m: Floats, reach_m: float = 0.0) -> WallIndex:
-        """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most a tile) of them."""
-        tiles = _unseen(np.asarray(x_m, np.float64), np.asarray(y_m, np.float64), min(reach_m, TILE_M), self._index)
-        if len(tiles):
-            self._index = _look(tiles, self._count, self._index)
-            self._count += len(tiles)
+        """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most FARTHEST_M) of them."""
+        reach_m = min(reach_m, FARTHEST_M)
+        tiles = np.empty(len(x_m) * (int(2.0 * reach_m / TILE_M) + 2) ** 2, np.int32)
+        count = _unseen(x_m, y_m, reach_m, self._index, tiles)
+        if count:
+            self._index = _look(tiles[:count], self._count, self._index)
+            self._count += count
         return self._index
 
 
-@njit(cache=True, error_model="numpy")
-def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex) -> Ints:
-    """Tiles near these places that were not looked at, each once, in order of appearance."""
-    tiles, count = np.empty(16, np.int32), 0
+@njit(**LEAN)
+def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex, tiles: Ints) -> int:
+    """Tiles near these places that were not looked at, each once, in order of appearance, into `tiles`; their number."""
+    count = 0
     for i in range(len(x)):
-        for k in range(4 if reach > 0.0 else 1):
-            tile = tile_at(x[i] + (reach if k & 1 else -reach), y[i] + (reach if k & 2 else -reach), index)
-            if tile < 0 or index.seen[tile] != 0:
-                continue
-            if count == len(tiles):
-                tiles = np.concatenate((tiles, tiles))
-            tiles[count] = tile
-            index.seen[tile] = -1
-            count += 1
+        if tile_at(x[i], y[i], index) < 0:
+            continue
+        left, right = (x[i] - reach - index.x0_m) / TILE_M, (x[i] + reach - index.x0_m) / TILE_M
+        low, high = (y[i] - reach - index.y0_m) / TILE_M, (y[i] + reach - index.y0_m) / TILE_M
+        for row in range(max(int(low), 0), min(int(high) + 1, index.rows)):
+            for tile in range(
+                row * index.columns + max(int(left), 0), row * index.columns + min(int(right) + 1, index.columns)
+            ):
+                if index.seen[tile] == 0:
+                    index.seen[tile] = -1
+                    tiles[count] = tile
+                    count += 1
     for k in range(count):
         index.seen[tiles[k]] = 0
-    return tiles[:count]
+    return count
 
 
 @njit(cache=True, error_model="numpy")
