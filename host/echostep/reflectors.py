@@ -34,6 +34,7 @@ Ints = NDArray[np.int32]
 
 WALL = 0.0
 MOST_SOURCES = 8
+FARTHEST_M = 3.0
 FOOT_M = 1e-3  # what stands so close to a wall does not hide it: walls drawn twice
 NEAREST_M = 1e-6
 CONE = math.cos(CONE_RAD)
@@ -49,31 +50,36 @@ class Walls:
         self._count = 0
 
     def near(self, x_m: Floats, y_m: Floats, reach_m: float = 0.0) -> WallIndex:
-        """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most a tile) of them."""
-        tiles = _unseen(np.asarray(x_m, np.float64), np.asarray(y_m, np.float64), min(reach_m, TILE_M), self._index)
-        if len(tiles):
-            self._index = _look(tiles, self._count, self._index)
-            self._count += len(tiles)
+        """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most FARTHEST_M) of them."""
+        reach_m = min(reach_m, FARTHEST_M)
+        tiles = np.empty(len(x_m) * (int(2.0 * reach_m / TILE_M) + 2) ** 2, np.int32)
+        count = _unseen(x_m, y_m, reach_m, self._index, tiles)
+        if count:
+            self._index = _look(tiles[:count], self._count, self._index)
+            self._count += count
         return self._index
 
 
-@njit(cache=True, error_model="numpy")
-def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex) -> Ints:
-    """Tiles near these places that were not looked at, each once, in order of appearance."""
-    tiles, count = np.empty(16, np.int32), 0
+@njit(**LEAN)
+def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex, tiles: Ints) -> int:
+    """Tiles near these places that were not looked at, each once, in order of appearance, into `tiles`; their number."""
+    count = 0
     for i in range(len(x)):
-        for k in range(4 if reach > 0.0 else 1):
-            tile = tile_at(x[i] + (reach if k & 1 else -reach), y[i] + (reach if k & 2 else -reach), index)
-            if tile < 0 or index.seen[tile] != 0:
-                continue
-            if count == len(tiles):
-                tiles = np.concatenate((tiles, tiles))
-            tiles[count] = tile
-            index.seen[tile] = -1
-            count += 1
+        if tile_at(x[i], y[i], index) < 0:
+            continue
+        left, right = (x[i] - reach - index.x0_m) / TILE_M, (x[i] + reach - index.x0_m) / TILE_M
+        low, high = (y[i] - reach - index.y0_m) / TILE_M, (y[i] + reach - index.y0_m) / TILE_M
+        for row in range(max(int(low), 0), min(int(high) + 1, index.rows)):
+            for tile in range(
+                row * index.columns + max(int(left), 0), row * index.columns + min(int(right) + 1, index.columns)
+            ):
+                if index.seen[tile] == 0:
+                    index.seen[tile] = -1
+                    tiles[count] = tile
+                    count += 1
     for k in range(count):
         index.seen[tiles[k]] = 0
-    return tiles[:count]
+    return count
 
 
 @njit(cache=True, error_model="numpy")
@@ -248,7 +254,6 @@ def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_a
     return min(n + 1, MOST_SOURCES)
 
 
-RANGER_AXES_RAD = (0.5 * math.pi, -0.5 * math.pi)
 SAME_M = 1e-9  # a ray meets walls so close together at once
 
 
@@ -263,70 +268,75 @@ def lambda_ray_ranges(
     within half the spacing from its normal. The reading is the shortest ray that counts, `maximum_m` (at most EAR_REACH_M) if there is none.
     No ray is cast: a wall can only answer on the ray that is nearest to its normal. Fast where `Walls` was made for half the spacing.
     """
-    ranges = np.full((len(x), 2), maximum_m)
-    for i in range(len(x)):
-        tile = tile_at(x[i], y[i], index)
-        if tile < 0 or not math.isfinite(heading_rad[i]):
-            continue
-        for ranger in range(2):
-            axis = heading_rad[i] + RANGER_AXES_RAD[ranger]
-            ranges[i, ranger] = _lambda_ray_range(x[i], y[i], axis, tile, index, rays, aperture_rad, maximum_m)
+    ranges = np.empty((len(x), 2))
+    spacing = aperture_rad / rays
+    angle = (np.arange(rays + 1) + 0.5 - 0.5 * rays) * spacing
+    bound = np.sin(np.minimum(np.maximum(angle - 0.5 * spacing, -0.5 * math.pi), 0.5 * math.pi))
+    fan = np.vstack((np.cos(angle), np.sin(angle), bound))
+    tables_hold = math.tan(0.5 * spacing) <= index.slant * (1.0 + 1e-12) and 0.5 * aperture_rad <= CONE_RAD
+    _cone_ranges(x, y, heading_rad, index, fan, tables_hold, maximum_m, ranges)
     return ranges
 
 
 @njit(**LEAN)
-def _lambda_ray_range(
-    px: float, py: float, axis: float, tile: int, index: WallIndex, rays: int, aperture: float, maximum_m: float
-) -> float:
-    k, slant = index.seen[tile] - 1, math.tan(0.5 * aperture / rays)
-    if k < 0 or slant > index.slant * (1.0 + 1e-12) or 0.5 * aperture > CONE_RAD:
-        return _lambda_ray_unseen(px, py, axis, tile, index, rays, aperture, maximum_m)
-    u = k * BEARINGS + bearing(axis)
-    return _shortest_ray(px, py, axis, index.walls, index.faces, u, rays, aperture, maximum_m)
+def _cone_ranges(
+    x: Floats, y: Floats, heading: Floats, index: WallIndex,
+    fan: Floats, tables_hold: bool, maximum_m: float, ranges: Floats,
+) -> None:  # fmt: skip
+    """Fill `ranges`; `fan` (3, rays + 1) has the cosine and sine of each ray off the axis, and the sine of the bound before it."""
+    for i in range(len(x)):
+        tile = tile_at(x[i], y[i], index)
+        if tile < 0 or not math.isfinite(heading[i]):
+            ranges[i, 0] = ranges[i, 1] = maximum_m
+            continue
+        k = index.seen[tile] - 1
+        ax, ay = -math.sin(heading[i]), math.cos(heading[i])
+        if k < 0 or not tables_hold:
+            ranges[i, 0] = _cone_range_unseen(x[i], y[i], ax, ay, tile, index, fan, maximum_m)
+            ranges[i, 1] = _cone_range_unseen(x[i], y[i], -ax, -ay, tile, index, fan, maximum_m)
+            continue
+        left = bearing(heading[i] + 0.5 * math.pi)
+        right = (left + BEARINGS // 2) % BEARINGS
+        left, right = left + k * BEARINGS, right + k * BEARINGS
+        ranges[i, 0] = _cone_range(x[i], y[i], ax, ay, index.walls, index.faces, left, fan, maximum_m)
+        ranges[i, 1] = _cone_range(x[i], y[i], -ax, -ay, index.walls, index.faces, right, fan, maximum_m)
 
 
 @njit(**ALLOCATES)
-def _lambda_ray_unseen(
-    px: float, py: float, axis: float, tile: int, index: WallIndex, rays: int, aperture: float, maximum_m: float
+def _cone_range_unseen(
+    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex, fan: Floats, maximum_m: float
 ) -> float:
     """The same where the tables do not hold."""
-    faces, _ = tile_sources(tile, index, math.tan(0.5 * aperture / rays))
+    spacing = math.atan2(fan[1, 1], fan[0, 1]) - math.atan2(fan[1, 0], fan[0, 0])
+    faces, _ = tile_sources(tile, index, math.tan(0.5 * spacing))
     shortest = maximum_m
     for u in range(BEARINGS):
-        shortest = min(shortest, _shortest_ray(px, py, axis, index.walls, faces, u, rays, aperture, maximum_m))
+        shortest = min(shortest, _cone_range(px, py, ax, ay, index.walls, faces, u, fan, maximum_m))
     return shortest
 
 
 @njit(**LEAN, inline="always")
-def _shortest_ray(
-    px: float, py: float, axis: float, walls: Floats, faces: SourceTable, u: int,
-    rays: int, aperture: float, maximum_m: float,
-) -> float:  # fmt: skip
-    """The shortest ray that counts, among the walls of unit u."""
-    ax, ay = math.cos(axis), math.sin(axis)
-    spacing, shortest, cone = aperture / rays, maximum_m, math.cos(min(0.5 * aperture, math.pi))
+def _cone_range(
+    px: float, py: float, ax: float, ay: float, walls: Floats, faces: SourceTable, u: int, fan: Floats, maximum_m: float
+) -> float:
+    """The shortest ray that counts about the axis a, among the walls of unit u."""
+    shortest, rays = maximum_m, fan.shape[1] - 1
     for at in range(faces.start[u], faces.start[u + 1]):
         i = faces.order[at]
         dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
         tx, ty = faces.rows[i, 2], faces.rows[i, 3]
-        s, h = dx * tx + dy * ty, dy * tx - dx * ty
-        d = abs(h)
-        ahead = (ax * ty - ay * tx) * h
-        if d >= shortest or d <= SAME_M or ahead < cone * d - SAME_M:
+        h = dy * tx - dx * ty
+        d, aside = abs(h), -(ax * tx + ay * ty) * h
+        if d >= shortest or aside < fan[2, 0] * d or aside >= fan[2, rays] * d or not (ax * ty - ay * tx) * h > 0.0:
             continue
-        # Angle of the normal from the axis, and of the nearest ray from the normal.
-        aside = -(ax * tx + ay * ty) * h
-        normal = math.atan2(aside, ahead)
-        ray = math.floor(normal / spacing + 0.5 * rays)
-        if ray < 0 or ray >= rays:
+        k = 0  # the ray nearest to the wall's normal
+        for j in range(1, rays):
+            k += aside >= fan[2, j] * d
+        rx, ry = ax * fan[0, k] - ay * fan[1, k], ay * fan[0, k] + ax * fan[1, k]
+        length = d / abs(rx * ty - ry * tx)
+        foot = dx * tx + dy * ty + length * (rx * tx + ry * ty)
+        if not (length < shortest and 0.0 <= foot <= faces.rows[i, 4]):
             continue
-        slope = math.tan((ray + 0.5 - 0.5 * rays) * spacing - normal)
-        length = d * math.sqrt(1.0 + slope * slope)
-        foot = s + h * slope
-        if length >= shortest or not 0.0 <= foot <= faces.rows[i, 4]:
-            continue
-        share = 1.0 - SAME_M / length
-        qx, qy = px + share * ((foot - s) * tx + h * ty), py + share * ((foot - s) * ty - h * tx)
-        if not _hidden(px, py, qx, qy, walls, faces, i):
+        if not _hidden(px, py, px + (length - SAME_M) * rx, py + (length - SAME_M) * ry, walls, faces, i):
             shortest = length
     return shortest

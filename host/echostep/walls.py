@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.core import types
+from numba.extending import typeof_impl
 from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
@@ -71,6 +73,17 @@ class WallIndex(NamedTuple):
 
 FACE, POINT = 5, 7  # columns of the rows
 BEARINGS = 16
+
+
+@typeof_impl.register(WallIndex)  # type: ignore[untyped-decorator]
+def _index_type(index: WallIndex, context: object) -> types.Type:
+    """All indexes have one type: numba need not look at the arrays of each, which takes longer than many a kernel."""
+    if not _INDEX_TYPE:
+        _INDEX_TYPE.append(types.BaseTuple.from_types([typeof_impl(field, context) for field in index], WallIndex))
+    return _INDEX_TYPE[0]
+
+
+_INDEX_TYPE: list[types.Type] = []
 
 
 def no_sources(columns: int) -> SourceTable:
