@@ -24,6 +24,12 @@ import numpy as np
 import shapely
 from numba import njit
 from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from echostep.plan import load_plan
+from echostep.reflectors import Walls, lambda_ray_ranges
+from echostep.walls import WallIndex, build_index, crosses_wall
 from peers import (
     APERTURE_RAD,
     MAPLESS,
@@ -34,12 +40,6 @@ from peers import (
     plain_rays,
     shapely_reader,
 )
-from rich.console import Console
-from rich.table import Table
-
-from echostep.plan import load_plan
-from echostep.reflectors import Walls, lambda_ray_ranges
-from echostep.walls import WallIndex, build_index, crosses_wall
 
 Floats = NDArray[np.float64]
 Work = Callable[[], object]
@@ -190,7 +190,9 @@ def growing(scale: Scale) -> Iterator[Row]:
         owner = Walls(walls, SLANT_RAD)
         work.append(lambda o=owner, p=poses: our_weights(lambda_ray_ranges(*p, o.near(p[0], p[1]))))
     city = offices(scale.city)
-    yield compared(f"weigh {scale.poses:,} poses among {len(city):,} walls; among 100", work[0], work[1], scale.rounds, 0.8)
+    yield compared(
+        f"weigh {scale.poses:,} poses among {len(city):,} walls; among 100", work[0], work[1], scale.rounds, 0.8
+    )
     times = []
     for _ in range(min(scale.rounds, 5)):
         began = time.perf_counter()
@@ -260,7 +262,9 @@ def stepping(scale: Scale) -> Iterator[Row]:
 
     def stepper(candidates: int) -> Work:
         settings = girard2011.GirardSettings(nu=max(candidates // 20, 1))
-        filter_ = girard2011.Girard(settings, (float(x[0]), 12.5 * (y[0] // 12.5) + 6.25), walls, np.random.default_rng(1))
+        filter_ = girard2011.Girard(
+            settings, (float(x[0]), 12.5 * (y[0] // 12.5) + 6.25), walls, np.random.default_rng(1)
+        )
         ahead = [1.0]
 
         def step() -> object:
@@ -328,7 +332,9 @@ def main() -> None:
     for row in rows(scale):
         found.append(row)
         wanted = "" if row.wanted is None else f">= {row.wanted:g}"
-        table.add_row(row.name, f"{1e3 * row.median_s:.3g} ms", f"{1e3 * row.peer_s:.3g} ms", f"{row.ratio:.3g}", wanted)
+        table.add_row(
+            row.name, f"{1e3 * row.median_s:.3g} ms", f"{1e3 * row.peer_s:.3g} ms", f"{row.ratio:.3g}", wanted
+        )
     options.out.mkdir(parents=True, exist_ok=True)
     kept = [{k: v for k, v in asdict(row).items() if k != "wanted"} for row in found]
     (options.out / "bench.json").write_text(json.dumps(kept, indent=1) + "\n")

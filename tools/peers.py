@@ -57,7 +57,9 @@ def embreex_reader(walls: Floats) -> Reader:
     a, b = np.c_[walls[:, :2], -np.ones(len(walls))], np.c_[walls[:, 2:], -np.ones(len(walls))]
     up = np.array([0.0, 0.0, 2.0])
     scene = EmbreeScene()
-    TriangleMesh(scene, np.concatenate([np.stack([a, b, b + up], 1), np.stack([a, b + up, a + up], 1)]).astype(np.float32))
+    TriangleMesh(
+        scene, np.concatenate([np.stack([a, b, b + up], 1), np.stack([a, b + up, a + up], 1)]).astype(np.float32)
+    )
 
     def read(x: Floats, y: Floats, heading: Floats) -> Floats:
         angle = fans(heading)

@@ -37,6 +37,21 @@ def girard2011(
 
 
 @app.command()
+def echoes(
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/echoes"),
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Fit the likelihood's settings to simulated pings (minutes).")
+    ] = False,
+) -> None:
+    """What simulated rangers hear, and how well the tracker's likelihood expects it."""
+    from echostep.evaluate.echoes import evaluate_echoes
+
+    evaluate_echoes(seed, json, out, fit=fit)
+
+
+@app.command()
 def trails(
     runs: Annotated[int, typer.Option("--runs", help="Walks of each trail, each by another person.", min=1)] = 10,
     seed: Seed = 1,

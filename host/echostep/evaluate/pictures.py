@@ -31,7 +31,7 @@ def draw_clouds(
     `clouds[system][step]` is (n, 2), `tracks[system]` and `truth` are (steps + 1, 2).
     """
     steps = sorted({step for seen in clouds.values() for step in seen})
-    figure, axes = _axes(len(clouds), len(steps), (4.6 * len(steps), 3.6 * len(clouds)))
+    figure, axes = axes_of(len(clouds), len(steps), (4.6 * len(steps), 3.6 * len(clouds)))
     for row, (system, seen) in zip(axes, clouds.items(), strict=True):
         for ax, step in zip(row, steps, strict=True):
             _walls(ax, walls)
@@ -58,7 +58,8 @@ def _walls(ax: Axes, walls: Floats) -> None:
     ax.tick_params(labelsize=7)
 
 
-def _axes(rows: int, columns: int, inches: tuple[float, float]) -> tuple[Figure, Sequence[Sequence[Axes]]]:
+def axes_of(rows: int, columns: int, inches: tuple[float, float]) -> tuple[Figure, Sequence[Sequence[Axes]]]:
+    """A figure of rows x columns axes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=inches, layout="constrained")

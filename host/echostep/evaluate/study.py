@@ -23,6 +23,7 @@ from rich.table import Table
 from echostep.errors import EchostepError
 
 Row = dict[str, Any]
+NARROWEST = 110  # columns of a table, also where nobody says how wide the terminal is
 console = Console(soft_wrap=True)
 
 
@@ -179,10 +180,10 @@ def print_table(title: str, rows: Sequence[Mapping[str, Any]], columns: Mapping[
     """A table on the terminal; `columns`: key of the rows -> heading. Numbers have two digits after the point."""
     table = Table(title=title)
     for k, heading in enumerate(columns.values()):
-        table.add_column(heading, justify="right" if k else "left")
+        table.add_column(heading, justify="right" if k else "left", overflow="fold")
     for row in rows:
         table.add_row(*(_cell(row.get(key)) for key in columns))
-    console.print(table)
+    Console(width=max(console.width, NARROWEST)).print(table)
 
 
 def _cell(value: Any) -> str:

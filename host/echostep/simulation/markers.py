@@ -48,11 +48,16 @@ class ImuModel:
 
 @dataclass(frozen=True, slots=True)
 class Pings:
-    """Each ping's trigger time (n,), ranger (n,) 0 left 1 right, and range (n,), nan when nothing was heard."""
+    """Each ping's trigger time (n,), ranger (n,) 0 left 1 right, and range (n,), nan when nothing was heard.
+
+    Of the truth: `pose` (n, 3): x, y and the ranger's axis; `cross` (n,): whether it was the other ranger's sound.
+    """
 
     t_s: Floats
     ranger: Ints
     range_m: Floats
+    pose: Floats
+    cross: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +99,11 @@ def walk_markers(
     passers: float = 0.0,
     model: ImuModel | None = None,
     acoustics: Acoustics = SRF02,
+    offset_s: float = HALF_US[Schedule.CONCURRENT] * 1e-6,
 ) -> MarkerWalk:
-    """Walk over markers (n + 1, 2) between the walls that are there (m, 4); `passers`: share of the pings that meet somebody first."""
+    """Walk over markers (n + 1, 2) between the walls that are there (m, 4); `passers`: share of the pings that meet somebody first;
+    `offset_s`: from the left ranger's ping to the right one's.
+    """
     ways, imu, rangers, people = (np.random.default_rng([seed, k]) for k in range(4))
     trunk = markers + CARELESS_M * ways.standard_normal(markers.shape)
     course = np.arctan2(*np.diff(markers, axis=0).T[::-1])
@@ -108,7 +116,7 @@ def walk_markers(
     bias_m = ranger_bias_m(rangers, acoustics)
     pair = echoes(trunk, np.append(course, course[-1]), built, bias_m, rangers, acoustics).own_us
     pair_m = np.where(pair > 0, pair * (0.5e-6 * acoustics.speed_m_s), np.nan)
-    pings = _ping(body, built, bias_m, rangers, acoustics)
+    pings = _ping(body, built, bias_m, offset_s, rangers, acoustics)
     if passers > 0.0:
         pings = _pass(pings, passers, people)
     return MarkerWalk(t_s, leaves_s, trunk, float(course[0]), course + error, turn_sd, pair_m, pings)
@@ -146,23 +154,27 @@ class _Body:
         return xy, heading + YAW_RAD * np.sin(math.pi * t_s + self._phase)
 
 
-def _ping(body: _Body, built: Floats, bias_m: Floats, rng: np.random.Generator, acoustics: Acoustics) -> Pings:
-    """Both rangers ping in turn on the concurrent schedule; each takes the first sound to arrive, be it the other's."""
-    half_s = HALF_US[Schedule.CONCURRENT] * 1e-6
-    count = int(body.end_s / half_s)
-    t_s = np.arange(count) * half_s + rng.uniform(0.0, JITTER_US * 1e-6, count)
+def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.random.Generator, a: Acoustics) -> Pings:
+    """The rangers ping in turn, the right one `offset_s` after the left one; each takes the first sound to arrive, be it the other's."""
+    period_s = 2.0 * max(offset_s, HALF_US[Schedule.CONCURRENT] * 1e-6)
+    count = 2 * int(body.end_s / period_s)
     ranger = np.arange(count) % 2
-    heard = echoes(*body.at(t_s), built, bias_m, rng, acoustics)
-    pick = np.arange(count)
-    came = np.zeros((count, 3))  # us after the trigger: own, the other's last ping, the other's next ping
-    came[:, 0] = heard.own_us[pick, ranger]
-    for k, other in ((1, pick - 1), (2, pick + 1)):
-        there = (other >= 0) & (other < count)
-        cross_us = heard.cross_us[np.clip(other, 0, count - 1), ranger].astype(float)
-        came[:, k] = np.where(there & (cross_us > 0), cross_us + (t_s[np.clip(other, 0, count - 1)] - t_s) * 1e6, 0.0)
+    t_s = (np.arange(count) // 2) * period_s + ranger * offset_s + rng.uniform(0.0, JITTER_US * 1e-6, count)
+    xy, heading = body.at(t_s)
+    heard = echoes(xy, heading, built, bias_m, rng, a)
+    came = np.zeros((count, 4))  # us after the trigger: own, and the other's last three pings about this one
+    came[:, 0] = heard.own_us[np.arange(count), ranger]
+    for k, other in enumerate((-3, -1, 1), start=1):
+        at = np.arange(count) + other * np.where(ranger == 1, 1, -1)
+        there = (at >= 0) & (at < count)
+        at = np.clip(at, 0, count - 1)
+        cross_us = heard.cross_us[at, ranger].astype(float)
+        came[:, k] = np.where(there & (cross_us > 0), cross_us + (t_s[at] - t_s) * 1e6, 0.0)
     came[(came < FIRST_US) | (came > LAST_US)] = np.inf
     first_us = came.min(1)
-    return Pings(t_s, ranger, np.where(np.isfinite(first_us), first_us * (0.5e-6 * acoustics.speed_m_s), np.nan))
+    range_m = np.where(np.isfinite(first_us), first_us * (0.5e-6 * a.speed_m_s), np.nan)
+    axis = heading + np.where(ranger == 0, 0.5 * math.pi, -0.5 * math.pi)
+    return Pings(t_s, ranger, range_m, np.column_stack([xy, axis]), (came.argmin(1) > 0) & np.isfinite(first_us))
 
 
 def _pass(pings: Pings, share: float, rng: np.random.Generator) -> Pings:
