@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -24,22 +25,23 @@ import numpy as np
 import shapely
 from numba import njit
 from numpy.typing import NDArray
-from peers import (
-    APERTURE_RAD,
-    MAPLESS,
-    MAXIMUM_M,
-    MISSING,
-    RAYS,
-    embreex_reader,
-    plain_rays,
-    shapely_reader,
-)
 from rich.console import Console
 from rich.table import Table
 
 from echostep.plan import load_plan
 from echostep.reflectors import Walls, lambda_ray_ranges
 from echostep.walls import WallIndex, build_index, crosses_wall
+from peers import (
+    APERTURE_RAD,
+    MAPLESS,
+    MAXIMUM_M,
+    MISSING,
+    RAYS,
+    Reader,
+    embreex_reader,
+    plain_rays,
+    shapely_reader,
+)
 
 Floats = NDArray[np.float64]
 Work = Callable[[], object]
@@ -95,6 +97,15 @@ def weights(readings: Floats) -> Floats:
     return (least / np.minimum(np.maximum(readings, MEASURED_M), MAXIMUM_M)).mean(1)
 
 
+def _read_weights(read: Reader, x: Floats, y: Floats, heading: Floats) -> Floats:
+    return weights(read(x, y, heading))
+
+
+def our_reading(owner: Walls, x: Floats, y: Floats, heading: Floats) -> Floats:
+    """Weights of poses by the visible walls."""
+    return our_weights(lambda_ray_ranges(x, y, heading, owner.near(x, y), RAYS, APERTURE_RAD, MAXIMUM_M))
+
+
 @njit(cache=True, error_model="numpy")
 def our_weights(readings: Floats) -> Floats:
     """The same in one sweep."""
@@ -131,11 +142,9 @@ def weighing(scale: Scale) -> Iterator[Row]:
     x, y, heading = cloud(walls, scale.poses)
     owner = Walls(walls, SLANT_RAD)
 
-    def ours() -> Floats:
-        return our_weights(lambda_ray_ranges(x, y, heading, owner.near(x, y)))
-
+    ours = partial(our_reading, owner, x, y, heading)
     expected = ours()
-    readers = {"shapely STRtree": (shapely_reader(walls), 1000.0)}
+    readers: dict[str, tuple[Reader, float | None]] = {"shapely STRtree": (shapely_reader(walls), 1000.0)}
     if "embreex" not in MISSING:
         readers["embreex"] = (embreex_reader(walls), 30.0)
     index = build_index(walls)
@@ -147,7 +156,7 @@ def weighing(scale: Scale) -> Iterator[Row]:
         yield compared(
             f"weigh {len(x):,} poses; {peer}, {2 * RAYS} rays a pose",
             ours,
-            lambda read=read: weights(read(x, y, heading)),
+            partial(_read_weights, read, x, y, heading),
             scale.rounds,
             wanted,
         )
@@ -186,11 +195,11 @@ def growing(scale: Scale) -> Iterator[Row]:
     """The same cloud in a plan of 100 walls and in one of a city's size; and opening that one."""
     work: list[Work] = []
     for walls in (offices(scale.city), offices(100)):
-        poses = cloud(walls, scale.poses)
-        owner = Walls(walls, SLANT_RAD)
-        work.append(lambda o=owner, p=poses: our_weights(lambda_ray_ranges(*p, o.near(p[0], p[1]))))
+        work.append(partial(our_reading, Walls(walls, SLANT_RAD), *cloud(walls, scale.poses)))
     city = offices(scale.city)
-    yield compared(f"weigh {scale.poses:,} poses among {len(city):,} walls; among 100", work[0], work[1], scale.rounds, 0.8)
+    yield compared(
+        f"weigh {scale.poses:,} poses among {len(city):,} walls; among 100", work[0], work[1], scale.rounds, 0.8
+    )
     times = []
     for _ in range(min(scale.rounds, 5)):
         began = time.perf_counter()
@@ -260,7 +269,9 @@ def stepping(scale: Scale) -> Iterator[Row]:
 
     def stepper(candidates: int) -> Work:
         settings = girard2011.GirardSettings(nu=max(candidates // 20, 1))
-        filter_ = girard2011.Girard(settings, (float(x[0]), 12.5 * (y[0] // 12.5) + 6.25), walls, np.random.default_rng(1))
+        filter_ = girard2011.Girard(
+            settings, (float(x[0]), 12.5 * (y[0] // 12.5) + 6.25), walls, np.random.default_rng(1)
+        )
         ahead = [1.0]
 
         def step() -> object:
@@ -328,7 +339,9 @@ def main() -> None:
     for row in rows(scale):
         found.append(row)
         wanted = "" if row.wanted is None else f">= {row.wanted:g}"
-        table.add_row(row.name, f"{1e3 * row.median_s:.3g} ms", f"{1e3 * row.peer_s:.3g} ms", f"{row.ratio:.3g}", wanted)
+        table.add_row(
+            row.name, f"{1e3 * row.median_s:.3g} ms", f"{1e3 * row.peer_s:.3g} ms", f"{row.ratio:.3g}", wanted
+        )
     options.out.mkdir(parents=True, exist_ok=True)
     kept = [{k: v for k, v in asdict(row).items() if k != "wanted"} for row in found]
     (options.out / "bench.json").write_text(json.dumps(kept, indent=1) + "\n")
