@@ -64,8 +64,12 @@ measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmwar
 	$(MAKE) --quiet -C tools/twin
 	$(BIN)/python tools/twin/measure.py
 
-bench: $(READY) ## speed of the host against real time and against peers
+bench: $(VENV)/peers ## speed of the host as ratios against others, in the same run
 	$(BIN)/python tools/bench.py
+
+$(VENV)/peers: host/pyproject.toml $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
+	touch $@
 
 flash: ## write the firmware to a board: make flash PORT=/dev/ttyACM0
 	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }

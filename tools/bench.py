@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -36,6 +37,7 @@ from peers import (
     MAXIMUM_M,
     MISSING,
     RAYS,
+    Reader,
     embreex_reader,
     plain_rays,
     shapely_reader,
@@ -95,6 +97,15 @@ def weights(readings: Floats) -> Floats:
     return (least / np.minimum(np.maximum(readings, MEASURED_M), MAXIMUM_M)).mean(1)
 
 
+def _read_weights(read: Reader, x: Floats, y: Floats, heading: Floats) -> Floats:
+    return weights(read(x, y, heading))
+
+
+def our_reading(owner: Walls, x: Floats, y: Floats, heading: Floats) -> Floats:
+    """Weights of poses by the visible walls."""
+    return our_weights(lambda_ray_ranges(x, y, heading, owner.near(x, y), RAYS, APERTURE_RAD, MAXIMUM_M))
+
+
 @njit(cache=True, error_model="numpy")
 def our_weights(readings: Floats) -> Floats:
     """The same in one sweep."""
@@ -131,11 +142,9 @@ def weighing(scale: Scale) -> Iterator[Row]:
     x, y, heading = cloud(walls, scale.poses)
     owner = Walls(walls, SLANT_RAD)
 
-    def ours() -> Floats:
-        return our_weights(lambda_ray_ranges(x, y, heading, owner.near(x, y)))
-
+    ours = partial(our_reading, owner, x, y, heading)
     expected = ours()
-    readers = {"shapely STRtree": (shapely_reader(walls), 1000.0)}
+    readers: dict[str, tuple[Reader, float | None]] = {"shapely STRtree": (shapely_reader(walls), 1000.0)}
     if "embreex" not in MISSING:
         readers["embreex"] = (embreex_reader(walls), 30.0)
     index = build_index(walls)
@@ -147,7 +156,7 @@ def weighing(scale: Scale) -> Iterator[Row]:
         yield compared(
             f"weigh {len(x):,} poses; {peer}, {2 * RAYS} rays a pose",
             ours,
-            lambda read=read: weights(read(x, y, heading)),
+            partial(_read_weights, read, x, y, heading),
             scale.rounds,
             wanted,
         )
@@ -186,9 +195,7 @@ def growing(scale: Scale) -> Iterator[Row]:
     """The same cloud in a plan of 100 walls and in one of a city's size; and opening that one."""
     work: list[Work] = []
     for walls in (offices(scale.city), offices(100)):
-        poses = cloud(walls, scale.poses)
-        owner = Walls(walls, SLANT_RAD)
-        work.append(lambda o=owner, p=poses: our_weights(lambda_ray_ranges(*p, o.near(p[0], p[1]))))
+        work.append(partial(our_reading, Walls(walls, SLANT_RAD), *cloud(walls, scale.poses)))
     city = offices(scale.city)
     yield compared(
         f"weigh {scale.poses:,} poses among {len(city):,} walls; among 100", work[0], work[1], scale.rounds, 0.8

@@ -143,7 +143,7 @@ def _first_hit(px: float, py: float, ux: float, uy: float, index: WallIndex, lim
 
 
 def filterpy_update(count: int) -> Callable[[], object]:
-    """filterpy: move, weigh by a distance, resample when too few particles count, average; the caller's numpy does the first two, as its book shows."""
+    """filterpy: move, weigh by two distances, resample, average; numpy does the first two, as its book shows."""
     from filterpy.monte_carlo import systematic_resample
 
     rng = np.random.default_rng(1)
@@ -202,13 +202,13 @@ def particles_update(count: int) -> Callable[[], object]:
     from particles import state_space_models as ssm
 
     class Walk(ssm.StateSpaceModel):  # type: ignore[misc]
-        def PX0(self) -> Any:
+        def PX0(self) -> Any:  # noqa: N802
             return distributions.IndepProd(distributions.Normal(), distributions.Normal())
 
-        def PX(self, t: int, xp: Any) -> Any:  # noqa: ARG002
+        def PX(self, t: int, xp: Any) -> Any:  # noqa: ARG002, N802
             return distributions.IndepProd(*(distributions.Normal(loc=xp[:, k], scale=0.25) for k in range(2)))
 
-        def PY(self, t: int, xp: Any, x: Any) -> Any:  # noqa: ARG002
+        def PY(self, t: int, xp: Any, x: Any) -> Any:  # noqa: ARG002, N802
             return distributions.IndepProd(*(distributions.Normal(loc=x[:, k], scale=0.5) for k in range(2)))
 
     feynman_kac = ssm.Bootstrap(ssm=Walk(), data=np.zeros((10_000, 2)))

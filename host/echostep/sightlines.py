@@ -63,7 +63,7 @@ def _walls_near(tile: int, index: WallIndex) -> Ints:
 @njit(cache=True, error_model="numpy")
 def _faces(corners: Floats, near: Ints, walls: Floats, slant: float) -> SourceTable:
     faces, starts = np.empty((len(near), FACE)), np.zeros(len(near) + 1, np.int32)
-    centre, spread = np.empty(len(near)), np.empty(len(near))
+    centre, spread, distance = np.empty(len(near)), np.empty(len(near)), np.empty(len(near))
     screens, used, count = np.empty(256, np.int32), 0, 0
     spans = np.empty((len(near), 4))
     for w in near:
@@ -96,11 +96,12 @@ def _faces(corners: Floats, near: Ints, walls: Floats, slant: float) -> SourceTa
             used = before
             continue
         faces[count, 0], faces[count, 1], faces[count, 2], faces[count, 3], faces[count, 4] = x, y, tx, ty, length
+        distance[count] = nearest
         centre[count] = math.atan2(-tx, ty) if low > 0.0 else math.atan2(tx, -ty)
         spread[count] = math.atan(slant) if nearest > 0.0 else math.pi
         count += 1
         starts[count] = used
-    bearings, order = _by_bearing(centre[:count], spread[:count])
+    bearings, order = _by_bearing(centre[:count], spread[:count], distance)
     total = np.array([0, count], np.int32)
     return SourceTable(total, bearings, order, faces[:count].copy(), starts[: count + 1].copy(), screens[:used].copy())
 
@@ -161,7 +162,7 @@ def _covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _points(corners: Floats, near: Ints, index: WallIndex) -> SourceTable:
-    points, starts = np.empty((8, POINT + 2)), np.zeros(9, np.int32)
+    points, starts = np.empty((8, POINT + 3)), np.zeros(9, np.int32)
     screens, used, count = np.empty(256, np.int32), 0, 0
     sectors, rays = np.empty((64, 5)), np.empty((64, 2))
     walls = index.walls
@@ -187,12 +188,13 @@ def _points(corners: Floats, near: Ints, index: WallIndex) -> SourceTable:
                     screens = np.concatenate((screens, screens))
                 points[count, 0], points[count, 1], points[count, 2:POINT] = x, y, sectors[k]
                 points[count, POINT], points[count, POINT + 1] = centre, spread
+                points[count, POINT + 2] = dx * dx + dy * dy
                 if k > 0:
                     screens[used : used + more] = screens[used - more : used]
                 used += more
                 count += 1
                 starts[count] = used
-    bearings, order = _by_bearing(points[:count, POINT], points[:count, POINT + 1])
+    bearings, order = _by_bearing(points[:count, POINT], points[:count, POINT + 1], points[:count, POINT + 2])
     rows, total = points[:count, :POINT].copy(), np.array([0, count], np.int32)
     return SourceTable(total, bearings, order, rows, starts[: count + 1].copy(), screens[:used].copy())
 
@@ -322,8 +324,8 @@ def _point_screens(
 
 
 @njit(cache=True, error_model="numpy")
-def _by_bearing(centre: Floats, spread: Floats) -> tuple[Ints, Ints]:
-    """For each bearing of an axis, the rows of which some part may be within CONE_RAD of it, as starts and row numbers."""
+def _by_bearing(centre: Floats, spread: Floats, distance: Floats) -> tuple[Ints, Ints]:
+    """For each bearing of an axis, the rows that may be within CONE_RAD of it, nearest first, as starts and row numbers."""
     start, order, count = np.zeros(BEARINGS + 1, np.int32), np.empty(BEARINGS * len(centre), np.int32), 0
     width = 2.0 * math.pi / BEARINGS
     for b in range(BEARINGS):
@@ -331,7 +333,11 @@ def _by_bearing(centre: Floats, spread: Floats) -> tuple[Ints, Ints]:
             off = (b + 0.5) * width - centre[i]
             off = abs(off - 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5))
             if off <= CONE_RAD + 0.5 * width + spread[i] + SLACK_M:
-                order[count] = i
+                place = count
+                while place > start[b] and distance[order[place - 1]] > distance[i]:
+                    order[place] = order[place - 1]
+                    place -= 1
+                order[place] = i
                 count += 1
         start[b + 1] = count
     return start, order[:count].copy()

@@ -75,11 +75,11 @@ FACE, POINT = 5, 7  # columns of the rows
 BEARINGS = 16
 
 
-@typeof_impl.register(WallIndex)  # type: ignore[untyped-decorator]
+@typeof_impl.register(WallIndex)
 def _index_type(index: WallIndex, context: object) -> types.Type:
     """All indexes have one type: numba need not look at the arrays of each, which takes longer than many a kernel."""
     if not _INDEX_TYPE:
-        _INDEX_TYPE.append(types.BaseTuple.from_types([typeof_impl(field, context) for field in index], WallIndex))
+        _INDEX_TYPE.append(types.NamedTuple([typeof_impl(field, context) for field in index], WallIndex))  # type: ignore[no-untyped-call]
     return _INDEX_TYPE[0]
 
 
