@@ -159,7 +159,7 @@ class Tracker:
         t_s = np.array([t for t, _ in samples])
         accel = np.array([s.accel for _, s in samples])
         gyro = np.array([s.gyro for _, s in samples])
-        for event in self.alignment.feed(self.foot.feed(t_s, accel, gyro)):
+        for event in self.alignment.feed(self.foot.feed(t_s, accel, gyro), samples[-1][0]):
             self._legs += self.path.step(event) if isinstance(event, Step) else self.path.stance(event)
         if self.foot.in_stance and not self.alignment.waiting:
             self._legs += self.path.stand(samples[-1][0], self.foot.heading_rad)
