@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from echostep.evaluate import leave_one_out
 from echostep.evaluate.feet import recordings_in, track_of
-from echostep.evaluate.judges import align, places, rmse
+from echostep.evaluate.judges import Figure, align, places, rmse
 from echostep.evaluate.recordings import Recording
+from echostep.ins import Noise
 from foot_walks import any_rotation, data_folder
 
 Row = dict[str, Any]
@@ -192,3 +194,26 @@ def test_motion_capture_holds_under_what_other_recordings_may_bring(
     assert len(errors) >= 6
     assert max(errors) <= worst
     assert median(errors) <= 0.07
+
+
+def test_a_set_that_is_left_out_has_no_say_in_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three made-up sets, each with its own best lever; the choice for one is what the other two agree on."""
+    monkeypatch.setattr(leave_one_out, "CONSTANTS", ("lever_m",))
+    best = {"a": 0.5, "b": 2.0, "c": 2.0}
+
+    def recording(group: str) -> Recording:
+        def judge(track: Any) -> list[Figure]:
+            return [Figure("error", 0.01 + abs(math.log(track / Noise().lever_m / best[group])))]
+
+        empty = np.empty((0, 3))
+        return Recording(group, "1", empty[:, 0], empty, empty, judge)
+
+    def track_of(_: Recording, noise: Noise | None) -> Any:
+        return (noise or Noise()).lever_m
+
+    chosen = leave_one_out.leave_one_out([recording(group) for group in best], track_of)
+    assert set(chosen) == set(best)
+    assert chosen["a"].lever_m == 2.0 * Noise().lever_m  # its own best is the half
+    rows: list[Row] = [{"set": "a", "recording": "1", "metric": "error", "value": 1.0}]
+    leave_one_out.add_left_out(rows, {"a": [rows[0] | {"value": 2.0}]})
+    assert rows[0]["left_out"] == 2.0

@@ -152,6 +152,10 @@ def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_c
         (lambda t, r: np.where(r.random(t.shape) < 0.3, np.nan, t), "no number"),
         (lambda t, _r: np.column_stack([np.tile(t[:300, 0], 9)[: len(t)], t[:, 1:]]), "t_s"),
         (lambda t, r: r.standard_normal(t.shape) * [0, 6, 6, 6, 3, 3, 3] + t * [1, 0, 0, 0, 0, 0, 0], "never stands"),
+        (lambda t, _r: t * [1, 1, 1, 1, 1, -1, 1], "are the units"),  # left-handed
+        (lambda t, _r: np.column_stack([t[:, :4], np.radians(t[:, 4:])]), "are the units"),  # converted twice
+        (lambda t, _r: t[:, [0, 1, 2, 3, 5, 4, 6]], "are the units"),  # gx and gy swapped
+        (lambda t, _r: t - [0, 0, 0, 9.81, 0, 0, 0], "gravity was removed"),
         (lambda t, _r: t[:1], "no samples"),
     ],
 )

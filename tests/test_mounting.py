@@ -76,7 +76,7 @@ def test_live_the_first_steps_wait_for_the_toe_and_no_others() -> None:
     foot, alignment, waited, steps = Foot(), Alignment(), 0, []
     for k in range(len(t)):
         events = foot.feed(t[k : k + 1], accel[k : k + 1], gyro[k : k + 1])
-        told = alignment.feed(events)
+        told = alignment.feed(events, float(t[k]))
         waited += bool(events) and not told and any(isinstance(e, Step) for e in events)
         steps += [e for e in told if isinstance(e, Step)]
     assert waited <= 2
@@ -113,11 +113,25 @@ def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]
     assert off.coverage95 > 0.8
 
 
-def test_a_foot_that_never_tips_is_taken_to_have_x_to_the_toe() -> None:
+def test_a_foot_that_does_not_tip_is_taken_to_have_x_to_the_toe_until_it_tips() -> None:
     alignment = Alignment()
     step = Step(0.0, 1.0, (0.2, 0.1, 0.0), np.eye(3), 0.0, 0.01)
-    assert alignment.feed([step, step]) == []
-    assert [event.move_m for event in alignment.feed([step]) if isinstance(event, Step)] == [step.move_m] * 3
+    assert alignment.feed([step, step], 1.0) == []
+    assert alignment.waiting
+    assert [event.move_m for event in alignment.feed([step], 1.0) if isinstance(event, Step)] == [step.move_m] * 3
+    assert len(alignment.feed([step], 2.0)) == 1
+    (tipped,) = alignment.feed([replace(step, toe_rad=math.pi / 2)], 3.0)
+    assert isinstance(tipped, Step)
+    assert tipped.move_m == pytest.approx((0.1, -0.2, 0.0))
+    assert not alignment.waiting
+
+
+def test_nobody_who_stops_after_one_step_is_kept_waiting() -> None:
+    alignment = Alignment()
+    step = Step(0.0, 1.0, (0.2, 0.1, 0.0), np.eye(3), 0.0, 0.01)
+    assert alignment.feed([step], 1.0) == []
+    assert alignment.feed([], 3.0) == []
+    assert alignment.feed([], 6.0) == [step]
 
 
 @pytest.mark.skipif(not fw.data_folder().is_dir(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)")

@@ -15,37 +15,46 @@ import numpy as np
 from echostep.foot import Stance, Step, Track
 
 SURE_RAD = math.radians(20.0)  # the toe is found to within this; who has put x to the toe knows better
-PATIENCE_STEPS = 3  # a foot that has not tipped by then does not tip: x is taken for the toe
+PATIENCE_STEPS, PATIENCE_S = 3, 4.0
 
 
 class Alignment:
-    """Live: holds the events of the first steps, two as a rule, until the toe is known."""
+    """Live: holds the events of the first steps, two as a rule, until the toe is known.
+
+    A foot that does not tip by PATIENCE_STEPS or PATIENCE_S is taken to have x to the toe for the time being; steps do not wait any longer.
+    """
 
     def __init__(self) -> None:
         self.toe_rad: float | None = None
         self._held: list[Step | Stance] = []
+        self._impatient = False
 
     @property
     def waiting(self) -> bool:
         """Whether events are held back."""
         return bool(self._held)
 
-    def feed(self, events: Iterable[Step | Stance]) -> list[Step | Stance]:
-        """Events with the toe on x; none before it is known."""
+    def feed(self, events: Iterable[Step | Stance], now_s: float) -> list[Step | Stance]:
+        """Events up to `now_s` with the toe on x; none before it is known."""
         self._held += events
-        if self.toe_rad is None:
-            self.toe_rad = self._known()
-        if self.toe_rad is None:
-            return []
-        told, self._held = self._held, []
-        return [turned(event, self.toe_rad) for event in told]
-
-    def _known(self) -> float | None:
         steps = [event for event in self._held if isinstance(event, Step)]
-        toes = [step.toe_rad for step in steps if step.toe_rad is not None]
-        if not toes:
-            return 0.0 if len(steps) >= PATIENCE_STEPS else None
-        return toes[-1] if abs(toes[-1]) > SURE_RAD else 0.0
+        if self.toe_rad is None:
+            self.toe_rad = _known(steps)
+        if self.toe_rad is None and not self._impatient:
+            since_s = self._held[0].t_end_s if self._held else now_s
+            self._impatient = len(steps) >= PATIENCE_STEPS or now_s - since_s > PATIENCE_S
+            if not self._impatient:
+                return []
+        told, self._held = self._held, []
+        return [turned(event, self.toe_rad or 0.0) for event in told]
+
+
+def _known(steps: list[Step]) -> float | None:
+    """The toe as the last of these steps knows it; who has put x to the toe is believed."""
+    toes = [step.toe_rad for step in steps if step.toe_rad is not None]
+    if not toes:
+        return None
+    return toes[-1] if abs(toes[-1]) > SURE_RAD else 0.0
 
 
 def turned(event: Step | Stance, toe_rad: float) -> Step | Stance:

@@ -26,7 +26,8 @@ STRANGE = 0.1  # of the field's strength: more than so off in strength or height
 SCATTER = 0.12  # of the field's strength, rms: more is no north
 AGREEING = 6  # stances in a row
 REPEATED = 5.0  # a disturbance is much the same over so many stances
-FLOOR = 0.02  # and never smaller than this
+FLOOR = 0.05  # of the strength: fields bend slowly along buildings, too
+NORTH, IRON = 0.5, 0.15  # of the strength, what they may be at first
 GAIN = 0.08  # of one stance, in what is usual
 DELTA, SIZE = 4, 5
 
@@ -95,7 +96,7 @@ def _start(compass: Compass, nav: Nav, h: Floats, strength: float, c: float, s: 
     compass.field[:] = 0.0
     compass.field[0], compass.field[1] = c * h[0] - s * h[1], s * h[0] + c * h[1]
     for i in range(DELTA):
-        compass.P[i, i] = (0.3 * strength) ** 2
+        compass.P[i, i] = ((NORTH if i < 2 else IRON) * strength) ** 2
     compass.P[DELTA, DELTA] = nav.P[YAW, YAW]
     compass.usual[0], compass.usual[1], compass.usual[2] = strength, h[2], 2.0 * SCATTER**2
     compass.yaw_variance[0] = nav.P[YAW, YAW]
