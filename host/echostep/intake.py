@@ -123,7 +123,7 @@ class Intake:
         begin = 0
         for event, told in zip(fall.events, fall.told.tolist(), strict=True):
             self._stand(fall, t_s, at, begin, told)
-            for known in self.alignment.feed([event]):
+            for known in self.alignment.feed([event], float(t_s[told])):
                 legs = self.path.step(known) if isinstance(known, Step) else self.path.stance(known)
                 self._waiting.go(int(at[told]), legs)
             begin = told

@@ -129,11 +129,11 @@ def _listen(
 def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model: EchoModel) -> Floats:
     """What the likelihood says of ranges (n,) of the left ranger at a pose."""
     x, y, heading = pose
-    sources = tuple(np.empty(MOST_SOURCES) for _ in range(3))
+    away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
     axis = heading + 0.5 * math.pi
     index = plan.near(np.array([x]), np.array([y]))
-    count = echo_sources(x, y, axis, index, *sources)
-    return np.array([log_echo(0.0 if math.isnan(z) else z, count, *sources, model) for z in ranges_m.tolist()])
+    count = echo_sources(x, y, axis, index, away, off, kind)
+    return np.array([log_echo(0.0 if math.isnan(z) else z, count, away, off, kind, model) for z in ranges_m.tolist()])
 
 
 def _row(effect: Effect) -> Row:
@@ -240,7 +240,7 @@ def _at_true_poses(seed: int) -> list[tuple[float, int, Floats, Floats, Floats]]
         walk = walk_markers(lay_markers(site.route), site.built, 10_000 + seed)
         plan, p = Walls(site.plan), walk.pings
         for x, y, axis, z in zip(*p.pose.T.tolist(), p.range_m.tolist(), strict=True):
-            sources = tuple(np.empty(MOST_SOURCES) for _ in range(3))
-            count = echo_sources(x, y, axis, plan.near(np.array([x]), np.array([y])), *sources)
-            seen.append((0.0 if math.isnan(z) else z, count, *sources))
+            away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
+            count = echo_sources(x, y, axis, plan.near(np.array([x]), np.array([y])), away, off, kind)
+            seen.append((0.0 if math.isnan(z) else z, count, away, off, kind))
     return seen
