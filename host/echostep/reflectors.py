@@ -284,7 +284,7 @@ def _cone_ranges(
     x: Floats, y: Floats, heading: Floats, index: WallIndex,
     fan: Floats, slant: float, tables_hold: bool, maximum_m: float, ranges: Floats,
 ) -> None:  # fmt: skip
-    """Fill `ranges`. `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of half the spacing."""
+    """Fill `ranges`. `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of its width."""
     for i in range(len(x)):
         tile = tile_at(x[i], y[i], index)
         if tile < 0 or not math.isfinite(heading[i]):
