@@ -273,17 +273,18 @@ def lambda_ray_ranges(
     angle = (np.arange(rays + 1) + 0.5 - 0.5 * rays) * spacing
     bound = np.sin(np.minimum(np.maximum(angle - 0.5 * spacing, -0.5 * math.pi), 0.5 * math.pi))
     fan = np.vstack((np.cos(angle), np.sin(angle), bound))
-    tables_hold = math.tan(0.5 * spacing) <= index.slant * (1.0 + 1e-12) and 0.5 * aperture_rad <= CONE_RAD
-    _cone_ranges(x, y, heading_rad, index, fan, tables_hold, maximum_m, ranges)
+    slant = math.tan(0.5 * spacing) * (1.0 + 1e-12)
+    tables_hold = slant <= index.slant * (1.0 + 1e-11) and 0.5 * aperture_rad <= CONE_RAD
+    _cone_ranges(x, y, heading_rad, index, fan, slant, tables_hold, maximum_m, ranges)
     return ranges
 
 
 @njit(**LEAN)
 def _cone_ranges(
     x: Floats, y: Floats, heading: Floats, index: WallIndex,
-    fan: Floats, tables_hold: bool, maximum_m: float, ranges: Floats,
+    fan: Floats, slant: float, tables_hold: bool, maximum_m: float, ranges: Floats,
 ) -> None:  # fmt: skip
-    """Fill `ranges`; `fan` (3, rays + 1) has the cosine and sine of each ray off the axis, and the sine of the bound before it."""
+    """Fill `ranges`. `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of its width."""
     for i in range(len(x)):
         tile = tile_at(x[i], y[i], index)
         if tile < 0 or not math.isfinite(heading[i]):
@@ -292,32 +293,40 @@ def _cone_ranges(
         k = index.seen[tile] - 1
         ax, ay = -math.sin(heading[i]), math.cos(heading[i])
         if k < 0 or not tables_hold:
-            ranges[i, 0] = _cone_range_unseen(x[i], y[i], ax, ay, tile, index, fan, maximum_m)
-            ranges[i, 1] = _cone_range_unseen(x[i], y[i], -ax, -ay, tile, index, fan, maximum_m)
+            ranges[i, 0] = _cone_range_unseen(x[i], y[i], ax, ay, tile, index, fan, slant, maximum_m)
+            ranges[i, 1] = _cone_range_unseen(x[i], y[i], -ax, -ay, tile, index, fan, slant, maximum_m)
             continue
         left = bearing(heading[i] + 0.5 * math.pi)
         right = (left + BEARINGS // 2) % BEARINGS
         left, right = left + k * BEARINGS, right + k * BEARINGS
-        ranges[i, 0] = _cone_range(x[i], y[i], ax, ay, index.walls, index.faces, left, fan, maximum_m)
-        ranges[i, 1] = _cone_range(x[i], y[i], -ax, -ay, index.walls, index.faces, right, fan, maximum_m)
+        ranges[i, 0] = _cone_range(x[i], y[i], ax, ay, index.walls, index.faces, left, fan, slant, maximum_m)
+        ranges[i, 1] = _cone_range(x[i], y[i], -ax, -ay, index.walls, index.faces, right, fan, slant, maximum_m)
 
 
 @njit(**ALLOCATES)
 def _cone_range_unseen(
-    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex, fan: Floats, maximum_m: float
+    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex, fan: Floats, slant: float, maximum_m: float
 ) -> float:
     """The same where the tables do not hold."""
-    spacing = math.atan2(fan[1, 1], fan[0, 1]) - math.atan2(fan[1, 0], fan[0, 0])
-    faces, _ = tile_sources(tile, index, math.tan(0.5 * spacing))
+    faces, _ = tile_sources(tile, index, slant)
     shortest = maximum_m
     for u in range(BEARINGS):
-        shortest = min(shortest, _cone_range(px, py, ax, ay, index.walls, faces, u, fan, maximum_m))
+        shortest = min(shortest, _cone_range(px, py, ax, ay, index.walls, faces, u, fan, slant, maximum_m))
     return shortest
 
 
 @njit(**LEAN, inline="always")
 def _cone_range(
-    px: float, py: float, ax: float, ay: float, walls: Floats, faces: SourceTable, u: int, fan: Floats, maximum_m: float
+    px: float,
+    py: float,
+    ax: float,
+    ay: float,
+    walls: Floats,
+    faces: SourceTable,
+    u: int,
+    fan: Floats,
+    slant: float,
+    maximum_m: float,
 ) -> float:
     """The shortest ray that counts about the axis a, among the walls of unit u."""
     shortest, rays = maximum_m, fan.shape[1] - 1
@@ -327,14 +336,17 @@ def _cone_range(
         tx, ty = faces.rows[i, 2], faces.rows[i, 3]
         h = dy * tx - dx * ty
         d, aside = abs(h), -(ax * tx + ay * ty) * h
-        if d >= shortest or aside < fan[2, 0] * d or aside >= fan[2, rays] * d or not (ax * ty - ay * tx) * h > 0.0:
+        s, aslant = dx * tx + dy * ty, d * slant
+        if not (d < shortest and -aslant <= s <= faces.rows[i, 4] + aslant and (ax * ty - ay * tx) * h > 0.0):
+            continue
+        if aside < fan[2, 0] * d or aside >= fan[2, rays] * d:
             continue
         k = 0  # the ray nearest to the wall's normal
         for j in range(1, rays):
             k += aside >= fan[2, j] * d
         rx, ry = ax * fan[0, k] - ay * fan[1, k], ay * fan[0, k] + ax * fan[1, k]
         length = d / abs(rx * ty - ry * tx)
-        foot = dx * tx + dy * ty + length * (rx * tx + ry * ty)
+        foot = s + length * (rx * tx + ry * ty)
         if not (length < shortest and 0.0 <= foot <= faces.rows[i, 4]):
             continue
         if not _hidden(px, py, px + (length - SAME_M) * rx, py + (length - SAME_M) * ry, walls, faces, i):
