@@ -96,3 +96,56 @@ def cone_reading(
         if counts:
             shortest = min(shortest, first)
     return shortest
+
+
+def merged(points: list[tuple[float, float, float]], tau_m: float) -> list[tuple[float, float, float]]:
+    """Particles (x, y, weight): from the heaviest down, one that is closer than tau to one already kept gives it its weight."""
+    kept: list[list[float]] = []
+    for k in sorted(range(len(points)), key=lambda k: -points[k][2]):
+        x, y, weight = points[k]
+        near = [host for host in kept if (x - host[0]) ** 2 + (y - host[1]) ** 2 < tau_m**2]
+        if near:
+            near[0][2] += weight
+        else:
+            kept.append([x, y, weight])
+    return [(x, y, weight) for x, y, weight in kept]
+
+
+def similarity(modelled: tuple[float, float], measured: tuple[float, float], maximum_m: float) -> float:
+    """[Girard 2011, eq. 1], a ranger after the other."""
+    parts = [min(d, z, maximum_m) / min(max(d, z), maximum_m) for d, z in zip(modelled, measured, strict=True)]
+    return sum(parts) / len(parts)
+
+
+class Girard:
+    """The eight steps with the printed parameters on Python lists; draws as the fast one does."""
+
+    def __init__(self, walls: Floats, start: tuple[float, float], rng: np.random.Generator) -> None:
+        self.walls = walls
+        self.rng = rng
+        self.particles = [(*start, 1.0)]
+
+    def step(self, dx: float, dy: float, heading: float, pair: tuple[float, float]) -> tuple[float, float]:
+        angles, shares = self.rng.uniform(0.0, 2.0 * math.pi, 20), np.sqrt(self.rng.uniform(0.0, 1.0, 20))
+        vectors = [
+            (dx + 0.25 * r * math.cos(a), dy + 0.25 * r * math.sin(a))
+            for a, r in zip(angles.tolist(), shares.tolist(), strict=True)
+        ]
+        moved = [
+            (x + u, y + v, w)
+            for x, y, w in self.particles
+            for u, v in vectors
+            if not crosses(x, y, x + u, y + v, self.walls)
+        ]
+        heard = tuple(6.0 if math.isnan(z) else z for z in pair)
+        aperture = math.radians(55.0)
+        weighed = []
+        for x, y, _ in merged(moved, 0.05):
+            modelled = [
+                cone_reading(x, y, heading + side, self.walls, 7, aperture, 6.0)
+                for side in (0.5 * math.pi, -0.5 * math.pi)
+            ]
+            weighed.append((x, y, similarity((modelled[0], modelled[1]), (heard[0], heard[1]), 6.0)))
+        self.particles = sorted(weighed, key=lambda p: -p[2])[:150]
+        total = sum(w for _, _, w in self.particles)
+        return sum(x * w for x, _, w in self.particles) / total, sum(y * w for _, y, w in self.particles) / total

@@ -89,6 +89,7 @@ def echo_model(s: EchoSettings) -> EchoModel:
 ABSORPTION_DB_M = 2.6  # there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)
 DEAF = 1e-4  # of a probability: nothing behind is worth a look
+SILENT = 0.2  # of what nothing explains, no echo
 NEVER = -8.0  # of a logit, likewise
 
 
@@ -107,11 +108,11 @@ def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Float
             break
     span = m.maximum_m - m.minimum_m
     if range_m <= 0.0:
-        return math.log((1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * 0.2)
+        return math.log((1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * SILENT)
     before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
     short = 1.0 / before if range_m < m.minimum_m + before else 0.0
     density = (1.0 - m.short) * (hit + unheard * m.stray / span) + m.short * short
-    return math.log((1.0 - m.outlier) * density + m.outlier / span)
+    return math.log((1.0 - m.outlier) * density + m.outlier * (1.0 - SILENT) / span)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -127,7 +127,7 @@ def _on_cluster(
     with client:
         runs = client.map(one, seeds, pure=False)
         seed_of = {run.key: seed for run, seed in zip(runs, seeds, strict=True)}
-        for done in distributed.as_completed(runs):
+        for done in distributed.as_completed(runs, loop=client.loop):
             yield seed_of[done.key], done.result()
 
 
