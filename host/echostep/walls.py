@@ -53,9 +53,9 @@ class WallIndex(NamedTuple):
     """A grid of tiles over the walls, and what may be heard from those tiles that were looked at.
 
     Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `seen[t]` is k + 1 for the k-th tile that was looked at, else 0; the tables have
-    the first `looked` of them. Rows of `faces` (walls): a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of walls):
-    x, y, kind, and the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that leaves
-    a wall at up to `slant` (tangent) from its normal.
+    the first `looked` of them. Rows of `faces` (walls): a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of
+    walls): x, y, kind, and the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that
+    leaves a wall at up to `slant` (tangent) from its normal.
     """
 
     x0_m: float
