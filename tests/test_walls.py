@@ -168,6 +168,16 @@ def test_tables_of_many_tiles_stay_right() -> None:
         assert heard(x, y, axis, index) == heard(x, y, axis, fresh)
 
 
+def test_an_index_given_out_before_stays_right() -> None:
+    rng = np.random.default_rng(6)
+    walls = np.hstack([(start := rng.uniform(0, 20, (60, 2))), start + rng.uniform(-3, 3, (60, 2))])
+    owner, fresh = Walls(walls), build_index(walls)
+    old = owner.near(np.array([3.0]), np.array([3.0]))
+    owner.near(*rng.uniform(0, 20, (2, 200)))
+    for x, y, axis in zip(*rng.uniform(0, 20, (2, 100)), rng.uniform(-3, 3, 100), strict=True):
+        assert heard(x, y, axis, old) == heard(x, y, axis, fresh)
+
+
 def test_a_plan_in_millimetres_is_refused() -> None:
     with pytest.raises(EchostepError, match="metres"):
         build_index(np.array([[0.0, 0.0, 90_000.0, 0.0], [0.0, 0.0, 0.0, 90_000.0]]))

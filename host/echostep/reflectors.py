@@ -47,16 +47,14 @@ class Walls:
     def __init__(self, walls: Floats, slant_rad: float = 0.0) -> None:
         """`slant_rad`: greatest angle of a ray to a wall's normal for which the tables must hold; 0 serves `echo_sources`."""
         self._index = build_index(walls, slant_rad)
-        self._count = 0
 
     def near(self, x_m: Floats, y_m: Floats, reach_m: float = 0.0) -> WallIndex:
         """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most FARTHEST_M) of them."""
         reach_m = min(reach_m, FARTHEST_M)
         tiles = np.empty(len(x_m) * (int(2.0 * reach_m / TILE_M) + 2) ** 2, np.int32)
-        count = _unseen(x_m, y_m, reach_m, self._index, tiles)
+        count = _unseen(np.ascontiguousarray(x_m), np.ascontiguousarray(y_m), reach_m, self._index, tiles)
         if count:
-            self._index = _look(tiles[:count], self._count, self._index)
-            self._count += count
+            self._index = _look(tiles[:count], self._index)
         return self._index
 
 
@@ -83,8 +81,9 @@ def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex, tiles: Ints) -
 
 
 @njit(cache=True, error_model="numpy")
-def _look(tiles: Ints, count: int, index: WallIndex) -> WallIndex:
-    """Append the tables of these tiles to those of the first `count`."""
+def _look(tiles: Ints, index: WallIndex) -> WallIndex:
+    """Append the tables of these tiles. Indexes given out before stay as they are."""
+    count = index.looked
     faces, points, numbers = index.faces, index.points, tiles.astype(np.int64)
     for k in range(len(tiles)):
         more_faces, more_points = tile_sources(numbers[k], index, index.slant)
@@ -94,7 +93,7 @@ def _look(tiles: Ints, count: int, index: WallIndex) -> WallIndex:
         index.seen[tiles[k]] = count + k + 1
     return WallIndex(
         index.x0_m, index.y0_m, index.columns, index.rows, index.walls, index.start, index.ids, index.slant, index.seen,
-        faces, points,
+        count + len(tiles), faces, points,
     )  # fmt: skip
 
 
@@ -144,7 +143,7 @@ def echo_sources(
     k = index.seen[tile] - 1
     u = bearing(axis_rad)
     ax, ay = math.cos(axis_rad), math.sin(axis_rad)
-    if k < 0:
+    if not 0 <= k < index.looked:
         return _sources_unseen(px, py, ax, ay, tile, u, index, distance_m, off_axis_rad, kind)
     u += k * BEARINGS
     n = _add_faces(px, py, ax, ay, index.walls, index.faces, u, distance_m, off_axis_rad, kind)
@@ -292,7 +291,7 @@ def _cone_ranges(
             continue
         k = index.seen[tile] - 1
         ax, ay = -math.sin(heading[i]), math.cos(heading[i])
-        if k < 0 or not tables_hold:
+        if not (0 <= k < index.looked and tables_hold):
             ranges[i, 0] = _cone_range_unseen(x[i], y[i], ax, ay, tile, index, fan, slant, maximum_m)
             ranges[i, 1] = _cone_range_unseen(x[i], y[i], -ax, -ay, tile, index, fan, slant, maximum_m)
             continue

@@ -52,10 +52,10 @@ class SourceTable(NamedTuple):
 class WallIndex(NamedTuple):
     """A grid of tiles over the walls, and what may be heard from those tiles that were looked at.
 
-    Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `seen[t]` is k + 1 for the k-th tile that was looked at, else 0.
-    Rows of `faces` (walls): a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of walls): x, y, kind, and the
-    sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that leaves a wall at up to
-    `slant` (tangent) from its normal.
+    Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `seen[t]` is k + 1 for the k-th tile that was looked at, else 0; the tables have
+    the first `looked` of them. Rows of `faces` (walls): a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of
+    walls): x, y, kind, and the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that
+    leaves a wall at up to `slant` (tangent) from its normal.
     """
 
     x0_m: float
@@ -67,6 +67,7 @@ class WallIndex(NamedTuple):
     ids: Ints
     slant: float
     seen: Ints
+    looked: int
     faces: SourceTable
     points: SourceTable
 
@@ -105,7 +106,7 @@ def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
     nothing_seen = (no_sources(FACE), no_sources(POINT))
     none, slant = np.zeros(1, np.int32), math.tan(slant_rad)
     if not len(walls):
-        return WallIndex(0.0, 0.0, 0, 0, walls, none, none[:0], slant, none[:0], *nothing_seen)
+        return WallIndex(0.0, 0.0, 0, 0, walls, none, none[:0], slant, none[:0], 0, *nothing_seen)
     ends = walls.reshape(-1, 2)
     low, high = ends.min(0) - EAR_REACH_M, ends.max(0) + EAR_REACH_M
     size = np.ceil((high - low) / TILE_M) + 1
@@ -114,7 +115,7 @@ def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
     columns, rows = int(size[0]), int(size[1])
     start, ids = _touched(walls, float(low[0]), float(low[1]), columns, rows)
     seen = np.zeros(columns * rows, np.int32)
-    return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, slant, seen, *nothing_seen)
+    return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, slant, seen, 0, *nothing_seen)
 
 
 @njit(cache=True, error_model="numpy")
