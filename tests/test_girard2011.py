@@ -48,6 +48,7 @@ def test_step_4_applies_every_vector_to_every_particle_and_walls_remove() -> Non
 
 @given(st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(0.01, 1.0)), min_size=1, max_size=60))
 def test_step_5_merges_what_is_closer_than_tau(points: list[tuple[float, float, float]]) -> None:
+    points = sorted(points, key=lambda point: -point[2])
     rows = np.array(points)
     x, y, weight = merge(rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy(), 0.05)
     kept = naive.merged(points, 0.05)

@@ -66,7 +66,7 @@ class Girard:
         x, y, weight = merge(x, y, weight, s.tau_m)
         if ranges_m is not None:
             weight = self._weigh(x, y, heading_rad, ranges_m)
-        kept = np.sort(np.argsort(-weight, kind="stable")[: s.nu])
+        kept = np.argsort(-weight, kind="stable")[: s.nu]
         self.x_m, self.y_m, self.weight = x[kept], y[kept], weight[kept]
         return average(self.x_m, self.y_m, self.weight)
 
@@ -132,39 +132,56 @@ def moved(x: Floats, y: Floats, vectors: Floats, walls: WallIndex) -> tuple[Floa
 
 @njit(cache=True, error_model="numpy")
 def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, Floats, Floats]:
-    """Step 5: no two particles closer than `tau_m`; the lighter one gives its weight away. Keeps the order."""
-    n = len(x)
-    if n == 0:
-        return x, y, weight
-    columns, column, row = _cells(x, y, tau_m)
-    size = 1
-    while size < 2 * n:
-        size *= 2
-    first = np.full(size, -1, np.int64)  # of each hashed cell: a chain of kept particles
-    following = np.full(n, -1, np.int64)
-    total = weight.copy()
-    kept = np.zeros(n, np.bool_)
-    for i in np.argsort(-weight, kind="mergesort"):
-        host = -1
-        for c in range(column[i] - 1, column[i] + 2):
-            for r in range(row[i] - 1, row[i] + 2):
-                j = first[(r * columns + c) & (size - 1)]
-                while j >= 0 and host < 0:
-                    if (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 < tau_m * tau_m:
-                        host = j
-                    j = following[j]
+    """Step 5: no two particles closer than `tau_m`; the lighter one gives its weight away. Particles come by falling weight and keep their order."""
+    # A torus of cells, tau across the corners: each holds at most one kept particle, but for those that the torus brings together from afar; these
+    # stand in a list that all ask. An empty cell holds a place infinitely far away, so that it is asked without a branch.
+    n, side = len(x), 64
+    while side * side < 4 * n:
+        side *= 2
+    places, holder = np.full((side * side, 2), np.inf), np.empty(side * side, np.int32)
+    kept_x, kept_y, total = np.empty(n), np.empty(n), np.empty(n)
+    crowded = np.empty(n, np.int32)
+    kept, crowd = 0, 0
+    per_m, tau2 = math.sqrt(2.0) / tau_m, tau_m * tau_m
+    for i in range(n):
+        column, row = math.floor(x[i] * per_m), math.floor(y[i] * per_m)
+        host = _host(x[i], y[i], column, row, side, places, holder, tau2)
+        for k in crowded[:crowd]:
+            if (kept_x[k] - x[i]) ** 2 + (kept_y[k] - y[i]) ** 2 < tau2:
+                host = k
         if host >= 0:
             total[host] += weight[i]
             continue
-        kept[i] = True
-        cell = (row[i] * columns + column[i]) & (size - 1)
-        following[i], first[cell] = first[cell], i
-    return x[kept], y[kept], total[kept]
+        cell = (row & (side - 1)) * side + (column & (side - 1))
+        if places[cell, 0] < np.inf:
+            crowded[crowd] = kept
+            crowd += 1
+        else:
+            places[cell, 0], places[cell, 1], holder[cell] = x[i], y[i], kept
+        kept_x[kept], kept_y[kept], total[kept] = x[i], y[i], weight[i]
+        kept += 1
+    return kept_x[:kept], kept_y[:kept], total[:kept]
 
 
 @njit(cache=True, error_model="numpy")
-def _cells(x: Floats, y: Floats, side_m: float) -> tuple[int, Ints, Ints]:
-    """Columns of a grid over all points, and each point's column and row; one empty cell around."""
-    x0, y0 = x.min(), y.min()
-    columns = int((x.max() - x0) / side_m) + 3
-    return columns, ((x - x0) / side_m).astype(np.int64) + 1, ((y - y0) / side_m).astype(np.int64) + 1
+def _host(
+    px: float, py: float, column: int, row: int, side: int, places: Floats, holder: NDArray[np.int32], tau2: float
+) -> int:
+    """A kept particle closer than tau in the cells about (column, row); -1 without one. The inner nine first: most find theirs there."""
+    host = -1
+    for r in range(-1, 2):
+        line = ((row + r) & (side - 1)) * side
+        for c in range(-1, 2):
+            cell = line + ((column + c) & (side - 1))
+            dx, dy = places[cell, 0] - px, places[cell, 1] - py
+            host = holder[cell] if dx * dx + dy * dy < tau2 else host
+    if host >= 0:
+        return host
+    for k in range(-1, 2):
+        line = ((row + k) & (side - 1)) * side
+        beside = (column + k) & (side - 1)
+        for far in (-2, 2):
+            for cell in (line + ((column + far) & (side - 1)), ((row + far) & (side - 1)) * side + beside):
+                dx, dy = places[cell, 0] - px, places[cell, 1] - py
+                host = holder[cell] if dx * dx + dy * dy < tau2 else host
+    return host

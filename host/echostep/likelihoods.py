@@ -33,7 +33,7 @@ class EchoSettings:
     `correlation_m`: travel over which errors of successive echoes become independent.
     """
 
-    sd_m: float = 0.045
+    sd_m: float = 0.04
     slant_m: float = 0.05
     rim_db: float = 6.0
     maximum_m: float = 6.0
