@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from statistics import median
+from unittest import mock
 
 import numpy as np
 import shapely
@@ -291,14 +292,11 @@ def stepping(scale: Scale) -> Iterator[Row]:
                 scale.rounds,
                 2.0,
             )
-    fast, step = girard2011.lambda_ray_ranges, stepper(3000)
+    step = stepper(3000)
 
     def with_rays() -> object:
-        girard2011.lambda_ray_ranges = plain_rays
-        try:
+        with mock.patch("echostep.girard2011.lambda_ray_ranges", plain_rays):
             return step()
-        finally:
-            girard2011.lambda_ray_ranges = fast
 
     yield compared("step at nu = 150; the same by our own plain rays", step, with_rays, scale.rounds, 10.0)
 
