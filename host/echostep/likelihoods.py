@@ -33,7 +33,7 @@ class EchoSettings:
     `correlation_m`: travel over which errors of successive echoes become independent.
     """
 
-    sd_m: float = 0.04
+    sd_m: float = 0.036
     slant_m: float = 0.05
     rim_db: float = 6.0
     maximum_m: float = 6.0
@@ -41,7 +41,7 @@ class EchoSettings:
     soft_db: float = 2.0
     edge_db: float = 20.0
     corner_db: float = 3.0
-    short: float = 0.1
+    short: float = 0.15
     stray: float = 0.3
     outlier: float = 0.05
     correlation_m: float = 0.06

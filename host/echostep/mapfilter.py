@@ -33,7 +33,8 @@ LEAST_TRUST = 0.1
 TURNING_RAD = math.radians(
     15.0
 )  # a leg that turns more than this is no straight line, and its headings are guesses in between
-EXACT_SD_M = 0.01  # no plan is more exact
+EXACT_SD_M = 0.005  # no plan is more exact
+PUZZLED_MORE = 3.0  # who understands nothing of what he hears keeps so many times more particles about him
 PLAN_SD_M = 0.15  # how far off a plan may be that explains little of what is heard
 
 
@@ -63,6 +64,7 @@ class MapFilter:
             self._doubt_m = math.hypot(self._doubt_m, leg.sd_m)
         else:
             heard = self._heard(passage)
+            self.cloud.puzzle(1.0 + PUZZLED_MORE * (1.0 - self._trust()))
             self._judge(self.cloud.follow(move, heard, self._model, self._walls), heard.power)
             self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) / REGAIN_M)
         doubt_m = math.hypot(self._doubt_m, leg.anchor_sd_m, PLAN_SD_M * (1.0 - self._trust()), EXACT_SD_M)

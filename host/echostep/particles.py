@@ -36,7 +36,7 @@ class CloudSettings:
     that going through a wall costs.
     """
 
-    size: int = 250
+    size: int = 220
     largest: int = 20_000
     kld: float = 0.15
     cell_m: float = 0.1
@@ -101,6 +101,11 @@ class Cloud:
         self.scale: Floats = 1.0 + settings.start_scale_sd * rng.standard_normal(n)
         self.log_weight: Floats = np.zeros(n)
         self.rescues = 0
+        self._least = n
+
+    def puzzle(self, times: float) -> None:
+        """Keep at least so many times the usual number of particles from the next resampling on."""
+        self._least = int(times * self._settings.size)
 
     def follow(self, move: Move, heard: Heard, model: EchoModel, walls: Walls) -> Floats:
         """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
@@ -176,10 +181,10 @@ class Cloud:
         )
         k = len(np.unique(cells @ np.array([1.0, 1e6, 1e12]))) - 1
         if k < 1:
-            return s.size
+            return self._least
         part = 2.0 / (9.0 * k)
         wanted = k / (2.0 * s.kld) * (1.0 - part + math.sqrt(part) * 2.33) ** 3
-        return int(min(max(wanted, s.size), s.largest))
+        return int(min(max(wanted, self._least), s.largest))
 
 
 NEGLIGIBLE = 1e-9  # particles of less weight go with the next resampling: not worth a look
