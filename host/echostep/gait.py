@@ -33,7 +33,7 @@ class GaitSettings:
 
     foot_left_m: float = -0.08
     half_stance_s: float = 0.25
-    anchor_sd_m: float = 0.025
+    anchor_sd_m: float = 0.04
 
 
 @dataclass(frozen=True, slots=True)

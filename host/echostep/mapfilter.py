@@ -27,7 +27,7 @@ EXPLAINED_SHARE = 0.1
 NO_NEWS = 0.01  # a ping with less is not worth a look
 UNEXPLAINED = -1.5  # a tracked walk has +1, an echo that fits nowhere -5: the plan does not explain what is heard
 LOST_SD_M = 3.0
-REGAIN_M = 10.0
+REGAIN_M = 10.0  # a way walked with full trust, after which a third of a doubt is left
 BELIEVED, DISBELIEVED = 1.2, -1.0  # of `explained`: echoes count in full, and with a tenth
 LEAST_TRUST = 0.1
 TURNING_RAD = math.radians(
@@ -66,7 +66,7 @@ class MapFilter:
             heard = self._heard(passage)
             self.cloud.puzzle(1.0 + PUZZLED_MORE * (1.0 - self._trust()))
             self._judge(self.cloud.follow(move, heard, self._model, self._walls), heard.power)
-            self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) / REGAIN_M)
+            self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) * self._trust() / REGAIN_M)
         doubt_m = math.hypot(self._doubt_m, leg.anchor_sd_m, PLAN_SD_M * (1.0 - self._trust()), EXACT_SD_M)
         return estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, doubt_m)
 
