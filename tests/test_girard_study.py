@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from shapely import LineString, MultiLineString
 
-from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.evaluate import girard2011 as study
 from echostep.evaluate.echoes import evaluate_echoes
@@ -165,8 +164,3 @@ def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> N
         write_json(tmp_path / "file" / "x.json", "s", 1, 1, [])
     with pytest.raises(EchostepError, match="cannot write there"):
         Study("s", 1, 1, math_run, tmp_path / "file").rows()
-
-
-def test_readme_names_the_commands() -> None:
-    text = (ROOT / "host/README.md").read_text()
-    assert all(f"echostep evaluate {name}" in text for name in ("girard2011", "echoes", "trails", "feet"))

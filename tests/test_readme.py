@@ -59,7 +59,18 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
     assert len(done.stdout.splitlines()) > 40
 
 
-@pytest.mark.parametrize("command", ["demo", "live", "record", "replay", "foot", "decode", "evaluate feet"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "demo",
+        "live",
+        "record",
+        "replay",
+        "foot",
+        "decode",
+        *(f"evaluate {name}" for name in ("feet", "girard2011", "echoes", "trails")),
+    ],
+)
 def test_every_option_that_is_named_exists(command: str) -> None:
     usage = subprocess.run(
         [sys.executable, "-m", "echostep", *command.split(), "--help"],
