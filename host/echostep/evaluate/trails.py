@@ -82,7 +82,7 @@ def track(samples: MtxSamples, profile: str) -> Track:
     """What a method makes of the samples."""
     if profile == "fischer2008":
         return fischer2008.walk_track(samples.t_s, samples.accel, samples.gyro, samples.orientation)
-    return walk_track(samples.t_s, samples.accel, samples.gyro)
+    return walk_track(samples.t_s, samples.accel, samples.gyro, mag=samples.mag)
 
 
 def judge(found: Track, walked: Walk) -> Walked:
