@@ -94,8 +94,10 @@ NEVER = -8.0  # of a logit, likewise
 
 
 @njit(cache=True, error_model="numpy")
-def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel) -> float:
-    """Log p(range | `count` sources, nearest first); range 0 means no echo."""
+def echo_density(
+    range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
+) -> float:
+    """Density per metre of a range given `count` sources, nearest first; range 0: the probability of no echo."""
     first = distance_m[0] if count else m.maximum_m
     unheard, hit = 1.0, 0.0
     for k in range(count):
@@ -108,11 +110,17 @@ def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Float
             break
     span = m.maximum_m - m.minimum_m
     if range_m <= 0.0:
-        return math.log((1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * SILENT)
+        return (1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * SILENT
     before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
     short = 1.0 / before if range_m < m.minimum_m + before else 0.0
     density = (1.0 - m.short) * (hit + unheard * m.stray / span) + m.short * short
-    return math.log((1.0 - m.outlier) * density + m.outlier * (1.0 - SILENT) / span)
+    return (1.0 - m.outlier) * density + m.outlier * (1.0 - SILENT) / span
+
+
+@njit(cache=True, error_model="numpy")
+def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel) -> float:
+    """Log p(range | sources), as `echo_density`."""
+    return math.log(echo_density(range_m, count, distance_m, off_axis_rad, kind, m))
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.likelihoods import EchoModel, log_echo
+from echostep.likelihoods import EchoModel, echo_density
 from echostep.plan import Pose
 from echostep.reflectors import MOST_SOURCES, Walls, echo_sources
 from echostep.walls import WallIndex, crosses_wall
@@ -210,11 +210,13 @@ def _follow(
             least = min(least, top)
             done = until
         if k < len(heard.share):
-            explained[k] = _reweight(
+            explained[k], size = _reweight(
                 x, y, turn, log_weight, heard.axis_rad[k], heard.range_m[k], heard.power[k], model, walls
             )
             k += 1
-        if effective_size(log_weight) < resample_below * len(x):
+        else:
+            size = effective_size(log_weight)
+        if size < resample_below * len(x):
             break
     return k, done, least
 
@@ -246,24 +248,31 @@ def _propagate(
 def _reweight(
     x: Floats, y: Floats, turn: Floats, log_weight: Floats,
     axis: float, range_m: float, power: float, model: EchoModel, walls: WallIndex,
-) -> float:  # fmt: skip
-    """Add each particle's log-likelihood and bring the greatest weight to 0; returns the log of the mean likelihood before."""
+) -> tuple[float, float]:  # fmt: skip
+    """Add each particle's log-likelihood and bring the greatest weight to 0.
+
+    Returns the log of the mean likelihood before, and the effective size after.
+    """
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
     top = -np.inf
-    weight, explained = 0.0, 0.0
+    weight, explained, total, squares = 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         w = math.exp(log_weight[i])
         if w < NEGLIGIBLE:
             continue
         count = echo_sources(x[i], y[i], axis + turn[i], walls, distance_m, off_axis_rad, kind)
-        log_likelihood = log_echo(range_m, count, distance_m, off_axis_rad, kind, model)
+        likelihood = echo_density(range_m, count, distance_m, off_axis_rad, kind, model)
         weight += w
-        explained += w * math.exp(log_likelihood)
-        log_weight[i] += power * log_likelihood
+        explained += w * likelihood
+        log_likelihood = power * math.log(likelihood)
+        log_weight[i] += log_likelihood
         top = max(top, log_weight[i])
+        w *= math.exp(log_likelihood)
+        total += w
+        squares += w * w
     for i in range(len(x)):
         log_weight[i] -= top
-    return math.log(explained / weight)
+    return math.log(explained / weight), total * total / squares
 
 
 @njit(cache=True, error_model="numpy")
