@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.building import LIFT, Storeys, connector_at, nearest_level
+from echostep.storeys import LIFT, Storeys, connector_at, nearest_level
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.building import Storeys
 from echostep.climbing import ClimbSettings, Rise
 from echostep.estimate import Estimate, estimate
 from echostep.gait import Leg, wrap
@@ -19,6 +18,7 @@ from echostep.likelihoods import EchoSettings, echo_model
 from echostep.particles import Cloud, CloudSettings, Heard, Move
 from echostep.plan import Pose
 from echostep.reflectors import Walls
+from echostep.storeys import Storeys
 from echostep.waiting import Passage
 
 Floats = NDArray[np.float64]
@@ -38,6 +38,7 @@ TURNING_RAD = math.radians(
 EXACT_SD_M = 0.005  # no plan is more exact
 PUZZLED_MORE = 3.0  # who understands nothing of what he hears keeps so many times more particles about him
 HEIGHT_SD_M = 0.3  # of one sample: an SCP1000 in its fast mode, a little worse than its documents say
+LATE_SAMPLES = 9  # a second
 AIR_SD_M = 0.1  # what the mean of many does not take away: draughts
 PLAN_SD_M = 0.15  # how far off a plan may be that explains little of what is heard
 
@@ -114,9 +115,9 @@ class MapFilter:
 
 
 def _rise(leg: Leg, height_m: Floats) -> Rise:
-    """What foot and pressure say of the height over a leg; the middle sample resists a slammed door."""
-    n = len(height_m)
-    height, sd = (
-        (float(np.median(height_m)), math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(n))) if n else (0.0, math.inf)
-    )
+    """What foot and pressure say of the height at the end of a leg; the middle one of the last samples resists a slammed door."""
+    late = height_m[-LATE_SAMPLES:]
+    if not len(late):
+        return Rise(leg.rise_m, leg.rise_sd_m, 0.0, math.inf, leg.t1_s - leg.t0_s)
+    height, sd = float(np.median(late)), math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(late)))
     return Rise(leg.rise_m, leg.rise_sd_m, height, sd, leg.t1_s - leg.t0_s)

@@ -17,11 +17,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from echostep.building import Storeys, level_of
 from echostep.climbing import ClimbSettings, Rise, carry, climb, climb_model
 from echostep.likelihoods import EchoModel, echo_density
 from echostep.plan import Pose
 from echostep.reflectors import MOST_SOURCES, Walls, echo_sources
+from echostep.storeys import Storeys, level_of
 from echostep.walls import WallIndex, crosses_wall
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from echostep.building import building
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, unwatched
 from echostep.gait import Leg
@@ -18,6 +17,7 @@ from echostep.particles import systematic
 from echostep.plan import Plan, Pose
 from echostep.settings import Settings
 from echostep.sources import Chunk, Portion, portion_of
+from echostep.storeys import building
 from echostep.waiting import Passage
 
 
