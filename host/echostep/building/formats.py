@@ -9,6 +9,7 @@ import hashlib
 from dataclasses import replace
 from pathlib import Path
 
+from echostep.building.nodelink import import_nodelink
 from echostep.building.wrld import import_wrld
 from echostep.errors import EchostepError
 from echostep.plan import Plan
@@ -24,7 +25,8 @@ def import_plan(path: Path, storey_m: float = STOREY_M) -> Plan:
 
 
 def _imported(path: Path, storey_m: float) -> Plan:
-    main = path / "main.json" if path.is_dir() else path
-    if main.name == "main.json":
-        return import_wrld(main, storey_m)
+    if path.name == "main.json" or (path / "main.json").exists():
+        return import_wrld(path / "main.json" if path.is_dir() else path, storey_m)
+    if path.name == "core.txt" or (path / "core.txt").exists():
+        return import_nodelink(path / "core.txt" if path.is_dir() else path)
     raise EchostepError(f"{path}: no format of plans that echostep knows")
