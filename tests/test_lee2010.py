@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from echostep import lee2010
 from echostep.lee2010 import Legs
 
+Floats = NDArray[np.float64]
 LEGS = Legs()
 angles = st.floats(-0.6, 0.6)
 
@@ -39,13 +41,18 @@ def test_velocity_is_the_derivative_of_the_travel(
     assert lee2010.velocity(a, b, c, d, thigh, calf, LEGS) == pytest.approx((after - before) / (2 * h), abs=1e-6)
 
 
+def _travel(at: Floats) -> float:
+    a, b, c, d = at.tolist()
+    return lee2010.travel(a, b, c, d, LEGS)
+
+
 @given(angles, angles, angles, angles)
 def test_jacobian_is_that_of_finite_differences(a: float, b: float, c: float, d: float) -> None:
     at, h = np.array([a, b, c, d]), 1e-6
-    found = lee2010.jacobian(*at.tolist(), LEGS)
+    found = lee2010.jacobian(a, b, c, d, LEGS)
     for k in range(4):
         step = h * np.eye(4)[k]
-        slope = (lee2010.travel(*(at + step).tolist(), LEGS) - lee2010.travel(*(at - step).tolist(), LEGS)) / (2 * h)
+        slope = (_travel(at + step) - _travel(at - step)) / (2 * h)
         assert found[k] == pytest.approx(slope, abs=1e-8)
 
 

@@ -238,7 +238,7 @@ class Walker:
         s, since_s = self.settings, self._since_s
         thigh, calf = self.thigh.angle_rad, self.calf.angle_rad
         rates = [turned / since_s for turned in self._sum]
-        v = 0.5 * abs(velocity(thigh, thigh, calf, calf, *rates, s.legs))
+        v = 0.5 * abs(velocity(thigh, thigh, calf, calf, rates[0], rates[1], s.legs))
         self._sum, self._since_s = [0.0, 0.0], 0.0
         if not math.isnan(self._bearing):
             self.heading = fuse(self._bearing, s.compass_sd_rad**2, self.heading.angle_rad, self.heading.variance)
