@@ -75,6 +75,11 @@ class LegPath:
             legs.append(self._stay(max(self._told_s, since_s), until_s))
         return legs
 
+    @property
+    def remembered_s(self) -> float:
+        """Since when headings are."""
+        return self._headings[0][0] if self._headings else math.inf
+
     def heading_rad(self, t_s: float) -> float:
         """Heading of the trunk at a time not long ago."""
         times, headings = zip(*self._headings, strict=True)
