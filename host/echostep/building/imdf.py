@@ -1,8 +1,8 @@
 """Indoor Mapping Data Format (zip or folder) -> `Plan`.
 
-In: an archive [OGC 20-094]. Out: `Plan`. IMDF draws no walls: the boundaries of enclosed units are taken as walls, open at the `opening`s, and units of
-brick, concrete or glass are walls with a thickness. Walkways and unenclosed areas have no walls of their own, nor have stairs, lifts and ramps without
-an opening. Storeys are `storey_m` apart, by their ordinals.
+In: an archive [OGC 20-094]. Out: `Plan`. IMDF draws no walls: the boundaries of enclosed units are taken as walls, open at the `opening`s; units
+of brick, concrete or glass are walls with a thickness. Walkways and unenclosed areas have no walls of their own, nor have stairs, lifts and ramps
+without an opening. Storeys are `storey_m` apart, by their ordinals.
 """
 
 from __future__ import annotations
