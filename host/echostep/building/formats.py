@@ -49,6 +49,10 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
         from echostep.building.wrld import import_wrld
 
         return import_wrld(path / "main.json" if path.is_dir() else path, hints.storey_m)
+    if path.suffix.casefold() == ".ifc":
+        from echostep.building.ifc import import_ifc
+
+        return import_ifc(path)
     if path.suffix.casefold() in (".zip", ".imdf") or (path / "manifest.json").exists():
         from echostep.building.imdf import import_imdf
 
