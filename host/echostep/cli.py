@@ -130,6 +130,22 @@ def decode(
     runs.decode(file)
 
 
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
+) -> None:
+    """Look at ports, board and MTx, and say what is wrong and what to do; exit status 1 when something is."""
+    from echostep import doctor as examination
+
+    if udev:
+        typer.echo(examination.rules_text(), nl=False)
+    elif not examination.run(board, mtx, seconds):
+        raise typer.Exit(1)
+
+
 def _pose(text: str | None) -> Pose | None:
     from echostep.runs import parse_pose
 
