@@ -146,6 +146,24 @@ def doctor(
         raise typer.Exit(1)
 
 
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); else the one shipped with this program."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from rich.console import Console
+
+    from echostep import flash as flashing
+
+    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
 def _pose(text: str | None) -> Pose | None:
     from echostep.runs import parse_pose
 
