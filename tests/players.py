@@ -10,6 +10,10 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from board_runs import ROOT, quiet_rows
 from echostep.simulation.board import PythonBoard
@@ -61,9 +65,16 @@ def babbling_port(sent: bytes) -> Iterator[str]:
             yield port
 
 
+def some_noise(rows: NDArray[Any], start_ms: int) -> None:
+    """Gyros that are never quite still."""
+    noise = np.random.default_rng(start_ms)
+    for name in ("thigh", "calf", "belt"):
+        rows[name] += np.rint(noise.normal(0.0, 2.5, len(rows))).astype(np.int16)
+
+
 @contextlib.contextmanager
-def python_board() -> Iterator[str]:
-    """The port of a Python board that never falls behind the clock."""
+def python_board(shape: Callable[[NDArray[Any], int], None] = some_noise) -> Iterator[str]:
+    """The port of a Python board that never falls behind the clock; `shape` changes the rows of a quiet person from that millisecond on."""
     board, began, played_ms = PythonBoard(), time.monotonic(), 0
     with pseudo_terminal() as (ours, port):
 
@@ -74,9 +85,7 @@ def python_board() -> Iterator[str]:
             due_ms = int((time.monotonic() - began) * 1e3)
             if due_ms > played_ms:
                 rows = quiet_rows(due_ms - played_ms)
-                rows["thigh"][:: 7 - played_ms % 3] += 1  # some noise
-                rows["calf"][:: 6 - played_ms % 3] += 1
-                rows["belt"][:: 5 - played_ms % 3] += 1
+                shape(rows, played_ms)
                 for _, sent in board.advance(rows):
                     with contextlib.suppress(BlockingIOError):
                         os.write(ours, sent)

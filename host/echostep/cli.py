@@ -14,6 +14,7 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
@@ -22,10 +23,16 @@ app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 Start = Annotated[
-    str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="X,Y,DEG[,LEVEL]",
+        help="Where the wearer stands and looks at first; level 0 is the plan's first, ? any.",
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
@@ -162,6 +169,24 @@ def flash(
     from echostep import flash as flashing
 
     flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[list[str] | None, typer.Argument(help="gyros, mounting; all of them when none is named.")] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
+    ] = Path("calibration.toml"),
+) -> None:
+    """Measure the wearer's gyros and mounting, and write them as settings."""
+    from rich.console import Console
+
+    from echostep import calibrate as calibration
+
+    calibration.calibrate(board, parts or [], out, Console(soft_wrap=True, highlight=False))
 
 
 def _pose(text: str | None) -> Pose | None:

@@ -16,7 +16,18 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader, StaleFirmwareError, encode
 from echostep.health import BoardWords
-from echostep.messages import CheckGyros, ClockQuery, ClockReply, Gyros, Identify, Message, Ping, SelfTest, Sync
+from echostep.messages import (
+    CheckGyros,
+    ClockQuery,
+    ClockReply,
+    Compass,
+    Gyros,
+    Identify,
+    Message,
+    Ping,
+    SelfTest,
+    Sync,
+)
 from echostep.mtx_start import MtxStart
 from echostep.sources import BOARD, MTX, Chunk, SerialPorts
 from echostep.timeline import MtxTiming
@@ -43,6 +54,7 @@ class Heard:
     ticks: dict[str, list[int]] = field(default_factory=dict)
     pings: list[Ping] = field(default_factory=list)
     gyros: list[Gyros] = field(default_factory=list)
+    compass: list[Compass] = field(default_factory=list)
     replies: list[tuple[float, float, int]] = field(default_factory=list)
     bytes_of: Counter[str] = field(default_factory=Counter)
     rejected: int = 0
@@ -171,6 +183,8 @@ class _Listener:
             heard.pings.append(message)
         elif isinstance(message, Gyros):
             heard.gyros.append(message)
+        elif isinstance(message, Compass):
+            heard.compass.append(message)
 
     def _follow_mtx(self, chunk: Chunk | None) -> None:
         if MTX not in self._names or self.heard.mtx_wrong:

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from echostep.calibration import RangerSettings
+from echostep.calibration import GyroSettings, RangerSettings
+from echostep.climbing import ClimbSettings
 from echostep.errors import EchostepError
 from echostep.foot import FootSettings
 from echostep.gait import GaitSettings
@@ -27,10 +28,12 @@ class Settings:
 
     mtx: MtxTiming = field(default_factory=MtxTiming)
     ranger: RangerSettings = field(default_factory=RangerSettings)
+    gyro: GyroSettings = field(default_factory=GyroSettings)
     foot: FootSettings = field(default_factory=FootSettings)
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
+    climb: ClimbSettings = field(default_factory=ClimbSettings)
 
 
 def read_settings(path: Path | str) -> str:
