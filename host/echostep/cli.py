@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | foot | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | doctor | flash | calibrate | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """

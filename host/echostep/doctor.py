@@ -113,7 +113,7 @@ def print_report(report: Report, console: Console) -> None:
     for finding in report.findings:
         console.print(
             Text.assemble(
-                (f"{finding.severity.name.lower():8}", STYLES[finding.severity]), f"  {finding.subject}: {finding.what}"
+                (f"{finding.severity.name:8}", STYLES[finding.severity]), f"  {finding.subject}: {finding.what}"
             )
         )
         console.print(Text(f"          {finding.remedy}", style="dim"))
