@@ -56,6 +56,7 @@ def examine(board: str | None, mtx: str | None, seconds: float = SECONDS) -> Rep
         report.findings.append(_no_board(seen))
     if wanted[MTX] is None:
         report.findings.append(_no_mtx())
+    report.findings += _several(seen, wanted[BOARD])
     if usable:
         _converse(report, usable, seconds)
     report.findings += rules_findings()
@@ -84,6 +85,14 @@ def _no_board(seen: list[PortSeen]) -> Finding:
     )
     remedy = "plug it in; a USB cable that only charges will not do; or name its port with --board"
     return Finding(Severity.FAULT, "board", what, remedy)
+
+
+def _several(seen: list[PortSeen], chosen: str | None) -> list[Finding]:
+    boards = [port.path for port in seen if port.role is Role.BOARD]
+    if len(boards) < 2:
+        return []
+    what = f"{len(boards)} boards are plugged in ({', '.join(boards)}); this is about {chosen}"
+    return [Finding(Severity.NOTE, "board", what, "name the other one with --board")]
 
 
 def _no_mtx() -> Finding:

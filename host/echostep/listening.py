@@ -92,7 +92,7 @@ class Drift:
 
 
 def drift_of(heard: Heard) -> Drift | None:
-    """A straight line through the replies that came back fastest; None when there are too few."""
+    """A straight line through the faster half of the replies, each with the weight of its haste; None when there are too few."""
     if len(heard.replies) < 8:
         return None
     sent_s, arrived_s, ticks = np.array(heard.replies, float).T
@@ -100,13 +100,16 @@ def drift_of(heard: Heard) -> Drift | None:
     quick = took_s <= np.median(took_s)
     host_s = 0.5 * (sent_s + arrived_s)[quick]
     board_s = ticks[quick] / TICKS_PER_S
-    host_s -= host_s.mean()
-    spread = float((host_s**2).sum())
+    weight = np.maximum(took_s[quick], 1e-4) ** -2.0
+    weight /= weight.sum()
+    host_s -= weight @ host_s
+    board_s -= weight @ board_s
+    spread = float(weight @ host_s**2)
     if quick.sum() < 4 or spread == 0.0:
         return None
-    slope = float((host_s * board_s).sum() / spread)
-    rest = board_s - board_s.mean() - slope * host_s
-    sd = math.sqrt(float((rest**2).sum()) / (len(rest) - 2) / spread)
+    slope = float(weight @ (host_s * board_s)) / spread
+    rest = board_s - slope * host_s
+    sd = math.sqrt(float(weight**2 @ (rest * host_s) ** 2)) / spread  # [White 1980]: whatever each reply's own error
     return Drift((slope - 1.0) * 1e6, sd * 1e6, float(np.median(took_s)))
 
 
