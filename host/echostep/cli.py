@@ -194,20 +194,26 @@ def flash(
 
 @app.command()
 def calibrate(
-    parts: Annotated[list[str] | None, typer.Argument(help="gyros, mounting; all of them when none is named.")] = None,
+    parts: Annotated[
+        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; all of them when none is named.")
+    ] = None,
     board: Annotated[
         str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
     ] = Path("calibration.toml"),
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
+    walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
 ) -> None:
-    """Measure the wearer's gyros and mounting, and write them as settings."""
+    """Measure the wearer's gyros, mounting, compass and legs, and write them as settings."""
     from rich.console import Console
 
     from echostep import calibrate as calibration
 
-    calibration.calibrate(board, parts or [], out, Console(soft_wrap=True, highlight=False))
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
 
 
 def _pose(text: str | None) -> Pose | None:

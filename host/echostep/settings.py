@@ -17,6 +17,8 @@ from echostep.climbing import ClimbSettings
 from echostep.errors import EchostepError
 from echostep.foot import FootSettings
 from echostep.gait import GaitSettings
+from echostep.heading import Iron
+from echostep.leg_kinematics import Segments
 from echostep.likelihoods import EchoSettings
 from echostep.particles import CloudSettings
 from echostep.timeline import MtxTiming
@@ -29,6 +31,8 @@ class Settings:
     mtx: MtxTiming = field(default_factory=MtxTiming)
     ranger: RangerSettings = field(default_factory=RangerSettings)
     gyro: GyroSettings = field(default_factory=GyroSettings)
+    compass: Iron = field(default_factory=Iron)
+    legs: Segments = field(default_factory=Segments)
     foot: FootSettings = field(default_factory=FootSettings)
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
