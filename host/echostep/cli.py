@@ -17,6 +17,7 @@ from echostep.evaluate.commands import app as evaluate
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
+    from echostep.runs import Outlet
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
@@ -33,6 +34,16 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", 
 Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Tell a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://, several times if you like.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
 
 
 @app.command()
@@ -40,6 +51,9 @@ def demo(
     out: Out = Path("out/demo"),
     headless: Headless = False,
     seed: Seed = 1,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
     board_command: Annotated[
         str | None,
         typer.Option(
@@ -52,7 +66,7 @@ def demo(
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, headless=headless)
+    runs.demo(out, seed, board_command, _outlet(publish, name, team), headless=headless)
 
 
 @app.command()
@@ -66,11 +80,16 @@ def live(
     seed: Seed = 0,
     headless: Headless = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track the wearer of a board and an MTx; everything is recorded."""
     from echostep import runs
 
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, headless=headless)
+    runs.live(
+        plan, board, mtx, out, _pose(start), settings, seed, seconds, _outlet(publish, name, team), headless=headless
+    )
 
 
 @app.command()
@@ -98,11 +117,16 @@ def replay(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
     headless: Headless = False,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, headless=headless)
+    runs.replay(
+        recording, plan, out, _pose(start), settings, seed, truth, _outlet(publish, name, team), headless=headless
+    )
 
 
 @app.command()
@@ -121,6 +145,23 @@ def foot(
 
 
 @app.command()
+def command(
+    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    plan: Plan,
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first."""
+    from echostep.team import commander
+
+    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
@@ -128,6 +169,12 @@ def decode(
     from echostep import runs
 
     runs.decode(file)
+
+
+def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
+    from echostep.runs import Outlet
+
+    return Outlet(tuple(publish), name, team) if publish else None
 
 
 def _pose(text: str | None) -> Pose | None:

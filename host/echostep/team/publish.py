@@ -1,0 +1,155 @@
+"""Publishing: a tracker's estimates -> reports -> every endpoint that was asked for.
+
+In: estimates, in the tracker's thread. Out: reports offered to one outbox an endpoint. Owns the outboxes and the facts that need a memory: steps,
+distance walked, rates.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import secrets
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+from echostep.errors import EchostepError
+from echostep.estimate import CHI2_95, Estimate
+from echostep.plan import Plan
+from echostep.team.cot import StreamLine, UdpLine
+from echostep.team.earth import georeference, place
+from echostep.team.endpoint import Endpoint, parse_endpoint
+from echostep.team.mqtt import MqttLine
+from echostep.team.outbox import Line, Outbox
+from echostep.team.report import Motion, Position, Report, Streams, checked_name
+from echostep.tracker import Tracker
+
+Source = Literal["live", "replay", "simulated"]
+PACE_S = 3.0  # speed and rates are taken over so long
+UNKNOWN_RAD = 1.0  # a heading with a larger standard deviation is not told
+SUPPLIES = Path("/sys/class/power_supply")
+
+
+class Publishing:
+    """`tell` the estimates as they come; leaving the context sends what is fresh and says how it went."""
+
+    def __init__(
+        self, urls: Sequence[str], name: str, team: str, tracker: Tracker, source: Source, say: Callable[[str], None]
+    ) -> None:
+        self._tracker, self._say = tracker, say
+        self._trail = Trail()
+        run = secrets.token_hex(4)
+        name, team = checked_name("--name", name), checked_name("--team", team)
+        self._blank = blank(tracker.plan, name, team, run, source)
+        endpoints = [parse_endpoint(url) for url in urls]
+        lines = [_line(endpoint, tracker.plan, team, name, run) for endpoint in endpoints]
+        self._outboxes = [Outbox(line, str(endpoint), say) for line, endpoint in zip(lines, endpoints, strict=True)]
+        self._offer(self._blank)
+
+    def tell(self, estimates: Iterable[Estimate]) -> None:
+        """Offer a report of each estimate; takes microseconds and never waits."""
+        if not self._outboxes:
+            return
+        streams = None
+        for estimate in estimates:
+            streams = streams or self._trail.streams(self._tracker, estimate.t_s)
+            self._offer(report(self._blank, self._tracker.plan, estimate, self._trail.motion(estimate), streams))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        for outbox in self._outboxes:
+            self._say(outbox.close())
+
+    def _offer(self, made: Report) -> None:
+        for outbox in self._outboxes:
+            outbox.offer(made)
+
+
+class Trail:
+    """What one estimate does not tell: steps and way so far, rates of the streams."""
+
+    def __init__(self) -> None:
+        self._last: Estimate | None = None
+        self._walked_m = 0.0
+        self._stepped_s = math.nan
+        self._recent: deque[tuple[float, float]] = deque()  # t_s, walked_m
+        self._counts: deque[tuple[float, int, int]] = deque()  # t_s, samples, frames
+
+    def motion(self, e: Estimate) -> Motion:
+        """How the wearer has moved until this estimate."""
+        last, self._last = self._last, e
+        if last is None or e.step != last.step:
+            self._stepped_s = e.t_s
+            self._walked_m += 0.0 if last is None else math.hypot(e.x_m - last.x_m, e.y_m - last.y_m)
+        self._recent.append((e.t_s, self._walked_m))
+        while self._recent[0][0] < e.t_s - PACE_S:
+            self._recent.popleft()
+        span_s, way_m = e.t_s - self._recent[0][0], self._walked_m - self._recent[0][1]
+        speed = min(way_m / span_s, 100.0) if span_s > 0.5 else 0.0
+        return Motion(max(e.step, 0), min(self._walked_m, 1e9), speed, max(e.t_s - self._stepped_s, 0.0))
+
+    def streams(self, tracker: Tracker, t_s: float) -> Streams:
+        """Health of the streams; rates by the tracker's clock."""
+        intake = tracker.intake
+        board, mtx, status = intake.board.counts, intake.mtx.counts, intake.status
+        counts = (t_s, mtx.good, board.good)
+        self._counts.append(counts)
+        while len(self._counts) > 2 and self._counts[1][0] < t_s - PACE_S:
+            self._counts.popleft()
+        span_s = t_s - self._counts[0][0]
+        mtx_hz, board_hz = ((counts[k] - self._counts[0][k]) / span_s if span_s > 0.0 else 0.0 for k in (1, 2))
+        return Streams(
+            mtx_hz=min(mtx_hz, 1e6),
+            board_hz=min(board_hz, 1e6),
+            bad=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
+            lost=board.lost + mtx.lost,
+            dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
+            synchronised=bool(intake.timeline.synchronised),
+        )
+
+
+def blank(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
+    """The report of a tracker that has no estimate yet; number and times are stamped when it is sent."""
+    return Report(
+        echostep_report=1, team=team, name=name, run=run, sequence=0, time="", stale="", source=source, status="waiting",
+        position=None, motion=None, place=None, streams=None, plan=plan.name[:64], plan_sha256=plan.digest,
+        version=importlib.metadata.version("echostep")[:32], battery_percent=battery_percent(), superseded=0,
+    )  # fmt: skip
+
+
+def report(blank: Report, plan: Plan, e: Estimate, motion: Motion, streams: Streams) -> Report:
+    """The report of an estimate."""
+    from dataclasses import replace
+
+    radius = e.ellipse95.major_m
+    heading = e.heading_rad if e.heading_sd_rad <= UNKNOWN_RAD else None
+    position = Position(
+        t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2, radius95_m=radius,
+        heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=0, floor_name=plan.levels[0].name[:64],
+    )  # fmt: skip
+    there = place(plan, e.x_m, e.y_m, radius / math.sqrt(CHI2_95), heading)
+    return replace(blank, status=e.status.value, position=position, motion=motion, place=there, streams=streams)
+
+
+def battery_percent() -> int | None:
+    """Charge of this computer's battery; None without one."""
+    for path in sorted(SUPPLIES.glob("BAT*/capacity")):
+        try:
+            return max(0, min(100, int(path.read_text())))
+        except (OSError, ValueError):
+            continue
+    return None
+
+
+def _line(endpoint: Endpoint, plan: Plan, team: str, name: str, run: str) -> Line:
+    if endpoint.scheme in ("mqtt", "mqtts"):
+        return MqttLine(endpoint, team, name, run)
+    if georeference(plan) is None:
+        raise EchostepError(
+            f"{endpoint}: the plan has no georeference, and TAK needs latitude and longitude: add one to the plan, or use mqtt://"
+        )
+    return UdpLine(endpoint) if endpoint.scheme == "cot+udp" else StreamLine(endpoint)
