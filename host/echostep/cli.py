@@ -17,7 +17,7 @@ from echostep.evaluate.commands import app as evaluate
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
-    from echostep.runs import Outlet
+    from echostep.team.endpoint import Outlet
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
@@ -172,9 +172,9 @@ def decode(
 
 
 def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
-    from echostep.runs import Outlet
+    from echostep.team.endpoint import parse_outlet
 
-    return Outlet(tuple(publish), name, team) if publish else None
+    return parse_outlet(publish, name, team) if publish else None
 
 
 def _pose(text: str | None) -> Pose | None:

@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -44,6 +44,7 @@ from echostep.view import TerminalView
 from echostep.xsens.reader import warm_up
 
 if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
     from echostep.team.publish import Source
 
 DEMO_PACE = 8.0
@@ -53,14 +54,6 @@ console = Console(soft_wrap=True)  # one message, one line, however wide the ter
 
 
 Tell = Callable[[list[Estimate]], None]
-
-
-class Outlet(NamedTuple):
-    """Where estimates are published, and under what name."""
-
-    urls: tuple[str, ...]
-    name: str
-    team: str
 
 
 def demo(out: Path, seed: int, board_command: str | None, outlet: Outlet | None = None, *, headless: bool) -> None:
@@ -246,7 +239,7 @@ def _published(outlet: Outlet | None, tracker: Tracker, source: Source) -> Itera
         return
     from echostep.team.publish import Publishing
 
-    with Publishing(outlet.urls, outlet.name, outlet.team, tracker, source, console.print) as publishing:
+    with Publishing(outlet, tracker, source, console.print) as publishing:
         yield publishing.tell
 
 

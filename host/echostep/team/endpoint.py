@@ -6,11 +6,13 @@ In: a URL. Out: an `Endpoint`, its TLS context. Owns nothing; every error names 
 from __future__ import annotations
 
 import ssl
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from echostep.errors import EchostepError
+from echostep.team.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089}
 FILES = ("ca", "cert", "key")
@@ -49,7 +51,7 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
         raise EchostepError(f"{shown}: expected one of {', '.join(f'{s}://' for s in schemes)}")
     if not host or port == 0 or parts.path not in ("", "/") or parts.fragment:
         raise EchostepError(f"{shown}: expected {parts.scheme}://HOST[:PORT]")
-    if not host.isprintable() or " " in host:
+    if not _lookable(host):
         raise EchostepError(f"{shown}: the name of the host is damaged")
     if unknown := set(asked) - set(FILES):
         raise EchostepError(f"{shown}: {', '.join(sorted(unknown))}: unknown; there are {', '.join(FILES)}")
@@ -66,6 +68,33 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
     if endpoint.user is not None and "mqtt" not in parts.scheme:
         raise EchostepError(f"{shown}: user and password are for mqtt:// and mqtts://")
     return endpoint
+
+
+def _lookable(host: str) -> bool:
+    """Whether the resolver would take the name."""
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        return False
+    return host.isprintable() and " " not in host
+
+
+@dataclass(frozen=True, slots=True)
+class Outlet:
+    """Where a tracker's estimates go, and under what name."""
+
+    endpoints: tuple[Endpoint, ...]
+    name: str
+    team: str
+
+
+def parse_outlet(urls: Sequence[str], name: str, team: str) -> Outlet:
+    """What `--publish`, `--name` and `--team` say; raises EchostepError."""
+    if not name:
+        raise EchostepError("--publish needs the wearer's name: --name NAME")
+    return Outlet(
+        tuple(parse_endpoint(url) for url in urls), checked_name("--name", name), checked_name("--team", team)
+    )
 
 
 def tls_context(endpoint: Endpoint) -> ssl.SSLContext:

@@ -88,7 +88,7 @@ class Reception:
                 failures, self.connected = 0, True
                 while not self._closing.is_set():
                     self._listener.turn(TURN_S)
-            except OSError as error:
+            except Exception as error:  # whatever it is, it is said and tried again
                 self.connected = False
                 self._listener.close()
                 if failures == 0:

@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -96,10 +97,10 @@ class Outbox:
                     self._line.open()
                     self._open = True
                     if self._failures:
-                        self._say(f"{self._name}: connected again")
+                        self._tell("connected again")
                     self._failures = 0
                 self._step()
-            except OSError as error:
+            except Exception as error:  # whatever it is, it is said, and tracking goes on
                 self._broken(error)
         self._line.close(ended=True)
 
@@ -145,18 +146,26 @@ class Outbox:
             given_up = self._failures > 0 or time.monotonic() > self._closing_s
             return given_up or not self._queue
 
-    def _broken(self, error: OSError) -> None:
+    def _tell(self, words: str) -> None:
+        with suppress(OSError, ValueError):  # a terminal that is gone
+            self._say(f"{self._name}: {words}")
+
+    def _broken(self, error: Exception) -> None:
         """Say it once, then wait longer and longer."""
         self._line.close(ended=False)
         if self._open:
             self.counts.breaks += 1
         self._open = False
         if self._failures == 0:
-            self._say(f"{self._name}: {error}; tracking goes on, trying again")
+            self._tell(f"{_reason(error)}; tracking goes on, trying again")
         pause_s = BACKOFF_S[min(self._failures, len(BACKOFF_S) - 1)] * random.uniform(0.8, 1.2)
         self._failures += 1
         with self._changed:
             self._changed.wait_for(lambda: self._closing_s is not None, pause_s)
+
+
+def _reason(error: Exception) -> str:
+    return (isinstance(error, OSError) and error.strerror) or str(error) or type(error).__name__
 
 
 def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtaken: int) -> Report:

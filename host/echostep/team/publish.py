@@ -10,7 +10,8 @@ import importlib.metadata
 import math
 import secrets
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
@@ -20,10 +21,10 @@ from echostep.estimate import CHI2_95, Estimate
 from echostep.plan import Plan
 from echostep.team.cot import StreamLine, UdpLine
 from echostep.team.earth import georeference, place
-from echostep.team.endpoint import Endpoint, parse_endpoint
+from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.mqtt import MqttLine
 from echostep.team.outbox import Line, Outbox
-from echostep.team.report import Motion, Position, Report, Streams, checked_name
+from echostep.team.report import Motion, Position, Report, Streams
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -35,17 +36,13 @@ SUPPLIES = Path("/sys/class/power_supply")
 class Publishing:
     """`tell` the estimates as they come; leaving the context sends what is fresh and says how it went."""
 
-    def __init__(
-        self, urls: Sequence[str], name: str, team: str, tracker: Tracker, source: Source, say: Callable[[str], None]
-    ) -> None:
+    def __init__(self, outlet: Outlet, tracker: Tracker, source: Source, say: Callable[[str], None]) -> None:
         self._tracker, self._say = tracker, say
         self._trail = Trail()
         run = secrets.token_hex(4)
-        name, team = checked_name("--name", name), checked_name("--team", team)
-        self._blank = blank(tracker.plan, name, team, run, source)
-        endpoints = [parse_endpoint(url) for url in urls]
-        lines = [_line(endpoint, tracker.plan, team, name, run) for endpoint in endpoints]
-        self._outboxes = [Outbox(line, str(endpoint), say) for line, endpoint in zip(lines, endpoints, strict=True)]
+        self._blank = blank(tracker.plan, outlet.name, outlet.team, run, source)
+        lines = [(_line(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
+        self._outboxes = [Outbox(line, name, say) for line, name in lines]
         self._offer(self._blank)
 
     def tell(self, estimates: Iterable[Estimate]) -> None:
@@ -123,8 +120,6 @@ def blank(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
 
 def report(blank: Report, plan: Plan, e: Estimate, motion: Motion, streams: Streams) -> Report:
     """The report of an estimate."""
-    from dataclasses import replace
-
     radius = e.ellipse95.major_m
     heading = e.heading_rad if e.heading_sd_rad <= UNKNOWN_RAD else None
     position = Position(
@@ -145,9 +140,9 @@ def battery_percent() -> int | None:
     return None
 
 
-def _line(endpoint: Endpoint, plan: Plan, team: str, name: str, run: str) -> Line:
+def _line(endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str) -> Line:
     if endpoint.scheme in ("mqtt", "mqtts"):
-        return MqttLine(endpoint, team, name, run)
+        return MqttLine(endpoint, outlet.team, outlet.name, run)
     if georeference(plan) is None:
         raise EchostepError(
             f"{endpoint}: the plan has no georeference, and TAK needs latitude and longitude: add one to the plan, or use mqtt://"

@@ -180,9 +180,17 @@ def _decoded(payload: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
     except UnicodeDecodeError as error:
         raise BadReportError("not UTF-8") from error
     except msgspec.ValidationError as error:
-        raise BadReportError(f"wrong field: {error}") from error
+        raise BadReportError(_named(str(error))) from error
     except (msgspec.DecodeError, RecursionError) as error:
         raise BadReportError("not JSON") from error
+
+
+def _named(error: str) -> str:
+    """What msgspec found, without the sender's own text, which may be made to harm a terminal."""
+    if "missing required field" in error:
+        return error.replace("Object missing required", "no")
+    at = error.rpartition(" - at `$.")[2].rstrip("`")
+    return f"wrong field {at}" if at.replace(".", "").replace("_", "").isalnum() and at.isascii() else "not a report"
 
 
 def check_name(text: str) -> None:
