@@ -12,7 +12,7 @@ from echostep.plan import load_plan
 from echostep.team.report import Motion, Place, Position, Report, Streams, moment
 
 PLAN = Path(ROOT / "host/echostep/plans/demo.json")
-POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor")
+POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor", 0.98, 0.0, 0.1)
 PLACE = Place(48.2, 16.37, None, 0.31, None, 61.4)
 
 

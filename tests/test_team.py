@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, Status
-from echostep.plan import load_plan
+from echostep.plan import Georeference, load_plan
 from echostep.team import outbox
 from echostep.team.commander import as_tree, look, table
 from echostep.team.cot import event
-from echostep.team.earth import place
+from echostep.team.earth import Ground
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import PER_TOPIC, Inbox
 from echostep.team.outbox import Outbox, aged, stamped
@@ -375,24 +375,14 @@ def test_motion_knows_steps_way_pace_and_rest() -> None:
     assert (motions[20].speed_m_s, motions[20].steps) == (0.0, 10)
 
 
-class Turned:
-    """A plan that is turned a quarter: its x points north."""
-
-    class georeference:  # noqa: N801
-        latitude_deg, longitude_deg, rotation_rad = 48.0, 16.0, math.pi / 2
-
-    uncertainty_m = 0.4
-
-
 def test_a_place_on_earth() -> None:
-    there = place(Turned(), 100.0, 0.0, 0.3, 0.0)  # type: ignore[arg-type]
-    assert there is not None
+    turned = replace(load_plan(PLAN), georeference=Georeference(16.0, 48.0, 0.5 * math.pi), uncertainty_m=0.4)
+    there = Ground(turned).place(100.0, 0.0, 0.3, 0.0)  # the plan's x points north
     assert there.lat_deg == pytest.approx(48.0 + 100.0 / 111_200.0, abs=1e-6)
     assert there.lon_deg == pytest.approx(16.0, abs=1e-9)
     assert there.course_deg == pytest.approx(0.0, abs=1e-9)
     assert there.sd_m == pytest.approx(0.5)
-    west = place(Turned(), 0.0, 100.0, 0.3, 0.5 * math.pi)  # type: ignore[arg-type]
-    assert west is not None
+    west = Ground(turned).place(0.0, 100.0, 0.3, 0.5 * math.pi)
     assert west.lon_deg == pytest.approx(16.0 - 100.0 / 74_630.0, abs=1e-6)
     assert west.course_deg == pytest.approx(270.0)
 

@@ -199,8 +199,8 @@ def _member(
 
 
 def _from_start(m: Member, plan: Plan) -> float | None:
-    """Straight distance from the plan's start, on its first floor."""
+    """Straight distance from the plan's start, on its floor."""
     p = m.report.position
-    if p is None or plan.start is None or p.floor != 0:
+    if p is None or plan.start is None or p.floor != plan.start.level:
         return None
     return math.hypot(p.x_m - plan.start.x_m, p.y_m - plan.start.y_m)

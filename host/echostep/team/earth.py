@@ -1,54 +1,36 @@
 """From the plan to the Earth: a position on the plan -> latitude and longitude.
 
-In: a plan with a georeference, a position, a heading. Out: `Place`. Owns nothing.
+In: a plan with a georeference, a position, a heading. Out: `Place`. Owns the projection.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from dataclasses import replace
 
+import numpy as np
+
+from echostep.building.earth import Earth
 from echostep.plan import Plan
 from echostep.team.report import Place
 
-EQUATOR_M, FLATTENING = 6_378_137.0, 1.0 / 298.257223563  # [WGS 84]
 
+class Ground:
+    """Where a plan with a georeference lies; `place` of a position on it, in WGS 84."""
 
-class Georeference(Protocol):
-    """What `Plan.georeference` tells: where the origin lies, and how far x is turned counter-clockwise from east."""
+    def __init__(self, plan: Plan) -> None:
+        """Raises ValueError when the plan has no georeference that can be used."""
+        if plan.georeference is None:
+            raise ValueError("the plan has no georeference")
+        self._rotation_rad = plan.georeference.rotation_rad
+        self._uncertainty_m = plan.uncertainty_m or 0.0
+        self._earth = Earth(replace(plan.georeference, crs="EPSG:4326"))
 
-    @property
-    def longitude_deg(self) -> float: ...
-    @property
-    def latitude_deg(self) -> float: ...
-    @property
-    def rotation_rad(self) -> float: ...
+    def place(self, x_m: float, y_m: float, sd_m: float, heading_rad: float | None) -> Place:
+        """Where a position is on Earth.
 
-
-def georeference(plan: Plan) -> Georeference | None:
-    """The plan's georeference, if it has one."""
-    return getattr(plan, "georeference", None)
-
-
-def place(plan: Plan, x_m: float, y_m: float, sd_m: float, heading_rad: float | None) -> Place | None:
-    """Where a position is on Earth; None without a georeference.
-
-    On the tangent plane at the plan's origin: within 1 mm for a kilometre. `sd_m` is widened by the plan's own uncertainty. The height stays unknown:
-    a plan's heights are not tied to the ellipsoid.
-    """
-    origin = georeference(plan)
-    if origin is None:
-        return None
-    c, s = math.cos(origin.rotation_rad), math.sin(origin.rotation_rad)
-    east, north = c * x_m - s * y_m, s * x_m + c * y_m
-    latitude = math.radians(origin.latitude_deg)
-    square = FLATTENING * (2.0 - FLATTENING)
-    curve = 1.0 - square * math.sin(latitude) ** 2
-    across, along = EQUATOR_M / math.sqrt(curve), EQUATOR_M * (1.0 - square) / curve**1.5  # radii of curvature
-    lat = origin.latitude_deg + math.degrees(north / along)
-    lon = origin.longitude_deg + math.degrees(east / (across * max(math.cos(latitude), 1e-9)))
-    course = None if heading_rad is None else (90.0 - math.degrees(heading_rad + origin.rotation_rad)) % 360.0
-    uncertainty = getattr(plan, "uncertainty_m", None) or 0.0
-    return Place(
-        max(-90.0, min(90.0, lat)), (lon + 180.0) % 360.0 - 180.0, None, math.hypot(sd_m, uncertainty), None, course
-    )
+        `sd_m` is widened by the plan's own uncertainty. The height stays unknown: a plan's heights are not tied to the ellipsoid.
+        """
+        ((lon, lat),) = self._earth.degrees(np.array([[x_m, y_m]]))
+        course = None if heading_rad is None else (90.0 - math.degrees(heading_rad + self._rotation_rad)) % 360.0
+        return Place(float(lat), float(lon), None, math.hypot(sd_m, self._uncertainty_m), None, course)

@@ -10,7 +10,7 @@ import importlib.metadata
 import math
 import secrets
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -18,9 +18,9 @@ from typing import Literal, Self
 
 from echostep.errors import EchostepError
 from echostep.estimate import CHI2_95, Estimate
-from echostep.plan import Plan
+from echostep.plan import Level, Plan
 from echostep.team.cot import StreamLine, UdpLine
-from echostep.team.earth import georeference, place
+from echostep.team.earth import Ground
 from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.mqtt import MqttLine
 from echostep.team.outbox import Line, Outbox
@@ -38,9 +38,10 @@ class Publishing:
 
     def __init__(self, outlet: Outlet, tracker: Tracker, source: Source, say: Callable[[str], None]) -> None:
         self._tracker, self._say = tracker, say
-        self._trail = Trail()
+        self._trail, self._levels = Trail(), tracker.plan.levels
         run = secrets.token_hex(4)
         self._blank = blank(tracker.plan, outlet.name, outlet.team, run, source)
+        self._ground = Ground(tracker.plan) if tracker.plan.georeference else None
         lines = [(_line(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(line, name, say) for line, name in lines]
         self._offer(self._blank)
@@ -52,7 +53,9 @@ class Publishing:
         streams = None
         for estimate in estimates:
             streams = streams or self._trail.streams(self._tracker, estimate.t_s)
-            self._offer(report(self._blank, self._tracker.plan, estimate, self._trail.motion(estimate), streams))
+            self._offer(
+                report(self._blank, self._levels, self._ground, estimate, self._trail.motion(estimate), streams)
+            )
 
     def __enter__(self) -> Self:
         return self
@@ -118,15 +121,18 @@ def blank(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
     )  # fmt: skip
 
 
-def report(blank: Report, plan: Plan, e: Estimate, motion: Motion, streams: Streams) -> Report:
+def report(
+    blank: Report, levels: Sequence[Level], ground: Ground | None, e: Estimate, motion: Motion, streams: Streams
+) -> Report:
     """The report of an estimate."""
     radius = e.ellipse95.major_m
     heading = e.heading_rad if e.heading_sd_rad <= UNKNOWN_RAD else None
     position = Position(
         t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2, radius95_m=radius,
-        heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=0, floor_name=plan.levels[0].name[:64],
+        heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=levels[e.level].name[:64],
+        floor_probability=min(max(e.levels[e.level], 0.0), 1.0), z_m=e.z_m, z_sd_m=e.z_sd_m,
     )  # fmt: skip
-    there = place(plan, e.x_m, e.y_m, radius / math.sqrt(CHI2_95), heading)
+    there = ground.place(e.x_m, e.y_m, radius / math.sqrt(CHI2_95), heading) if ground else None
     return replace(blank, status=e.status.value, position=position, motion=motion, place=there, streams=streams)
 
 
@@ -143,7 +149,7 @@ def battery_percent() -> int | None:
 def _line(endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str) -> Line:
     if endpoint.scheme in ("mqtt", "mqtts"):
         return MqttLine(endpoint, outlet.team, outlet.name, run)
-    if georeference(plan) is None:
+    if plan.georeference is None:
         raise EchostepError(
             f"{endpoint}: the plan has no georeference, and TAK needs latitude and longitude: add one to the plan, or use mqtt://"
         )

@@ -55,7 +55,11 @@ class Position:
     heading_sd_rad: Annotated[float, Meta(ge=0.0, le=100.0, description="standard deviation, rad")]
     floor: Annotated[int, Meta(ge=-1000, le=1000, description="index of the level in the plan")]
     floor_name: Text
-    floor_probability: Annotated[float, Meta(ge=0.0, le=1.0)] | None = None
+    floor_probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that he is on this floor")]
+    z_m: Annotated[
+        float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor he stands on, in the plan's metres")
+    ]
+    z_sd_m: Annotated[float, Meta(ge=0.0, le=LIMIT_M, description="standard deviation of it, m")]
 
 
 @dataclass(frozen=True, slots=True)
