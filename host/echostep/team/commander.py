@@ -65,6 +65,7 @@ def command(
         pass
     finally:
         reception.close()
+    look(inbox, roster)
     now_s = time.monotonic()
     if picture:
         draw_team(picture, plan, roster.members(now_s), now_s)

@@ -23,6 +23,7 @@ STALE_S = 10.0
 WAITING = 1024  # reports
 FRESH_S = 1.0  # what has waited longer than this is overtaken by the newest
 SETTLED_S = 2.0  # the tracker speaks twice a second, or at each stride; beyond this it is silent
+FARTHEST_S = 1e5  # after a day's walk nothing is left to say
 BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0)
 CLOSING_S = 3.0
 
@@ -195,4 +196,4 @@ def aged(position: Position, age_s: float) -> Position:
 
 def _walked2(age_s: float) -> float:
     """Variance of a walk that nobody watched, m2."""
-    return (WALKER_M_S * age_s) ** 2 if age_s > SETTLED_S else 0.0
+    return (WALKER_M_S * min(age_s, FARTHEST_S)) ** 2 if age_s > SETTLED_S else 0.0

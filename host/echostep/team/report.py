@@ -22,12 +22,8 @@ MAX_PAYLOAD = 8192  # bytes; ours have about 900
 LIMIT_M = 1e5
 
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="m, on the plan (x east, y north)")]
-Variance = Annotated[float, Meta(ge=0.0, le=1e12, description="m2")]
-Count = Annotated[int, Meta(ge=0, le=2**53)]
-Rate = Annotated[float, Meta(ge=0.0, le=1e6, description="per second")]
-Text = Annotated[str, Meta(max_length=64)]
 Name = Annotated[
-    str, Meta(min_length=1, max_length=32, pattern="^[^/+#]*$", description="1 to 32 printable characters, no / + #")
+    str, Meta(min_length=1, max_length=32, pattern="^[^/+#]*$", description="printable characters, no / + #")
 ]
 Moment = Annotated[str, Meta(min_length=20, max_length=32, description="UTC, RFC 3339, by the tracker's clock")]
 Heading = Annotated[float, Meta(ge=-7.0, le=7.0, description="rad counter-clockwise from x")]
@@ -54,7 +50,7 @@ class Position:
     heading_rad: Heading | None
     heading_sd_rad: Annotated[float, Meta(ge=0.0, le=100.0, description="standard deviation, rad")]
     floor: Annotated[int, Meta(ge=-1000, le=1000, description="index of the level in the plan")]
-    floor_name: Text
+    floor_name: Annotated[str, Meta(max_length=64, description="its name")]
     floor_probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that he is on this floor")]
     z_m: Annotated[
         float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor he stands on, in the plan's metres")
@@ -66,7 +62,7 @@ class Position:
 class Motion:
     """How the wearer moves."""
 
-    steps: Count
+    steps: Annotated[int, Meta(ge=0, le=2**53, description="of the foot that wears the MTx")]
     walked_m: Annotated[float, Meta(ge=0.0, le=1e9, description="length of the track so far, m")]
     speed_m_s: Annotated[float, Meta(ge=0.0, le=100.0, description="over the last seconds, m/s")]
     still_s: Annotated[float, Meta(ge=0.0, le=1e9, description="seconds since the last step")]
@@ -91,8 +87,8 @@ class Place:
 class Streams:
     """Health of what the sensors send."""
 
-    mtx_hz: Rate
-    board_hz: Rate
+    mtx_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="samples of the MTx per second")]
+    board_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="messages of the sensor board per second")]
     bad: Annotated[int, Meta(ge=0, le=2**53, description="frames that failed a check, both ports, since the start")]
     lost: Annotated[int, Meta(ge=0, le=2**53, description="frames that never came, both ports, since the start")]
     dropped: Annotated[int, Meta(ge=0, le=2**53, description="messages that the board had no room for")]
@@ -103,22 +99,27 @@ class Streams:
 class Report:
     """All of it; `position` is missing until the tracker has its first estimate."""
 
-    echostep_report: Literal[1]
+    echostep_report: Annotated[Literal[1], Meta(description="version of this form")]
     team: Name
     name: Name
     run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$", description="one run of one tracker; another run, another one")]
     sequence: Annotated[int, Meta(ge=0, le=2**53, description="counts the reports made in this run")]
-    time: Moment
-    stale: Moment
+    time: Annotated[Moment, Meta(description="when it was sent: UTC, RFC 3339, by the tracker's clock")]
+    stale: Annotated[Moment, Meta(description="until when it holds, by the same clock")]
     source: Annotated[Literal["live", "replay", "simulated"], Meta(description="where the bytes come from")]
-    status: Literal["waiting", "tracking", "uncertain", "lost"]
-    position: Position | None
-    motion: Motion | None
-    place: Place | None
-    streams: Streams | None
-    plan: Text
-    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-    version: Annotated[str, Meta(max_length=32)]
+    status: Annotated[
+        Literal["waiting", "tracking", "uncertain", "lost"],
+        Meta(
+            description="waiting: no estimate yet; uncertain: beyond 1 m of 95 % radius; lost: beyond 5 m, or the sensors are silent"
+        ),
+    ]
+    position: Annotated[Position | None, Meta(description="missing while waiting")]
+    motion: Annotated[Motion | None, Meta(description="missing while waiting")]
+    place: Annotated[Place | None, Meta(description="missing without a georeference")]
+    streams: Annotated[Streams | None, Meta(description="missing while waiting")]
+    plan: Annotated[str, Meta(max_length=64, description="name of the plan that he is tracked on")]
+    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="of the plan's file")]
+    version: Annotated[str, Meta(max_length=32, description="of the tracker's echostep")]
     battery_percent: Annotated[int, Meta(ge=0, le=100, description="charge of the tracker's computer")] | None
     superseded: Annotated[
         int, Meta(ge=0, le=2**53, description="reports that a newer one overtook before they could be sent")
