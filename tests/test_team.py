@@ -176,6 +176,15 @@ def test_what_a_broker_remembers_is_as_old_as_it_says() -> None:
     assert member.silent_s(NOW) == pytest.approx(300.0)
 
 
+def test_what_is_of_another_day_is_not_shown() -> None:
+    roster = heard(report(at_s=UNIX - 90_000.0), retained=True)
+    assert (roster.members(NOW), list(roster.counts)) == ([], ["remembered by the broker for more than a day"])
+    roster = heard(report(at_s=UNIX - 3000.0), retained=True)
+    roster.hear("echostep/red/anna/presence", encode(Presence(1, "0123abcd", "ended")), True, NOW, UNIX)
+    assert len(roster.members(NOW)) == 1
+    assert len(roster.members(NOW + 700.0)) == 0
+
+
 def test_two_trackers_of_one_name_are_both_shown_and_named() -> None:
     roster = heard(said(), said(run="ffffffff", sequence=5))
     assert roster.duplicates(NOW) == {("red", "anna")}

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
@@ -29,10 +30,13 @@ from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, Need, Roster, nea
 from echostep.team.team_picture import draw_team
 
 LOOK_S = 0.25
+WIDE = 110  # columns of a terminal that has room for all
+WIDEST = 24  # of one of them
 COLUMNS = {
-    "who": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "looks": "right",
-    "to start m": "right", "nearest m": "left", "walked m": "right", "note": "left",
+    "who": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "to start": "right",
+    "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
+SPARED = ("looks", "nearest m", "walked m")  # in a narrow terminal
 STYLES = {
     Need.LOST: "bold white on red", Need.STALE: "bold red", Need.UNCERTAIN: "yellow",
     Need.WAITING: "cyan", Need.TRACKING: "green", Need.ENDED: "grey62",
@@ -60,7 +64,10 @@ def command(
                 time.sleep(min(LOOK_S, max(end_s - time.monotonic(), 0.0)))
                 look(inbox, roster)
                 if not as_json:
-                    shown.update(table(roster, plan, time.monotonic(), connected=reception.connected), refresh=True)
+                    shown.update(
+                        table(roster, plan, time.monotonic(), connected=reception.connected, columns=console.width),
+                        refresh=True,
+                    )
     except KeyboardInterrupt:
         pass
     finally:
@@ -84,17 +91,23 @@ def look(inbox: Inbox, roster: Roster) -> None:
         roster.refuse(why, count)
 
 
-def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool) -> Group:
-    """The roster for people."""
+def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns: int = WIDE) -> Group:
+    """The roster for people, a line for each, in so many columns."""
     members = roster.members(now_s)
     made = Table(
         title=f"{plan.name}: {summary(members, now_s)}", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
     )
-    for name, kind in COLUMNS.items():
-        made.add_column(name, justify=kind, no_wrap=name in ("who", "state", "x, y m"))  # type: ignore[arg-type]
+    names = [name for name in COLUMNS if columns >= WIDE or name not in SPARED]
     duplicates = roster.duplicates(now_s)
-    for m in members:
-        made.add_row(*map(Text, _cells(m, members, plan, now_s, duplicates)), style=STYLES[m.need(now_s)])
+    rows = [_cells(m, members, plan, now_s, duplicates) for m in members]
+    left = columns - 2
+    for name in names:
+        longest = max([len(name)] + [cell_len(row[name]) for row in rows])
+        width = max(left, 8) if name == "note" else min(longest, WIDEST)
+        left -= width + 2
+        made.add_column(name, justify=COLUMNS[name], no_wrap=True, width=width)  # type: ignore[arg-type]
+    for m, row in zip(members, rows, strict=True):
+        made.add_row(*(Text(row[name]) for name in names), style=STYLES[m.need(now_s)])
     below = [] if connected else [Text("no connection to the broker", style="bold red")]
     if roster.counts:
         below.append(Text(f"not believed: {refused(roster)}", style="grey62"))
@@ -116,21 +129,21 @@ def refused(roster: Roster) -> str:
 
 def _cells(
     m: Member, members: Sequence[Member], plan: Plan, now_s: float, duplicates: set[tuple[str, str]]
-) -> list[str]:
-    r, p, near = m.report, m.report.position, nearest(m, members)
+) -> dict[str, str]:
+    r, p, near = m.report, m.position(now_s), nearest(m, members)
     from_start = _from_start(m, plan)
-    return [
-        f"{r.team}/{r.name}",
-        _state(m, now_s),
-        f"{p.x_m:.1f}, {p.y_m:.1f}" if p else "",
-        f"{p.radius95_m:.1f}" if p else "",
-        p.floor_name if p else "",
-        "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
-        "" if from_start is None else f"{from_start:.0f}",
-        f"{near[0]:.1f} {near[1].report.name}" if near else "",
-        f"{r.motion.walked_m:.0f}" if r.motion else "",
-        "; ".join(notes(m, plan, duplicates)),
-    ]
+    return {
+        "who": f"{r.team}/{r.name}",
+        "state": _state(m, now_s),
+        "x, y m": f"{p.x_m:.1f}, {p.y_m:.1f}" if p else "",
+        "±95% m": f"{p.radius95_m:.1f}" if p else "",
+        "floor": p.floor_name if p else "",
+        "to start": "" if from_start is None else f"{from_start:.0f} m",
+        "looks": "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
+        "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",
+        "walked m": f"{r.motion.walked_m:.0f}" if r.motion else "",
+        "note": "; ".join(notes(m, plan, duplicates)),
+    }
 
 
 def _state(m: Member, now_s: float) -> str:
@@ -190,6 +203,7 @@ def _member(
         "stale": m.silent_s(now_s) > m.patience_s or m.presence == "broken",
         "presence": m.presence,
         "remembered": m.retained,
+        "radius95_m": p.radius95_m if (p := m.position(now_s)) else None,
         "clock_ahead_s": round(m.clock_off_s, 3),
         "missed": m.missed,
         "from_start_m": _from_start(m, plan),

@@ -78,11 +78,15 @@ class Outbox:
                 self.counts.overtaken += 1
             self._changed.notify()
 
-    def close(self) -> str:
-        """Send what is fresh, end the thread, and tell how it went."""
+    def end(self) -> None:
+        """Begin to close: send what is fresh, then end the thread."""
         with self._changed:
-            self._closing_s = time.monotonic() + CLOSING_S
+            self._closing_s = self._closing_s or time.monotonic() + CLOSING_S
             self._changed.notify()
+
+    def close(self) -> str:
+        """Wait for the end, some seconds at most, and tell how it went."""
+        self.end()
         self._thread.join(CLOSING_S + 6.0)
         c = self.counts
         unsent = c.offered - c.sent - c.overtaken

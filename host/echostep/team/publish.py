@@ -62,6 +62,8 @@ class Publishing:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         for outbox in self._outboxes:
+            outbox.end()
+        for outbox in self._outboxes:
             self._say(outbox.close())
 
     def _offer(self, made: Report) -> None:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from echostep.team.outbox import aged
 from echostep.team.report import BadReportError, Position, Presence, Report, check_name, decode, decode_presence
 
 MOST_MEMBERS = 256
@@ -21,6 +22,8 @@ CLOCK_JUMP_S = 5.0
 MOST_STALE_S = 60.0  # no tracker may ask for a longer patience
 HURRY_M_S = 12.0  # nobody walks so fast: the position has jumped
 STILL_S = 30.0
+ENDED_KEPT_S = 3600.0  # runs that ended are shown for so long
+REMEMBERED_S = 86_400.0  # what a broker remembers for longer is of another day
 KEPT_S = 60.0  # a run that a newer run of the same name has replaced is forgotten after so long
 
 
@@ -62,6 +65,13 @@ class Member:
     def silent_s(self, now_s: float) -> float:
         """Seconds without a word."""
         return max(now_s - self.heard_s, 0.0)
+
+    def position(self, now_s: float) -> Position | None:
+        """Where he may be by now: when he is silent, as far as he may have walked since."""
+        p, silent_s = self.report.position, self.silent_s(now_s)
+        if p is None or self.presence == "ended" or silent_s <= self.patience_s:
+            return p
+        return replace(aged(p, silent_s), age_s=p.age_s + silent_s)
 
     def need(self, now_s: float) -> Need:
         """What the commander should think of him."""
@@ -129,6 +139,8 @@ class Roster:
             raise BadReportError("name and topic contradict each other")
         key = (team, name, r.run)
         off_s = r.sent_s - unix_s
+        if retained and off_s < -REMEMBERED_S:
+            raise BadReportError("remembered by the broker for more than a day")
         heard_s = now_s - max(-off_s, 0.0) if retained else now_s
         last = self._members.get(key)
         if last is None:
@@ -165,7 +177,7 @@ class Roster:
             m.key
             for m in self._members.values()
             if (m.heard_s < newest[m.key[:2]] and (m.presence != "online" or m.silent_s(now_s) > KEPT_S))
-            or (hard and m.need(now_s) is Need.ENDED)
+            or (m.need(now_s) is Need.ENDED and (hard or m.silent_s(now_s) > ENDED_KEPT_S))
         ]
         for key in gone:
             del self._members[key]
@@ -197,7 +209,7 @@ def distance_m(a: Position, b: Position) -> float | None:
 
 
 def nearest(me: Member, others: Iterable[Member]) -> tuple[float, Member] | None:
-    """The closest other member with a position on the same floor."""
+    """The closest other member with a position on the same floor; by their last known places."""
     if me.report.position is None:
         return None
     found = [
