@@ -14,6 +14,7 @@ import resource
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -53,6 +54,20 @@ def publish(url: str, plan: Plan, trackers: int, rate_hz: float, seconds: float)
     return [box.close() for box in boxes]
 
 
+def flood(port: int, rate_hz: float, ended: threading.Event) -> None:
+    """Somebody sends the same nonsense so many times a second, at QoS 0, past every queue of ours [MQTT 3.1.1, 3.1 and 3.3]."""
+    payload, topic = b'{"echostep_report":1,"team":"evil"}' + b" " * 700, b"echostep/evil/eve/estimate"
+    rest = struct.pack(">H", len(topic)) + topic + payload
+    packets = (b"\x30" + bytes([len(rest) & 127 | 128, len(rest) >> 7]) + rest) * 100
+    with socket.create_connection(("127.0.0.1", port)) as sock:
+        sock.sendall(b"\x10\x10\x00\x04MQTT\x04\x02\x00\x3c\x00\x04evil")
+        began, sent = time.monotonic(), 0
+        while not ended.is_set():
+            sock.sendall(packets)
+            sent += 100
+            time.sleep(max(began + sent / rate_hz - time.monotonic(), 0.0))
+
+
 def drain(descriptor: int) -> None:
     """Read a pseudo terminal until it is closed."""
     try:
@@ -80,14 +95,19 @@ def follow(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.
     return running
 
 
-def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: float) -> None:
+def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: float, flood_hz: float) -> None:
     """Two commanders follow, one draws its table, one keeps the roster; print what they used and heard."""
     drawing = follow(url, plan_path, terminal=True)
     keeping = follow(url, plan_path, "--json", terminal=False)
     time.sleep(5.0)
     before_s, mine_s = (cpu_s(drawing.pid), cpu_s(keeping.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     began = time.monotonic()
+    ended = threading.Event()
+    if flood_hz:
+        port = int(url.rpartition(":")[2])
+        threading.Thread(target=flood, args=(port, flood_hz, ended), daemon=True).start()
     summaries = publish(url, load_plan(plan_path), trackers, rate_hz, seconds)
+    ended.set()
     span_s = time.monotonic() - began
     after_s, ours_s = (cpu_s(drawing.pid), cpu_s(keeping.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     for commander in (drawing, keeping):
@@ -99,10 +119,13 @@ def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: f
     print(f"{trackers} trackers x {rate_hz:g} estimates/s for {span_s:.0f} s on {os.cpu_count()} cores")
     for name, a, b in zip(("with its table", "roster only"), after_s, before_s, strict=True):
         print(f"commander, {name}: {100.0 * (a - b) / span_s:.1f} % of one core")
-    print(f"publishing, each tracker: {100.0 * (ours_s - mine_s) / span_s / trackers:.2f} % of one core")
-    missed = sum(m["missed"] for m in roster["members"])
+    if not flood_hz:
+        print(f"publishing, each tracker: {100.0 * (ours_s - mine_s) / span_s / trackers:.2f} % of one core")
+    followed = [m for m in roster["members"] if m["team"] == "load"]
+    missed, refused = sum(m["missed"] for m in followed), sum(roster["not_believed"].values())
+    print(f"{roster['heard']} messages heard, {refused} not believed")
     print(
-        f"messages heard {roster['heard']}, missed {missed}, not believed {sum(roster['not_believed'].values())}; trackers that overtook: {late}"
+        f"{len(followed)} trackers followed, {missed} of their reports missed; {late} overtook some or left some unsent"
     )
 
 
@@ -112,6 +135,7 @@ def main() -> None:
     parser.add_argument("--trackers", type=int, default=20)
     parser.add_argument("--rate", type=float, default=10.0)
     parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--flood", type=float, default=0.0, help="hostile messages per second beside them")
     asked = parser.parse_args()
     mosquitto = shutil.which("mosquitto", path=os.environ["PATH"] + ":/usr/sbin")
     if mosquitto is None:
@@ -123,7 +147,7 @@ def main() -> None:
         configuration.write_text(f"user root\nlistener {port} 127.0.0.1\nallow_anonymous true\n")
         broker = subprocess.Popen([mosquitto, "-c", str(configuration)], stderr=subprocess.DEVNULL)
         try:
-            measure(f"mqtt://127.0.0.1:{port}", plan_path, asked.trackers, asked.rate, asked.seconds)
+            measure(f"mqtt://127.0.0.1:{port}", plan_path, asked.trackers, asked.rate, asked.seconds, asked.flood)
         finally:
             broker.terminate()
             broker.wait(10)

@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
@@ -239,7 +240,7 @@ def _published(outlet: Outlet | None, tracker: Tracker, source: Source) -> Itera
         return
     from echostep.team.publish import Publishing
 
-    with Publishing(outlet, tracker, source, console.print) as publishing:
+    with Publishing(outlet, tracker, source, partial(console.print, markup=False, highlight=False)) as publishing:
         yield publishing.tell
 
 

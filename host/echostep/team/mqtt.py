@@ -7,23 +7,16 @@ queue are not used, for they would keep old estimates.
 
 from __future__ import annotations
 
-import struct
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 import paho.mqtt.client as paho
-from paho.mqtt.enums import CallbackAPIVersion
 
+from echostep.team.broker import FAULTS, LOOP_S, RefusedError, connect, drop, make_client, pump, turn
 from echostep.team.endpoint import Endpoint, tls_context
 from echostep.team.report import Presence, Report, encode
-
-ANSWER_S = 5.0  # the broker's answers are waited for so long
-KEEPALIVE_S = 6
-LOOP_S = 0.05
-MAX_PACKET = 65_536  # the broker is asked to send nothing longer
-_FAULTS = (OSError, ValueError, RuntimeError, struct.error, IndexError, AttributeError, TypeError, KeyError)
 
 
 class MqttLine:
@@ -37,7 +30,7 @@ class MqttLine:
 
     def open(self) -> None:
         """Connect; raises OSError with the broker's reason."""
-        client = _client(self._endpoint, self._tls, f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}")
+        client = make_client(self._endpoint, self._tls, f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}")
         client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=1, retain=True)
         self._client = client
         connect(client, self._endpoint)
@@ -58,11 +51,11 @@ class MqttLine:
                 self._publish("presence", self._presence("ended"))
                 client.disconnect()
                 client.loop(LOOP_S)
-        except _FAULTS:
+        except FAULTS:
             pass
         finally:
             self._client = None
-            _drop(client)
+            drop(client)
 
     def _presence(self, presence: Any) -> bytes:
         return encode(Presence(1, self._run, presence))
@@ -74,69 +67,8 @@ class MqttLine:
         try:
             info = client.publish(f"{self._topic}/{leaf}", payload, qos=1, retain=True)
             pump(client, info.is_published, "the broker does not acknowledge")
-        except OSError:
-            raise
-        except _FAULTS as error:
-            raise ConnectionError(f"the broker sends nonsense: {error}") from error
-
-
-def connect(client: paho.Client, endpoint: Endpoint) -> None:
-    """Connect and wait until the broker agrees; raises OSError."""
-    refused: list[str] = []
-
-    def answered(_client: paho.Client, _user: Any, _flags: Any, code: Any, _properties: Any) -> None:
-        if code.is_failure:
-            refused.append(str(code))
-
-    client.on_connect = answered
-    try:
-        client.connect(endpoint.host, endpoint.port, keepalive=KEEPALIVE_S)
-        pump(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
-    except OSError as error:
-        raise type(error)(refused[0]) if refused else ConnectionError(_reason(error)) from error
-    except _FAULTS as error:
-        raise ConnectionError(f"the broker sends nonsense: {error}") from error
-    if refused:
-        raise ConnectionError(f"the broker refuses: {refused[0]}")
-
-
-def pump(client: paho.Client, done: Callable[[], bool], otherwise: str) -> None:
-    """Run the connection until something is done; raises OSError when it breaks or takes too long."""
-    end_s = time.monotonic() + ANSWER_S
-    while not done():
-        turn(client, LOOP_S)
-        if time.monotonic() > end_s:
-            raise TimeoutError(otherwise)
-
-
-def turn(client: paho.Client, timeout_s: float) -> None:
-    """Wait for the connection and run it once, which takes in one packet; raises OSError when it is broken."""
-    code = client.loop(timeout_s)
-    if code != paho.MQTT_ERR_SUCCESS:
-        raise ConnectionError(f"the connection broke: {paho.error_string(code)}")
-
-
-def _client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = False) -> paho.Client:
-    protocol = paho.MQTTv5 if newest else paho.MQTTv311
-    client = paho.Client(CallbackAPIVersion.VERSION2, identity, protocol=protocol, reconnect_on_failure=False)
-    client.connect_timeout = ANSWER_S
-    if endpoint.user is not None:
-        client.username_pw_set(endpoint.user, endpoint.password)
-    if tls is not None:
-        client.tls_set_context(tls)
-    return client
-
-
-def _drop(client: paho.Client) -> None:
-    """Close the socket without a word, whatever state it is in."""
-    with suppress(*_FAULTS):
-        sock = client.socket()
-        if sock is not None:
-            sock.close()
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error) or type(error).__name__
+        except (ValueError, RuntimeError) as error:
+            raise ConnectionError(f"cannot publish: {error}") from error
 
 
 class Listener:
@@ -150,12 +82,12 @@ class Listener:
 
     def open(self) -> None:
         """Connect and subscribe; raises OSError. A broker that knows no MQTT 5 is asked in MQTT 3.1.1 the next time."""
-        client = _client(self._endpoint, self._tls, "", newest=self._newest)
+        client = make_client(self._endpoint, self._tls, "", newest=self._newest)
         client.on_message = self._message
         self._client = client
         try:
-            self._connect(client)
-        except OSError:
+            connect(client, self._endpoint)
+        except RefusedError:
             self._newest = not self._newest
             raise
         subscribed: list[bool] = []
@@ -165,27 +97,19 @@ class Listener:
         if not subscribed[0]:
             raise ConnectionError(f"the broker does not let us read {self._topic}")
 
-    def _connect(self, client: paho.Client) -> None:
-        connect(client, self._endpoint)
-
     def turn(self, timeout_s: float) -> None:
         """Bring what has come; raises OSError when the connection is broken."""
         if self._client is None:
             raise ConnectionError("not connected")
-        try:
-            turn(self._client, timeout_s)
-        except OSError:
-            raise
-        except _FAULTS as error:
-            raise ConnectionError(f"the broker sends nonsense: {error}") from error
+        turn(self._client, timeout_s)
 
     def close(self) -> None:
         """End the connection; raises nothing."""
         client, self._client = self._client, None
         if client is not None:
-            with suppress(*_FAULTS):
+            with suppress(*FAULTS):
                 client.disconnect()
-            _drop(client)
+            drop(client)
 
     def _message(self, _client: paho.Client, _user: Any, message: paho.MQTTMessage) -> None:
         try:
