@@ -21,6 +21,6 @@ def report(name: str = "anna", sequence: int = 1, at_s: float | None = None, **f
     sent_s = time.time() if at_s is None else at_s
     made = Report(
         1, "red", name, "0123abcd", sequence, moment(sent_s), moment(sent_s + 10.0), "live", "tracking", POSITION,
-        Motion(7, 9.5, 1.2, 0.4), PLACE, Streams(100.0, 360.0, 0, 0, 0, True), "Demo office", load_plan(PLAN).digest, "0.1.0", None, 0,
+        Motion(7, 9.5, 1.2, 0.4), PLACE, Streams(100.0, 360.0, 0, 0, 0, True, ()), "Demo office", load_plan(PLAN).digest, "0.1.0", None, 0,
     )  # fmt: skip
     return replace(made, **fields)

@@ -87,6 +87,8 @@ def test_a_report_reads_back_as_it_was_and_obeys_its_schema() -> None:
         (b"{", b'{"a":' * 1000, "not JSON"),
         (b'"status":"tracking"', b'"status":"\\u001b[2J"', "^wrong field status$"),
         (b'"team":"red",', b"", "no field `team`"),
+        (b'"findings":[]', b'"findings":["\\u001b[2J"]', "unprintable"),
+        (b'"findings":[]', b'"findings":["a","b","c","d","e"]', "findings"),
     ],
 )
 def test_a_wrong_payload_is_refused_by_name(old: bytes, new: bytes, why: str) -> None:

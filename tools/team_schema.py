@@ -39,6 +39,8 @@ def kind(row: dict[str, Any]) -> str:
         return " or ".join(kind(part) for part in row["anyOf"])
     if "enum" in row:
         return ", ".join(f"`{value}`" for value in row["enum"])
+    if row.get("type") == "array":
+        return f"list of {kind(row['items'])}"
     return str(row.get("type", ""))
 
 
@@ -49,6 +51,8 @@ def limits(row: dict[str, Any]) -> str:
     low, high = row.get("minimum"), row.get("maximum")
     if low is not None:
         return f"{low:g} to {'2^53' if high == 2**53 else f'{high:g}'}"
+    if "maxItems" in row:
+        return f"at most {row['maxItems']}, of {limits(row['items'])}"
     least, most = row.get("minLength", 0), row.get("maxLength")
     if most is not None:
         return f"{least} to {most} characters"

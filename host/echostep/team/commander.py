@@ -172,6 +172,7 @@ def notes(m: Member, plan: Plan, duplicates: set[tuple[str, str]]) -> list[str]:
         said.append(f"clock {'ahead' if m.clock_off_s > 0 else 'behind'} by {abs(m.clock_off_s):.0f} s")
     if r.battery_percent is not None and r.battery_percent < 20:
         said.append(f"battery {r.battery_percent} %")
+    said += r.streams.findings if r.streams else ()
     if r.streams and r.streams.dropped + r.streams.lost + r.streams.bad:
         said.append(f"{r.streams.bad} bad, {r.streams.lost} lost, {r.streams.dropped} dropped frames")
     said += [f"{why} {count} x" for why, count in m.notes.items()]

@@ -9,8 +9,9 @@ from __future__ import annotations
 import importlib.metadata
 import math
 import secrets
+import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -18,13 +19,14 @@ from typing import Literal, Self
 
 from echostep.errors import EchostepError
 from echostep.estimate import CHI2_95, Estimate
+from echostep.health import board_findings
 from echostep.plan import Level, Plan
 from echostep.team.cot import StreamLine, UdpLine
 from echostep.team.earth import Ground
 from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.mqtt import MqttLine
-from echostep.team.outbox import Line, Outbox
-from echostep.team.report import Motion, Position, Report, Streams
+from echostep.team.outbox import HEARTBEAT_S, Line, Outbox
+from echostep.team.report import Motion, Position, Report, Streams, printable
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -39,6 +41,7 @@ class Publishing:
     def __init__(self, outlet: Outlet, tracker: Tracker, source: Source, say: Callable[[str], None]) -> None:
         self._tracker, self._say = tracker, say
         self._trail, self._levels = Trail(), tracker.plan.levels
+        self._before, self._told_s = Trail(), time.monotonic()  # the first estimate
         run = secrets.token_hex(4)
         self._blank = blank(tracker.plan, outlet.name, outlet.team, run, source)
         self._ground = Ground(tracker.plan) if tracker.plan.georeference else None
@@ -46,16 +49,23 @@ class Publishing:
         self._outboxes = [Outbox(line, name, say) for line, name in lines]
         self._offer(self._blank)
 
-    def tell(self, estimates: Iterable[Estimate]) -> None:
+    def tell(self, estimates: Sequence[Estimate]) -> None:
         """Offer a report of each estimate; takes microseconds and never waits."""
-        if not self._outboxes:
+        if not estimates:
+            self._still_waiting(time.monotonic())
             return
-        streams = None
+        self._told_s = math.inf
+        streams = self._trail.streams(self._tracker, estimates[0].t_s)
         for estimate in estimates:
-            streams = streams or self._trail.streams(self._tracker, estimate.t_s)
             self._offer(
                 report(self._blank, self._levels, self._ground, estimate, self._trail.motion(estimate), streams)
             )
+
+    def _still_waiting(self, now_s: float) -> None:
+        """Before the first estimate, tell now and then how the streams are."""
+        if now_s - self._told_s >= HEARTBEAT_S:
+            self._told_s = now_s
+            self._offer(replace(self._blank, streams=self._before.streams(self._tracker, now_s)))
 
     def __enter__(self) -> Self:
         return self
@@ -111,6 +121,7 @@ class Trail:
             lost=board.lost + mtx.lost,
             dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
             synchronised=bool(intake.timeline.synchronised),
+            findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in board_findings(intake.words)[:4]),
         )
 
 
@@ -118,7 +129,7 @@ def blank(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
     """The report of a tracker that has no estimate yet; number and times are stamped when it is sent."""
     return Report(
         echostep_report=1, team=team, name=name, run=run, sequence=0, time="", stale="", source=source, status="waiting",
-        position=None, motion=None, place=None, streams=None, plan=plan.name[:64], plan_sha256=plan.digest,
+        position=None, motion=None, place=None, streams=None, plan=printable(plan.name, 64), plan_sha256=plan.digest,
         version=importlib.metadata.version("echostep")[:32], battery_percent=battery_percent(), superseded=0,
     )  # fmt: skip
 
@@ -131,7 +142,7 @@ def report(
     heading = e.heading_rad if e.heading_sd_rad <= UNKNOWN_RAD else None
     position = Position(
         t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2, radius95_m=radius,
-        heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=levels[e.level].name[:64],
+        heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=printable(levels[e.level].name, 64),
         floor_probability=min(max(e.levels[e.level], 0.0), 1.0), z_m=e.z_m, z_sd_m=e.z_sd_m,
     )  # fmt: skip
     there = ground.place(e.x_m, e.y_m, radius / math.sqrt(CHI2_95), heading) if ground else None

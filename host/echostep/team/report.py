@@ -93,6 +93,10 @@ class Streams:
     lost: Annotated[int, Meta(ge=0, le=2**53, description="frames that never came, both ports, since the start")]
     dropped: Annotated[int, Meta(ge=0, le=2**53, description="messages that the board had no room for")]
     synchronised: Annotated[bool, Meta(description="the MTx is timed by its SyncOut wire")]
+    findings: Annotated[
+        tuple[Annotated[str, Meta(max_length=100)], ...],
+        Meta(max_length=4, description="what is wrong with the sensors, the worst first"),
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +120,7 @@ class Report:
     position: Annotated[Position | None, Meta(description="missing while waiting")]
     motion: Annotated[Motion | None, Meta(description="missing while waiting")]
     place: Annotated[Place | None, Meta(description="missing without a georeference")]
-    streams: Annotated[Streams | None, Meta(description="missing while waiting")]
+    streams: Annotated[Streams | None, Meta(description="missing until something is heard")]
     plan: Annotated[str, Meta(max_length=64, description="name of the plan that he is tracked on")]
     plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="of the plan's file")]
     version: Annotated[str, Meta(max_length=32, description="of the tracker's echostep")]
@@ -165,7 +169,8 @@ def decode(payload: bytes) -> Report:
         raise BadReportError("position: not a covariance")
     if (p is None) != (report.status == "waiting"):
         raise BadReportError("status and position contradict each other")
-    for text in (report.plan, report.version, p.floor_name if p else ""):
+    findings = report.streams.findings if report.streams else ()
+    for text in (report.plan, report.version, p.floor_name if p else "", *findings):
         if not _printable(text):
             raise BadReportError("unprintable text")
     return report
@@ -211,6 +216,11 @@ def checked_name(option: str, text: str) -> str:
     except BadReportError as error:
         raise EchostepError(f"{option} {text!r}: {error}") from error
     return text
+
+
+def printable(text: str, most: int) -> str:
+    """A text of ours as a report may carry it."""
+    return "".join(c if _printable(c) else " " for c in text[:most])
 
 
 def _printable(text: str) -> bool:

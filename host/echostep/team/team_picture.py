@@ -37,7 +37,9 @@ def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -
         axes = figure.add_subplot(
             len(floors), 1, k + 1, aspect="equal", title=f"{plan.name}: {level.name}", xlabel="x / m", ylabel="y / m"
         )
-        axes.add_collection(LineCollection(list(level.walls.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
+        axes.add_collection(LineCollection(list(level.solid.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
+        for room in level.rooms:
+            axes.text(*room.at_m, room.name.replace("$", r"\$"), ha="center", va="center", color="#888888", fontsize=8)
         axes.autoscale_view()
         axes.autoscale(enable=False)  # the ellipse of somebody lost may be larger than the plan
         labels: list[tuple[float, float]] = []
