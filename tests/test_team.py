@@ -19,7 +19,7 @@ from echostep.estimate import Estimate, Status
 from echostep.plan import Georeference, load_plan
 from echostep.team import outbox
 from echostep.team.commander import as_tree, look, table
-from echostep.team.cot import event
+from echostep.team.cot import event, uid
 from echostep.team.earth import Ground
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import PER_TOPIC, Inbox
@@ -134,6 +134,21 @@ def test_a_damaged_report_never_stops_the_roster(garbage: bytes, at: int, cut: i
         assert math.isfinite(member.silent_s(NOW))
 
 
+@given(st.lists(st.tuples(
+    st.none() | st.text(max_size=20) | st.sampled_from(["echostep/red/anna/estimate", "echostep/red/anna/presence"]),
+    st.binary(max_size=60) | st.sampled_from([encode(report()), encode(Presence(1, "0123abcd", "broken"))]),
+    st.booleans(),
+)))  # fmt: skip
+def test_no_sequence_of_messages_stops_the_commander(letters: list[tuple[str | None, bytes, bool]]) -> None:
+    inbox, roster = Inbox(), Roster()
+    for letter in letters:
+        inbox.hear(*letter)
+    look(inbox, roster)
+    assert roster.heard == len(letters)
+    assert len(roster.members(time.monotonic())) <= 1
+    table(roster, load_plan(PLAN), time.monotonic(), connected=False, columns=60)
+
+
 @pytest.mark.parametrize("text", ["", " anna", "anna ", "a/b", "a+", "#", "a\nb", "\x1b[2J", "a\u200bb", "a" * 33])
 def test_a_name_that_could_confuse_is_refused(text: str) -> None:
     with pytest.raises(BadReportError):
@@ -204,6 +219,8 @@ def test_a_restarted_tracker_replaces_its_former_run() -> None:
 
 def test_old_reports_and_clocks_that_jump_are_counted() -> None:
     roster = heard(said(sequence=4), said(sequence=3), said(sequence=4))
+    assert roster.counts == {"older than what was heard before": 2}
+    roster.hear("echostep/red/anna/estimate", encode(said(sequence=4)), True, NOW, UNIX)  # after a new connection
     assert roster.counts == {"older than what was heard before": 2}
     roster.hear("echostep/red/anna/estimate", encode(report(sequence=8, at_s=UNIX + 3600.0)), False, NOW, UNIX)
     (member,) = roster.members(NOW)
@@ -415,6 +432,9 @@ def test_an_event_of_cursor_on_target() -> None:
         "ce": "0.32",
         "le": "9999999.0",
     }
+    group = top.find("detail/__group")
+    assert group is not None
+    assert group.attrib == {"name": "Red", "role": "Team Member"}
     contact, track, status = (top.find(f"detail/{name}") for name in ("contact", "track", "status"))
     assert contact is not None
     assert contact.get("callsign") == "anna"
@@ -424,6 +444,11 @@ def test_an_event_of_cursor_on_target() -> None:
     assert status.get("battery") == "55"
     assert "95 % within 0.8 m" in (top.findtext("detail/remarks") or "")
     assert event(report(place=None)) is None
+
+
+def test_every_wearer_has_his_own_uid() -> None:
+    pairs = [("a", "b"), ("a-b", "c"), ("a", "b-c"), ("a-b-c", "d"), ("a", "b-c-d"), ("a-b", "c-d")]
+    assert len({uid(*pair) for pair in pairs}) == len(pairs)
 
 
 @given(st.text(max_size=32))

@@ -13,6 +13,7 @@ import ipaddress
 import math
 import socket
 import ssl
+from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
 from echostep.team.endpoint import Endpoint, tls_context
@@ -22,6 +23,10 @@ FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 UNKNOWN = "9999999.0"  # of the schema
 HOW = {"live": "m-f", "replay": "m-f", "simulated": "m-s"}  # machine: fused, simulated
 PATIENCE_S = 3.0
+GROUPS = {
+    "White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple",
+    "Dark Blue", "Blue", "Cyan", "Teal", "Green", "Dark Green", "Brown",
+}  # of TAK  # fmt: skip
 HOPS = 4  # of multicast
 
 
@@ -30,7 +35,7 @@ def event(report: Report) -> bytes | None:
     place, position, motion = report.place, report.position, report.motion
     if place is None or position is None:
         return None
-    top = ElementTree.Element("event", version="2.0", uid=f"echostep-{report.team}-{report.name}", type=FRIEND_ON_FOOT)
+    top = ElementTree.Element("event", version="2.0", uid=uid(report.team, report.name), type=FRIEND_ON_FOOT)
     top.attrib |= {"time": report.time, "start": report.time, "stale": report.stale, "how": HOW[report.source]}
     hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
     point = {"lat": f"{place.lat_deg:.8f}", "lon": f"{place.lon_deg:.8f}", "hae": hae, "ce": _up(place.sd_m), "le": le}
@@ -42,10 +47,18 @@ def event(report: Report) -> bytes | None:
         ElementTree.SubElement(detail, "track", track)
     if report.battery_percent is not None:
         ElementTree.SubElement(detail, "status", battery=str(report.battery_percent))
+    if report.team.title() in GROUPS:
+        ElementTree.SubElement(detail, "__group", name=report.team.title(), role="Team Member")
     ElementTree.SubElement(detail, "precisionlocation", geopointsrc="CALC", altsrc="CALC" if place.hae_m else "???")
     ElementTree.SubElement(detail, "takv", platform="echostep", version=report.version, device="", os="")
     ElementTree.SubElement(detail, "remarks").text = remarks(report)
     return ElementTree.tostring(top, encoding="utf-8", xml_declaration=False)
+
+
+def uid(team: str, name: str) -> str:
+    """One for each wearer; where a hyphen in a name makes it ambiguous, with a part of a hash."""
+    plain = f"echostep-{team}-{name}"
+    return plain if plain.count("-") == 2 else f"{plain}-{uuid5(NAMESPACE_URL, f'{team}/{name}').hex[:8]}"
 
 
 def remarks(report: Report) -> str:

@@ -148,6 +148,8 @@ class Roster:
                 raise BadReportError(f"more than {MOST_MEMBERS} trackers")
             self._members[key] = Member(r, heard_s, retained, off_s, self._presence.pop(key, "online"))
             return
+        if retained and r == last.report:
+            return  # told again after a new connection
         if r.sequence <= last.report.sequence:
             raise BadReportError("older than what was heard before")
         last.missed += r.sequence - last.report.sequence - 1
