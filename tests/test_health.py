@@ -6,9 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_runs import Bench, needs_twin
+from board_runs import ROOT, Bench, needs_twin
 from echostep import messages as m
+from echostep.frames import encode
 from echostep.health import BoardWords, Severity, board_findings, expected_rates, gyro_celsius, rate_findings
+from echostep.plan import load_plan
+from echostep.sources import BOARD, Chunk
+from echostep.tracker import Tracker
+from echostep.view import findings
 
 CONFIGURATION = m.Configuration(0, 0xFF, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
 
@@ -101,6 +106,17 @@ def test_rates_below_what_is_configured_are_said() -> None:
 
 def test_temperature_of_a_gyro() -> None:
     assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
+
+
+def test_the_live_view_says_it_too() -> None:
+    plan = load_plan(ROOT / "host/echostep/plans/demo.json")
+    tracker = Tracker(plan)
+    said: list[m.Message] = [CONFIGURATION, status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM)]
+    for k, message in enumerate(said):
+        tracker.feed(Chunk(BOARD, k, encode(message, k)))
+    shown = [str(finding) for finding in findings(tracker)]
+    assert len(shown) == 1
+    assert shown[0].startswith("barometer: EEPROM check failed")
 
 
 u16 = st.integers(0, 65_535)

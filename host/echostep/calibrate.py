@@ -107,8 +107,8 @@ def _believable(wearer: Wearer) -> None:
 def _listen(port: str, seconds: float, console: Console) -> Heard:
     if sys.stdin.isatty():
         console.input("Press Enter to begin. ")
-    console.print(f"Listening for {seconds:g} s.")
-    heard = listen({BOARD: port}, seconds)
+    with console.status(f"Listening for {seconds:g} s."):
+        heard = listen({BOARD: port}, seconds)
     _check(heard, port)
     return heard
 
