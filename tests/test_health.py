@@ -92,6 +92,16 @@ def test_what_a_gyro_says_of_itself(said: m.GyroHealth, part: str, severity: int
     assert [f.what for f in board_findings(words(absent, said))] == ["does not answer"]  # nothing is said twice
 
 
+def test_self_test_inputs_that_are_not_wired_are_said_once() -> None:
+    tests = [m.GyroHealth(0, gyro, 0, m.SelfTest.FAILED, 1, -2) for gyro in m.Gyro]
+    (finding,) = board_findings(words(status(), *tests))
+    assert "none of them responds" in finding.what
+    assert "A0 to ST1" in finding.remedy
+    assert finding.severity is Severity.WARNING
+    passed = m.GyroHealth(0, m.Gyro.BELT, 0, m.SelfTest.PASSED, -200, 200)
+    assert [f.subject for f in board_findings(words(status(), *tests, passed))] == ["thigh gyro", "calf gyro"]
+
+
 def test_rates_below_what_is_configured_are_said() -> None:
     heard = words(status())
     rates = expected_rates(heard)

@@ -27,6 +27,7 @@ from echostep.messages import (
 
 INVALID = -32768
 TEMPERATURE_C = (-20.0, 60.0)  # what a gyro on a person can be
+UNMOVED_COUNTS = 12
 MEMORY_MAX_BYTES = 2200  # of 2560 [firmware/README.md, budgets]
 RATE_LEAST = 0.9  # of what is expected; below half of it the stream is as good as gone
 PINGS_HZ = {Schedule.CONCURRENT: 28.0, Schedule.SEQUENTIAL: 13.5}  # both rangers [firmware/README.md]
@@ -221,7 +222,11 @@ def _losses(status: Status, earlier: Status | None) -> list[Finding]:
 
 
 _TESTS = {
-    SelfTest.FAILED: (Severity.FAULT, "failed its self-test", "power-cycle the board; if it stays, replace the gyro"),
+    SelfTest.FAILED: (
+        Severity.FAULT,
+        "failed its self-test",
+        "check its ST1 (A0) and ST2 (A1), power-cycle the board; if it stays, replace the gyro",
+    ),
     SelfTest.NO_ANSWER: (Severity.FAULT, "did not answer during its self-test", "check its SPI cable and its 5 V"),
     SelfTest.MOVED: (
         Severity.WARNING,
@@ -233,23 +238,40 @@ _TESTS = {
 
 
 def _gyro_tests(words: BoardWords) -> list[Finding]:
-    found = []
     unhealthy = 0 if words.status is None else ~words.status.healthy
-    for gyro, said in sorted(words.gyros.items()):
-        device = Healthy[Gyro(gyro).name]
-        if unhealthy & device or not words.sensors & device:
-            continue  # that is said, or meant, already
-        name, outcome = NAMES[device], SelfTest(said.self_test)
-        if outcome in _TESTS:
-            severity, what, remedy = _TESTS[outcome]
+    answering = [
+        (NAMES[device], said)
+        for gyro, said in sorted(words.gyros.items())
+        if (device := Healthy[Gyro(gyro).name]) & words.sensors and not device & unhealthy  # else that is said already
+    ]
+    unmoved = [name for name, said in answering if _unmoved(said)]
+    found = []
+    if len(unmoved) > 1 and len(unmoved) == len(answering):
+        what = f"none of them responds to its self-test ({', '.join(unmoved)})"
+        remedy = "check the wires from A0 to ST1 and from A1 to ST2; without them the gyros work, but cannot be tested"
+        found.append(Finding(Severity.WARNING, "gyros", what, remedy))
+    explained = set(unmoved) if found else set()
+    for name, said in answering:
+        if SelfTest(said.self_test) in _TESTS and name not in explained:
+            severity, what, remedy = _TESTS[SelfTest(said.self_test)]
             found.append(Finding(severity, name, what + _responses(said), remedy))
-        if said.temperature == INVALID:
-            what = "answers, but not with its temperature: its MISO may be held low"
-            found.append(Finding(Severity.FAULT, name, what, "check its SPI cable for a short to ground"))
-        elif not TEMPERATURE_C[0] <= gyro_celsius(said) <= TEMPERATURE_C[1]:
-            what = f"says it has {gyro_celsius(said):.0f} degrees Celsius"
-            found.append(Finding(Severity.WARNING, name, what, "its bias drifts outside -20 to 60 degrees"))
+        found += _temperature(name, said)
     return found
+
+
+def _unmoved(said: GyroHealth) -> bool:
+    """A gyro whose rate the self-test did not change at all."""
+    return said.self_test == SelfTest.FAILED and max(abs(said.response_st1), abs(said.response_st2)) <= UNMOVED_COUNTS
+
+
+def _temperature(name: str, said: GyroHealth) -> list[Finding]:
+    if said.temperature == INVALID:
+        what = "answers, but not with its temperature: its MISO may be held low"
+        return [Finding(Severity.FAULT, name, what, "check its SPI cable for a short to ground")]
+    if TEMPERATURE_C[0] <= gyro_celsius(said) <= TEMPERATURE_C[1]:
+        return []
+    what = f"says it has {gyro_celsius(said):.0f} degrees Celsius"
+    return [Finding(Severity.WARNING, name, what, "its bias drifts outside -20 to 60 degrees")]
 
 
 def _responses(said: GyroHealth) -> str:
