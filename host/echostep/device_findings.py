@@ -90,7 +90,7 @@ _TESTS = {
     ),
     SelfTest.NO_ANSWER: (Severity.FAULT, "did not answer during its self-test", "check its SPI cable and its 5 V"),
     SelfTest.MOVED: (
-        Severity.WARNING,
+        Severity.NOTE,
         "was turning during its self-test, or one of ST1 (A0) and ST2 (A1) is not connected",
         "stand still and run echostep doctor; if it stays, check both wires",
     ),

@@ -76,20 +76,25 @@ class BoardWords:
 
 
 def suffix(device: Healthy) -> str:
+    """A device's name in the fields of `Status`."""
     return (device.name or "").lower()
 
 
 def of(status: Status, what: str, device: Healthy) -> int:
+    """`errors_...` or `fault_...` of a device."""
     return int(getattr(status, f"{what}_{suffix(device)}"))
 
 
 def has_failed(status: Status, device: Healthy) -> bool:
+    """Whether a device ever failed; one that was not asked yet did not."""
     return bool(of(status, "errors", device) or of(status, "fault", device))
 
 
 def grown(status: Status, earlier: Status, name: str) -> int:
+    """What a counter has grown by; it wraps."""
     return int((getattr(status, name) - getattr(earlier, name)) & 0xFFFF)
 
 
 def span_s(status: Status, earlier: Status) -> float:
+    """Time between two statuses."""
     return ((status.ticks - earlier.ticks) & 0xFFFFFFFF) * 0.5e-6
