@@ -1,7 +1,7 @@
 """`echostep calibrate`: the wearer's gyros, mounting, compass and legs, measured in a minute and written as settings.
 
 In: the board's port, and a wearer who stands still, turns and walks when asked. Out: a settings file (TOML) for `--settings`, whose other sections
-are kept. Owns the questions; the port is listened to by `listening`, what it means is found by `wearer`.
+are kept. Owns the questions; the port is listened to by `listening`, what it means is found by `fitting`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from rich.console import Console
 
 from echostep.calibration import GYROS, GyroSettings
 from echostep.errors import EchostepError
+from echostep.fitting import Found, find_compass, find_gyros, find_legs, find_mounting
 from echostep.health import Severity, board_findings
 from echostep.leg_file import segments
 from echostep.listening import Heard, listen
 from echostep.ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD
-from echostep.wearer import Found, find_compass, find_gyros, find_legs, find_mounting
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0
 WALKED_M = (3.0, 100.0)
@@ -107,8 +107,8 @@ def _believable(wearer: Wearer) -> None:
 def _listen(port: str, seconds: float, console: Console) -> Heard:
     if sys.stdin.isatty():
         console.input("Press Enter to begin. ")
-    console.print(f"Listening for {seconds:g} s.")
-    heard = listen({BOARD: port}, seconds)
+    with console.status(f"Listening for {seconds:g} s."):
+        heard = listen({BOARD: port}, seconds)
     _check(heard, port)
     return heard
 

@@ -36,8 +36,8 @@ __all__ = ["examine", "rules_text", "run"]
 def run(board: str | None, mtx: str | None, seconds: float) -> bool:
     """Look at everything and print it; whether all is fine."""
     console = Console(soft_wrap=True, highlight=False)
-    console.print(Text("Looking at the ports and listening for some seconds: stand still.", style="dim"))
-    report = examine(board, mtx, seconds)
+    with console.status("Looking at the ports and listening for some seconds: stand still."):
+        report = examine(board, mtx, seconds)
     print_report(report, console)
     return report.fine
 
