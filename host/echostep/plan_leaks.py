@@ -29,10 +29,8 @@ def leak(segments: NDArray[np.float64], at_m: tuple[float, float]) -> tuple[floa
             return None
         room, outside = free
         if not room.intersects(window.boundary):
-            middle = shapely.shortest_line(
-                room, outside
-            ).centroid  # shorter where an opening has closed than through a wall
-            return float(middle.x), float(middle.y), width
+            way = shapely.shortest_line(room, outside)  # shorter where an opening has closed than through a wall
+            return None if way.intersects(walls) else (float(way.centroid.x), float(way.centroid.y), width)
     return None
 
 
