@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 # Dorsiflexion of the ankle every 4 % of the stride from heel strike to toe off, degrees [Perry 1992; Winter 2009; Kadaba 1990, read to a degree].
-DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 12, 14, 15, 16, 15, 12, 5, -4, -11, -8)
+DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 14, 14, 11, 5, -4, -10, -14, -14)
 DORSIFLEXION_STEP = 0.04
 ANKLE_HEIGHT = (
     0.16  # of the shank: 0.039 of the body's height, the shank is 0.246 [Winter 2009, after Drillis and Contini]
@@ -30,7 +30,7 @@ FLAT = 0.08  # share of the stride at which the foot is flat on the floor [Perry
 HEEL_RISES = 0.25  # not before
 TOE_OFF = 0.62
 PELVIS = 1.017  # of a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
-HALVES = (0.03, 0.05, 0.07, 0.09)  # where half strides begin, foot all but flat
+HALVES = (0.06, 0.08, 0.10)  # where half strides begin, foot all but flat
 WITH_FOOT = 1.09  # of the thigh: a longer shank is measured to the floor (0.285 of the height, not 0.246; the thigh has 0.245) [Winter 2009]
 TO_FLOOR = 0.285 / 0.246
 

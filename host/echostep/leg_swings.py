@@ -26,9 +26,10 @@ DECIDE_S = 2.2  # of motion
 MOVING_RAD_S = 0.35
 CLEAR = 0.12  # of the score that tells the sign
 OF_SKEW = 0.3  # in it, beside how the leads of forward and of backward turns differ
+OF_LEAD = 0.25
 BACKWARD = -0.1  # of the thigh's lead
 LAGS = range(5, 26, 5)  # places by which the thigh may lead
-SPENT = 0.03  # of its way from mid swing: a last step to a stand comes to rest slowly
+SPENT = 0.01  # of its way from mid swing: a last step to a stand comes to rest slowly
 LATEST_STRIKE_S = 0.45
 STILL = int(0.35 * GRID_HZ)
 STILL_RANGE_RAD_S = 0.16
@@ -55,7 +56,10 @@ class Swings:
         if not final and moving.sum() < DECIDE_S * GRID_HZ:
             return False
         rates = rates - np.median(rates[~moving], axis=0) if (~moving).sum() > STILL else rates
-        thigh = 1.0 if together(rates) >= 0.0 else -1.0
+        pair = together(rates) + OF_LEAD * leads(rates)  # hardly anybody walks backward
+        if abs(pair) < CLEAR and not final:
+            return False
+        thigh = 1.0 if pair >= 0.0 else -1.0
         rates = rates * np.array([thigh, 1.0])
         ahead = leads(rates)
         skew = lopsided(rates[:, 0]) + lopsided(rates[:, 1])
@@ -90,7 +94,8 @@ def together(rates: Floats) -> float:
         angles = angles[width // 2 : width // 2 + len(mean)] - mean
     else:
         angles = angles - angles.mean(axis=0)
-    return float((angles[:, 0] * angles[:, 1]).sum())
+    size = math.sqrt(float((angles[:, 0] ** 2).sum() * (angles[:, 1] ** 2).sum()))
+    return float((angles[:, 0] * angles[:, 1]).sum()) / size if size > 0.0 else 0.0
 
 
 def leads(rates: Floats) -> float:

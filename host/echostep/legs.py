@@ -31,7 +31,6 @@ from echostep.leg_kinematics import (
     STANDING_THIGH_RAD,
     TOE_OFF,
     Segments,
-    Travel,
     travel,
 )
 from echostep.leg_swings import GRID_HZ, Swings
@@ -54,7 +53,8 @@ EDGE_SD_M = 0.08  # of a beginning or an end
 BLIND_SD_M = 0.4  # of what this leg cannot see
 REST_SD_RAD_S = math.radians(0.15)
 LOOK = 3  # places on either side for a rate
-EDGE = 12  # places over which a speed is taken at the beginning and the end of a stance
+STANCE = 62  # percent of a stride
+FIRST_SWING = 0.62  # of the pace: from rest to the full pace it takes about a stride [Breniere and Do 1986]
 STAYS = 0.44  # phase after which a foot that stays does not rise
 FORGET = 500
 
@@ -366,16 +366,24 @@ class Legs:
         span = peak - bout.begin
         if span <= 0:
             return
-        length = pace_m_s * span / GRID_HZ
-        if bout.stood:
-            thigh, shank = self._angles(bout.begin, peak)
-            rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
-            off = leg_swings.toe_off_before(rate, span - 1, 0)
-            phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
-            way = travel(phase, thigh, shank, self.settings.segments, struck=None)
-            swing_m_s = 0.5 * (pace_m_s + _slope(way, max(off - EDGE, 0), off))
-            length = PELVIS * float(way.forward_m[off] - way.forward_m[0]) + swing_m_s * (span - off) / GRID_HZ
+        thigh, shank = self._angles(bout.begin, peak)
+        rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
+        off = leg_swings.toe_off_before(rate, span - 1, 0)
+        phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
+        stance = (
+            0
+            if bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
+            else int(np.argmax(phase > 0.0))
+        )
+        swinging = FIRST_SWING if (stance == 0 and phase[0] < -0.1) or bout.stood else 1.0
+        way = travel(phase, thigh, shank, self.settings.segments, struck=None)
+        length = PELVIS * float(way.forward_m[off] - way.forward_m[stance])
+        length += pace_m_s * (stance + swinging * (span - off)) / GRID_HZ
         self._tell(self._time(bout.begin), self._time(peak), max(length, 0.0), EDGE_SD_M, 0.0, Flag.EDGE)
+
+    def _calm(self, rate: Floats) -> bool:
+        """Whether the shank (rates (n,)) was on a foot that stood: no swing in it."""
+        return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.OF_USUAL
 
     def _end_bout(self, end: int, *, stands: bool) -> None:
         """The walk is over at this place, because he stands or because there is no more to see."""
@@ -393,14 +401,17 @@ class Legs:
         """From the last middle of a swing to the end of the walk."""
         bout, span = self._bout, end - peak
         pace = bout.pace_m_s or 0.0
-        length = pace * span / GRID_HZ
+        thigh, shank = self._angles(peak, end)
+        strike = leg_swings.strike_after(shank)
+        phase = (np.arange(strike, len(shank)) - strike) / bout.cycle
+        last = len(phase) - 1
         if stands:
-            thigh, shank = self._angles(peak, end)
-            strike = leg_swings.strike_after(shank)
-            phase = np.minimum((np.arange(strike, len(shank)) - strike) / bout.cycle, STAYS)
-            way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
-            landing = 0.5 * (pace + _slope(way, 0, min(EDGE, len(phase) - 1)))
-            length = PELVIS * float(way.forward_m[-1] - way.forward_m[0]) + landing * strike / GRID_HZ
+            phase = np.minimum(phase, STAYS)
+        else:
+            last = min(last, int(TOE_OFF * bout.cycle))
+        way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
+        length = PELVIS * float(way.forward_m[last] - way.forward_m[0])
+        length += pace * ((FIRST_SWING if stands else 1.0) * strike + span - strike - last) / GRID_HZ
         self._tell(self._time(peak), self._time(end), max(length, 0.0), EDGE_SD_M, 0.0, Flag.EDGE)
 
     def _angles(self, begin: int, end: int) -> tuple[Floats, Floats]:
@@ -438,13 +449,6 @@ class Legs:
         if self._still_since is not None:
             self._still_since -= k
         self._top = (self._top[0], self._top[1] - k)
-
-
-def _slope(way: Travel, first: int, last: int) -> float:
-    """Mean speed of the hips between two places of a stance (m/s)."""
-    if last <= first:
-        return 0.0
-    return float(way.forward_m[last] - way.forward_m[first]) * GRID_HZ / (last - first)
 
 
 def distance_sd_m(strides: Iterable[Stride]) -> float:

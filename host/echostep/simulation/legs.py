@@ -57,8 +57,8 @@ class Leg:
 
 def leg_rates(phase: Floats, effort: Floats, rate_hz: float) -> tuple[Floats, Floats]:
     """Pitch rates (n,) of thigh and calf in rad/s by the normal curves, forward positive."""
-    thigh = effort * _series(THIGH_DEG, phase)
-    calf = thigh - effort * _series(KNEE_DEG, phase)
+    thigh = effort * series(THIGH_DEG, phase)
+    calf = thigh - effort * series(KNEE_DEG, phase)
     return np.gradient(thigh) * rate_hz, np.gradient(calf) * rate_hz
 
 
@@ -97,7 +97,7 @@ def sway(phase: Floats, effort: Floats) -> tuple[Floats, Floats]:
     return left_m, twist
 
 
-def _series(degrees: tuple[int, ...], phase: Floats) -> Floats:
+def series(degrees: tuple[int, ...], phase: Floats) -> Floats:
     """The curve in radians, by its first terms."""
     c = np.fft.rfft(np.radians(degrees)) / len(degrees)
     found = np.full(len(phase), c[0].real)
