@@ -29,7 +29,7 @@ OF_SKEW = 0.3  # in it, beside how the leads of forward and of backward turns di
 OF_LEAD = 0.25
 BACKWARD = -0.1  # of the thigh's lead
 LAGS = range(5, 26, 5)  # places by which the thigh may lead
-SPENT = 0.01  # of its way from mid swing: a last step to a stand comes to rest slowly
+NEAR, SPENT = 0.2, 0.05  # of the way from mid swing, of the rate there
 LATEST_STRIKE_S = 0.45
 STILL = int(0.35 * GRID_HZ)
 STILL_RANGE_RAD_S = 0.16
@@ -113,10 +113,13 @@ def is_still(rates: Floats) -> bool:
 
 
 def strike_after(shank: Floats) -> int:
-    """Heel strike after the middle of a swing, from which on these angles are: where the shank has all but reached its foremost angle."""
+    """Heel strike after the middle of a swing, from which on these angles are: the shank has all but stopped, near its foremost angle."""
     swing = shank[: int(LATEST_STRIKE_S * GRID_HZ)]
     foremost = float(swing.max())
-    return int(np.argmax(swing >= foremost - SPENT * (foremost - shank[0])))
+    near = swing >= foremost - NEAR * (foremost - shank[0])
+    rate = np.diff(smooth(swing), append=swing[-1])
+    stops = near & (rate <= SPENT * max(float(rate[:SMOOTH].max()), 1e-9))
+    return int(np.argmax(stops)) if stops.any() else int(np.argmax(swing))
 
 
 def toe_off_before(shank: Floats, peak: int, begin: int) -> int:
