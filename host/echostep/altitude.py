@@ -132,8 +132,8 @@ def _heights(t_s: Floats, found: Floats) -> Heights:
     w, h, v = found[:, :, 0], found[:, :, 1], found[:, :, 2]
     mean = (w * h).sum(axis=1)
     variance = (w * (found[:, :, 4] + (h - mean[:, None]) ** 2)).sum(axis=1)
-    moving = w[:, vertical.STAIRS_UP :]
-    speed = (moving * v[:, vertical.STAIRS_UP :]).sum(axis=1)
+    moving = w * (np.arange(vertical.MODES) % vertical.WAYS != vertical.ON)
+    speed = (moving * v).sum(axis=1)
     return Heights(t_s, mean, variance, speed, moving.sum(axis=1))
 
 

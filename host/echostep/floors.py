@@ -115,7 +115,7 @@ def checked_heights(heights_m: Floats) -> Floats:
 
 
 def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats, claimed: Floats) -> Floors:
-    """Floors by weights (n, 6 k): the storey of those who are on one, the nearest one of those between."""
+    """Floors by weights (n, 10 k): the storey of those who are on one, the nearest one of those between."""
     n, count = len(found), len(heights_m)
     middles = 0.5 * (heights_m[1:] + heights_m[:-1])
     probability = np.zeros((n, count))
@@ -125,7 +125,7 @@ def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats, claim
         for mode in range(vertical.MODES):
             s = k * vertical.MODES + mode
             w = weight[:, s]
-            if mode <= vertical.GUST:
+            if mode % vertical.WAYS == vertical.ON:
                 probability[:, k] += w
             elif w.max(initial=0.0) > 0.0:
                 above = _normal_cdf((height[:, s, None] - middles) / sd[:, s, None])
@@ -134,9 +134,9 @@ def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats, claim
     probability /= np.maximum(probability.sum(axis=1, keepdims=True), 1e-300)
     best = probability.max(axis=1, keepdims=True, initial=0.0)
     floor = np.argmax(probability >= TIED * best, axis=1) if n else np.zeros(0, int)
-    modes = np.arange(weight.shape[1]) % vertical.MODES
-    up = weight[:, (modes == vertical.STAIRS_UP) | (modes == vertical.LIFT_UP)].sum(axis=1)
-    down = weight[:, (modes == vertical.STAIRS_DOWN) | (modes == vertical.LIFT_DOWN)].sum(axis=1)
+    ways = np.arange(weight.shape[1]) % vertical.WAYS
+    up = weight[:, (ways == vertical.STAIRS_UP) | (ways == vertical.LIFT_UP)].sum(axis=1)
+    down = weight[:, (ways == vertical.STAIRS_DOWN) | (ways == vertical.LIFT_DOWN)].sum(axis=1)
     return Floors(
         t_s, heights_m, floor.astype(np.int64), probability, _height(heights_m, floor, height, weight), up, down
     )

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-ON, GUST, STAIRS_UP, STAIRS_DOWN, LIFT_UP, LIFT_DOWN = range(6)
-MODES = 6
+ON, STAIRS_UP, STAIRS_DOWN, LIFT_UP, LIFT_DOWN = range(5)  # ways of moving
+WAYS = 5
+MODES = 2 * WAYS  # each way in calm air, then each in a gust
 UNKNOWN, WALKING, STILL = range(3)  # gait
 CONNECTOR, OUTSIDE = 1, 2  # place: on stairs or in a lift by the plan, or certainly not
 DT, CLAIMED, NOISE, GAIT, PLACE, FOOT, FOOT_SD, LOWEST, HIGHEST = range(9)  # what is seen in a step
@@ -37,7 +38,6 @@ BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
 GUST_M, GUST_S = 1.5, 4.0  # sd and time constant of doors and fans: 18 Pa
-GUST_FADES_S = 3.0  # while he moves
 SHIFT_M = 1.5
 GUST_OVER_M = 0.3
 CLIMB_M_S, CLIMB_SD_M_S, CLIMB_S = 0.25, 0.25, 1.5  # mean, sd, time constant of vertical speed
@@ -51,7 +51,7 @@ FOOT_LEVEL_M_S = 0.1  # what a foot on level ground may claim, over a second
 
 
 def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) -> tuple[Floats, Floats, Floats]:
-    """Weights (6 k,), means (6 k, 4), covariances (6 k, 4, 4): he stands on one of the storeys, with these probabilities."""
+    """Weights (10 k,), means (10 k, 4), covariances (10 k, 4, 4): he stands on one of the storeys, with these probabilities."""
     n = MODES * len(heights_m)
     weights, means, covariances = np.zeros(n), np.zeros((n, 4)), np.zeros((n, 4, 4))
     weights[ON::MODES] = prior / prior.sum()
@@ -66,8 +66,8 @@ def follow(state, heights_m, free, seen, found, joint):  # type: ignore[no-untyp
     """All samples of a portion; `state` (weights, means, covariances) goes on from them.
 
     `seen`: (n, 9) since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a second (NaN: unknown),
-    lowest and highest storey. `free`: level ground is anywhere. Filled: `found` (n, 6 k, 5) with weight, h, v, d and the variance of h; `joint`
-    (n, 6 k, 6 k) with p(now, before) for `backward`, unless it has length 0.
+    lowest and highest storey. `free`: level ground is anywhere. Filled: `found` (n, 10 k, 5) with weight, h, v, d and the variance of h; `joint`
+    (n, 10 k, 10 k) with p(now, before) for `backward`, unless it has length 0.
     """
     size = len(state[0])
     merged = (
@@ -110,7 +110,7 @@ def _chained(later, earlier):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def backward(joint, last):  # type: ignore[no-untyped-def]
-    """Probabilities (n, 6 k) at the samples *before* those of `joint`, given all samples, and `last` (6 k,) at its last one [Kim 1994]."""
+    """Probabilities (n, 10 k) at the samples *before* those of `joint`, given all samples, and `last` (10 k,) at its last one [Kim 1994]."""
     n, size = len(joint), len(last)
     found = np.zeros((n, size))
     later = last.copy()
@@ -135,11 +135,11 @@ def _step(state, heights_m, free, dt, seen, merged):  # type: ignore[no-untyped-
     for s in range(len(weights)):
         if weights[s] < TINY:
             continue
-        if s % MODES <= GUST:
-            left = weights[s] - _sets_off(state, s, dt, seen, merged)
-            left -= _settles(state, s, dt, seen, merged)
+        left = weights[s] - _air(state, s, dt, seen, merged)
+        if s % WAYS == ON:
+            left -= _sets_off(state, s, dt, seen, merged)
         else:
-            left = weights[s] - _arrives(state, s, heights_m, free, dt, seen, merged)
+            left -= _arrives(state, s, heights_m, free, dt, seen, merged)
             left *= math.exp(-dt / BETWEEN_S)
         x, c = _copied(state, s, merged)
         _take(x, c, left, s, s, seen, merged)
@@ -161,48 +161,48 @@ def _step(state, heights_m, free, dt, seen, merged):  # type: ignore[no-untyped-
 @njit(cache=True, error_model="numpy")
 def _sets_off(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
     """From level ground to stairs and lifts; the weight that goes."""
-    weights = state[0]
+    weights, here = state[0], s - s % WAYS
     often = 10.0 if seen[PLACE] == CONNECTOR else 1.0
     gone = 0.0
-    for target in range(STAIRS_UP, MODES):
+    for target in range(STAIRS_UP, WAYS):
         share = weights[s] * _share(often * (CLIMB_BEGINS if target < LIFT_UP else RIDE_BEGINS), dt)
         x, c = _copied(state, s, merged)
         _forget(x, c, 1, CLIMB_STOPS_M_S if target < LIFT_UP else RIDE_STOPS_M_S)
-        _take(x, c, share, s - s % MODES + target, s, seen, merged)
+        _take(x, c, share, here + target, s, seen, merged)
         gone += share
     return gone
 
 
 @njit(cache=True, error_model="numpy")
-def _settles(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
-    """The air on level ground: gusts begin, jump, end, and leave a shifted pressure behind; the weight that goes."""
-    weights = state[0]
-    base, gone = s - s % MODES, 0.0
-    if s == base + ON:
-        share = weights[s] * _share(GUST_BEGINS, dt)
+def _air(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
+    """Gusts begin, jump, end, and leave a shifted pressure behind; the weight that goes."""
+    weights, level, gusty = state[0], s % WAYS == ON, s % MODES >= WAYS
+    if not gusty:
+        gone = weights[s] * _share(GUST_BEGINS, dt)
         x, c = _copied(state, s, merged)
         _forget(x, c, 3, GUST_M)
-        _take(x, c, share, base + GUST, s, seen, merged)
-        gone += share
-        share = weights[s] * _share(SHIFTS, dt)
-        x, c = _copied(state, s, merged)
-        c[2, 2] += SHIFT_M**2
-        _take(x, c, share, s, s, seen, merged)
-        return gone + share
-    share = weights[s] * _share(GUST_JUMPS, dt)
+        _take(x, c, gone, s + WAYS, s, seen, merged)
+        if level:
+            share = weights[s] * _share(SHIFTS, dt)
+            x, c = _copied(state, s, merged)
+            c[2, 2] += SHIFT_M**2
+            _take(x, c, share, s, s, seen, merged)
+            gone += share
+        return gone
+    gone = weights[s] * _share(GUST_JUMPS, dt)
     x, c = _copied(state, s, merged)
     _forget(x, c, 3, GUST_M)
-    _take(x, c, share, s, s, seen, merged)
-    gone += share
-    share = weights[s] * _share(GUST_SHIFTS, dt)
-    x, c = _copied(state, s, merged)
-    _add(x, c, 2, 3, 0.0)
-    _take(x, c, share, base + ON, s, seen, merged)
-    gone += share
+    _take(x, c, gone, s, s, seen, merged)
+    if level:
+        share = weights[s] * _share(GUST_SHIFTS, dt)
+        x, c = _copied(state, s, merged)
+        _add(x, c, 2, 3, 0.0)
+        _take(x, c, share, s - WAYS, s, seen, merged)
+        gone += share
     x, c = _copied(state, s, merged)
     share = weights[s] * _share(GUST_ENDS, dt) * _pinned(x, c, 3, 0.0, GUST_OVER_M)
     _forget(x, c, 3, 0.0)
-    _take(x, c, share, base + ON, s, seen, merged)
+    _take(x, c, share, s - WAYS, s, seen, merged)
     return gone + share
 
 
@@ -210,8 +210,9 @@ def _settles(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
 def _arrives(state, s, heights_m, free, dt, seen, merged):  # type: ignore[no-untyped-def]
     """From stairs and lifts to level ground, and about on the stairs; the weight that goes."""
     weights, means, covariances = state
-    base, mode, gone = s - s % MODES, s % MODES, 0.0
-    stairs = mode < LIFT_UP
+    here, way, gone = s - s % WAYS, s % WAYS, 0.0
+    air = s % MODES - way
+    stairs = way < LIFT_UP
     ends = weights[s] * _share(CLIMB_ENDS if stairs else RIDE_ENDS, dt)
     for j in range(len(heights_m)):
         wide = math.hypot(STOREY_M, SCALE * (heights_m[j] - heights_m[s // MODES]))
@@ -223,14 +224,13 @@ def _arrives(state, s, heights_m, free, dt, seen, merged):  # type: ignore[no-un
             share *= _pinned(x, c, 0, heights_m[j], wide)
             _add(x, c, 2, 0, heights_m[j])
         _forget(x, c, 1, 0.0)
-        _forget(x, c, 3, 0.0)
-        _take(x, c, share, j * MODES + ON, s, seen, merged)
+        _take(x, c, share, j * MODES + air + ON, s, seen, merged)
         gone += share
     if stairs:
         share = weights[s] * _share(CLIMB_TURNS, dt)
-        other = STAIRS_DOWN if mode == STAIRS_UP else STAIRS_UP
+        other = STAIRS_DOWN if way == STAIRS_UP else STAIRS_UP
         x, c = _copied(state, s, merged)
-        _take(x, c, share, base + other, s, seen, merged)
+        _take(x, c, share, here + other, s, seen, merged)
         gone += share
     return gone
 
@@ -296,11 +296,11 @@ def _take(x, c, weight, target, source, seen, merged):  # type: ignore[no-untype
     w, m, p, xi, _, _ = merged
     if weight < TINY * TINY:
         return
-    mode, dt = target % MODES, seen[DT]
-    _predict(x, c, mode, dt)
-    weight *= math.exp(-dt * _contradiction(x, mode, seen))
+    way, gusty, dt = target % WAYS, target % MODES >= WAYS, seen[DT]
+    _predict(x, c, way, gusty, dt)
+    weight *= math.exp(-dt * _contradiction(x, way, seen))
     if seen[FOOT] == seen[FOOT]:
-        weight *= _meets_foot(x, c, mode, seen)
+        weight *= _meets_foot(x, c, way, seen)
     if seen[CLAIMED] == seen[CLAIMED]:
         weight *= _meets_pressure(x, c, seen)
     w[target] += weight
@@ -312,30 +312,30 @@ def _take(x, c, weight, target, source, seen, merged):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(x, c, mode, dt):  # type: ignore[no-untyped-def]
+def _predict(x, c, way, gusty, dt):  # type: ignore[no-untyped-def]
     """Weather walks, gusts fade, vertical speed returns to what stairs and lifts have."""
     c[2, 2] += WEATHER_M**2 * dt
-    fades = math.exp(-dt / (GUST_S if mode == GUST else GUST_FADES_S))
-    x[3] *= fades
-    for a in range(4):
-        c[3, a] *= fades
-        c[a, 3] *= fades
-    if mode == GUST:
+    if gusty:
+        fades = math.exp(-dt / GUST_S)
+        x[3] *= fades
+        for a in range(4):
+            c[3, a] *= fades
+            c[a, 3] *= fades
         c[3, 3] += GUST_M**2 * (1.0 - fades**2)
-    if mode <= GUST:
+    if way == ON:
         return
-    stairs = mode < LIFT_UP
-    speed = (CLIMB_M_S if stairs else RIDE_M_S) * (1.0 if mode in (STAIRS_UP, LIFT_UP) else -1.0)
+    stairs = way < LIFT_UP
+    speed = (CLIMB_M_S if stairs else RIDE_M_S) * (1.0 if way in (STAIRS_UP, LIFT_UP) else -1.0)
     sd, tau = (CLIMB_SD_M_S, CLIMB_S) if stairs else (RIDE_SD_M_S, RIDE_S)
     keeps = math.exp(-dt / tau)
-    way, noise = tau * (1.0 - keeps), sd**2 * (1.0 - keeps**2)
-    x[0] += speed * dt + way * (x[1] - speed)
+    far, noise = tau * (1.0 - keeps), sd**2 * (1.0 - keeps**2)
+    x[0] += speed * dt + far * (x[1] - speed)
     x[1] = speed + keeps * (x[1] - speed)
     for a in range(4):
-        c[0, a] += way * c[1, a]
+        c[0, a] += far * c[1, a]
         c[1, a] *= keeps
     for a in range(4):
-        c[a, 0] += way * c[a, 1]
+        c[a, 0] += far * c[a, 1]
         c[a, 1] *= keeps
     c[0, 0] += noise * dt**2 / 3.0
     c[0, 1] += noise * dt / 2.0
@@ -344,20 +344,20 @@ def _predict(x, c, mode, dt):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _contradiction(x, mode, seen):  # type: ignore[no-untyped-def]
+def _contradiction(x, way, seen):  # type: ignore[no-untyped-def]
     """Nats a second against this mode by gait, plan and the range of storeys."""
     cost = 0.0
-    if mode > GUST:
+    if way != ON:
         cost += PLACE_COST * (seen[PLACE] == OUTSIDE)
-        cost += GAIT_COST * (seen[GAIT] == (STILL if mode < LIFT_UP else WALKING))
+        cost += GAIT_COST * (seen[GAIT] == (STILL if way < LIFT_UP else WALKING))
         cost += RANGE_COST * (max(0.0, x[0] - seen[HIGHEST] - 1.0) + max(0.0, seen[LOWEST] - 1.0 - x[0]))
     return cost
 
 
 @njit(cache=True, error_model="numpy")
-def _meets_foot(x, c, mode, seen):  # type: ignore[no-untyped-def]
+def _meets_foot(x, c, way, seen):  # type: ignore[no-untyped-def]
     """Likelihood of the foot's vertical speed, which on stairs is the wearer's; elsewhere, in a lift too, the foot claims none."""
-    stairs = STAIRS_UP <= mode < LIFT_UP
+    stairs = STAIRS_UP <= way < LIFT_UP
     noise = seen[FOOT_SD] ** 2 / seen[DT] + (0.0 if stairs else FOOT_LEVEL_M_S**2)
     off = seen[FOOT] - (x[1] if stairs else 0.0)
     spread = noise + (c[1, 1] if stairs else 0.0)
