@@ -1,11 +1,11 @@
 """Heights from pressure, sample by sample: what the weather, doors and fans do to pressure is told from what the wearer does.
 
-In: pressures with times, and what is known of temperature, gait, foot and plan. Out: `Heights`: height above the start with its variance, vertical speed,
-probability of going up or down. Owns the running column of air and the filter's state (`vertical.py`).
+In: pressures with times, and what is known of temperature, gait, foot and plan. Out: `Heights`: height above the start with its variance,
+vertical speed, probability of going up or down. Owns the running column of air and the filter's state (`vertical.py`).
 
-Pressure to height is hypsometric, dh = -(R T / g) dp / p, summed from sample to sample, so that a warming device does not lift anybody who stands. T is the air's:
-a device is never long colder than the air about it, but often warmer (body, electronics), so readings above 20 degC count half. Without a reading 20 degC are
-taken: an error of 3 K makes 1 % of the rise.
+Pressure to height is hypsometric, dh = -(R T / g) dp / p, summed from sample to sample, so that a warming device does not lift anybody who
+stands. T is the air's: a device is never long colder than the air about it, but often warmer (body, electronics), so what it reads above 20 degC
+counts half. Without a reading 20 degC are taken: an error of 3 K makes 1 % of the rise.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep import vertical
+from echostep.hypotheses import Hypotheses
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -104,19 +105,18 @@ class Altitude:
 
     def __init__(self, settings: BarometerSettings | None = None) -> None:
         self._column = Column(settings or BarometerSettings())
-        self._state: tuple[Floats, Floats, Floats] | None = None
-        self._ground = np.zeros(1)
+        self._hypotheses = Hypotheses(np.zeros(1), np.ones(1), free=True)
 
     def take(self, samples: Pressures) -> Heights:
         """Heights at the samples that could be used; what is no pressure, or not later than the sample before, is left out."""
         seen, used = self._column.rows(samples)
-        if self._state is None and len(seen):
-            first = seen[0]
-            self._state = vertical.start(self._ground, np.ones(1), first[vertical.CLAIMED], first[vertical.NOISE])
-        found = np.zeros((len(seen), vertical.MODES, 5))
-        if self._state is not None:
-            vertical.follow(self._state, self._ground, True, seen, found, np.zeros((0, 0, 0)))
-        return _heights(samples.t_s[used], found)
+        found = self._hypotheses.follow(seen)
+        return _heights(samples.t_s[used], found, found[:, :, 0])
+
+    def look_back(self, samples: Pressures) -> Heights:
+        """Heights at the samples of a whole record: whether he moved is judged by all of it; once for an `Altitude`."""
+        seen, used = self._column.rows(samples)
+        return _heights(samples.t_s[used], *self._hypotheses.look_back(seen))
 
 
 def noise_of(pressure_pa: Floats) -> float:
@@ -127,9 +127,9 @@ def noise_of(pressure_pa: Floats) -> float:
     return max(QUIETEST_PA, 1.4826 * float(np.median(np.abs(off))) / math.sqrt(1.5))
 
 
-def _heights(t_s: Floats, found: Floats) -> Heights:
+def _heights(t_s: Floats, found: Floats, w: Floats) -> Heights:
     """Mean and variance over the hypotheses."""
-    w, h, v = found[:, :, 0], found[:, :, 1], found[:, :, 2]
+    h, v = found[:, :, 1], found[:, :, 2]
     mean = (w * h).sum(axis=1)
     variance = (w * (found[:, :, 4] + (h - mean[:, None]) ** 2)).sum(axis=1)
     moving = w * (np.arange(vertical.MODES) % vertical.WAYS != vertical.ON)
@@ -138,7 +138,15 @@ def _heights(t_s: Floats, found: Floats) -> Heights:
 
 
 @njit(cache=True, error_model="numpy")
-def _claim(t_s, pressure_pa, temperature_c, known, state, seen, used):  # type: ignore[no-untyped-def] # noqa: PLR0913
+def _claim(
+    t_s: Floats,
+    pressure_pa: Floats,
+    temperature_c: Floats,
+    known: bool,
+    state: Floats,
+    seen: Floats,
+    used: NDArray[np.bool_],
+) -> None:
     """Time since the last good sample, the height that pressure claims, and metres for a pascal, into `seen`."""
     for i in range(len(t_s)):
         if not (LOWEST_PA <= pressure_pa[i] <= HIGHEST_PA and (t_s[i] > state[0] or state[0] != state[0])):

@@ -1,10 +1,11 @@
 """Going up and down, heard by a barometer: one filter over what the wearer and the air may be doing, with storeys or without.
 
-In: heights that pressure claims (m), their noise, what gait, foot and plan know. Out: a weight and a Gaussian for each hypothesis. Owns the kernels only; the
-state lies in plain arrays, so that cutting a record into portions changes nothing.
+In: heights that pressure claims (m), their noise, what gait, foot and plan know. Out: a weight and a Gaussian for each hypothesis.
+Owns the kernels only; the state lies in plain arrays, so that cutting a record into portions changes nothing.
 
-A hypothesis is (storey k, mode). Its Gaussian is over x = [height h, vertical speed v, weather d, gust u] in metres and m/s; pressure says h + d + u. Each
-pair of a hypothesis and a successor is updated on its own and merged afterwards [Blom and Bar-Shalom 1988, with the merging of second order]. Without
+A hypothesis is (storey k, mode): the storey that he is on, or where he set off; the way of moving, in calm air or in a gust. Its Gaussian is over
+x = [height h, vertical speed v, weather d, gust u] in metres and m/s; pressure says h + d + u. Each pair of a hypothesis and its successor is updated
+on its own and merged afterwards: the generalised pseudo-Bayesian filter of second order [Bar-Shalom, Li and Kirubarajan 2001, 11.6.5]. Without
 storeys k is 0 alone, and level ground is wherever he stops.
 """
 
@@ -17,6 +18,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+State = tuple[Floats, Floats, Floats]  # weights, means, covariances
+Merged = tuple[
+    Floats, Floats, Floats, Floats, Floats, Floats
+]  # the next state times its weights, joint weights, scratch
 
 ON, STAIRS_UP, STAIRS_DOWN, LIFT_UP, LIFT_DOWN = range(5)  # ways of moving
 WAYS = 5
@@ -30,14 +35,15 @@ MOST_STEPS = 240  # in one gap
 TINY = 1e-9  # weights below are forgotten
 
 # How often what begins and ends, 1/s
-GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.3
+GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.5
 SHIFTS, GUST_SHIFTS = 1 / 600, 1 / 60  # the pressure of the building changes for good
 CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 200, 0.5, 1 / 60
 RIDE_BEGINS, RIDE_ENDS = 1 / 600, 1.0
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
-GUST_M, GUST_S = 1.5, 4.0  # sd and time constant of doors and fans: 18 Pa
+GUST_M, GUST_S = 1.5, 4.0  # sd of a jump and time constant of doors and fans: 18 Pa
+GUST_WANDERS_M = 0.6  # sd of what a gust wanders beside its jumps
 SHIFT_M = 1.5
 GUST_OVER_M = 0.3
 CLIMB_M_S, CLIMB_SD_M_S, CLIMB_S = 0.25, 0.25, 1.5  # mean, sd, time constant of vertical speed
@@ -62,11 +68,12 @@ def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) ->
 
 
 @njit(cache=True, error_model="numpy")
-def follow(state, heights_m, free, seen, found, joint):  # type: ignore[no-untyped-def]
+def follow(state: State, heights_m: Floats, free: bool, seen: Floats, found: Floats, joint: Floats) -> None:
     """All samples of a portion; `state` (weights, means, covariances) goes on from them.
 
-    `seen`: (n, 9) since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a second (NaN: unknown),
-    lowest and highest storey. `free`: level ground is anywhere. Filled: `found` (n, 10 k, 5) with weight, h, v, d and the variance of h; `joint`
+    `seen`: (n, 9) time since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a
+    second (NaN: unknown), lowest and highest storey. `free`: level ground is anywhere.
+    Filled: `found` (n, 10 k, 5) with weight, h, v, d and the variance of h; `joint`
     (n, 10 k, 10 k) with p(now, before) for `backward`, unless it has length 0.
     """
     size = len(state[0])
@@ -98,7 +105,7 @@ def follow(state, heights_m, free, seen, found, joint):  # type: ignore[no-untyp
 
 
 @njit(cache=True, error_model="numpy")
-def _chained(later, earlier):  # type: ignore[no-untyped-def]
+def _chained(later: Floats, earlier: Floats) -> Floats:
     """p(now, long before) from p(now, before) and p(before, long before)."""
     total = earlier.sum(axis=1)
     conditional = np.zeros_like(earlier)
@@ -109,7 +116,7 @@ def _chained(later, earlier):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def backward(joint, last):  # type: ignore[no-untyped-def]
+def backward(joint: Floats, last: Floats) -> Floats:
     """Probabilities (n, 10 k) at the samples *before* those of `joint`, given all samples, and `last` (10 k,) at its last one [Kim 1994]."""
     n, size = len(joint), len(last)
     found = np.zeros((n, size))
@@ -127,7 +134,7 @@ def backward(joint, last):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _step(state, heights_m, free, dt, seen, merged):  # type: ignore[no-untyped-def]
+def _step(state: State, heights_m: Floats, free: bool, dt: float, seen: Floats, merged: Merged) -> None:
     """One step of time: every hypothesis with each of its successors, updated and merged into the state."""
     weights, means, covariances = state
     w, m, p, xi, _, _ = merged
@@ -159,7 +166,7 @@ def _step(state, heights_m, free, dt, seen, merged):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, error_model="numpy")
-def _sets_off(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
+def _sets_off(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
     """From level ground to stairs and lifts; the weight that goes."""
     weights, here = state[0], s - s % WAYS
     often = 10.0 if seen[PLACE] == CONNECTOR else 1.0
@@ -174,7 +181,7 @@ def _sets_off(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _air(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
+def _air(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
     """Gusts begin, jump, end, and leave a shifted pressure behind; the weight that goes."""
     weights, level, gusty = state[0], s % WAYS == ON, s % MODES >= WAYS
     if not gusty:
@@ -207,7 +214,7 @@ def _air(state, s, dt, seen, merged):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _arrives(state, s, heights_m, free, dt, seen, merged):  # type: ignore[no-untyped-def]
+def _arrives(state: State, s: int, heights_m: Floats, free: bool, dt: float, seen: Floats, merged: Merged) -> float:
     """From stairs and lifts to level ground, and about on the stairs; the weight that goes."""
     weights, means, covariances = state
     here, way, gone = s - s % WAYS, s % WAYS, 0.0
@@ -236,7 +243,7 @@ def _arrives(state, s, heights_m, free, dt, seen, merged):  # type: ignore[no-un
 
 
 @njit(cache=True, error_model="numpy")
-def _copied(state, s, merged):  # type: ignore[no-untyped-def]
+def _copied(state: State, s: int, merged: Merged) -> tuple[Floats, Floats]:
     """Mean and covariance of hypothesis s, to be changed."""
     x, c = merged[4], merged[5]
     for a in range(4):
@@ -247,13 +254,13 @@ def _copied(state, s, merged):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _share(rate, dt):  # type: ignore[no-untyped-def]
+def _share(rate: float, dt: float) -> float:
     """Probability that what happens so often happens within dt."""
     return 1.0 - math.exp(-rate * dt)
 
 
 @njit(cache=True, error_model="numpy")
-def _forget(x, c, a, sd):  # type: ignore[no-untyped-def]
+def _forget(x: Floats, c: Floats, a: int, sd: float) -> None:
     """Component a is 0 with this sd, whatever it was."""
     x[a] = 0.0
     c[a, :] = 0.0
@@ -262,7 +269,7 @@ def _forget(x, c, a, sd):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _add(x, c, a, b, rest):  # type: ignore[no-untyped-def]
+def _add(x: Floats, c: Floats, a: int, b: int, rest: float) -> None:
     """Component b becomes exactly `rest`; what it was beyond goes to a."""
     x[a] += x[b] - rest
     c[a, :] += c[b, :]
@@ -272,7 +279,7 @@ def _add(x, c, a, b, rest):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _pinned(x, c, a, value, width):  # type: ignore[no-untyped-def]
+def _pinned(x: Floats, c: Floats, a: int, value: float, width: float) -> float:
     """Mean of exp(-(x_a - value)^2 / (2 width^2)) over the Gaussian, which is then multiplied by it."""
     spread = c[a, a] + width**2
     off = value - x[a]
@@ -281,7 +288,7 @@ def _pinned(x, c, a, value, width):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _drawn(x, c, a, off, spread):  # type: ignore[no-untyped-def]
+def _drawn(x: Floats, c: Floats, a: int, off: float, spread: float) -> None:
     """Component a is drawn by a measurement of it that is `off`, with this variance in all."""
     gain = (c[0, a] / spread, c[1, a] / spread, c[2, a] / spread, c[3, a] / spread)
     for i in range(4):
@@ -291,7 +298,7 @@ def _drawn(x, c, a, off, spread):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _take(x, c, weight, target, source, seen, merged):  # type: ignore[no-untyped-def]
+def _take(x: Floats, c: Floats, weight: float, target: int, source: int, seen: Floats, merged: Merged) -> None:
     """A hypothesis goes on as `target` for dt, meets what was seen, and is merged."""
     w, m, p, xi, _, _ = merged
     if weight < TINY * TINY:
@@ -312,7 +319,7 @@ def _take(x, c, weight, target, source, seen, merged):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(x, c, way, gusty, dt):  # type: ignore[no-untyped-def]
+def _predict(x: Floats, c: Floats, way: int, gusty: bool, dt: float) -> None:
     """Weather walks, gusts fade, vertical speed returns to what stairs and lifts have."""
     c[2, 2] += WEATHER_M**2 * dt
     if gusty:
@@ -321,7 +328,7 @@ def _predict(x, c, way, gusty, dt):  # type: ignore[no-untyped-def]
         for a in range(4):
             c[3, a] *= fades
             c[a, 3] *= fades
-        c[3, 3] += GUST_M**2 * (1.0 - fades**2)
+        c[3, 3] += GUST_WANDERS_M**2 * (1.0 - fades**2)
     if way == ON:
         return
     stairs = way < LIFT_UP
@@ -344,7 +351,7 @@ def _predict(x, c, way, gusty, dt):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _contradiction(x, way, seen):  # type: ignore[no-untyped-def]
+def _contradiction(x: Floats, way: int, seen: Floats) -> float:
     """Nats a second against this mode by gait, plan and the range of storeys."""
     cost = 0.0
     if way != ON:
@@ -355,7 +362,7 @@ def _contradiction(x, way, seen):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _meets_foot(x, c, way, seen):  # type: ignore[no-untyped-def]
+def _meets_foot(x: Floats, c: Floats, way: int, seen: Floats) -> float:
     """Likelihood of the foot's vertical speed, which on stairs is the wearer's; elsewhere, in a lift too, the foot claims none."""
     stairs = STAIRS_UP <= way < LIFT_UP
     noise = seen[FOOT_SD] ** 2 / seen[DT] + (0.0 if stairs else FOOT_LEVEL_M_S**2)
@@ -367,7 +374,7 @@ def _meets_foot(x, c, way, seen):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _meets_pressure(x, c, seen):  # type: ignore[no-untyped-def]
+def _meets_pressure(x: Floats, c: Floats, seen: Floats) -> float:
     """Likelihood of the claimed height, which may be a spike; the update is shared between both readings of it."""
     h0, h1, h2, h3 = (
         c[0, 0] + c[0, 2] + c[0, 3],

@@ -3,9 +3,9 @@
 In: times, the wearer's true heights, whether he is in a stairwell or lift shaft, a seeded generator. Out: true pressures and the temperature that a
 worn device reads. Owns the constants of the air. Nothing here knows how anybody estimates heights from it.
 
-The column of air is hydrostatic at the building's own temperature [ISO 2533 with another temperature]. On top of it: weather (a trend and a random walk), doors
-(pulses of 5 to 50 Pa: the air swings and settles), a fan that goes on and off, shafts whose pressure differs from the floors' by the stack effect
-[ASHRAE Fundamentals 2017, 16.4: 0.04 Pa per metre and kelvin], and the piston of a lift.
+The column of air is hydrostatic at the building's own temperature [ISO 2533 with another temperature]. On top of it: weather (a trend and a random
+walk), doors (pulses of 5 to 50 Pa: the air swings and settles), a fan that goes on and off, shafts whose pressure differs from the floors' by the
+stack effect [ASHRAE Fundamentals 2017, 16.4: 0.04 Pa per metre and kelvin], and the piston of a lift.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ BODY_HEAT_C, WARMING_S = 6.0, 400.0
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """`trend_pa_h`: of the weather; `wander_pa`: its random walk in a second; `doors_s`, `fan_s`: mean time between pulses, and between switchings of the fan, inf: never.
+    """`trend_pa_h`: of the weather; `wander_pa`: its random walk in a second; `doors_s`, `fan_s`: mean time between pulses, and between the fan's
+    switchings, inf: never.
 
     `air_c`: in the building; `colder_k`: outside by so much, which drives the stack effect.
     """
