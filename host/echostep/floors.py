@@ -83,7 +83,7 @@ def checked_heights(heights_m: Floats) -> Floats:
 
 
 def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats) -> Floors:
-    """Floors by weights (n, 10 k): the storey of those who are on one, the nearest one of those between."""
+    """Floors by weights (n, 15 k): the storey of those who are on one, the nearest one of those between."""
     n, count = len(found), len(heights_m)
     middles = 0.5 * (heights_m[1:] + heights_m[:-1])
     probability = np.zeros((n, count))

@@ -3,7 +3,7 @@
 In: heights that pressure claims (m), their noise, what gait, foot and plan know. Out: a weight and a Gaussian for each hypothesis.
 Owns the kernels only; the state lies in plain arrays, so that cutting a record into portions changes nothing.
 
-A hypothesis is (storey k, mode): the storey that he is on, or where he set off; the way of moving, in calm air or in a gust. Its Gaussian is over
+A hypothesis is (storey k, mode): the storey that he is on, or where he set off; the way of moving, and the air: calm, a gust that is held, one that fades. Its Gaussian is over
 x = [height h, vertical speed v, weather d, gust u] in metres and m/s; pressure says h + d + u. Each pair of a hypothesis and its successor is updated
 on its own and merged afterwards: the generalised pseudo-Bayesian filter of second order [Bar-Shalom, Li and Kirubarajan 2001, 11.6.5]. Without
 storeys k is 0 alone, and level ground is wherever he stops.
@@ -25,7 +25,8 @@ Merged = tuple[
 
 ON, STAIRS_UP, STAIRS_DOWN, LIFT_UP, LIFT_DOWN = range(5)  # ways of moving
 WAYS = 5
-MODES = 2 * WAYS  # each way in calm air, then each in a gust
+CALM, HELD, FADING = range(3)  # air: no gust, one that stays, one that dies away
+MODES = 3 * WAYS  # each way in calm air, then each in held and in fading gusts
 UNKNOWN, WALKING, STILL = range(3)  # gait
 CONNECTOR, OUTSIDE = 1, 2  # place: on stairs or in a lift by the plan, or certainly not
 DT, CLAIMED, NOISE, GAIT, PLACE, FOOT, FOOT_SD, LOWEST, HIGHEST = range(9)  # what is seen in a step
@@ -35,15 +36,17 @@ MOST_STEPS = 240  # in one gap
 TINY = 1e-9  # weights below are forgotten
 
 # How often what begins and ends, 1/s
-GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.5
+GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.3
+HELD_FADES, FADING_HOLDS = 0.3, 0.1
 SHIFTS, GUST_SHIFTS = 1 / 600, 1 / 60  # the pressure of the building changes for good
 CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 200, 0.5, 1 / 60
 RIDE_BEGINS, RIDE_ENDS = 1 / 600, 1.0
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
-GUST_M, GUST_S = 1.5, 4.0  # sd of a jump and time constant of doors and fans: 18 Pa
-GUST_WANDERS_M = 0.6  # sd of what a gust wanders beside its jumps
+GUST_M = 1.5  # sd of doors and fans: 18 Pa
+HELD_WANDERS_M, FADING_WANDERS_M, FADING_WANDERS = 0.2, 0.4, 0.2  # in a second; the last one times the gust
+FADES_S = 1.5
 SHIFT_M = 1.5
 GUST_OVER_M = 0.3
 CLIMB_M_S, CLIMB_SD_M_S, CLIMB_S = 0.25, 0.25, 1.5  # mean, sd, time constant of vertical speed
@@ -57,7 +60,7 @@ FOOT_LEVEL_M_S = 0.1  # what a foot on level ground may claim, over a second
 
 
 def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) -> tuple[Floats, Floats, Floats]:
-    """Weights (10 k,), means (10 k, 4), covariances (10 k, 4, 4): he stands on one of the storeys, with these probabilities."""
+    """Weights (15 k,), means (15 k, 4), covariances (15 k, 4, 4): he stands on one of the storeys, with these probabilities."""
     n = MODES * len(heights_m)
     weights, means, covariances = np.zeros(n), np.zeros((n, 4)), np.zeros((n, 4, 4))
     weights[ON::MODES] = prior / prior.sum()
@@ -73,8 +76,8 @@ def follow(state: State, heights_m: Floats, free: bool, seen: Floats, found: Flo
 
     `seen`: (n, 9) time since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a
     second (NaN: unknown), lowest and highest storey. `free`: level ground is anywhere.
-    Filled: `found` (n, 10 k, 5) with weight, h, v, d and the variance of h; `joint`
-    (n, 10 k, 10 k) with p(now, before) for `backward`, unless it has length 0.
+    Filled: `found` (n, 15 k, 5) with weight, h, v, d and the variance of h; `joint`
+    (n, 15 k, 15 k) with p(now, before) for `backward`, unless it has length 0.
     """
     size = len(state[0])
     merged = (
@@ -117,7 +120,7 @@ def _chained(later: Floats, earlier: Floats) -> Floats:
 
 @njit(cache=True, error_model="numpy")
 def backward(joint: Floats, last: Floats) -> Floats:
-    """Probabilities (n, 10 k) at the samples *before* those of `joint`, given all samples, and `last` (10 k,) at its last one [Kim 1994]."""
+    """Probabilities (n, 15 k) at the samples *before* those of `joint`, given all samples, and `last` (15 k,) at its last one [Kim 1994]."""
     n, size = len(joint), len(last)
     found = np.zeros((n, size))
     later = last.copy()
@@ -183,12 +186,16 @@ def _sets_off(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> 
 @njit(cache=True, error_model="numpy")
 def _air(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
     """Gusts begin, jump, end, and leave a shifted pressure behind; the weight that goes."""
-    weights, level, gusty = state[0], s % WAYS == ON, s % MODES >= WAYS
-    if not gusty:
-        gone = weights[s] * _share(GUST_BEGINS, dt)
-        x, c = _copied(state, s, merged)
-        _forget(x, c, 3, GUST_M)
-        _take(x, c, gone, s + WAYS, s, seen, merged)
+    weights, level, air = state[0], s % WAYS == ON, s % MODES // WAYS
+    calm = s - air * WAYS
+    gone = 0.0
+    if air == CALM:
+        for kind in (HELD, FADING):
+            share = weights[s] * _share(0.5 * GUST_BEGINS, dt)
+            x, c = _copied(state, s, merged)
+            _forget(x, c, 3, GUST_M)
+            _take(x, c, share, calm + kind * WAYS, s, seen, merged)
+            gone += share
         if level:
             share = weights[s] * _share(SHIFTS, dt)
             x, c = _copied(state, s, merged)
@@ -196,20 +203,25 @@ def _air(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float
             _take(x, c, share, s, s, seen, merged)
             gone += share
         return gone
-    gone = weights[s] * _share(GUST_JUMPS, dt)
+    share = weights[s] * _share(GUST_JUMPS, dt)
     x, c = _copied(state, s, merged)
     _forget(x, c, 3, GUST_M)
-    _take(x, c, gone, s, s, seen, merged)
-    if level:
+    _take(x, c, share, s, s, seen, merged)
+    gone += share
+    share = weights[s] * _share(HELD_FADES if air == HELD else FADING_HOLDS, dt)
+    x, c = _copied(state, s, merged)
+    _take(x, c, share, calm + (FADING if air == HELD else HELD) * WAYS, s, seen, merged)
+    gone += share
+    if level and air == HELD:
         share = weights[s] * _share(GUST_SHIFTS, dt)
         x, c = _copied(state, s, merged)
         _add(x, c, 2, 3, 0.0)
-        _take(x, c, share, s - WAYS, s, seen, merged)
+        _take(x, c, share, calm, s, seen, merged)
         gone += share
     x, c = _copied(state, s, merged)
     share = weights[s] * _share(GUST_ENDS, dt) * _pinned(x, c, 3, 0.0, GUST_OVER_M)
     _forget(x, c, 3, 0.0)
-    _take(x, c, share, s - WAYS, s, seen, merged)
+    _take(x, c, share, calm, s, seen, merged)
     return gone + share
 
 
@@ -303,8 +315,8 @@ def _take(x: Floats, c: Floats, weight: float, target: int, source: int, seen: F
     w, m, p, xi, _, _ = merged
     if weight < TINY * TINY:
         return
-    way, gusty, dt = target % WAYS, target % MODES >= WAYS, seen[DT]
-    _predict(x, c, way, gusty, dt)
+    way, air, dt = target % WAYS, target % MODES // WAYS, seen[DT]
+    _predict(x, c, way, air, dt)
     weight *= math.exp(-dt * _contradiction(x, way, seen))
     if seen[FOOT] == seen[FOOT]:
         weight *= _meets_foot(x, c, way, seen)
@@ -319,16 +331,18 @@ def _take(x: Floats, c: Floats, weight: float, target: int, source: int, seen: F
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(x: Floats, c: Floats, way: int, gusty: bool, dt: float) -> None:
+def _predict(x: Floats, c: Floats, way: int, air: int, dt: float) -> None:
     """Weather walks, gusts fade, vertical speed returns to what stairs and lifts have."""
     c[2, 2] += WEATHER_M**2 * dt
-    if gusty:
-        fades = math.exp(-dt / GUST_S)
+    if air == HELD:
+        c[3, 3] += HELD_WANDERS_M**2 * dt
+    elif air == FADING:
+        c[3, 3] += (FADING_WANDERS_M**2 + (FADING_WANDERS * x[3]) ** 2) * dt
+        fades = math.exp(-dt / FADES_S)
         x[3] *= fades
         for a in range(4):
             c[3, a] *= fades
             c[a, 3] *= fades
-        c[3, 3] += GUST_WANDERS_M**2 * (1.0 - fades**2)
     if way == ON:
         return
     stairs = way < LIFT_UP

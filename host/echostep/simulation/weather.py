@@ -22,7 +22,7 @@ SEA_LEVEL_PA = 101_325.0
 GRAVITY_M_S2, DRY_AIR_J_KG_K, ZERO_C_K = 9.80665, 287.053, 273.15
 STACK_PA_M_K = 0.04
 LEAKY = 0.3  # share of the stack effect that falls on the shaft's doors
-PISTON_PA = 2.0  # before and behind a lift at 1 m/s
+PISTON_PA = 1.0  # in a lift at 1 m/s, growing with its square; assumed: the car is open to the air before and behind it
 BODY_HEAT_C, WARMING_S = 6.0, 400.0
 
 
