@@ -3,10 +3,10 @@
 In: heights that pressure claims (m), their noise, what gait, foot and plan know. Out: a weight and a Gaussian for each hypothesis.
 Owns the kernels only; the state lies in plain arrays, so that cutting a record into portions changes nothing.
 
-A hypothesis is (storey k, mode): the storey that he is on, or where he set off; the way of moving, and the air: calm, a gust that is held, one that fades. Its Gaussian is over
-x = [height h, vertical speed v, weather d, gust u] in metres and m/s; pressure says h + d + u. Each pair of a hypothesis and its successor is updated
-on its own and merged afterwards: the generalised pseudo-Bayesian filter of second order [Bar-Shalom, Li and Kirubarajan 2001, 11.6.5]. Without
-storeys k is 0 alone, and level ground is wherever he stops.
+A hypothesis is (storey k, mode): the storey that he is on, or where he set off; the way of moving; the air, which is calm or in a gust that is
+held or fades. Its Gaussian is over x = [height h, vertical speed v, weather d, gust u] in metres and m/s; pressure says h + d + u. Each pair of a
+hypothesis and its successor is updated on its own and merged afterwards: the generalised pseudo-Bayesian filter of second order
+[Bar-Shalom, Li and Kirubarajan 2001, 11.6.5]. Without storeys k is 0 alone, and level ground is wherever he stops.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ TINY = 1e-9  # weights below are forgotten
 # How often what begins and ends, 1/s
 GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.3
 HELD_FADES, FADING_HOLDS = 0.3, 0.1
-SHIFTS, GUST_SHIFTS = 1 / 600, 1 / 60  # the pressure of the building changes for good
+SHIFTS, GUST_SHIFTS = 1 / 1200, 1 / 60  # the pressure of the building changes for good
 CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 200, 0.5, 1 / 60
-RIDE_BEGINS, RIDE_ENDS = 1 / 600, 1.0
+RIDE_BEGINS, RIDE_ENDS = 1 / 400, 1.0
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
@@ -213,8 +213,8 @@ def _air(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float
     _take(x, c, share, calm + (FADING if air == HELD else HELD) * WAYS, s, seen, merged)
     gone += share
     if level and air == HELD:
-        share = weights[s] * _share(GUST_SHIFTS, dt)
         x, c = _copied(state, s, merged)
+        share = weights[s] * _share(GUST_SHIFTS, dt) * _pinned(x, c, 3, 0.0, SHIFT_M)
         _add(x, c, 2, 3, 0.0)
         _take(x, c, share, calm, s, seen, merged)
         gone += share

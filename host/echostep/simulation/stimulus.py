@@ -32,17 +32,21 @@ class BoardSensors:
 
     def __init__(
         self, walk: Walk, walls: Floats, sync_t_s: Floats, rng: np.random.Generator,
-        magnetism: Magnetism | None = None, height_m: float = 0.0,
+        magnetism: Magnetism | None = None, height_m: Floats | float = 0.0, air_pa: Floats | None = None,
     ) -> None:  # fmt: skip
-        """`sync_t_s`: times of the MTx's SyncOut edges, ascending; `height_m`: of the floor; without `magnetism` the earth's field alone."""
+        """`sync_t_s`: times of the MTx's SyncOut edges, ascending; without `magnetism` the earth's field alone.
+
+        `height_m`: of the floor, or of each millisecond of the walk; `air_pa`: the true pressure at each (`weather.pressures`), which then counts.
+        """
         self._walk = walk
         self._walls = walls
         self._sync_us = np.rint(sync_t_s * 1e6).astype(np.int64)
-        self._height_m = height_m
+        self._height_m = np.broadcast_to(np.asarray(height_m, float), len(walk.t_s))
         self._acoustics = SRF02._replace(speed_m_s=speed_of_sound_m_s(TEMPERATURE_C))
         self._echo_rng, *rest = rng.spawn(6)
         self._range_bias_m = ranger_bias_m(self._echo_rng, self._acoustics)
         self._thigh, self._calf, self._belt = (Adis16100(r) for r in rest[:3])
+        self._air_pa = air_pa
         self._barometer = Scp1000(rest[3])
         self._compass = Compass(magnetism, rest[4])
 
@@ -58,7 +62,8 @@ class BoardSensors:
         heard = echoes(trunk, heading, self._walls, self._range_bias_m, self._echo_rng, self._acoustics)
         rows["own_us"], rows["cross_us"] = heard.own_us, heard.cross_us
         rows["bearing"] = self._compass.bearings(trunk, heading)
-        rows["pressure"], rows["temperature"] = self._barometer.counts(self._height_m, TEMPERATURE_C, len(at))
+        air = None if self._air_pa is None else self._air_pa[at]
+        rows["pressure"], rows["temperature"] = self._barometer.counts(self._height_m[at], TEMPERATURE_C, len(at), air)
         rows["sync_us"] = self._edges(start, stop)
         return rows
 
