@@ -190,6 +190,27 @@ def command(
 
 
 @app.command()
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option("--heights", metavar="METRES", help="Heights of the storeys, as 0,3.5,7; auto: from the record."),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="The floor at the start, when it is known.", min=0)
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
+) -> None:
+    """Floors of a recorded barometer: t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep import floor_run
+
+    floor_run.floors(pressure, heights, out, start, plot=plot)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:

@@ -79,6 +79,20 @@ def trails(
     study(runs, seed, out, json, scheduler)
 
 
+@app.command("floors")
+def floors_command(
+    runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/floors"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
+    from echostep.evaluate.floors import evaluate_floors
+
+    evaluate_floors(runs, seed, json, out, scheduler)
+
+
 @app.command("feet")
 def feet_command(
     folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
