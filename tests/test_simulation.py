@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader, encode
-from echostep.plan import Plan, load_plan
+from echostep.plan import Level, Plan, load_plan
 from echostep.simulation.acoustics import (
     PIPE_RADIUS_M,
     SRF02,
@@ -505,7 +505,7 @@ def test_a_row_has_the_layout_of_the_bench() -> None:
 
 def sensors(walked: Walk, sync_t_s: Floats, seed: int = 1) -> BoardSensors:
     walls = np.array([[-3.0, 1.0, 9.0, 1.0], [-3.0, -1.0, 9.0, -1.0]])
-    return BoardSensors(walked, walls, sync_t_s, np.random.default_rng(seed))
+    return BoardSensors(walked, [Level("hall", 0.0, walls)], sync_t_s, np.random.default_rng(seed))
 
 
 def test_rows_hold_what_the_sensors_would_say(l_walk: Walk) -> None:
@@ -554,9 +554,11 @@ def test_gyros_saturate() -> None:
 
 
 def test_pressure_falls_with_height_and_drifts_slowly() -> None:
-    ground, above = (Scp1000(np.random.default_rng(1)).counts(h, 20.0, 5_000)[0].mean() / 4.0 for h in (0.0, 3.0))
+    ground, above = (
+        Scp1000(np.random.default_rng(1)).counts(np.full(5_000, h), 20.0, 5_000)[0].mean() / 4.0 for h in (0.0, 3.0)
+    )
     assert ground - above == pytest.approx(36.0, abs=0.5)
-    long = Scp1000(np.random.default_rng(1)).counts(0.0, 20.0, 600_000)[0] / 4.0
+    long = Scp1000(np.random.default_rng(1)).counts(np.zeros(600_000), 20.0, 600_000)[0] / 4.0
     minutes = long.reshape(10, -1).mean(1)
     assert 0.1 < np.ptp(minutes) < 20.0
 
@@ -599,7 +601,12 @@ def test_the_python_board_sends_every_stream_at_its_rate() -> None:
     assert abs(count["Compass"] - 100) <= 2
     assert abs(count["Pressure"] - 90) <= 2
     assert 9 <= count["Status"] <= 10
-    assert {x[1:] for x in found if isinstance(x, m.Gyros)} == {(41, -82, 5)}
+    rates = [x[1:] for x in found if isinstance(x, m.Gyros)]
+    assert set(rates[:112]) == {(-32768, -32768, -32768)}  # the self-test
+    assert set(rates[112:]) == {(41, -82, 5)}
+    assert {x[1:] for x in found if isinstance(x, m.GyroHealth)} == {
+        (gyro, -34, m.SelfTest.PASSED, -221, 221) for gyro in m.Gyro
+    }
     assert {x.time_of_flight_us for x in found if isinstance(x, m.Ping) and x.ranger == m.Ranger.LEFT} == {5_831}
     assert [x.edge for x in found if isinstance(x, m.Sync)][:3] == [0, 1, 2]
     assert {x.ticks % 20_000 for x in found if isinstance(x, m.Sync)} == {666}

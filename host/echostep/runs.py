@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from echostep import fischer2008
+from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
@@ -28,9 +28,11 @@ from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
+from echostep.legs import LegsSettings
 from echostep.messages import Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
+from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
@@ -175,6 +177,28 @@ def _fischer2008_track(imu: Imu, name: str) -> Track:
 FOOT_PROFILES = {"default": _own_track, "fischer2008": _fischer2008_track}
 
 
+def legs(
+    path: Path, thigh_m: float, shank_m: float, out: Path, profile: str, scale: float | None, walked_m: float | None
+) -> None:
+    """Track a recorded leg by our own method or a paper's."""
+    if profile not in leg_file.PROFILES:
+        raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(leg_file.PROFILES)}")
+    if scale is not None and not 0.5 < scale < 2.0:
+        raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
+    lengths = leg_file.segments(thigh_m, shank_m, scale or 1.0)
+    samples = leg_file.load_legs(path)
+    for note in samples.notes:
+        console.print(f"{path.name}: {note}")
+    if lengths.measured_to_floor and profile == "default":
+        console.print(f"--shank {shank_m:g} is taken as knee to floor: {lengths.to_ankle_m:.3f} m to the ankle")
+    track = leg_file.PROFILES[profile](samples, LegsSettings(lengths, calibrated=scale is not None))
+    leg_file.write_leg_track(out, track)
+    console.print(f"{path.name}: {leg_file.describe_legs(track)}")
+    if walked_m is not None:
+        found = leg_file.calibrated_scale(float(track.rows[-1, 1]) if len(track.rows) else 0.0, walked_m)
+        console.print(f"--scale {(scale or 1.0) * found:.4f} makes this walk {walked_m:g} m long")
+
+
 def decode(path: Path) -> None:
     """Print a capture as JSON lines, and on stderr what was rejected."""
     decoder = Decoder()
@@ -185,14 +209,16 @@ def decode(path: Path) -> None:
 
 
 def parse_pose(text: str) -> Pose:
-    """X,Y,DEG as a pose; raises EchostepError."""
+    """X,Y,DEG[,LEVEL] as a pose, the level by its number from 0 or `?` for any; raises EchostepError."""
+    parts = text.split(",")
     try:
-        x, y, degrees = (float(part) for part in text.split(","))
+        x, y, degrees = (float(part) for part in parts[:3])
+        level = 0 if len(parts) < 4 else ANY_LEVEL if parts[3] == "?" else int(parts[3])
     except ValueError as error:
-        raise EchostepError(f"--start {text}: expected X,Y,DEG, for instance 1.5,2,90") from error
-    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)):
+        raise EchostepError(f"--start {text}: expected X,Y,DEG[,LEVEL], for instance 1.5,2,90 or 1.5,2,90,3") from error
+    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)) or len(parts) > 4 or level < ANY_LEVEL:
         raise EchostepError(f"--start {text}: not a place")
-    return Pose(x, y, math.radians(degrees))
+    return Pose(x, y, math.radians(degrees), level)
 
 
 def _run(
@@ -273,7 +299,7 @@ def _finish(
     write_track(out / "track.csv", estimates)
     off = errors(estimates, truth) if truth else None
     title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
-    draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
+    draw_track(out / "track.png", tracker.plan, estimates, truth, title)
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
@@ -289,7 +315,7 @@ def _finish(
 
 
 def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
-    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r}"
+    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"
     return {
         "version": _version(),
         "plan_sha256": plan.digest,
@@ -303,7 +329,10 @@ def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) ->
 def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
     try:
         text = about.get("start_x_y_rad")
-        return None if text is None else Pose(*(float(v) for v in text.split(",")))
+        if text is None:
+            return None
+        x, y, heading, *level = (float(v) for v in text.split(","))
+        return Pose(x, y, heading, int(level[0]) if level else 0)
     except (ValueError, TypeError) as error:
         raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
 
