@@ -103,7 +103,13 @@ def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:
         "out",
     ]
     run = subprocess.run(
-        command, cwd=tmp_path, env=os.environ | {"COLUMNS": "200"}, capture_output=True, text=True, timeout=300
+        command,
+        cwd=tmp_path,
+        env=os.environ | {"COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert run.returncode == 0, run.stderr
     rows = json.loads((tmp_path / "rows.json").read_text())["rows"]

@@ -1,7 +1,7 @@
 """Ways through a building: the shortest that a person can walk, through doors, stairs and lifts.
 
-In: a plan, and where from and where to. Out: a `Route`, a line a level. Owns the grids of a plan's levels. Doors that stand open or may be opened are gaps
-in the walls. The way is found on a grid [Dijkstra 1959] and then drawn tight, so that it bends at corners only.
+In: a plan, and where from and where to. Out: a `Route`, a line a level. Owns the grids of a plan's levels. Doors are gaps in the walls. The way is
+found on a grid [Dijkstra 1959] and then drawn tight, so that it bends at corners only.
 """
 
 from __future__ import annotations
@@ -71,19 +71,25 @@ class Routes:
         self._low = low - MARGIN_M
         columns, rows = (int(n) for n in np.ceil((high + MARGIN_M - self._low) / CELL_M))
         if columns * rows * len(plan.levels) > MOST_CELLS:
-            raise EchostepError(f"plan {plan.name}: too large to find ways in: {columns} x {rows} cells on {len(plan.levels)} levels")
+            raise EchostepError(
+                f"plan {plan.name}: too large to find ways in: {columns} x {rows} cells on {len(plan.levels)} levels"
+            )
         self._plan = plan
         self._blocked = np.zeros((len(plan.levels), rows, columns), np.bool_)
         for k, level in enumerate(plan.levels):
-            _block((np.asarray(level.solid, np.float64) - np.tile(self._low, 2)) / CELL_M, BODY_M / CELL_M, self._blocked[k])
+            _block(
+                (np.asarray(level.solid, np.float64) - np.tile(self._low, 2)) / CELL_M,
+                BODY_M / CELL_M,
+                self._blocked[k],
+            )
         self._connector = np.full(self._blocked.shape, -1, np.int64)
         self._serves = np.zeros((len(plan.connectors), len(plan.levels)), np.bool_)
         for c, connector in enumerate(plan.connectors):
             cells = self._inside(connector.outline_m)
-            for level in connector.levels:
-                self._serves[c, level] = True
-                self._connector[level][cells] = c
-                self._blocked[level][cells] = False
+            for storey in connector.levels:
+                self._serves[c, storey] = True
+                self._connector[storey][cells] = c
+                self._blocked[storey][cells] = False
         self._height = np.array([level.height_m for level in plan.levels])
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
 
@@ -102,7 +108,7 @@ class Routes:
         cuts = [0, *(np.flatnonzero(np.diff(trail[:, 0])) + 1).tolist(), len(trail)]
         for first, beyond in zip(cuts[:-1], cuts[1:], strict=True):
             part, level = trail[first:beyond], int(trail[first, 0])
-            if len(part) == 1 and 0 < first and beyond < len(trail):
+            if len(part) == 1 and first > 0 and beyond < len(trail):
                 continue  # a level that the stairs only pass
             kept = _tight(self._blocked[level], part[:, 1:])
             line = self._low + (part[kept][:, [2, 1]] + 0.5) * CELL_M
@@ -123,7 +129,11 @@ class Routes:
         c, r = (np.array([place.x_m, place.y_m]) - self._low) / CELL_M
         reach = int(ASIDE_M / CELL_M)
         near = np.argwhere(
-            ~self._blocked[place.level, max(int(r) - reach, 0) : max(int(r) + reach + 1, 0), max(int(c) - reach, 0) : max(int(c) + reach + 1, 0)]
+            ~self._blocked[
+                place.level,
+                max(int(r) - reach, 0) : max(int(r) + reach + 1, 0),
+                max(int(c) - reach, 0) : max(int(c) + reach + 1, 0),
+            ]
         )
         if not (0 <= r < rows and 0 <= c < columns) or not len(near):
             raise EchostepError(f"{what} ({place.x_m:.1f}, {place.y_m:.1f}) is outside the plan or inside a wall")
@@ -178,37 +188,38 @@ def _search(
         if spent > cost[here]:
             continue
         level, r, c = here // size, here % size // columns, here % columns
-        for dr in range(-1, 2):
-            for dc in range(-1, 2):
-                y, x = r + dr, c + dc
-                if not (0 <= y < rows and 0 <= x < columns) or blocked[level, y, x]:
-                    continue
-                if dr != 0 and dc != 0 and (blocked[level, r, x] or blocked[level, y, c]):
-                    continue
-                there, total = level * size + y * columns + x, spent + CELL_M * math.sqrt(dr * dr + dc * dc)
+        for k in range(9):
+            y, x = r + k // 3 - 1, c + k % 3 - 1
+            if (
+                0 <= y < rows
+                and 0 <= x < columns
+                and not (blocked[level, y, x] or blocked[level, r, x] or blocked[level, y, c])
+            ):
+                there, total = level * size + y * columns + x, spent + CELL_M * math.hypot(y - r, x - c)
                 if total < cost[there]:
                     cost[there], before[there] = total, here
                     heapq.heappush(heap, (total, there))
         k = connector[level, r, c]
-        if k < 0:
-            continue
         for other in range(levels):
-            if other == level or not serves[k, other] or connector[other, r, c] != k:
-                continue
-            rise = abs(height[other] - height[level])
-            there, total = other * size + r * columns + c, spent + (LIFT_M + rise if lift[k] else CLIMB * rise)
-            if total < cost[there]:
-                cost[there], before[there] = total, here
-                heapq.heappush(heap, (total, there))
-    if cost[last] == np.inf:
-        return np.zeros((0, 3), np.int64)
+            if k >= 0 and other != level and serves[k, other] and connector[other, r, c] == k:
+                rise = abs(height[other] - height[level])
+                there, total = other * size + r * columns + c, spent + (LIFT_M + rise if lift[k] else CLIMB * rise)
+                if total < cost[there]:
+                    cost[there], before[there] = total, here
+                    heapq.heappush(heap, (total, there))
+    return _trace(before, first, last, rows, columns)
+
+
+@njit(cache=True, error_model="numpy")
+def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints:
+    """The trail to `last`, from what came before each cell; (0, 3) when it was not reached."""
     count, at = 1, last
-    while at != first:
+    while at != first and at >= 0:
         at, count = before[at], count + 1
-    trail = np.empty((count, 3), np.int64)
+    trail = np.empty((count if at == first else 0, 3), np.int64)
     at = last
-    for i in range(count - 1, -1, -1):
-        trail[i] = at // size, at % size // columns, at % columns
+    for i in range(len(trail) - 1, -1, -1):
+        trail[i] = at // (rows * columns), at % (rows * columns) // columns, at % columns
         at = before[at]
     return trail
 
