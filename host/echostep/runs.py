@@ -11,6 +11,7 @@ import math
 import shlex
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from importlib.resources import as_file, files
@@ -229,7 +230,14 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
     """Every chunk, after it has been written."""
     for chunk in chunks:
         recorder.write(chunk)
+        recorder.settle(chunk)
+        _say(recorder.notices)
         yield chunk
+
+
+def _say(notices: deque[str]) -> None:
+    while notices:
+        console.print(notices.popleft())
 
 
 def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
@@ -248,8 +256,8 @@ def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: floa
     start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:
         for chunk in ports.chunks():
-            while ports.notices:
-                console.print(ports.notices.popleft())
+            _say(ports.notices)
+            _say(recorder.notices)
             if chunk is not None:
                 recorder.write(chunk)
             start.follow(chunk)
