@@ -311,7 +311,10 @@ def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) ->
 def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
     try:
         text = about.get("start_x_y_rad")
-        return None if text is None else Pose(*(float(v) for v in text.split(",")))
+        if text is None:
+            return None
+        x, y, heading = (float(v) for v in text.split(","))
+        return Pose(x, y, heading)
     except (ValueError, TypeError) as error:
         raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
 
