@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -100,6 +100,11 @@ class Recorder:
         if self._settled_ns is None or chunk.t_arrival_ns - self._settled_ns >= SETTLE_NS:
             self._settled_ns = chunk.t_arrival_ns
             self._spool.settle()
+
+    def notes(self, notes: Iterable[Note]) -> None:
+        """Keep derived messages."""
+        for note in notes:
+            self.note(note)
 
     def note(self, note: Note) -> None:
         """Keep a derived message, unless the disk is busy with the bytes."""

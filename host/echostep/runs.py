@@ -24,6 +24,7 @@ from rich.console import Console
 from echostep import fischer2008
 from echostep.alignment import aligned
 from echostep.capture import Decoder, as_json, read_capture
+from echostep.derived import Derived
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
@@ -74,6 +75,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
                 "echostep demo (simulated)",
                 lambda: scenario.fraction,
                 headless,
+                recorder,
             )
     finally:
         scenario.close()
@@ -95,7 +97,7 @@ def live(
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
             chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
-            estimates = _run(tracker, chunks, "echostep live", None, headless)
+            estimates = _run(tracker, chunks, "echostep live", None, headless, recorder)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live")
@@ -197,9 +199,11 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool
-) -> list[Estimate]:
-    """Feed everything; Ctrl-C ends a run like its last chunk does."""
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool,
+    recorder: Recorder | None = None,
+) -> list[Estimate]:  # fmt: skip
+    """Feed everything; Ctrl-C ends a run like its last chunk does. `recorder`: what is derived is recorded, once it has been shown."""
+    derived = Derived(tracker)
     view = None if headless else TerminalView(tracker, title, progress, console)
     estimates: list[Estimate] = []
     shown: AbstractContextManager[object] = view or nullcontext()
@@ -210,6 +214,8 @@ def _run(
                 estimates += new
                 if view:
                     view.show(new)
+                if recorder:
+                    recorder.notes(derived.take(portion, new))
         except KeyboardInterrupt:
             pass
     return estimates

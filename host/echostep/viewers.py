@@ -66,9 +66,7 @@ FRAME = topic(
         rotation=_TURN,
     ),
 )
-SCENE = topic(
-    "/scene", fields("foxglove.SceneUpdate", deletions=rows({"type": "object"}), entities=rows(_ENTITY))
-)
+SCENE = topic("/scene", fields("foxglove.SceneUpdate", deletions=rows({"type": "object"}), entities=rows(_ENTITY)))
 LOCATION = topic(
     "/location",
     fields(
@@ -101,8 +99,8 @@ def time_of(t_ns: int) -> dict[str, int]:
 
 
 def place(at: Place) -> dict[str, float]:
-    """A point or a vector."""
-    return dict(zip("xyz", at, strict=True))
+    """A point or a vector, to a tenth of a millimetre."""
+    return {axis: round(v, 4) for axis, v in zip("xyz", at, strict=True)}
 
 
 def turned(heading_rad: float) -> dict[str, float]:
@@ -114,9 +112,7 @@ def pose(t_ns: int, at: Place, heading_rad: float) -> list[Note]:
     """Where the trunk is: as a pose, and as a frame that a view can follow."""
     stamp, here, turn = time_of(t_ns), place(at), turned(heading_rad)
     return [
-        Note(
-            POSE, t_ns, {"timestamp": stamp, "frame_id": MAP_FRAME, "pose": {"position": here, "orientation": turn}}
-        ),
+        Note(POSE, t_ns, {"timestamp": stamp, "frame_id": MAP_FRAME, "pose": {"position": here, "orientation": turn}}),
         Note(
             FRAME,
             t_ns,
