@@ -14,6 +14,7 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.logs_cli import app as logs
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
@@ -22,6 +23,7 @@ app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(logs)
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 Start = Annotated[

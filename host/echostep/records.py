@@ -126,14 +126,14 @@ def _sweep(
     """Fill the columns from message records of the ports; returns how many there were, and where another record or the end came."""
     found = 0
     while at + HEAD_SIZE <= len(buffer) and buffer[at] == MESSAGE:
-        length = _number(buffer, at + 1, 8)
+        length = number_at(buffer, at + 1, 8)
         body = at + HEAD_SIZE
         if not 0 <= length <= len(buffer) - body:
             break
         at = body + length
-        if length >= MESSAGE_SIZE and port_of[_number(buffer, body, 2)] >= 0:
-            port[found] = port_of[_number(buffer, body, 2)]
-            log_time_ns = _number(buffer, body + 6, 8)
+        if length >= MESSAGE_SIZE and port_of[number_at(buffer, body, 2)] >= 0:
+            port[found] = port_of[number_at(buffer, body, 2)]
+            log_time_ns = number_at(buffer, body + 6, 8)
             t_arrival_ns[found] = log_time_ns if 0 <= log_time_ns <= LATEST_NS else LATEST_NS
             start[found], end[found] = body + MESSAGE_SIZE, at
             found += 1
@@ -141,7 +141,7 @@ def _sweep(
 
 
 @njit(cache=True, error_model="numpy")
-def _number(buffer: Octets, at: int, size: int) -> int:
+def number_at(buffer: Octets, at: int, size: int) -> int:
     """A little-endian number; from 2^63 on negative."""
     value = 0
     for k in range(size):
