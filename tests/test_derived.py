@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from echostep.derived import TOPICS, Derived
-from echostep.earth import covariance_east_north, longitude_latitude
+from echostep.derived import TOPICS, Derived, east_north
 from echostep.estimate import Estimate, digest
 from echostep.plan import Georeference, Plan, load_plan
 from echostep.recording import Recorder, open_recording
@@ -116,7 +115,7 @@ def test_steps_echoes_and_pressure_are_plausible(recorded: tuple[Path, list[Esti
     assert all(0.1 < range_m < 7.0 for range_m in heard)
     assert all(95_000 < p["pressure_pa"] < 105_000 for p in by_topic["/pressure"])
     names = [entity["id"] for body in by_topic["/scene"] for entity in body["entities"]]
-    assert names.count("plan") == 1
+    assert sum(name.startswith("plan") for name in names) == 1
 
 
 def test_a_recording_with_derived_messages_replays_to_the_same_estimates(recorded: tuple[Path, list[Estimate]]) -> None:
@@ -125,20 +124,9 @@ def test_a_recording_with_derived_messages_replays_to_the_same_estimates(recorde
     assert digest(tracked(None, load_plan(DEMO), most=7)) == digest(estimates)
 
 
-def test_places_on_earth() -> None:
-    """100 m along the map's x, 30 degrees from east to north: by the length of a degree on the ellipsoid."""
-    longitude, latitude = longitude_latitude(TAY, np.array([0.0, 100.0]), np.array([0.0, 0.0]))
-    assert (longitude[0], latitude[0]) == pytest.approx((-2.978, 56.46), abs=1e-12)
-    phi, e2, a = math.radians(56.46), 0.00669437999014, 6378137.0
-    meridian = a * (1 - e2) / (1 - e2 * math.sin(phi) ** 2) ** 1.5
-    parallel = a * math.cos(phi) / math.sqrt(1 - e2 * math.sin(phi) ** 2)
-    assert math.radians(latitude[1] - 56.46) * meridian == pytest.approx(50.0, abs=0.01)
-    assert math.radians(longitude[1] + 2.978) * parallel == pytest.approx(100.0 * math.cos(math.pi / 6), abs=0.01)
-
-
 def test_covariance_on_earth_is_the_turned_one() -> None:
     c, s = math.cos(TAY.rotation_rad), math.sin(TAY.rotation_rad)
     turn = np.array([[c, -s], [s, c]])
     expected = turn @ np.array([[0.5, 0.1], [0.1, 0.2]]) @ turn.T
-    east, both, north = covariance_east_north(TAY, 0.5, 0.1, 0.2)
+    east, both, north = east_north(TAY.rotation_rad, 0.5, 0.1, 0.2)
     assert np.array([[east, both], [both, north]]) == pytest.approx(expected)

@@ -126,14 +126,12 @@ def test_damage_in_the_middle_costs_what_is_damaged_and_little_more(tmp_path: Pa
 def test_garbage_ends_in_one_error_or_nothing_believed(tmp_path: Path, junk: bytes, magic: bool) -> None:
     path = tmp_path / "junk.mcap"
     path.write_bytes((b"\x89MCAP0\r\n" if magic else b"") + junk)
-    for run in (
-        lambda: info(path),
-        lambda: repair(path, tmp_path / "o.mcap"),
-        lambda: cut(path, 0, 1, tmp_path / "o.mcap"),
-    ):
+    out = tmp_path / "o.mcap"
+    runs: list[Callable[[], object]] = [lambda: info(path), lambda: repair(path, out), lambda: cut(path, 0, 1, out)]
+    for run in runs:
         with pytest.raises(EchostepError, match=r"junk\.mcap"):
             run()
-        assert not (tmp_path / "o.mcap").exists()
+        assert not out.exists()
 
 
 @pytest.mark.parametrize("length", [(1 << 64) - 1, 1 << 63, 1 << 40, 1 << 28, 0])

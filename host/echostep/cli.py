@@ -15,6 +15,7 @@ import typer
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
 from echostep.logs_cli import app as logs
+from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
@@ -24,6 +25,7 @@ app = typer.Typer(
 )
 app.add_typer(evaluate, name="evaluate")
 app.add_typer(logs)
+app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 Start = Annotated[

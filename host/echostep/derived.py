@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from echostep.building.earth import Earth
 from echostep.calibration import ranges
-from echostep.earth import covariance_east_north, longitude_latitude
+from echostep.errors import EchostepError
 from echostep.estimate import Estimate
 from echostep.frames import BoardReader, Frames
 from echostep.messages import BY_ID, Ping, Pressure, Ranger, Status
+from echostep.plan import Plan
 from echostep.recording import Note, Topic
 from echostep.sources import BOARD, Portion
 from echostep.tracker import Tracker
@@ -32,6 +34,7 @@ from echostep.viewers import (
     WHOLE,
     Place,
     Shape,
+    array,
     fields,
     location,
     pose,
@@ -47,7 +50,14 @@ TRACK_PIECE = 40  # points of the track that are drawn as one
 BEAM_S = 1.0  # an older echo is not drawn any more
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-_SHAPES: dict[str, Shape] = {"float": NUMBER, "int": WHOLE, "Status": TEXT, "str": TEXT, "bool": TRUTH}
+_SHAPES: dict[str, Shape] = {
+    "float": NUMBER,
+    "int": WHOLE,
+    "Status": TEXT,
+    "str": TEXT,
+    "bool": TRUTH,
+    "tuple[float, ...]": array(NUMBER),
+}
 _SIDES = ("left", "right")
 
 ESTIMATE = topic(
@@ -86,6 +96,7 @@ class Derived:
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
         tracker.intake.timeline.arrival_ns(0.0)  # compiled before anything is in a hurry
+        self._earth = earth_of(tracker.plan)
         self._board = BoardReader()
         self._drawn = False
         self._last: Estimate | None = None
@@ -148,22 +159,21 @@ class Derived:
             "radius95_m": ellipse.major_m,
         }
         notes = [Note(ESTIMATE, t_ns, body)]
-        height_m = self._tracker.plan.levels[0].height_m
-        notes += pose(t_ns, (e.x_m, e.y_m, height_m), e.heading_rad)
-        notes += self._earth(e, t_ns, height_m)
+        notes += pose(t_ns, (e.x_m, e.y_m, e.z_m), e.heading_rad)
+        notes += self._location(e, t_ns)
         notes += self._step(e, t_ns)
-        notes.append(self._scene(e, t_ns, height_m))
+        notes.append(self._scene(e, t_ns))
         self._last = e
         return notes
 
-    def _earth(self, e: Estimate, t_ns: int, height_m: float) -> list[Note]:
+    def _location(self, e: Estimate, t_ns: int) -> list[Note]:
         georeference = self._tracker.plan.georeference
-        if georeference is None:
+        if self._earth is None or georeference is None:
             return []
-        longitude, latitude = longitude_latitude(georeference, np.array([e.x_m]), np.array([e.y_m]))
-        ee, en, nn = covariance_east_north(georeference, e.xx_m2, e.xy_m2, e.yy_m2)
-        covariance = (ee, en, 0.0, en, nn, 0.0, 0.0, 0.0, 0.0)
-        return [location(t_ns, float(longitude[0]), float(latitude[0]), height_m, covariance)]
+        longitude, latitude = self._earth.degrees(np.array([[e.x_m, e.y_m]]))[0].tolist()
+        ee, en, nn = east_north(georeference.rotation_rad, e.xx_m2, e.xy_m2, e.yy_m2)
+        covariance = (ee, en, 0.0, en, nn, 0.0, 0.0, 0.0, e.z_sd_m**2)
+        return [location(t_ns, longitude, latitude, e.z_m, covariance)]
 
     def _step(self, e: Estimate, t_ns: int) -> list[Note]:
         """A step ends at the first estimate that counts it; it began at the last estimate of the step before."""
@@ -179,25 +189,41 @@ class Derived:
             body["speed_m_s"] = length_m / duration_s
         return [Note(STEP, t_ns, body)]
 
-    def _scene(self, e: Estimate, t_ns: int, height_m: float) -> Note:
+    def _scene(self, e: Estimate, t_ns: int) -> Note:
         """The plan once, and what moves."""
-        here = (e.x_m, e.y_m, height_m)
+        here = (e.x_m, e.y_m, e.z_m)
         self._walked.append(here)
         begun = (len(self._walked) - 2) // TRACK_PIECE * TRACK_PIECE if len(self._walked) > 1 else 0
         drawn = {
             f"track_{begun}": (LINE_STRIP, TRACK, self._walked[begun:]),
-            "ellipse95": (LINE_STRIP, ELLIPSE, _outline(e, height_m)),
+            "ellipse95": (LINE_STRIP, ELLIPSE, _outline(e)),
         }
         for which, color in ((Ranger.LEFT, LEFT_BEAM), (Ranger.RIGHT, RIGHT_BEAM)):
             heard_ns, range_m = self._heard.get(which, (-1 << 62, 0.0))
             axis = e.heading_rad + (0.5 if which == Ranger.LEFT else -0.5) * math.pi
             fresh = abs(t_ns - heard_ns) < BEAM_S * 1e9
-            end = (e.x_m + range_m * math.cos(axis), e.y_m + range_m * math.sin(axis), height_m)
+            end = (e.x_m + range_m * math.cos(axis), e.y_m + range_m * math.sin(axis), e.z_m)
             drawn[f"echo_{_SIDES[which]}"] = (LINE_STRIP, color, [here, end] if fresh else [])
         if not self._drawn:
             self._drawn = True
-            drawn["plan"] = walls(self._tracker.plan.levels[0])
+            drawn |= {f"plan {k} {level.name}": walls(level) for k, level in enumerate(self._tracker.plan.levels)}
         return scene(t_ns, **drawn)
+
+
+def earth_of(plan: Plan) -> Earth | None:
+    """Where the plan lies on Earth, if that is known; raises EchostepError when it cannot be understood."""
+    try:
+        return None if plan.georeference is None else Earth(plan.georeference)
+    except ValueError as error:
+        raise EchostepError(f"plan {plan.name}: {error}") from error
+
+
+def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) -> tuple[float, float, float]:
+    """A covariance on the map's axes as variances east, of both, north; `rotation_rad`: from east to the map's x axis."""
+    c, s = math.cos(rotation_rad), math.sin(rotation_rad)
+    east = c * c * xx_m2 - 2.0 * c * s * xy_m2 + s * s * yy_m2
+    north = s * s * xx_m2 + 2.0 * c * s * xy_m2 + c * c * yy_m2
+    return east, c * s * (xx_m2 - yy_m2) + (c * c - s * s) * xy_m2, north
 
 
 def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
@@ -213,11 +239,11 @@ def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
     return notes
 
 
-def _outline(e: Estimate, height_m: float) -> list[Place]:
+def _outline(e: Estimate) -> list[Place]:
     major_m, minor_m, angle_rad = e.ellipse95
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return [
-        (e.x_m + c * u - s * v, e.y_m + s * u + c * v, height_m)
+        (e.x_m + c * u - s * v, e.y_m + s * u + c * v, e.z_m)
         for turn in np.linspace(0.0, 2.0 * math.pi, ELLIPSE_POINTS).tolist()
         for u, v in [(major_m * math.cos(turn), minor_m * math.sin(turn))]
     ]

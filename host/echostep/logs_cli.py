@@ -36,6 +36,30 @@ def cut(
 
 
 @app.command()
+def export(
+    file: Log,
+    plan: Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="OUT", help="track.csv, .parquet, .gpkg, .kml, or .mcap with derived messages."
+        ),
+    ],
+    start: Annotated[
+        str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")
+    ] = None,
+    settings: Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
+) -> None:
+    """Track a recording and write its track for other programs."""
+    from echostep import runs
+    from echostep.export import export as write
+
+    pose = None if start is None else runs.parse_pose(start)
+    print(write(file, plan, out, lambda recording, on: runs.tracker_of(recording, on, pose, settings, seed)))
+
+
+@app.command()
 def repair(file: Log, out: Out) -> None:
     """Save what a crash or damage left of a recording."""
     from echostep import logs

@@ -35,7 +35,7 @@ from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
-from echostep.recording import Recorder, open_recording
+from echostep.recording import Recorder, Recording, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
 from echostep.timeline import MtxTiming
@@ -127,10 +127,8 @@ def replay(
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
-    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
-    settings = parse_settings(text, str(settings_path or path))
     truth = load_truth(truth_path) if truth_path else None
-    tracker = Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
+    tracker = tracker_of(recording, plan, start, settings_path, seed)
     out = _folder(out)
     if note := about.get("note"):
         console.print(f"Recording: {note}")
@@ -143,6 +141,16 @@ def replay(
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
     _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+
+
+def tracker_of(
+    recording: Recording, plan: Plan, start: Pose | None, settings_path: Path | None, seed: int | None
+) -> Tracker:
+    """A tracker as the recording was tracked, but for what is given; raises EchostepError when something is missing or damaged."""
+    about, path = recording.about, recording.path
+    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
+    settings = parse_settings(text, str(settings_path or path))
+    return Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:

@@ -15,9 +15,9 @@ from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
 from echostep.plan import Plan, Pose
-from echostep.reflectors import Walls
 from echostep.settings import Settings
 from echostep.sources import Chunk, Portion, portion_of
+from echostep.storeys import building
 from echostep.waiting import Passage
 
 
@@ -33,7 +33,7 @@ class Tracker:
         self.plan = plan
         self.start = pose
         self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
-        self.walls = Walls(plan.levels[0].walls)
+        self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self._rng = np.random.default_rng(seed)
         self._last: Estimate | None = None
@@ -63,4 +63,5 @@ class Tracker:
         systematic(np.ones(2), 0.5, 2)
 
     def _begin(self, walk_heading_rad: float, rng: np.random.Generator) -> MapFilter:
-        return MapFilter(self.walls, self.start, walk_heading_rad, rng, self.settings.cloud, self.settings.echo)
+        s, b = self.settings, self.building
+        return MapFilter(b.walls, self.start, walk_heading_rad, rng, s.cloud, s.echo, b.storeys, s.climb)

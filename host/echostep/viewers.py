@@ -29,7 +29,7 @@ def fields(title: str, **properties: Shape) -> dict[str, Any]:
     return {"title": title, "type": "object", "properties": dict(properties)}
 
 
-def rows(items: Shape) -> dict[str, Any]:
+def array(items: Shape) -> dict[str, Any]:
     """A JSON Schema of an array."""
     return {"type": "array", "items": dict(items)}
 
@@ -45,14 +45,14 @@ _TURN = fields("foxglove.Quaternion", x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
 _POSE = fields("foxglove.Pose", position=_PLACE, orientation=_TURN)
 _COLOR = fields("foxglove.Color", r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
 _LINE = fields(
-    "foxglove.LinePrimitive", type=WHOLE, pose=_POSE, thickness=NUMBER, scale_invariant=TRUTH, points=rows(_PLACE),
-    color=_COLOR, colors=rows(_COLOR), indices=rows(WHOLE),
+    "foxglove.LinePrimitive", type=WHOLE, pose=_POSE, thickness=NUMBER, scale_invariant=TRUTH, points=array(_PLACE),
+    color=_COLOR, colors=array(_COLOR), indices=array(WHOLE),
 )  # fmt: skip
 _SOLIDS = ("arrows", "cubes", "spheres", "cylinders", "triangles", "texts", "models")
 _ENTITY = fields(
     "foxglove.SceneEntity", timestamp=_TIME, frame_id=TEXT, id=TEXT, lifetime=fields("duration", sec=WHOLE, nsec=WHOLE),
-    frame_locked=TRUTH, metadata=rows(fields("foxglove.KeyValuePair", key=TEXT, value=TEXT)), lines=rows(_LINE),
-    **{name: rows({"type": "object"}) for name in _SOLIDS},
+    frame_locked=TRUTH, metadata=array(fields("foxglove.KeyValuePair", key=TEXT, value=TEXT)), lines=array(_LINE),
+    **{name: array({"type": "object"}) for name in _SOLIDS},
 )  # fmt: skip
 POSE = topic("/pose", fields("foxglove.PoseInFrame", timestamp=_TIME, frame_id=TEXT, pose=_POSE))
 FRAME = topic(
@@ -66,7 +66,7 @@ FRAME = topic(
         rotation=_TURN,
     ),
 )
-SCENE = topic("/scene", fields("foxglove.SceneUpdate", deletions=rows({"type": "object"}), entities=rows(_ENTITY)))
+SCENE = topic("/scene", fields("foxglove.SceneUpdate", deletions=array({"type": "object"}), entities=array(_ENTITY)))
 LOCATION = topic(
     "/location",
     fields(
@@ -76,7 +76,7 @@ LOCATION = topic(
         latitude=NUMBER,
         longitude=NUMBER,
         altitude=NUMBER,
-        position_covariance={**rows(NUMBER), "minItems": 9, "maxItems": 9},
+        position_covariance={**array(NUMBER), "minItems": 9, "maxItems": 9},
         position_covariance_type=WHOLE,
     ),
 )
@@ -150,7 +150,7 @@ def scene(t_ns: int, **drawn: tuple[int, Color, Sequence[Place]]) -> Note:
 def walls(level: Level) -> tuple[int, Color, list[Place]]:
     """The plan's walls for `scene`, at the level's height; the first `MOST_WALLS` of them."""
     points: list[Place] = []
-    for x0, y0, x1, y1 in level.walls[:MOST_WALLS].tolist():
+    for x0, y0, x1, y1 in level.solid[:MOST_WALLS].tolist():
         points += [(x0, y0, level.height_m), (x1, y1, level.height_m)]
     return LINE_LIST, WALL, points
 
