@@ -16,7 +16,10 @@ import pytest
 from pyarrow import parquet
 
 from echostep.building.earth import Earth
+from echostep.errors import EchostepError
 from echostep.estimate import Estimate
+from echostep.export import export as write
+from echostep.logs import info
 from echostep.plan import load_plan
 from echostep.recording import Recorder, open_recording
 from echostep.runs import tracker_of
@@ -45,12 +48,13 @@ def estimates(folder: Path) -> list[Estimate]:
 
 def export(folder: Path, name: str, plan: Path | None = None) -> Path:
     out = folder / name
-    done = subprocess.run(
-        [sys.executable, "-m", "echostep", "export", folder / "walk.mcap", "--plan", plan or folder / "plan.json", "-o", out],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert name in done.stdout
+    said = write(
+        folder / "walk.mcap",
+        plan or folder / "plan.json",
+        out,
+        lambda recording, on: tracker_of(recording, on, None, None, None),
+    )
+    assert name in said
     return out
 
 
@@ -89,11 +93,9 @@ def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> 
     out = export(folder, "again.mcap")
     assert tuple(open_recording(out).chunks()) == walk_chunks()
     assert open_recording(out).about == {"seed": "3", "note": "a test"}
-    told = subprocess.run(
-        [sys.executable, "-m", "echostep", "info", out], capture_output=True, text=True, check=True
-    ).stdout
+    told = "\n".join(info(out))
     assert "/estimate" in told
-    assert told.rstrip().endswith("whole")
+    assert told.endswith("whole")
 
 
 @pytest.mark.parametrize(
@@ -102,11 +104,15 @@ def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> 
 )
 def test_what_cannot_be_written_is_named(folder: Path, name: str, plan: Path, said: str) -> None:
     before = (folder / "walk.mcap").read_bytes()
+    with pytest.raises(EchostepError, match=said):
+        export(folder, name, plan)
+    assert (folder / "walk.mcap").read_bytes() == before
+
+
+def test_the_command_says_what_it_wrote(folder: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "echostep", "export", folder / "walk.mcap", "--plan", plan, "-o", folder / name],
+        [sys.executable, "-m", "echostep", "export", folder / "walk.mcap", "--plan", DEMO, "-o", folder / "by_command.csv"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert (folder / "walk.mcap").read_bytes() == before
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "by_command.csv" in done.stdout.splitlines()[-1]

@@ -203,19 +203,17 @@ def _rate(count: int, seconds: float) -> str:
 def _condition(salvage: Salvage, facts: Facts) -> list[str]:
     """What is wrong with the file, nothing: no lines."""
     lines = [f"  {note}" for note in facts.notes]
-    if salvage.skipped:
-        first = salvage.skipped[0][0]
-        lines.append(
-            f"  damaged: {salvage.lost_bytes} bytes in {len(salvage.skipped)} places make no sense, the first at byte {first}"
-        )
+    places = [place for place in salvage.skipped if place[1] < salvage.size]
+    if places:
+        lost = sum(end - begin for begin, end in places)
+        lines.append(f"  damaged: {lost} bytes in {len(places)} places make no sense, the first at byte {places[0][0]}")
     if salvage.closed:
         lines.append(f"  damaged: {salvage.closed} compressed chunks cannot be opened")
     if facts.earlier:
         lines.append(f"  {facts.earlier} chunks stand behind later ones")
     if not salvage.finished:
-        lines.append(
-            "  not finished: the recorder was stopped before it could close the file (echostep repair mends that)"
-        )
+        middle = ", in the middle of a record" if len(places) < len(salvage.skipped) else ""
+        lines.append(f"  the file ends too early{middle}: the recorder was stopped before it could close it")
     return lines
 
 

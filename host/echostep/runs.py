@@ -77,6 +77,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
                 headless,
                 recorder,
             )
+        _say(recorder.notices)
     finally:
         scenario.close()
     _finish(out, tracker, estimates, truth, "simulated walk")
@@ -98,6 +99,7 @@ def live(
         with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
             chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
             estimates = _run(tracker, chunks, "echostep live", None, headless, recorder)
+        _say(recorder.notices)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live")
@@ -113,6 +115,7 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
         with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
             for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
                 count[chunk.port] += len(chunk.data)
+        _say(recorder.notices)
     finally:
         ports.close()
     console.print(f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx")
@@ -291,11 +294,15 @@ def _finish(
     title: str,
     elapsed_s: float | None = None,
 ) -> None:
-    """Write the track and say how it went."""
-    write_track(out / "track.csv", estimates)
+    """Write the track and say how it went; a disk that is full is said last."""
     off = errors(estimates, truth) if truth else None
     title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
-    draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
+    trouble = None
+    try:
+        write_track(out / "track.csv", estimates)
+        draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
+    except OSError as error:
+        trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
@@ -307,7 +314,10 @@ def _finish(
     if elapsed_s:
         span = estimates[-1].t_s - estimates[0].t_s
         console.print(f"{span:.0f} s of walk in {elapsed_s:.2f} s: {span / elapsed_s:.0f} x real time")
-    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}; track.csv and track.png are in {out}")
+    written = f"; track.csv and track.png are in {out}" if trouble is None else ""
+    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}{written}")
+    if trouble is not None:
+        raise trouble
 
 
 def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
