@@ -71,6 +71,12 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
+wheel: $(READY) ## build the wheel, install it in a fresh environment without compiler, run the demo in there, and pipx
+	$(BIN)/python tools/wheel.py
+
+kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
+	$(BIN)/python tools/kill_recorder.py
+
 flash: ## write the firmware to a board: make flash PORT=/dev/ttyACM0
 	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }
 	@[ -e "$(PORT)" ] || { echo "$(PORT): there is no such port; see ls /dev/serial/by-id"; exit 2; }
@@ -83,4 +89,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup tools-apt firmware twin demo real test check size measure bench flash clean
+.PHONY: help setup tools-apt firmware twin demo real test check size measure bench wheel kill docs flash clean

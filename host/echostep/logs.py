@@ -18,6 +18,7 @@ from rich.progress import Progress
 
 from echostep.capture import Decoder
 from echostep.errors import EchostepError
+from echostep.messages import BY_ID, Identity
 from echostep.recording import METADATA_NAME
 from echostep.records import port_of
 from echostep.salvage import Entry, Salvage
@@ -26,6 +27,7 @@ from echostep.sources import BOARD, LATEST_NS, MTX
 SHOW_EVERY = 5000  # messages
 GAP_S = 1.0  # a port that says nothing for so long was away
 START = "start_x_y_rad"
+IDENTITY = next(identifier for identifier, kind in BY_ID.items() if kind is Identity)
 
 
 class Packer:
@@ -129,6 +131,7 @@ class Facts:
     earlier: int = 0  # chunks that stand behind later ones
     decoder: Decoder = field(default_factory=Decoder)
     notes: list[str] = field(default_factory=list)
+    firmware: str = ""  # of the board, as it said last
 
     @property
     def seconds(self) -> float:
@@ -152,7 +155,9 @@ class Facts:
 
     def _decode(self, port: str, body: bytes) -> None:
         if port == BOARD:
-            self.decoder.board.frames(body)
+            for row in self.decoder.board.frames(body).rows(IDENTITY)[1]:
+                said = Identity.unpack(row.tobytes())
+                self.firmware = f"{said.version_major}.{said.version_minor}.{said.version_patch}"
         elif port == MTX:
             self.decoder.mtx.feed_batch(body)
 
@@ -188,12 +193,16 @@ def _ports(facts: Facts) -> list[str]:
         lines.append(f"  {name}: {port.received} bytes in {port.chunks} chunks{gaps}")
     board, mtx = facts.decoder.board.counts, facts.decoder.mtx.counts
     if BOARD in facts.ports:
-        lines.append(f"  board frames: {board.good} good, {board.rejected} bad, {board.lost} lost")
+        lines.append(f"  board frames: {board.good} good, {board.rejected} bad, {board.lost} lost{_firmware(facts)}")
     if MTX in facts.ports:
         lines.append(f"  MTx samples: {mtx.good}{_rate(mtx.good, facts.seconds)}, {mtx.bad_checksum} bad checksums")
     if facts.derived:
         lines.append("  derived: " + ", ".join(f"{name} {count}" for name, count in sorted(facts.derived.items())))
     return lines
+
+
+def _firmware(facts: Facts) -> str:
+    return f"; firmware {facts.firmware}" if facts.firmware else ""
 
 
 def _rate(count: int, seconds: float) -> str:

@@ -8,12 +8,14 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import math
+import platform
 import shlex
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
+from datetime import UTC, datetime
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
@@ -30,7 +32,7 @@ from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
-from echostep.messages import Identify
+from echostep.messages import SCHEMA_HASH, Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.picture import draw_foot, draw_track, write_track
@@ -96,7 +98,7 @@ def live(
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
+        with Recorder(out / "walk.mcap", {**_about(plan, tracker.start, seed, text, "live"), **_now()}) as recorder:
             chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
             estimates = _run(tracker, chunks, "echostep live", None, headless, recorder)
         _say(recorder.notices)
@@ -112,7 +114,7 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
     count = {BOARD: 0, MTX: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
+        with Recorder(out, {**_versions(), **_now(), "note": "recorded without tracking"}) as recorder:
             for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
                 count[chunk.port] += len(chunk.data)
         _say(recorder.notices)
@@ -323,7 +325,8 @@ def _finish(
 def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
     pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r}"
     return {
-        "version": _version(),
+        **_versions(),
+        "plan_name": plan.name,
         "plan_sha256": plan.digest,
         "start_x_y_rad": pose,
         "seed": str(seed),
@@ -358,5 +361,18 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _version() -> str:
-    return importlib.metadata.version("echostep")
+def _versions() -> dict[str, str]:
+    """Of everything that an estimate depends on."""
+    named = {name: importlib.metadata.version(name) for name in ("numpy", "numba")}
+    return {
+        "version": importlib.metadata.version("echostep"),
+        "versions": ", ".join(
+            f"{name} {version}" for name, version in {"python": platform.python_version(), **named}.items()
+        ),
+        "protocol": f"0x{SCHEMA_HASH:08X}",
+    }
+
+
+def _now() -> dict[str, str]:
+    """What the clock on the wall says, and the clock of the arrivals at the same time."""
+    return {"started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"), "started_ns": str(time.monotonic_ns())}
