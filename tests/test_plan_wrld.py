@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from echostep.building.formats import import_plan
+from echostep.building.formats import Hints, import_plan
 from echostep.errors import EchostepError
 from echostep.plan import Plan, load_plan
 from echostep.plan_writer import save_plan
@@ -91,7 +91,7 @@ def write(folder: Path, features: Any, main: dict[str, Any] | None = None) -> Pa
 
 
 def test_a_wall_and_its_place(tmp_path: Path) -> None:
-    plan = import_plan(write(tmp_path, [feature("wall")]), storey_m=4.0)
+    plan = import_plan(write(tmp_path, [feature("wall")]), Hints(storey_m=4.0))
     walls = plan.levels[0].walls
     assert len(walls) == 4
     assert np.ptp(walls[:, [0, 2]]) == pytest.approx(6.24, abs=0.01)  # 0.0001 degrees at latitude 56
@@ -135,5 +135,7 @@ def test_no_json(tmp_path: Path, raw: bytes) -> None:
 
 
 def test_no_file(tmp_path: Path) -> None:
-    with pytest.raises(EchostepError, match="no such file"):
+    with pytest.raises(EchostepError, match="no format"):
         import_plan(tmp_path)
+    with pytest.raises(EchostepError, match="no such file"):
+        import_plan(tmp_path / "main.json")

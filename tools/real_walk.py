@@ -208,7 +208,7 @@ def main() -> int:
     laid, fitted = foot_alone(walk, plan.start)
     write_track(options.out / "track.csv", estimates)
     title = f"{NAME}: real foot, echoes simulated; RMSE {found:.2f} m at the surveyed footprints"
-    draw_track(options.out / "track.png", plan.levels[0], estimates, load_truth(options.out / "truth.csv"), title)
+    draw_track(options.out / "track.png", plan, estimates, load_truth(options.out / "truth.csv"), title)
     console.print(f"{NAME}: {NOTE}.")
     console.print(f"2D RMSE at the {len(walk.print_t_s)} stride points, map frame, no alignment:")
     console.print(f"  foot alone       {laid:.2f} m   ({fitted:.2f} m after rigid alignment)")

@@ -29,7 +29,12 @@ app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 Start = Annotated[
-    str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="X,Y,DEG[,LEVEL]",
+        help="Where the wearer stands and looks at first; level 0 is the plan's first, ? any.",
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]

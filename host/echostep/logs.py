@@ -305,7 +305,7 @@ def _place_at(path: Path, t_ns: int) -> str | None:
             with suppress(ValueError, KeyError, TypeError):
                 body = json.loads(entry.body)
                 x, y, heading = (float(body[key]) for key in ("x_m", "y_m", "heading_rad"))
-                found = f"{x!r},{y!r},{heading!r}"
+                found = f"{x!r},{y!r},{heading!r},{int(body.get('level', 0))}"
     return found
 
 

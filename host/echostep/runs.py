@@ -35,6 +35,7 @@ from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_trac
 from echostep.messages import SCHEMA_HASH, Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
+from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, Recording, open_recording
@@ -201,14 +202,16 @@ def decode(path: Path) -> None:
 
 
 def parse_pose(text: str) -> Pose:
-    """X,Y,DEG as a pose; raises EchostepError."""
+    """X,Y,DEG[,LEVEL] as a pose, the level by its number from 0 or `?` for any; raises EchostepError."""
+    parts = text.split(",")
     try:
-        x, y, degrees = (float(part) for part in text.split(","))
+        x, y, degrees = (float(part) for part in parts[:3])
+        level = 0 if len(parts) < 4 else ANY_LEVEL if parts[3] == "?" else int(parts[3])
     except ValueError as error:
-        raise EchostepError(f"--start {text}: expected X,Y,DEG, for instance 1.5,2,90") from error
-    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)):
+        raise EchostepError(f"--start {text}: expected X,Y,DEG[,LEVEL], for instance 1.5,2,90 or 1.5,2,90,3") from error
+    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)) or len(parts) > 4 or level < ANY_LEVEL:
         raise EchostepError(f"--start {text}: not a place")
-    return Pose(x, y, math.radians(degrees))
+    return Pose(x, y, math.radians(degrees), level)
 
 
 def _run(
@@ -302,7 +305,7 @@ def _finish(
     trouble = None
     try:
         write_track(out / "track.csv", estimates)
-        draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
+        draw_track(out / "track.png", tracker.plan, estimates, truth, title)
     except OSError as error:
         trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
@@ -323,7 +326,7 @@ def _finish(
 
 
 def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
-    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r}"
+    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"
     return {
         **_versions(),
         "plan_name": plan.name,
@@ -340,10 +343,10 @@ def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
         text = about.get("start_x_y_rad")
         if text is None:
             return None
-        x, y, heading = (float(v) for v in text.split(","))
-        return Pose(x, y, heading)
+        x, y, heading, *level = (float(v) for v in text.split(","))
+        return Pose(x, y, heading, int(level[0]) if level else 0)
     except (ValueError, TypeError) as error:
-        raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
+        raise EchostepError(f"{path}: its recorded start is not known: give one with --start X,Y,DEG") from error
 
 
 def _recorded_seed(about: dict[str, str], path: Path, seed: int | None) -> int:

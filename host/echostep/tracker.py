@@ -29,6 +29,8 @@ class Tracker:
         pose = start or plan.start
         if pose is None:
             raise EchostepError("the plan has no start: give one with --start X,Y,DEG")
+        if pose.level >= len(plan.levels):
+            raise EchostepError(f"the start is on level {pose.level}, the plan has {len(plan.levels)}, counted from 0")
         self.settings = settings or Settings()
         self.plan = plan
         self.start = pose

@@ -20,10 +20,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.estimate import Estimate
+from echostep.health import Finding, Severity, board_findings
 from echostep.plan import Level
 from echostep.tracker import Tracker
 
 REFRESH_S = 0.1
+MOST_FINDINGS = 3
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille dots by row and column
 
 
@@ -87,7 +89,8 @@ class TerminalView:
     ) -> None:
         self._tracker = tracker
         self._title = title
-        self._canvas = Canvas(tracker.plan.levels[0])
+        self._level = tracker.start.level if tracker.start.level in range(len(tracker.plan.levels)) else 0
+        self._canvas = Canvas(tracker.plan.levels[self._level])
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()
         )
@@ -105,9 +108,18 @@ class TerminalView:
         self.show([], final=True)
         self._live.__exit__(kind, error, at)
 
+    def _storey(self) -> str:
+        """The level in words, where there are several."""
+        levels, here = self._tracker.plan.levels, self._last
+        if len(levels) < 2 or here is None:
+            return ""
+        return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
+
     def show(self, estimates: list[Estimate], notice: str = "", *, final: bool = False) -> None:
         """Take new estimates; redraw when it is time."""
         for e in estimates:
+            if e.level != self._level:
+                self._level, self._canvas = e.level, Canvas(self._tracker.plan.levels[e.level])
             self._canvas.walked(e)
             self._last = e
         now = time.monotonic()
@@ -118,8 +130,9 @@ class TerminalView:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
             self._canvas.render(self._last),
-            Text(describe(self._last)),
+            Text(describe(self._last) + self._storey()),
             Text(health(self._tracker), style="grey62"),
+            *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
         ]
         if notice:
             parts.append(Text(notice, style="bold"))
@@ -142,3 +155,9 @@ def health(tracker: Tracker) -> str:
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
     return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}"
+
+
+def findings(tracker: Tracker) -> list[Finding]:
+    """The worst that the board says is wrong, in words."""
+    found = board_findings(tracker.intake.words)
+    return [finding for finding in found if finding.severity > Severity.NOTE][:MOST_FINDINGS]
