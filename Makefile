@@ -54,6 +54,7 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
+	$(BIN)/python tools/docs.py --check
 	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
 size: ## flash, static RAM and stack of the firmware
@@ -73,6 +74,9 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 
 wheel: $(READY) ## build the wheel, install it in a fresh environment without compiler, run the demo in there, and pipx
 	$(BIN)/python tools/wheel.py
+
+docs: $(READY) ## reference pages of commands, settings and recordings, out of the code (host/docs)
+	$(BIN)/python tools/docs.py
 
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
 	$(BIN)/python tools/kill_recorder.py

@@ -345,7 +345,7 @@ def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
             return None
         x, y, heading, *level = (float(v) for v in text.split(","))
         return Pose(x, y, heading, int(level[0]) if level else 0)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise EchostepError(f"{path}: its recorded start is not known: give one with --start X,Y,DEG") from error
 
 
