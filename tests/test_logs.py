@@ -89,6 +89,14 @@ def test_a_whole_recording_is_described(tmp_path: Path) -> None:
     assert text.endswith("whole")
 
 
+def test_no_terminal_obeys_a_strangers_recording(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", {"note": "\x1b]0;owned\x07" + "x" * 10_000}) as recorder:
+        recorder.write(Chunk("bo\x1b[2Jard", 1, b"x"))
+    text = "\n".join(info(tmp_path / "a.mcap"))
+    assert "\x1b" not in text
+    assert len(text) < 6000
+
+
 def test_mending_a_whole_file_changes_nothing_in_it(tmp_path: Path) -> None:
     assert saved(write(tmp_path / "a.mcap"), tmp_path) == CHUNKS
     assert open_recording(tmp_path / "out.mcap").about == {"seed": "4", "start_x_y_rad": "1.0,2.0,0.0"}

@@ -25,6 +25,7 @@ from echostep.salvage import Entry, Salvage
 from echostep.sources import BOARD, LATEST_NS, MTX
 
 SHOW_EVERY = 5000  # messages
+LONGEST_LINE = 4000
 GAP_S = 1.0  # a port that says nothing for so long was away
 START = "start_x_y_rad"
 IDENTITY = next(identifier for identifier, kind in BY_ID.items() if kind is Identity)
@@ -171,7 +172,14 @@ def info(path: Path) -> list[str]:
         raise EchostepError(f"{path}: no message in it can be read: is this an echostep recording (.mcap)?")
     condition = _condition(salvage, facts)
     mend = f"  echostep repair {path} -o OUT makes a whole file of it"
-    return [*_head(salvage, facts), *_ports(facts), *(condition or ["  whole"]), *([mend] if condition else [])]
+    lines = [*_head(salvage, facts), *_ports(facts), *(condition or ["  whole"]), *([mend] if condition else [])]
+    return [printable(line) for line in lines]
+
+
+def printable(line: str) -> str:
+    """The line without anything that a terminal would obey, and not endless: a stranger may have written it."""
+    line = line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE] + " ..."
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in line)
 
 
 def _head(salvage: Salvage, facts: Facts) -> list[str]:
