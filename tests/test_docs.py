@@ -74,6 +74,7 @@ def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{line}\n{done.stderr}"
         said[arguments[0]] = said.get(arguments[0], "") + done.stdout
     assert len(said) == 5
+    assert "/estimate" in said["info"]
     sha = re.compile(r"sha256 (\w{16})")
     assert sha.findall(said["demo"])[0] == sha.findall(said["replay"])[0]
     for name in ("first/track.png", "first/walk.mcap", "piece/track.csv", "track.parquet", "view.mcap"):

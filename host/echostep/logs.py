@@ -26,6 +26,7 @@ from echostep.sources import BOARD, LATEST_NS, MTX
 
 SHOW_EVERY = 5000  # messages
 LONGEST_LINE = 4000
+DECODED_AT_ONCE = 1 << 16
 GAP_S = 1.0  # a port that says nothing for so long was away
 START = "start_x_y_rad"
 IDENTITY = next(identifier for identifier, kind in BY_ID.items() if kind is Identity)
@@ -132,6 +133,7 @@ class Facts:
     earlier: int = 0  # chunks that stand behind later ones
     decoder: Decoder = field(default_factory=Decoder)
     notes: list[str] = field(default_factory=list)
+    waiting: dict[str, bytearray] = field(default_factory=dict)
     firmware: str = ""  # of the board, as it said last
 
     @property
@@ -148,11 +150,23 @@ class Facts:
         self.earlier += entry.t_ns < self.last_ns
         self.first_ns, self.last_ns = min(self.first_ns, entry.t_ns), max(self.last_ns, entry.t_ns)
         self.ports.setdefault(port, PortFacts()).add(entry)
+        waiting = self.waiting.setdefault(port, bytearray())
+        waiting += entry.body
+        if len(waiting) >= DECODED_AT_ONCE:
+            self._try(port, waiting)
+
+    def finish(self) -> None:
+        """Decode what still waits."""
+        for port, waiting in self.waiting.items():
+            self._try(port, waiting)
+
+    def _try(self, port: str, waiting: bytearray) -> None:
         try:
-            self._decode(port, entry.body)
+            self._decode(port, bytes(waiting))
         except EchostepError as error:
             if str(error) not in self.notes:
                 self.notes.append(str(error))
+        waiting.clear()
 
     def _decode(self, port: str, body: bytes) -> None:
         if port == BOARD:
@@ -168,6 +182,7 @@ def info(path: Path) -> list[str]:
     salvage, facts = Salvage(path), Facts()
     for entry in shown(salvage, f"reading {path.name}"):
         facts.add(entry)
+    facts.finish()
     if not facts.ports and not facts.derived:
         raise EchostepError(f"{path}: no message in it can be read: is this an echostep recording (.mcap)?")
     condition = _condition(salvage, facts)
