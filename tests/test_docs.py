@@ -59,6 +59,8 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
     (tmp_path / "host").symlink_to(ROOT / "host")
+    (plan,) = blocks(TUTORIAL, "json")
+    (tmp_path / "plan.json").write_text(plan)
     said: dict[str, str] = {}
     for line in "".join(blocks(TUTORIAL, "sh")).splitlines():
         program, *arguments = shlex.split(line)
@@ -73,11 +75,11 @@ def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
         )
         assert done.returncode == 0, f"{line}\n{done.stderr}"
         said[arguments[0]] = said.get(arguments[0], "") + done.stdout
-    assert len(said) == 5
+    assert set(said) == {"demo", "info", "replay", "cut", "export", "plan"}
     assert "/estimate" in said["info"]
     sha = re.compile(r"sha256 (\w{16})")
     assert sha.findall(said["demo"])[0] == sha.findall(said["replay"])[0]
-    for name in ("first/track.png", "first/walk.mcap", "piece/track.csv", "track.parquet", "view.mcap"):
+    for name in ("first/track.png", "first/walk.mcap", "piece/track.csv", "track.parquet", "view.mcap", "plan.png"):
         assert (tmp_path / "out" / name).stat().st_size > 1000
 
 

@@ -164,6 +164,11 @@ class Legs:
         self._found: list[Stride] = []
         self._keep = 0  # places before it can be forgotten
 
+    @property
+    def standing_since_s(self) -> float | None:
+        """Since when he stands; None: he does not, as far as is known."""
+        return None if self._still_since is None else self._time(self._still_since)
+
     def feed(self, t_s: Floats, thigh: Floats, shank: Floats) -> list[Stride]:
         """Samples (n,) each: time, rates in rad/s."""
         for sample in zip(t_s.tolist(), thigh.tolist(), shank.tolist(), strict=True):

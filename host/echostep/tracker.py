@@ -12,6 +12,7 @@ from echostep.errors import EchostepError
 from echostep.estimate import Estimate, unwatched
 from echostep.gait import Leg
 from echostep.intake import Intake
+from echostep.legpath import Wearer
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
 from echostep.plan import Plan, Pose
@@ -34,7 +35,8 @@ class Tracker:
         self.settings = settings or Settings()
         self.plan = plan
         self.start = pose
-        self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
+        s = self.settings
+        self.intake = Intake(s.mtx, s.ranger, s.foot, s.gait, Wearer(s.gyro, s.compass, s.legs))
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self._rng = np.random.default_rng(seed)
