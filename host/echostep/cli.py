@@ -14,6 +14,7 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.logs_cli import app as logs
 from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
@@ -302,5 +304,8 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        print(f"echostep: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
