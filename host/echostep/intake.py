@@ -57,6 +57,7 @@ class Intake:
         self.path = TrunkPath(gait)
         self.status: Status | None = None
         self.identity: Identity | None = None
+        self.pings = 0
         self._ranger = ranger
         self._waiting = Waiting()
         self._unknown_ports = 0
@@ -105,6 +106,7 @@ class Intake:
     def _hear(self, frames: Frames, times: Times) -> None:
         """Pings that say something about walls wait for their leg."""
         place, pings = frames.rows(PING)
+        self.pings += len(place)
         if not len(place):
             return
         t_s = times.board_s[place] + self._ranger.delay_s

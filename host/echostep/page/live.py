@@ -1,0 +1,112 @@
+"""The live page of a run: watches a tracker and shows what it knows.
+
+In: a tracker, and the moment after each portion that it took. Out: scenes on a stage that a server serves; check-ins for the tracker. Owns both.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from types import TracebackType
+from typing import Self
+
+from echostep.estimate import Estimate
+from echostep.likelihoods import echo_model
+from echostep.page.beams import beams, expected_range
+from echostep.page.health import Pulse
+from echostep.page.scene import MOST_SHOWN, Scene, specks, words
+from echostep.page.server import Address, PageServer
+from echostep.page.stage import Stage
+from echostep.sources import Portion
+from echostep.tracker import Tracker
+from echostep.waiting import Passage
+
+STEP_M = 0.02  # the trail gets a point when he has moved so far
+PULSE_NS = 250_000_000
+MOST_KEPT = 2000  # specks of each scene of a film
+
+
+class LivePage:
+    """Call `shown` after each portion; `said` gives what pages had to say, as bytes of chunks."""
+
+    def __init__(self, tracker: Tracker, title: str, address: Address, *, replay: bool = False) -> None:
+        self.wanted = True  # until Ctrl-C
+        self._tracker = tracker
+        self._stage = Stage(tracker.plan, title, replay=replay)
+        self._server = PageServer(self._stage, address)
+        self._model = echo_model(tracker.settings.echo)
+        self._pulse = Pulse()
+        self._pulsed_ns = 0
+        self._arrived_ns = 0
+        self._new: list[Scene] = []
+        self._scene = Scene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
+        self._replay = replay
+        self._last_m: tuple[float, float] | None = None
+        self._born_ns = time.monotonic_ns()
+        if not replay:
+            self._stage.publish(self._scene)
+        expected_range(0.0, 0.0, 0.0, tracker.walls.index, self._model)  # compiled now, not at the first step
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self._server.url
+
+    @property
+    def pages(self) -> int:
+        """How many pages look."""
+        return self._server.pages
+
+    def __enter__(self) -> Self:
+        self._tracker.watch = self._watch
+        self._server.__enter__()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._tracker.watch = None
+        self._server.__exit__(kind, error, at)
+
+    def said(self) -> Iterator[bytes]:
+        """Check-ins that pages made since, as the tracker takes them."""
+        for check_in in self._stage.said():
+            yield check_in.encode()
+
+    def coming(self) -> None:
+        """Bytes have come: what is seen next was born now."""
+        self._born_ns = time.monotonic_ns()
+
+    def shown(self, portion: Portion) -> None:
+        """The tracker has taken a portion: publish what it told, and now and then how the streams are."""
+        if len(portion.t_arrival_ns):
+            self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
+        else:
+            self._arrived_ns = max(self._arrived_ns, time.monotonic_ns())
+        if not self._new and (self._replay or self._arrived_ns - self._pulsed_ns < PULSE_NS):
+            return
+        if self._arrived_ns - self._pulsed_ns >= PULSE_NS:
+            self._pulsed_ns = self._arrived_ns
+            self._scene = replace(self._scene, health=self._pulse.health(self._tracker, self._arrived_ns))
+        if self._scene.told is None:
+            self._scene = replace(self._scene, words=words(None, waits=self._tracker.lost_at_start))
+        for scene in self._new or [self._scene]:
+            self._stage.publish(replace(scene, health=self._scene.health))
+        self._new = []
+
+    def _watch(self, passage: Passage | None, told: Estimate) -> None:
+        """The tracker told an estimate."""
+        tracker = self._tracker
+        if self._last_m is None or max(abs(told.x_m - self._last_m[0]), abs(told.y_m - self._last_m[1])) > STEP_M:
+            self._last_m = (told.x_m, told.y_m)
+            self._stage.trail.add(told.x_m, told.y_m)
+        shown, heard = self._scene.specks, self._scene.beams
+        if passage is not None and tracker.filter is not None:
+            shown = specks(tracker.filter.cloud, MOST_KEPT if self._replay else MOST_SHOWN)
+            heard = beams(passage, told, tracker.walls.index, self._model)
+        elif passage is None:
+            heard = ()
+        self._scene = replace(
+            self._scene, born_ns=self._born_ns, t_s=told.t_s, told=told, walked=len(self._stage.trail),
+            words=words(told, taps=not self._replay), specks=shown, beams=heard,
+        )  # fmt: skip
+        self._new.append(self._scene)
