@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader, encode
-from echostep.plan import Plan, load_plan
+from echostep.plan import Level, Plan, load_plan
 from echostep.simulation.acoustics import (
     PIPE_RADIUS_M,
     SRF02,
@@ -505,7 +505,7 @@ def test_a_row_has_the_layout_of_the_bench() -> None:
 
 def sensors(walked: Walk, sync_t_s: Floats, seed: int = 1) -> BoardSensors:
     walls = np.array([[-3.0, 1.0, 9.0, 1.0], [-3.0, -1.0, 9.0, -1.0]])
-    return BoardSensors(walked, walls, sync_t_s, np.random.default_rng(seed))
+    return BoardSensors(walked, [Level("hall", 0.0, walls)], sync_t_s, np.random.default_rng(seed))
 
 
 def test_rows_hold_what_the_sensors_would_say(l_walk: Walk) -> None:
@@ -554,9 +554,11 @@ def test_gyros_saturate() -> None:
 
 
 def test_pressure_falls_with_height_and_drifts_slowly() -> None:
-    ground, above = (Scp1000(np.random.default_rng(1)).counts(h, 20.0, 5_000)[0].mean() / 4.0 for h in (0.0, 3.0))
+    ground, above = (
+        Scp1000(np.random.default_rng(1)).counts(np.full(5_000, h), 20.0, 5_000)[0].mean() / 4.0 for h in (0.0, 3.0)
+    )
     assert ground - above == pytest.approx(36.0, abs=0.5)
-    long = Scp1000(np.random.default_rng(1)).counts(0.0, 20.0, 600_000)[0] / 4.0
+    long = Scp1000(np.random.default_rng(1)).counts(np.zeros(600_000), 20.0, 600_000)[0] / 4.0
     minutes = long.reshape(10, -1).mean(1)
     assert 0.1 < np.ptp(minutes) < 20.0
 

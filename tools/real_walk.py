@@ -111,7 +111,8 @@ def true_walk(walk: Recorded) -> Walk:
     heading = np.interp(t - START_S, middle, np.unwrap(np.arctan2(legs[:, 1], legs[:, 0])))
     still = np.zeros((len(t), 3))
     rate = np.zeros(len(t))
-    return Walk(t, trunk, heading, still, still, rate, rate, np.gradient(heading) * RATE_HZ, np.ones(len(t), bool))
+    belt = np.gradient(heading) * RATE_HZ
+    return Walk(t, trunk, heading, still, still, rate, rate, belt, np.ones(len(t), bool), rate)
 
 
 def chunks(walk: Recorded, plan: Plan, seed: int) -> list[Chunk]:
@@ -119,7 +120,7 @@ def chunks(walk: Recorded, plan: Plan, seed: int) -> list[Chunk]:
     rng = np.random.default_rng([seed, 9])
     truth = true_walk(walk)
     sync_t_s = START_S + walk.t_s
-    sensors = BoardSensors(truth, plan.levels[0].walls, sync_t_s, rng)
+    sensors = BoardSensors(truth, plan.levels, sync_t_s, rng)
     board = PythonBoard(seed)
     board.send(encode(m.Configure(m.Sensors.RANGER_LEFT | m.Sensors.RANGER_RIGHT | m.Sensors.SYNC, 0, 10, 1, 0), 0))
     found = []
@@ -207,7 +208,7 @@ def main() -> int:
     laid, fitted = foot_alone(walk, plan.start)
     write_track(options.out / "track.csv", estimates)
     title = f"{NAME}: real foot, echoes simulated; RMSE {found:.2f} m at the surveyed footprints"
-    draw_track(options.out / "track.png", plan.levels[0], estimates, load_truth(options.out / "truth.csv"), title)
+    draw_track(options.out / "track.png", plan, estimates, load_truth(options.out / "truth.csv"), title)
     console.print(f"{NAME}: {NOTE}.")
     console.print(f"2D RMSE at the {len(walk.print_t_s)} stride points, map frame, no alignment:")
     console.print(f"  foot alone       {laid:.2f} m   ({fitted:.2f} m after rigid alignment)")

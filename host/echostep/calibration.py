@@ -39,3 +39,16 @@ def ranges(pings: NDArray[np.void], settings: RangerSettings) -> NDArray[np.floa
     range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
     range_m[(pings["outcome"] != Outcome.ECHO) | (pings["time_of_flight_us"] == 0)] = np.nan
     return range_m
+
+
+STANDARD_PA = 101_325.0
+
+
+def heights(samples: NDArray[np.void]) -> NDArray[np.float64]:
+    """Heights (n,) in the standard atmosphere [ISO 2533] of barometer samples (n,) by the schema's dtype; NaN when nothing was measured.
+
+    Differences count, over a building; the weather moves all of them.
+    """
+    pressure_pa = np.where(samples["pressure"] == 0, np.nan, 0.25 * samples["pressure"])
+    found: NDArray[np.float64] = 44_330.77 * (1.0 - (pressure_pa / STANDARD_PA) ** 0.190263)
+    return found

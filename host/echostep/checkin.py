@@ -11,7 +11,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from echostep.plan import LIMIT_M, Pose
+from echostep.fields import LIMIT_M
+from echostep.plan import Pose
 
 PERSON = "person"
 MOST_BYTES = 512
@@ -33,7 +34,7 @@ class CheckIn:
     @property
     def pose(self) -> Pose:
         """Place and heading; east when he did not say."""
-        return Pose(self.x_m, self.y_m, self.heading_rad or 0.0)
+        return Pose(self.x_m, self.y_m, self.heading_rad or 0.0, self.level)
 
     def encode(self) -> bytes:
         """Bytes of a chunk."""

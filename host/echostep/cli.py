@@ -14,6 +14,7 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
@@ -24,10 +25,16 @@ app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 Start = Annotated[
-    str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="X,Y,DEG[,LEVEL]",
+        help="Where the wearer stands and looks at first; level 0 is the plan's first, ? any.",
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]

@@ -14,12 +14,14 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echostep.particles import Cloud
 
 CHI2_95 = 5.991464547107979  # two degrees of freedom
 TRACKING_M = 1.0
 LOST_M = 5.0
+SURE_OF_LEVEL = 0.9  # of the cloud's weight
 WALKER_M_S = 1.5
 
 
@@ -33,7 +35,10 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`."""
+    """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`.
+
+    `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
+    """
 
     t_s: float
     x_m: float
@@ -45,6 +50,10 @@ class Estimate:
     heading_sd_rad: float
     step: int
     status: Status
+    level: int = 0
+    levels: tuple[float, ...] = (1.0,)
+    z_m: float = 0.0
+    z_sd_m: float = 0.0
 
     @property
     def ellipse95(self) -> Ellipse:
@@ -78,15 +87,30 @@ def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, doubt
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]; `doubt_m`: standard deviation that the cloud does not know of."""
     weight = np.exp(cloud.log_weight)
     weight /= weight.sum()
-    x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
-    dx, dy = cloud.x_m - x, cloud.y_m - y
+    levels, z, z_sd = _heights(cloud, weight)
+    map_x = cloud.map_x_m
+    x, y = float(weight @ map_x), float(weight @ cloud.y_m)
+    dx, dy = map_x - x, cloud.y_m - y
     xx, xy, yy = float(weight @ (dx * dx)), float(weight @ (dx * dy)), float(weight @ (dy * dy))
     east = float(weight @ np.cos(cloud.turn_rad + walk_heading_rad))
     north = float(weight @ np.sin(cloud.turn_rad + walk_heading_rad))
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     xx, yy = xx + doubt_m**2, yy + doubt_m**2
     status = trust(ellipse95(xx, xy, yy).major_m)
-    return Estimate(t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status)
+    if status is Status.TRACKING and max(levels) < SURE_OF_LEVEL:
+        status = Status.UNCERTAIN
+    return Estimate(
+        t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd
+    )
+
+
+def _heights(cloud: Cloud, weight: NDArray[np.float64]) -> tuple[tuple[float, ...], float, float]:
+    """Probability of each level; mean and standard deviation of the height."""
+    if cloud.storeys is None:
+        return (1.0,), 0.0, 0.0
+    share = np.bincount(cloud.level, weight, len(cloud.storeys.height_m))
+    z = float(weight @ cloud.z_m)
+    return tuple(share.tolist()), z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2))
 
 
 def unwatched(last: Estimate, t_s: float) -> Estimate:
@@ -110,4 +134,5 @@ def digest(estimates: Iterable[Estimate]) -> str:
     for e in estimates:
         numbers = (e.t_s, e.x_m, e.y_m, e.xx_m2, e.xy_m2, e.yy_m2, e.heading_rad, e.heading_sd_rad)
         sha.update(struct.pack("<8di", *numbers, e.step) + e.status.value.encode())
+        sha.update(struct.pack(f"<i2d{len(e.levels)}d", e.level, e.z_m, e.z_sd_m, *e.levels))
     return sha.hexdigest()

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
@@ -41,7 +41,7 @@ class Leg:
     """The trunk moves evenly by (dx, dy) in the walk frame, from `t0_s` to `t1_s`, turning from `heading0_rad` to `heading1_rad`.
 
     `sd_m` is the move's standard deviation per axis, `turn_sd_rad` the growth of the yaw error. `step` counts steps so far. `anchor_sd_m`: of
-    both ends, alike.
+    both ends, alike. `rise_m`: how much higher the foot has landed, with its standard deviation; infinite when no foot tells.
     """
 
     t0_s: float
@@ -54,6 +54,8 @@ class Leg:
     turn_sd_rad: float
     step: int
     anchor_sd_m: float = 0.0
+    rise_m: float = 0.0
+    rise_sd_m: float = math.inf
 
     @property
     def unwatched(self) -> bool:
@@ -118,7 +120,9 @@ class TrunkPath:
         self._stance_begin_s = step.t_end_s
         heading = step.heading_rad + self._toe.angle_rad
         variance = 0.5 * (float(step.covariance[0][0]) + float(step.covariance[1][1]))
-        return [self._go(step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad)]
+        leg = self._go(step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad)
+        rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
+        return [replace(leg, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd)]
 
     def _go(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> Leg:
         x, y = self._trunk(heading)
@@ -133,7 +137,7 @@ class TrunkPath:
         assert self._anchor is not None
         t0, x, y, heading = self._anchor
         self._anchor = (t_s, x, y, heading)
-        return Leg(t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps, self._settings.anchor_sd_m)
+        return Leg(t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps, self._settings.anchor_sd_m, 0.0, 0.0)
 
     def _trunk(self, heading: float) -> tuple[float, float]:
         """Where the trunk is above this foot; left of the heading is (-sin, cos)."""

@@ -15,21 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.alignment import Alignment
-from echostep.calibration import RangerSettings, ranges
+from echostep.calibration import RangerSettings, heights, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, TrunkPath
-from echostep.messages import BY_ID, ROWS, Identity, Outcome, Ping, Status, Sync
+from echostep.messages import BY_ID, ROWS, Identity, Outcome, Ping, Pressure, Status, Sync
 from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
-from echostep.waiting import Passage, Silence, Waiting
+from echostep.waiting import HEIGHT, Passage, Silence, Waiting
 from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, pack_mtdata
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-IDENTITY, PING, SYNC, STATUS = (_IDS[kind] for kind in (Identity, Ping, Sync, Status))
+IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
 _TIMED = np.array(
     [i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)]
 )  # the body begins with them
@@ -104,16 +104,19 @@ class Intake:
             self.identity = Identity.unpack(identity)
 
     def _hear(self, frames: Frames, times: Times) -> None:
-        """Pings that say something about walls wait for their leg."""
+        """Pings that say something about walls, and heights by pressure, wait for their leg."""
         place, pings = frames.rows(PING)
         self.pings += len(place)
-        if not len(place):
-            return
         t_s = times.board_s[place] + self._ranger.delay_s
-        range_m = ranges(pings, self._ranger)
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
-        rows = np.column_stack([t_s[kept], pings["ranger"][kept], range_m[kept]])
-        self._waiting.hear(times.board_at[place[kept]], rows)
+        rows = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[kept]
+        aloft, samples = frames.rows(PRESSURE)
+        height_m = heights(samples)
+        high = ~np.isnan(times.board_s[aloft]) & ~np.isnan(height_m)
+        more = np.column_stack([times.board_s[aloft], np.full(len(aloft), HEIGHT), height_m])[high]
+        places = np.concatenate([place[kept], aloft[high]])
+        order = np.argsort(places, kind="stable")
+        self._waiting.hear(times.board_at[places[order]], np.concatenate([rows, more])[order])
 
     def _follow(self, batch: MtBatch, times: Times) -> None:
         """Samples go through the foot to the path, whose legs wait for their pings."""

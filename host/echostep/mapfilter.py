@@ -11,12 +11,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.climbing import ClimbSettings, Rise
 from echostep.estimate import Estimate, estimate
-from echostep.gait import wrap
+from echostep.gait import Leg, wrap
 from echostep.likelihoods import EchoSettings, echo_model
 from echostep.particles import Cloud, CloudSettings, Heard, Move
 from echostep.plan import Pose
 from echostep.reflectors import Walls
+from echostep.storeys import Storeys
 from echostep.waiting import Passage
 
 Floats = NDArray[np.float64]
@@ -35,6 +37,9 @@ TURNING_RAD = math.radians(
 )  # a leg that turns more than this is no straight line, and its headings are guesses in between
 EXACT_SD_M = 0.005  # no plan is more exact
 PUZZLED_MORE = 3.0  # who understands nothing of what he hears keeps so many times more particles about him
+HEIGHT_SD_M = 0.3  # of one sample: an SCP1000 in its fast mode, a little worse than its documents say
+LATE_SAMPLES = 9  # a second
+AIR_SD_M = 0.1  # what the mean of many does not take away: draughts
 PLAN_SD_M = 0.15  # how far off a plan may be that explains little of what is heard
 
 
@@ -44,9 +49,10 @@ class MapFilter:
     def __init__(
         self, walls: Walls, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
         cloud: CloudSettings | None = None, echo: EchoSettings | None = None,
+        storeys: Storeys | None = None, climbing: ClimbSettings | None = None,
     ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`."""
-        self.cloud = Cloud(cloud or CloudSettings(), start, walk_heading_rad, rng)
+        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; `storeys`: how levels lie on the walls' sheet."""
+        self.cloud = Cloud(cloud or CloudSettings(), start, walk_heading_rad, rng, storeys, climbing)
         self.explained = 1.0
         self._walls = walls
         self._echo = echo or EchoSettings()
@@ -59,13 +65,15 @@ class MapFilter:
         """Move along a leg and weigh by its pings."""
         leg = passage.leg
         move = Move(leg.dx_m, leg.dy_m, leg.sd_m, leg.turn_sd_rad)
+        rise = _rise(leg, passage.height_m)
         if leg.unwatched:
-            self.cloud.scatter(move)
+            self.cloud.scatter(move, rise)
             self._doubt_m = math.hypot(self._doubt_m, leg.sd_m)
         else:
             heard = self._heard(passage)
             self.cloud.puzzle(1.0 + PUZZLED_MORE * (1.0 - self._trust()))
             self._judge(self.cloud.follow(move, heard, self._model, self._walls), heard.power)
+            self.cloud.climb(move, rise)
             self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) * self._trust() / REGAIN_M)
         doubt_m = math.hypot(self._doubt_m, leg.anchor_sd_m, PLAN_SD_M * (1.0 - self._trust()), EXACT_SD_M)
         return estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, doubt_m)
@@ -104,3 +112,12 @@ class MapFilter:
             self.explained += power * EXPLAINED_SHARE * (value - self.explained)
             if self.explained < UNEXPLAINED:
                 self._doubt_m = max(self._doubt_m, LOST_SD_M)
+
+
+def _rise(leg: Leg, height_m: Floats) -> Rise:
+    """What foot and pressure say of the height at the end of a leg; the middle one of the last samples resists a slammed door."""
+    late = height_m[-LATE_SAMPLES:]
+    if not len(late):
+        return Rise(leg.rise_m, leg.rise_sd_m, 0.0, math.inf, leg.t1_s - leg.t0_s)
+    height, sd = float(np.median(late)), math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(late)))
+    return Rise(leg.rise_m, leg.rise_sd_m, height, sd, leg.t1_s - leg.t0_s)

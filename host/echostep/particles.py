@@ -3,7 +3,8 @@
 In: straight pieces of the trunk's path (walk frame) with the pings heard on them. Out: a `Cloud` whose moments are the estimate. Owns the particles;
 draws from the generator that it is given. Only this module goes from the walk frame to the map.
 
-A particle is (x, y) in the map, `turn` = rotation walk -> map, and `scale` = true length / measured length. Weights are logarithms.
+A particle is (x, y) on the building's sheet, `turn` = rotation walk -> map, `scale` = true length / measured length; in a building of several levels
+also its height `z` and what the pressure's height is off by, `lag`. Weights are logarithms.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.climbing import ClimbSettings, Rise, carry, climb, climb_model
 from echostep.likelihoods import EchoModel, echo_density
 from echostep.plan import Pose
 from echostep.reflectors import MOST_SOURCES, Walls, echo_sources
+from echostep.storeys import Storeys, level_of
 from echostep.walls import WallIndex, crosses_wall
 
 Floats = NDArray[np.float64]
@@ -83,14 +86,23 @@ class Heard(NamedTuple):
     power: Floats
 
 
+ANY_LEVEL = -1  # of a start: nobody knows
+UNKNOWN_LAG_M2 = 1e6  # nobody knows the weather, either
 NOTHING = Heard(*(np.zeros(0) for _ in range(4)))
 
 
 class Cloud:
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0."""
 
-    def __init__(self, settings: CloudSettings, start: Pose, walk_heading_rad: float, rng: np.random.Generator) -> None:
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`."""
+    def __init__(
+        self, settings: CloudSettings, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
+        storeys: Storeys | None = None, climbing: ClimbSettings | None = None,
+    ) -> None:  # fmt: skip
+        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; without `storeys` there is one level."""
+        self.storeys = storeys if storeys is not None and len(storeys.height_m) > 1 else None
+        self._climbing = climbing or ClimbSettings()
+        self._climb = climb_model(self._climbing)
+        self._lag_variance = UNKNOWN_LAG_M2
         n = settings.size
         self._settings = settings
         self._rng = rng
@@ -99,9 +111,39 @@ class Cloud:
         spread = math.radians(settings.start_turn_sd_deg)
         self.turn_rad: Floats = start.heading_rad - walk_heading_rad + spread * rng.standard_normal(n)
         self.scale: Floats = 1.0 + settings.start_scale_sd * rng.standard_normal(n)
+        self.z_m: Floats = np.zeros(n)
+        self.lag_m: Floats = np.zeros(n)
         self.log_weight: Floats = np.zeros(n)
+        if self.storeys:
+            levels = len(self.storeys.height_m)
+            level = np.arange(n) % levels if start.level == ANY_LEVEL else np.full(n, start.level)
+            self.x_m += level * self.storeys.pitch_m
+            self.z_m = self.storeys.height_m[level]
         self.rescues = 0
         self._least = n
+
+    @property
+    def level(self) -> Ints:
+        """Level of each particle (n,), an index into the plan's."""
+        return level_of(self.x_m, self.storeys) if self.storeys else np.zeros(len(self.x_m), np.int64)
+
+    @property
+    def map_x_m(self) -> Floats:
+        """East of each particle in the map (n,), whichever its level."""
+        return self.x_m - self.level * self.storeys.pitch_m if self.storeys else self.x_m
+
+    def climb(self, move: Move, rise: Rise) -> None:
+        """Heights and levels after a move, and what they say of each particle."""
+        if self.storeys is None:
+            return
+        if math.isfinite(rise.height_sd_m):
+            self._lag_variance += self._climbing.drift_m**2 * rise.span_s
+        noise = self._rng.standard_normal(len(self.x_m))
+        self._lag_variance = climb(
+            self.x_m, self.y_m, self.turn_rad, self.scale, self.z_m, self.lag_m, self.log_weight,
+            move.dx_m, move.dy_m, noise, rise, self._lag_variance, self._climb, self.storeys,
+        )  # fmt: skip
+        self._renew()
 
     def puzzle(self, times: float) -> None:
         """Keep at least so many times the usual number of particles from the next resampling on."""
@@ -142,19 +184,22 @@ class Cloud:
         self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
         self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
 
-    def scatter(self, move: Move) -> None:
-        """Spread by a move that nobody watched: he may have gone round any wall, so none can veto it."""
+    def scatter(self, move: Move, rise: Rise | None = None) -> None:
+        """Spread by a move that nobody watched: he may have gone round any wall, so none can veto it, and up or down as the pressure says."""
         self._take(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         noise = self._rng.standard_normal((3, len(self.x_m)))
         self.turn_rad += move.turn_sd_rad * noise[2]
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
         self.x_m += c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
         self.y_m += s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
+        if self.storeys and rise and math.isfinite(rise.height_sd_m):
+            carry(self.x_m, self.z_m, self.lag_m, rise.height_m, self.storeys)
 
     def _take(self, chosen: Ints) -> None:
         """Keep these particles, with equal weights."""
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
+        self.z_m, self.lag_m = self.z_m[chosen], self.lag_m[chosen]
         self.log_weight = np.zeros(len(chosen))
 
     def _renew(self) -> None:

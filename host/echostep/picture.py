@@ -9,15 +9,38 @@ import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echostep.estimate import Estimate
 from echostep.foot import Track
-from echostep.plan import Level
+from echostep.plan import Level, Plan
 from echostep.truth import Truth
 
-COLUMNS = ("t_s", "x_m", "y_m", "heading_rad", "xx_m2", "xy_m2", "yy_m2", "heading_sd_rad", "step", "status")
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+
+COLUMNS = (
+    "t_s",
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "xx_m2",
+    "xy_m2",
+    "yy_m2",
+    "heading_sd_rad",
+    "step",
+    "status",
+    "level",
+    "z_m",
+    "z_sd_m",
+)
+MOST_INCHES = 40.0
+ELSEWHERE_S = 5.0
 TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # told apart by the colour-blind [Okabe and Ito 2008]
 
 
@@ -29,21 +52,34 @@ def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
         writer.writerows([getattr(e, name) for name in COLUMNS] for e in estimates)
 
 
-def draw_track(path: Path, level: Level, estimates: Sequence[Estimate], truth: Truth | None, title: str) -> None:
-    """Plan, truth, estimate and 95 % ellipses as a PNG."""
+def draw_track(path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str) -> None:
+    """Plan, truth, estimate and 95 % ellipses as a PNG, the levels that he was on one above the other."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
+
+    visited = sorted({e.level for e in estimates}) or [0]
+    inches = min(sum(_height(plan.levels[k]) for k in visited), MOST_INCHES)
+    figure = Figure(figsize=(10, inches), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title)
+    for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
+        here = [e for e in estimates if e.level == k]
+        _draw_level(axes, plan.levels[k], here, truth.between(here) if truth else None)
+        if len(plan.levels) > 1:
+            axes.set_title(plan.levels[k].name, loc="left", fontsize=9)
+    figure.savefig(path)
+
+
+def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m: Floats | None) -> None:
+    from matplotlib.collections import LineCollection
     from matplotlib.patches import Ellipse as Patch
 
-    figure = Figure(figsize=(10, _height(level)), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot(aspect="equal", title=title, xlabel="x / m", ylabel="y / m")
-    axes.add_collection(LineCollection(list(level.walls.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
+    axes.set(aspect="equal", xlabel="x / m", ylabel="y / m")
+    axes.add_collection(LineCollection(list(level.solid.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
     for room in level.rooms:
         axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8)
-    if truth is not None:
-        axes.plot(*truth.xy_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
+    if truth_m is not None:
+        axes.plot(*truth_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
     for e in _spread(estimates, 60):
         ellipse = e.ellipse95
         patch = Patch(
@@ -55,11 +91,18 @@ def draw_track(path: Path, level: Level, estimates: Sequence[Estimate], truth: T
             alpha=0.15,
         )
         axes.add_patch(patch)
-    track = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
+    track = _with_gaps([(e.t_s, e.x_m, e.y_m) for e in estimates])
     axes.plot(*track.T, color=TRACK_COLOUR, linewidth=1, marker=".", markersize=4, label="estimate, 95 % ellipses")
     axes.autoscale_view()
     axes.legend(loc="upper right", fontsize=8)
-    figure.savefig(path)
+
+
+def _with_gaps(rows: Sequence[tuple[float, float, float]]) -> Floats:
+    """Places (n, 2) of rows of t_s, x, y; a break in the line where he was elsewhere."""
+    table = np.array(rows).reshape(-1, 3)
+    breaks = np.flatnonzero(np.diff(table[:, 0]) > ELSEWHERE_S) + 1
+    found: Floats = np.insert(table[:, 1:], breaks, np.nan, axis=0)
+    return found
 
 
 def draw_foot(path: Path, track: Track, title: str) -> None:
@@ -83,9 +126,9 @@ def draw_foot(path: Path, track: Track, title: str) -> None:
 
 def _height(level: Level) -> float:
     """Inches that suit the plan's shape at a width of ten."""
-    if not len(level.walls):
+    if not len(level.solid):
         return 6.5
-    width, height = np.ptp(level.walls.reshape(-1, 2), axis=0)
+    width, height = np.ptp(level.solid.reshape(-1, 2), axis=0)
     return float(np.clip(1.0 + 9.2 * height / max(width, 1e-9), 4.0, 12.0))
 
 

@@ -35,6 +35,7 @@ from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.page.live import LivePage
 from echostep.page.server import Address
+from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose, load_plan
 from echostep.recording import Recorder, open_recording
@@ -201,14 +202,16 @@ def decode(path: Path) -> None:
 
 
 def parse_pose(text: str) -> Pose:
-    """X,Y,DEG as a pose; raises EchostepError."""
+    """X,Y,DEG[,LEVEL] as a pose, the level by its number from 0 or `?` for any; raises EchostepError."""
+    parts = text.split(",")
     try:
-        x, y, degrees = (float(part) for part in text.split(","))
+        x, y, degrees = (float(part) for part in parts[:3])
+        level = 0 if len(parts) < 4 else ANY_LEVEL if parts[3] == "?" else int(parts[3])
     except ValueError as error:
-        raise EchostepError(f"--start {text}: expected X,Y,DEG, for instance 1.5,2,90") from error
-    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)):
+        raise EchostepError(f"--start {text}: expected X,Y,DEG[,LEVEL], for instance 1.5,2,90 or 1.5,2,90,3") from error
+    if not all(math.isfinite(v) and abs(v) < 1e6 for v in (x, y, degrees)) or len(parts) > 4 or level < ANY_LEVEL:
         raise EchostepError(f"--start {text}: not a place")
-    return Pose(x, y, math.radians(degrees))
+    return Pose(x, y, math.radians(degrees), level)
 
 
 def _run(
@@ -339,7 +342,7 @@ def _finish(
     write_track(out / "track.csv", estimates)
     off = errors(estimates, truth) if truth else None
     title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
-    draw_track(out / "track.png", tracker.plan.levels[0], estimates, truth, title)
+    draw_track(out / "track.png", tracker.plan, estimates, truth, title)
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
@@ -357,7 +360,7 @@ def _finish(
 def _about(plan: Plan, start: Pose | None, seed: int, settings_toml: str, note: str) -> dict[str, str]:
     first = {"start": TAPPED}
     if start is not None:
-        first = {"start_x_y_rad": f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r}"}
+        first = {"start_x_y_rad": f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"}
     return {
         "version": _version(),
         "plan_sha256": plan.digest,
@@ -371,7 +374,10 @@ def _about(plan: Plan, start: Pose | None, seed: int, settings_toml: str, note: 
 def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
     try:
         text = about.get("start_x_y_rad")
-        return None if text is None else Pose(*(float(v) for v in text.split(",")))
+        if text is None:
+            return None
+        x, y, heading, *level = (float(v) for v in text.split(","))
+        return Pose(x, y, heading, int(level[0]) if level else 0)
     except (ValueError, TypeError) as error:
         raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.calibration import RangerSettings
+from echostep.climbing import ClimbSettings
 from echostep.errors import EchostepError
 from echostep.foot import FootSettings
 from echostep.gait import GaitSettings
@@ -31,6 +32,7 @@ class Settings:
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
+    climb: ClimbSettings = field(default_factory=ClimbSettings)
 
 
 def read_settings(path: Path | str) -> str:

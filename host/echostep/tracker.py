@@ -20,13 +20,16 @@ from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import CloudSettings, Move, systematic
 from echostep.plan import Plan, Pose
-from echostep.reflectors import Walls
 from echostep.settings import Settings
 from echostep.sources import Chunk, Portion, portion_of
+from echostep.storeys import building
 from echostep.waiting import Passage
 
 KNOWN_SD_RAD = 0.5  # of a heading; beyond it the cloud must look everywhere
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
+Watch = Callable[
+    [Passage | None, Estimate], None
+]  # is told of each estimate and of what it came from; None: of a silent foot
 
 
 class Tracker:
@@ -48,15 +51,15 @@ class Tracker:
         pose = start or plan.start
         if pose is None and not waits:
             raise EchostepError("the plan has no start: give one with --start X,Y,DEG")
+        if pose is not None and pose.level >= len(plan.levels):
+            raise EchostepError(f"the start is on level {pose.level}, the plan has {len(plan.levels)}, counted from 0")
         self.settings = settings or Settings()
         self.plan = plan
         self.start = pose
         self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
-        self.walls = Walls(plan.levels[0].walls)
+        self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
-        self.watch: Callable[[Passage | None, Estimate], None] | None = (
-            None  # is told of each estimate; None: of a silent foot
-        )
+        self.watch: Watch | None = None
         self.check_ins = 0
         self.bad_check_ins = 0
         self._rng = np.random.default_rng(seed)
@@ -145,7 +148,7 @@ class Tracker:
             heading_rad, sd_rad = (self._last.heading_rad, self._last.heading_sd_rad) if self._last else (0.0, math.pi)
         turn_sd_deg = math.degrees(min(sd_rad, KNOWN_SD_RAD))
         spread = replace(self.settings.cloud, start_sd_m=said.sd_m, start_turn_sd_deg=turn_sd_deg)
-        drawn = self._begin(Pose(said.x_m, said.y_m, heading_rad), walk_heading_rad, self._rng, spread)
+        drawn = self._begin(Pose(said.x_m, said.y_m, heading_rad, said.level), walk_heading_rad, self._rng, spread)
         if sd_rad > KNOWN_SD_RAD:
             drawn.cloud.scatter(Move(0.0, 0.0, 0.0, sd_rad))
         return drawn
@@ -153,4 +156,5 @@ class Tracker:
     def _begin(
         self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
     ) -> MapFilter:
-        return MapFilter(self.walls, start, walk_heading_rad, rng, cloud or self.settings.cloud, self.settings.echo)
+        s, b = self.settings, self.building
+        return MapFilter(b.walls, start, walk_heading_rad, rng, cloud or s.cloud, s.echo, b.storeys, s.climb)

@@ -17,6 +17,8 @@ from echostep.estimate import CHI2_95, Estimate
 
 Floats = NDArray[np.float64]
 
+NEARBY_S = 2.5
+
 
 @dataclass(frozen=True, slots=True)
 class Truth:
@@ -28,6 +30,16 @@ class Truth:
     def at(self, t_s: Floats) -> Floats:
         """Positions (m, 2) at times (m,), linear between the rows."""
         return np.column_stack([np.interp(t_s, self.t_s, self.xy_m[:, k]) for k in (0, 1)])
+
+    def between(self, estimates: Sequence[Estimate]) -> Floats:
+        """Positions (m, 2) while these estimates were made, NaN for the times between them when there are none for seconds."""
+        t_s = np.array([e.t_s for e in estimates])
+        if not len(t_s):
+            return np.zeros((0, 2))
+        away = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s), 0, len(t_s) - 1)])
+        before = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s) - 1, 0, len(t_s) - 1)])
+        found: Floats = np.where((np.minimum(away, before) < NEARBY_S)[:, None], self.xy_m, np.nan)
+        return found
 
 
 @dataclass(frozen=True, slots=True)

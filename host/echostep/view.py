@@ -87,7 +87,9 @@ class TerminalView:
     ) -> None:
         self._tracker = tracker
         self._title = title
-        self._canvas = Canvas(tracker.plan.levels[0])
+        at = tracker.start.level if tracker.start else 0
+        self._level = at if at in range(len(tracker.plan.levels)) else 0
+        self._canvas = Canvas(tracker.plan.levels[self._level])
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()
         )
@@ -105,9 +107,18 @@ class TerminalView:
         self.show([], final=True)
         self._live.__exit__(kind, error, at)
 
+    def _storey(self) -> str:
+        """The level in words, where there are several."""
+        levels, here = self._tracker.plan.levels, self._last
+        if len(levels) < 2 or here is None:
+            return ""
+        return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
+
     def show(self, estimates: list[Estimate], notice: str = "", *, final: bool = False) -> None:
         """Take new estimates; redraw when it is time."""
         for e in estimates:
+            if e.level != self._level:
+                self._level, self._canvas = e.level, Canvas(self._tracker.plan.levels[e.level])
             self._canvas.walked(e)
             self._last = e
         now = time.monotonic()
@@ -118,7 +129,7 @@ class TerminalView:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
             self._canvas.render(self._last),
-            Text(describe(self._last)),
+            Text(describe(self._last) + self._storey()),
             Text(health(self._tracker), style="grey62"),
         ]
         if notice:

@@ -7,7 +7,7 @@ come any more, and seconds of a silent foot. Owns what waits.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -22,17 +22,22 @@ Ints = NDArray[np.int64]
 PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
 SILENCE_S = 0.5  # a port that is this far behind the other one is not waited for
 BLIND_S = 1.0
+HEIGHT = 2  # among the rangers: a height by pressure
 MAX_WAITING = 4096  # pings; beyond it the oldest are given up and counted
 
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """A leg, and the pings since the leg before it, oldest first: `t_s`, `ranger` (0 looks left, 1 right), `range_m` (NaN: no echo), all (n,)."""
+    """A leg, and the pings since the leg before it, oldest first: `t_s`, `ranger` (0 looks left, 1 right), `range_m` (NaN: no echo), all (n,).
+
+    `height_m` (k,): heights by the air's pressure in the same time.
+    """
 
     leg: Leg
     t_s: Floats
     ranger: Ints
     range_m: Floats
+    height_m: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +82,7 @@ class Waiting:
         return int(self._state["dropped"][0])
 
     def hear(self, at: Ints, pings: Floats) -> None:
-        """Pings (n, 3) of t_s, ranger, range_m, and the place of each message (n,)."""
+        """Pings (n, 3) of t_s, ranger, range_m, or HEIGHT and a height, and the place of each message (n,)."""
         self._new_at, self._new = at, pings
 
     def go(self, at: int, legs: list[Leg]) -> None:
@@ -101,11 +106,18 @@ class Waiting:
             if k < 0:
                 pieces.append(Silence(silent_s))
                 continue
-            pieces.append(Passage(legs[k], ping_s[begin:end], ranger[begin:end], range_m[begin:end]))
+            pieces.append(_passage(legs[k], ping_s[begin:end], ranger[begin:end], range_m[begin:end]))
             begin, gone = end, k + 1
         self._new_at, self._new = np.empty(0, np.int64), np.empty((0, 3))
         self._legs, self._leg_at = legs[gone:], [-1] * (len(legs) - gone)
         return pieces
+
+
+def _passage(leg: Leg, t_s: Floats, ranger: Ints, value_m: Floats) -> Passage:
+    high = ranger == HEIGHT
+    if not high.any():
+        return Passage(leg, t_s, ranger, value_m)
+    return Passage(leg, t_s[~high], ranger[~high], value_m[~high], value_m[high])
 
 
 @njit(cache=True, error_model="numpy")

@@ -25,8 +25,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Beam:
-    """A ping sent from (x_m, y_m) along `axis_rad` of the map; None: no echo came, or none is expected."""
+    """A ping sent at `t_s` from (x_m, y_m) along `axis_rad` of the map; None: no echo came, or none is expected."""
 
+    t_s: float
     ranger: int
     x_m: float
     y_m: float
@@ -35,8 +36,11 @@ class Beam:
     expected_m: float | None
 
 
-def beams(passage: Passage, told: Estimate, index: WallIndex, model: EchoModel) -> tuple[Beam, ...]:
-    """The last ping of each ranger on a passage, placed where the estimate says that the trunk was then."""
+def beams(passage: Passage, told: Estimate, east_m: float, index: WallIndex, model: EchoModel) -> tuple[Beam, ...]:
+    """The last ping of each ranger on a passage, placed where the estimate says that the trunk was then.
+
+    `east_m`: how far east of the map its level lies on the walls' sheet.
+    """
     leg, found = passage.leg, []
     turn = told.heading_rad - leg.heading1_rad
     span_s = leg.t1_s - leg.t0_s
@@ -51,8 +55,10 @@ def beams(passage: Passage, told: Estimate, index: WallIndex, model: EchoModel) 
         back, c, s = share - 1.0, math.cos(turn), math.sin(turn)
         x = told.x_m + back * (c * leg.dx_m - s * leg.dy_m)
         y = told.y_m + back * (s * leg.dx_m + c * leg.dy_m)
-        expected = expected_range(x, y, axis, index, model)
-        found.append(Beam(ranger, x, y, axis, *(None if math.isnan(v) else float(v) for v in (range_m, expected))))
+        expected = expected_range(x + east_m, y, axis, index, model)
+        found.append(
+            Beam(ping_s, ranger, x, y, axis, *(None if math.isnan(v) else float(v) for v in (range_m, expected)))
+        )
     return tuple(found)
 
 

@@ -23,11 +23,21 @@ class Guidance:
     path: tuple[tuple[float, float], ...]
 
 
-def straight(told: Estimate, x_m: float, y_m: float) -> Guidance:
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A destination: metres in the map, an index into Plan.levels."""
+
+    x_m: float
+    y_m: float
+    level: int
+
+
+def straight(told: Estimate, goal: Place) -> Guidance:
     """The straight line to a place."""
-    dx, dy = x_m - told.x_m, y_m - told.y_m
+    dx, dy, levels = goal.x_m - told.x_m, goal.y_m - told.y_m, goal.level - told.level
     distance_m = math.hypot(dx, dy)
-    path = ((told.x_m, told.y_m), (x_m, y_m))
-    if distance_m <= ARRIVED_M:
+    path = ((told.x_m, told.y_m), (goal.x_m, goal.y_m))
+    if distance_m <= ARRIVED_M and not levels:
         return Guidance("you are there", None, distance_m, path)
-    return Guidance(f"straight line: {distance_m:.0f} m", math.atan2(dy, dx), distance_m, path)
+    climb = f", {abs(levels)} level{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
+    return Guidance(f"{distance_m:.0f} m in a straight line{climb}", math.atan2(dy, dx), distance_m, path)

@@ -24,6 +24,7 @@ from echostep.waiting import Passage
 
 STEP_M = 0.02  # the trail gets a point when he has moved so far
 PULSE_NS = 250_000_000
+STALE_S = 1.5  # echoes are shown no longer
 MOST_KEPT = 2000  # specks of each scene of a film
 
 
@@ -42,11 +43,11 @@ class LivePage:
         self._new: list[Scene] = []
         self._scene = Scene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
         self._replay = replay
-        self._last_m: tuple[float, float] | None = None
+        self._last: Estimate | None = None  # in the trail
         self._born_ns = time.monotonic_ns()
         if not replay:
             self._stage.publish(self._scene)
-        expected_range(0.0, 0.0, 0.0, tracker.walls.index, self._model)  # compiled now, not at the first step
+        expected_range(0.0, 0.0, 0.0, tracker.building.walls.index, self._model)  # compiled now, not at the first step
 
     @property
     def url(self) -> str:
@@ -96,15 +97,17 @@ class LivePage:
     def _watch(self, passage: Passage | None, told: Estimate) -> None:
         """The tracker told an estimate."""
         tracker = self._tracker
-        if self._last_m is None or max(abs(told.x_m - self._last_m[0]), abs(told.y_m - self._last_m[1])) > STEP_M:
-            self._last_m = (told.x_m, told.y_m)
-            self._stage.trail.add(told.x_m, told.y_m)
+        last = self._last
+        if last is None or max(abs(told.x_m - last.x_m), abs(told.y_m - last.y_m)) > STEP_M or told.level != last.level:
+            self._last = told
+            self._stage.trail.add(told.x_m, told.y_m, told.level)
         shown, heard = self._scene.specks, self._scene.beams
         if passage is not None and tracker.filter is not None:
             shown = specks(tracker.filter.cloud, MOST_KEPT if self._replay else MOST_SHOWN)
-            heard = beams(passage, told, tracker.walls.index, self._model)
-        elif passage is None:
-            heard = ()
+            sheet = tracker.building
+            new = beams(passage, told, told.level * sheet.storeys.pitch_m, sheet.walls.index, self._model)
+            heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)
+        heard = tuple(beam for beam in heard if told.t_s - beam.t_s < STALE_S)
         self._scene = replace(
             self._scene, born_ns=self._born_ns, t_s=told.t_s, told=told, walked=len(self._stage.trail),
             words=words(told, taps=not self._replay), specks=shown, beams=heard,

@@ -22,11 +22,12 @@ MOST_SHOWN = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Specks:
-    """A cloud as it is drawn: `x_m`, `y_m` (n,) float32, `weight` (n,) uint8, 255 for the greatest."""
+    """A cloud as it is drawn: `x_m`, `y_m` (n,) float32 in the map, `weight` (n,) uint8, 255 for the greatest, `level` (n,) uint8."""
 
     x_m: NDArray[np.float32]
     y_m: NDArray[np.float32]
     weight: NDArray[np.uint8]
+    level: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,8 @@ def specks(cloud: Cloud, most: int = MOST_SHOWN) -> Specks:
     every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
     weight = np.exp(cloud.log_weight[every])
     shown = (255.0 * weight / max(float(weight.max()), 1e-300)).astype(np.uint8)
-    return Specks(cloud.x_m[every].astype(np.float32), cloud.y_m[every].astype(np.float32), shown)
+    x_m, y_m = cloud.map_x_m[every].astype(np.float32), cloud.y_m[every].astype(np.float32)
+    return Specks(x_m, y_m, shown, np.minimum(cloud.level[every], 255).astype(np.uint8))
 
 
 def words(told: Estimate | None, *, waits: bool = False, taps: bool = True) -> str:

@@ -19,7 +19,7 @@ from echostep.checkin import CheckIn
 from echostep.estimate import Estimate
 from echostep.page import wire
 from echostep.page.cursor import Cursor
-from echostep.page.guide import Guidance
+from echostep.page.guide import Guidance, Place
 from echostep.page.scene import Scene, Specks
 from echostep.page.stage import Stage
 
@@ -27,7 +27,7 @@ FRAME_S = 1.0 / 30.0
 MOST_UNDRAWN = 2
 MOST_REQUESTS_A_SECOND = 240
 POLICY = 1008
-Guide = Callable[[Estimate, float, float], Guidance]
+Guide = Callable[[Estimate, Place], Guidance]
 
 
 @dataclass(slots=True)
@@ -49,7 +49,7 @@ class Session:
         self._guide = guide
         self._counts = counts
         self._cursor = Cursor(stage.film) if stage.film is not None else None
-        self._goal: wire.GoTo | None = None
+        self._goal: Place | None = None
         self._news = asyncio.Event()
         self._undrawn: dict[int, int] = {}  # serial number of a frame sent: birth of its scene
         self._serial = 0
@@ -101,8 +101,8 @@ class Session:
                 if not self._stage.check_in(request):
                     self._counts.refused += 1
                     await self._socket.send_text('{"kind":"refused","what":"check_in"}')
-            case wire.GoTo():
-                self._goal, self._asked = request, True
+            case wire.GoTo(goal) if goal.level < len(self._stage.plan.levels):
+                self._goal, self._asked = goal, True
             case wire.GoNowhere():
                 self._goal, self._asked = None, True
             case _ if self._cursor is not None:
@@ -139,7 +139,7 @@ class Session:
         self._undrawn[self._serial] = scene.born_ns
         begin = min(self._walked, scene.walked)
         new = scene.specks if scene.specks is not self._specks else None
-        guidance = self._guide(scene.told, self._goal.x_m, self._goal.y_m) if scene.told and self._goal else None
+        guidance = self._guide(scene.told, self._goal) if scene.told and self._goal else None
         play = self._cursor.state() if self._cursor else None
         self._last, self._walked, self._specks = scene, scene.walked, scene.specks
         return wire.frame(scene, self._serial, self._stage.trail.part(begin, scene.walked), begin, new, guidance, play)

@@ -22,18 +22,18 @@ class Trail:
     """The way so far: points that are only ever appended; any thread may read."""
 
     def __init__(self) -> None:
-        self._xy = array("f")
+        self._rows = array("f")
 
     def __len__(self) -> int:
-        return len(self._xy) // 2
+        return len(self._rows) // 3
 
-    def add(self, x_m: float, y_m: float) -> None:
+    def add(self, x_m: float, y_m: float, level: int) -> None:
         """One more point."""
-        self._xy.extend((x_m, y_m))
+        self._rows.extend((x_m, y_m, level))
 
     def part(self, begin: int, end: int) -> bytes:
-        """Points [begin, end) as float32 pairs."""
-        return self._xy[2 * begin : 2 * end].tobytes()
+        """Points [begin, end) as rows of float32 x, y, level."""
+        return self._rows[3 * begin : 3 * end].tobytes()
 
 
 class Film:

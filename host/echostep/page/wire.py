@@ -1,7 +1,8 @@
 """The wire between server and page: frames as bytes, the plan as JSON, requests as checked objects.
 
 In: scenes and plans; texts from sockets. Out: bytes for sockets; requests. Owns nothing. A frame is a u32 (little-endian) length, a JSON header
-padded to four bytes, the trail's new points as float32 pairs, and the cloud as columns of u16 x, u16 y (a grid that the header gives) and u8 weight.
+padded to four bytes, the trail's new points as float32 rows x, y, level, and the cloud as columns of u16 x, u16 y (a grid that the
+header gives), u8 weight, u8 level.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from echostep.checkin import MOST_LEVELS, CheckIn, check_in_of
-from echostep.page.guide import Guidance
+from echostep.fields import LIMIT_M
+from echostep.page.guide import Guidance, Place
 from echostep.page.scene import KNOWN_HEADING_RAD, Scene, Specks
-from echostep.plan import LIMIT_M, Plan
+from echostep.plan import Plan
 
 MOST_REQUEST = 2048  # bytes
 GRID = 65535.0
@@ -28,9 +30,7 @@ FASTEST = 32.0
 class GoTo:
     """Guide me to a place."""
 
-    x_m: float
-    y_m: float
-    level: int
+    goal: Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ def _request(tree: dict[str, Any]) -> Request | None:
 
 def _go_to(tree: dict[str, Any]) -> GoTo | None:
     x, y, level = _number(tree.get("x_m")), _number(tree.get("y_m")), _whole(tree.get("level", 0))
-    return None if x is None or y is None or level is None or not 0 <= level < MOST_LEVELS else GoTo(x, y, level)
+    return None if x is None or y is None or level is None or not 0 <= level < MOST_LEVELS else GoTo(Place(x, y, level))
 
 
 def _drawn(tree: dict[str, Any]) -> Drawn | None:
@@ -148,7 +148,7 @@ def hello(plan: Plan, title: str, *, replay: bool) -> str:
         {
             "name": level.name,
             "height_m": level.height_m,
-            "walls": len(level.walls),
+            "walls": len(level.solid),
             "rooms": [asdict(r) for r in level.rooms],
         }
         for level in plan.levels
@@ -164,7 +164,7 @@ def hello(plan: Plan, title: str, *, replay: bool) -> str:
 
 def walls(plan: Plan, level: int) -> bytes:
     """The walls of a level as float32 x0 y0 x1 y1."""
-    return plan.levels[level].walls.astype("<f4").tobytes()
+    return plan.levels[level].solid.astype("<f4").tobytes()
 
 
 def frame(
@@ -176,7 +176,7 @@ def frame(
     guidance: Guidance | None,
     play: dict[str, Any] | None,
 ) -> bytes:
-    """One frame; `serial` comes back when it is drawn; `trail`: float32 points from `trail_from` on.
+    """One frame; `serial` comes back when it is drawn; `trail`: float32 rows x, y, level from `trail_from` on.
 
     `specks`: None when the page has them already.
     """
@@ -189,7 +189,7 @@ def frame(
         "told": _told(scene),
         "beams": [asdict(beam) for beam in scene.beams],
         "health": asdict(scene.health) if scene.health else None,
-        "trail": {"from": trail_from, "count": len(trail) // 8},
+        "trail": {"from": trail_from, "count": len(trail) // 12},
         "cloud": grid,
         "guidance": asdict(guidance) if guidance else None,
         "play": play,
@@ -207,7 +207,7 @@ def _told(scene: Scene) -> dict[str, Any] | None:
     return {
         "x_m": e.x_m,
         "y_m": e.y_m,
-        "level": 0,
+        "level": e.level,
         "major_m": ellipse.major_m,
         "minor_m": ellipse.minor_m,
         "angle_rad": ellipse.angle_rad,
@@ -216,7 +216,9 @@ def _told(scene: Scene) -> dict[str, Any] | None:
         "heading_known": e.heading_sd_rad <= KNOWN_HEADING_RAD,
         "step": e.step,
         "status": e.status.value,
-        "levels": [1.0],
+        "levels": e.levels,
+        "z_m": e.z_m,
+        "z_sd_m": e.z_sd_m,
     }
 
 
@@ -227,4 +229,4 @@ def _cloud(specks: Specks) -> tuple[dict[str, float], bytes]:
     step = max(float(x.max()) - x0, float(y.max()) - y0, 1e-3) / GRID
     columns = [((v - v0) / step).round().clip(0.0, GRID).astype("<u2").tobytes() for v, v0 in ((x, x0), (y, y0))]
     grid = {"count": len(x), "x0_m": x0, "y0_m": y0, "step_m": step}
-    return grid, b"".join(columns) + specks.weight.tobytes()
+    return grid, b"".join(columns) + specks.weight.tobytes() + specks.level.tobytes()

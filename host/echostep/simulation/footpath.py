@@ -36,7 +36,7 @@ class Foot:
 
 @dataclass(frozen=True, slots=True)
 class Strides:
-    """Middles of stances `t_s` (k,), and the trunk above the foot at each: `trunk_m` (k, 2), `heading_rad` (k,).
+    """Middles of stances `t_s` (k,), and the trunk above the foot at each: `trunk_m` (k, 2), `heading_rad` (k,), `ground_m` (k,) the floor's height.
 
     `moves` (k - 1,): whether the foot moves between them.
     """
@@ -45,6 +45,7 @@ class Strides:
     moves: NDArray[np.bool_]
     trunk_m: Floats
     heading_rad: Floats
+    ground_m: Floats
 
     def at(self, t_s: Floats) -> tuple[NDArray[np.intp], Floats]:
         """Number of the stride at each time, and the share of it that is over."""
@@ -66,8 +67,11 @@ class Strides:
         return found
 
 
-def foot_path(t_s: Floats, strides: Strides, foot: Foot) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Position (n, 3) of the sensor, its roll, pitch, yaw (n, 3), and whether the foot is flat, which is when nothing moves at all."""
+def foot_path(t_s: Floats, strides: Strides, foot: Foot, height_m: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Position (n, 3) of the sensor, its roll, pitch, yaw (n, 3), and whether the foot is flat, which is when nothing moves at all.
+
+    `height_m` (n,): of the floor that carries him, which in a lift moves; on stairs the foot is over the next step before it comes down.
+    """
     k, share = strides.at(t_s)
     share = np.where(strides.moves[k], share, 0.0)
     effort = strides.effort(t_s, 1.3)
@@ -83,6 +87,9 @@ def foot_path(t_s: Floats, strides: Strides, foot: Foot) -> tuple[Floats, Floats
     place[:, :2] = prints[k] + gone[:, None] * (prints[np.minimum(k + 1, len(prints) - 1)] - prints[k])
     place[:, 2] = -BALL[2] + effort * foot.lift_m * _bump(share, TOE_OFF - 0.05, HEEL_STRIKE + 0.02)
     place[:, 2] += effort * _knock(share, np.diff(strides.t_s)[k])
+    rise = np.diff(strides.ground_m)[k]
+    lifted = np.where(rise > 0.0, _ease(share, HEEL_OFF + 0.05, 0.60), _ease(share, 0.45, 0.5 * (HEEL_STRIKE + FLAT)))
+    place[:, 2] += np.where(strides.moves[k], strides.ground_m[k] + lifted * rise, height_m)
     return place + _roll_over(share, rpy), rpy, (share <= HEEL_OFF) | (share >= FLAT)
 
 

@@ -44,22 +44,23 @@ class Scenario:
         """`configure` is sent to the board before it starts."""
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
         magnetism = Magnetism(streams[3])
-        level = plan.levels[0]
         self.walk = walk(waypoints, person or Person(), streams[0])
         self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
-        self.sensors = BoardSensors(self.walk, level.walls, self.mtx.t_s, streams[2], magnetism, level.height_m)
+        self.sensors = BoardSensors(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)
         self._board = board
         self.fraction = 0.0  # of the walk that is over
         if configure is not None:
             board.send(encode(configure, 0))
         x, y = self.walk.trunk_m[0].tolist()
-        self.start = Pose(x, y, float(self.walk.heading_rad[0]))
+        begin_m = float(self.walk.height_m[0])
+        level = min(range(len(plan.levels)), key=lambda k: abs(plan.levels[k].height_m - begin_m))
+        self.start = Pose(x, y, float(self.walk.heading_rad[0]), level)
 
     @property
     def truth(self) -> Floats:
-        """Where the trunk was, 50 times a second: (n, 4) t_s, x, y, heading_rad, map frame."""
+        """Where the trunk was, 50 times a second: (n, 5) t_s, x, y, heading_rad, height of the floor, map frame."""
         w = self.walk
-        return np.column_stack([w.t_s, w.trunk_m, w.heading_rad])[::TRUTH_MS]
+        return np.column_stack([w.t_s, w.trunk_m, w.heading_rad, w.height_m])[::TRUTH_MS]
 
     def chunks(self) -> Iterator[Chunk]:
         """Chunks of both ports in order of arrival, those of a block as soon as the board has lived through it."""
@@ -81,8 +82,8 @@ class Scenario:
 
     def write_truth(self, path: Path, begin_s: float = 0.0) -> None:
         """The truth as CSV; `begin_s`: board time at which the walk begins."""
-        table = self.truth + [begin_s, 0.0, 0.0, 0.0]
-        np.savetxt(path, table, delimiter=",", header="t_s,x,y,heading_rad", comments="", fmt="%.6f")
+        table = self.truth + [begin_s, 0.0, 0.0, 0.0, 0.0]
+        np.savetxt(path, table, delimiter=",", header="t_s,x,y,heading_rad,z", comments="", fmt="%.6f")
 
     def close(self) -> None:
         """Switch the board off."""

@@ -49,8 +49,8 @@ class Scp1000:
         self._rng = rng
         self._drift_pa = 0.0
 
-    def counts(self, height_m: float, temperature_c: float, n: int) -> tuple[Counts, Counts]:
-        """Pressure (0.25 Pa) and temperature (0.05 degC) of n milliseconds at a height [ISO 2533, standard atmosphere]."""
+    def counts(self, height_m: Floats, temperature_c: float, n: int) -> tuple[Counts, Counts]:
+        """Pressure (0.25 Pa) and temperature (0.05 degC) of n milliseconds at heights (n,) [ISO 2533, standard atmosphere]."""
         drawn = self._rng.standard_normal((n, 3))
         drift = self._drift_pa + PRESSURE_DRIFT_PA * math.sqrt(1e-3) * np.cumsum(drawn[:, 0])
         self._drift_pa = float(drift[-1])

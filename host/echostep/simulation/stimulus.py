@@ -1,13 +1,16 @@
 """What the board's sensors feel, as rows of one millisecond (host/DESIGN.md, the bench).
 
-In: a walk, walls, a seeded generator. Out: rows for a board. Owns the sensors.
+In: a walk, the levels of a building, a seeded generator. Out: rows for a board. Owns the sensors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.plan import Level
 from echostep.simulation.acoustics import SRF02, speed_of_sound_m_s
 from echostep.simulation.magnetism import Magnetism
 from echostep.simulation.sensors import Adis16100, Compass, Scp1000
@@ -31,14 +34,14 @@ class BoardSensors:
     """Makes the rows of any stretch of a walk; the same seed makes the same rows when stretches are asked for in order, however long they are."""
 
     def __init__(
-        self, walk: Walk, walls: Floats, sync_t_s: Floats, rng: np.random.Generator,
-        magnetism: Magnetism | None = None, height_m: float = 0.0,
+        self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
+        magnetism: Magnetism | None = None,
     ) -> None:  # fmt: skip
-        """`sync_t_s`: times of the MTx's SyncOut edges, ascending; `height_m`: of the floor; without `magnetism` the earth's field alone."""
+        """`sync_t_s`: times of the MTx's SyncOut edges, ascending; without `magnetism` the earth's field alone. He hears the level nearest to him."""
         self._walk = walk
-        self._walls = walls
+        self._walls = [level.solid for level in levels]
+        self._level = np.abs(walk.height_m[:, None] - [level.height_m for level in levels]).argmin(1)
         self._sync_us = np.rint(sync_t_s * 1e6).astype(np.int64)
-        self._height_m = height_m
         self._acoustics = SRF02._replace(speed_m_s=speed_of_sound_m_s(TEMPERATURE_C))
         self._echo_rng, *rest = rng.spawn(6)
         self._range_bias_m = ranger_bias_m(self._echo_rng, self._acoustics)
@@ -55,10 +58,15 @@ class BoardSensors:
         rows["calf"] = self._calf.counts(w.calf_rad_s[at])
         rows["belt"] = self._belt.counts(w.belt_rad_s[at])
         trunk, heading = w.trunk_m[at], w.heading_rad[at]
-        heard = echoes(trunk, heading, self._walls, self._range_bias_m, self._echo_rng, self._acoustics)
-        rows["own_us"], rows["cross_us"] = heard.own_us, heard.cross_us
+        begin = 0
+        for end in [*(np.flatnonzero(np.diff(self._level[at])) + 1).tolist(), len(at)]:
+            one = slice(begin, end)
+            walls = self._walls[self._level[at[begin]]]
+            heard = echoes(trunk[one], heading[one], walls, self._range_bias_m, self._echo_rng, self._acoustics)
+            rows["own_us"][one], rows["cross_us"][one] = heard.own_us, heard.cross_us
+            begin = end
         rows["bearing"] = self._compass.bearings(trunk, heading)
-        rows["pressure"], rows["temperature"] = self._barometer.counts(self._height_m, TEMPERATURE_C, len(at))
+        rows["pressure"], rows["temperature"] = self._barometer.counts(w.height_m[at], TEMPERATURE_C, len(at))
         rows["sync_us"] = self._edges(start, stop)
         return rows
 

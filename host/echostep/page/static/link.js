@@ -39,13 +39,14 @@ export function parseFrame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   let at = 4 + length;
-  header.trail.points = new Float32Array(buffer, at, 2 * header.trail.count);
-  at += 8 * header.trail.count;
+  header.trail.points = new Float32Array(buffer, at, 3 * header.trail.count);
+  at += 12 * header.trail.count;
   if (header.cloud) {
     const n = header.cloud.count;
     header.cloud.x = new Uint16Array(buffer, at, n);
     header.cloud.y = new Uint16Array(buffer, at + 2 * n, n);
     header.cloud.weight = new Uint8Array(buffer, at + 4 * n, n);
+    header.cloud.level = new Uint8Array(buffer, at + 5 * n, n);
   }
   return header;
 }

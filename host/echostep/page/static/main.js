@@ -13,9 +13,10 @@ const $ = (id) => document.getElementById(id);
 const FINGER_PX = 20;
 const LEAST_SD_M = 0.3;
 
-const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), panel = new Panel(showFloor);
-const scene = { frame: null, cloud: null, trail: { points: new Float32Array(2048), count: 0 }, tapped: null };
-let plan = null, level = 0, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetAt = null, turned = 0, fitted = false;
+const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
+const panel = new Panel((k) => { setFollows(false); showFloor(k); });
+const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetAt = null, turned = 0, fitted = false, wanted = 0;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('Not taken: this is a replay, or it is too busy.', 3000), onState: connection });
 const replay = new Replay((kind, fields) => link.say(kind, fields));
@@ -29,16 +30,18 @@ async function hello(said) {
   panel.hello(said);
   replay.show(said.replay);
   $('here').hidden = $('sheet-here').hidden = said.replay;
-  await showFloor(Math.min(level, plan.levels.length - 1));
+  await showFloor(Math.min(scene.level, plan.levels.length - 1));
 }
 
 async function showFloor(k) {
+  wanted = k;
   const walls = await fetch(new URL(`walls/${k}`, document.baseURI)).then((answer) => answer.arrayBuffer());
-  level = k;
+  if (k !== wanted) return;
+  scene.level = k;
   planView.show(new Float32Array(walls), plan.levels[k].rooms);
   if (!fitted) view.fit(planView.box);
   fitted = true;
-  panel.floors(level, scene.frame?.told);
+  panel.floors(k, scene.frame?.told);
   view.changed();
 }
 
@@ -57,19 +60,22 @@ function frame(got) {
 
 function extend(trail, { from, count, points }) {
   const total = from + count;
-  if (2 * total > trail.points.length) {
-    const more = new Float32Array(4 * total);
-    more.set(trail.points.subarray(0, 2 * from));
+  if (3 * total > trail.points.length) {
+    const more = new Float32Array(6 * total);
+    more.set(trail.points.subarray(0, 3 * from));
     trail.points = more;
   }
-  trail.points.set(points, 2 * from);
+  trail.points.set(points, 3 * from);
   trail.count = total;
 }
 
 function draw() {
   requestAnimationFrame(draw);
   const { told } = scene.frame ?? {};
-  if (dirty && told && follows && !mode) view.keep(told.x_m, told.y_m);
+  if (dirty && told && follows && !mode) {
+    if (!view.shows(planView.box)) view.keep(told.x_m, told.y_m);
+    if (told.level !== scene.level && told.level !== wanted) showFloor(told.level);
+  }
   const moved = drawnStamp !== view.stamp;
   if (!dirty && !moved) return;
   if (moved) {
@@ -80,8 +86,8 @@ function draw() {
   if (mode && $('cross').hidden === false) posing(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
-    panel.frame(scene.frame, plan.levels[level].rooms, view.turn);
-    panel.floors(level, told);
+    panel.frame(scene.frame, plan.levels[scene.level].rooms, view.turn);
+    panel.floors(scene.level, told);
     replay.frame(scene.frame.play);
     if (!told && scene.frame.words.startsWith('tap') && !mode) enter('here');
   }
@@ -120,14 +126,14 @@ function posing(place, heading_rad) {
 }
 
 function posed([x_m, y_m], heading_rad) {
-  const wanted = mode;
+  const meant = mode;
   enter(null);
-  if (wanted === 'go') {
-    link.say('go_to', { x_m, y_m, level });
+  if (meant === 'go') {
+    link.say('go_to', { x_m, y_m, level: scene.level });
     return;
   }
   const sd_m = Math.max(LEAST_SD_M, FINGER_PX / view.scale);
-  link.say('check_in', { x_m, y_m, heading_rad, sd_m, level });
+  link.say('check_in', { x_m, y_m, heading_rad, sd_m, level: scene.level });
   posing([x_m, y_m], heading_rad);
   hint(heading_rad === null ? 'Taken. Where you look is found while you walk.' : 'Taken.', 2500);
   setTimeout(() => { if (!mode) posing(null, null); }, 1500);

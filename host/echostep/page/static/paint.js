@@ -23,11 +23,11 @@ export class Painter {
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
-    if (scene.cloud) this.specks(view, scene.cloud);
-    this.trail(view, scene.trail);
+    if (scene.cloud) this.specks(view, scene.cloud, scene.level);
+    this.trail(view, scene.trail, scene.level);
     const { told } = scene.frame ?? {};
     if (scene.frame?.guidance) this.way(view, scene.frame.guidance.path);
-    if (told) {
+    if (told && told.level === scene.level) {
       for (const beam of scene.frame.beams) this.beam(view, beam);
       this.ellipse(view, told);
       this.wearer(view, told);
@@ -35,7 +35,7 @@ export class Painter {
     if (scene.tapped) this.pose(view, scene.tapped);
   }
 
-  specks(view, { count, x0_m, y0_m, step_m, x, y, weight }) {
+  specks(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shown) {
     const [a, b, c, d, e, f] = view.matrix(), { pen } = this, half = SPECK_PX / 2;
     pen.fillStyle = this.colour.cloud;
     const e0 = a * x0_m + c * y0_m + e - half, f0 = b * x0_m + d * y0_m + f - half;
@@ -43,7 +43,7 @@ export class Painter {
     for (let grade = 0; grade < GRADES; grade++) {
       pen.globalAlpha = 0.12 + (0.5 * grade) / (GRADES - 1);
       for (let k = 0; k < count; k++) {
-        if (weight[k] >> 6 !== grade) continue;
+        if (weight[k] >> 6 !== grade || level[k] !== shown) continue;
         const sx = as * x[k] + cs * y[k] + e0, sy = bs * x[k] + ds * y[k] + f0;
         if (sx > -4 && sy > -4 && sx < view.width && sy < view.height) pen.fillRect(sx, sy, SPECK_PX, SPECK_PX);
       }
@@ -62,13 +62,14 @@ export class Painter {
     pen.setLineDash([]);
   }
 
-  trail(view, { points, count }) {
-    if (count < 2) return;
+  trail(view, { points, count }, shown) {
     const [a, b, c, d, e, f] = view.matrix(), { pen } = this;
     pen.beginPath();
-    for (let k = 0; k < 2 * count; k += 2) {
-      const x = points[k], y = points[k + 1];
-      pen.lineTo(a * x + c * y + e, b * x + d * y + f);
+    let on = false;
+    for (let k = 0; k < 3 * count; k += 3) {
+      const x = points[k], y = points[k + 1], here = points[k + 2] === shown;
+      if (here) pen[on ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
+      on = here;
     }
     pen.strokeStyle = this.colour.trail;
     pen.lineWidth = 2;

@@ -1,0 +1,52 @@
+"""Which format a file is in, and the plan in it.
+
+In: a path. Out: `Plan`. Owns the list of formats.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.plan import Plan
+from echostep.plan_writer import plan_json
+
+STOREY_M = 3.5  # from floor to floor, where a format does not say
+
+
+@dataclass(frozen=True, slots=True)
+class Hints:
+    """What a file may leave open: the height of a storey, units and layers of drawings."""
+
+    storey_m: float = STOREY_M
+    units: str | None = None
+    layers: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+
+def import_plan(path: Path, hints: Hints | None = None, above: Sequence[Path] = ()) -> Plan:
+    """The plan in a file of another program (drawings: one file a storey, more of them `above`); EchostepError names the file and the place in it."""
+    plan = _imported(path, hints or Hints(), above)
+    return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
+
+
+def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
+    if path.suffix.casefold() == ".dxf":
+        from echostep.building.dxf import import_dxf
+
+        return import_dxf([path, *above], hints.storey_m, hints.layers, hints.units)
+    if above:
+        raise EchostepError(f"{above[0]}: only drawings (DXF) come in several files")
+    if path.name == "main.json" or (path / "main.json").exists():
+        from echostep.building.wrld import import_wrld
+
+        return import_wrld(path / "main.json" if path.is_dir() else path, hints.storey_m)
+    if path.name == "core.txt" or (path / "core.txt").exists():
+        from echostep.building.nodelink import import_nodelink
+
+        return import_nodelink(path / "core.txt" if path.is_dir() else path)
+    if not path.exists():
+        raise EchostepError(f"{path}: no such file")
+    raise EchostepError(f"{path}: no format of plans that echostep knows")
