@@ -5,6 +5,7 @@ In: a tracker, and the moment after each portion that it took. Out: scenes on a 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -44,6 +45,7 @@ class LivePage:
         self._scene = Scene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
         self._replay = replay
         self._last: Estimate | None = None  # in the trail
+        self._check_ins = 0
         self._born_ns = time.monotonic_ns()
         if not replay:
             self._stage.publish(self._scene)
@@ -99,7 +101,9 @@ class LivePage:
         tracker = self._tracker
         last = self._last
         if last is None or max(abs(told.x_m - last.x_m), abs(told.y_m - last.y_m)) > STEP_M or told.level != last.level:
-            self._last = told
+            if tracker.check_ins != self._check_ins:
+                self._stage.trail.add(math.nan, math.nan, told.level)
+            self._last, self._check_ins = told, tracker.check_ins
             self._stage.trail.add(told.x_m, told.y_m, told.level)
         shown, heard = self._scene.specks, self._scene.beams
         if passage is not None and tracker.filter is not None:

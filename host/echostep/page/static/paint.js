@@ -62,12 +62,13 @@ export class Painter {
     pen.setLineDash([]);
   }
 
+  // A point that is no number is a break: somebody checked in.
   trail(view, { points, count }, shown) {
     const [a, b, c, d, e, f] = view.matrix(), { pen } = this;
     pen.beginPath();
     let on = false;
     for (let k = 0; k < 3 * count; k += 3) {
-      const x = points[k], y = points[k + 1], here = points[k + 2] === shown;
+      const x = points[k], y = points[k + 1], here = points[k + 2] === shown && x === x;
       if (here) pen[on ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
       on = here;
     }
@@ -118,7 +119,7 @@ export class Painter {
     pen.translate(...view.toScreen(x_m, y_m));
     pen.rotate(-(heading_rad + view.turn));
     pen.beginPath();
-    if (heading_known) { pen.moveTo(15, 0); pen.lineTo(-10, 9); pen.lineTo(-5, 0); pen.lineTo(-10, -9); pen.closePath(); }
+    if (heading_known) { pen.moveTo(13, 0); pen.lineTo(-9, 8); pen.lineTo(-4, 0); pen.lineTo(-9, -8); pen.closePath(); }
     else pen.arc(0, 0, 8, 0, 2 * Math.PI);
     pen.lineWidth = 4;
     pen.strokeStyle = this.colour.halo;

@@ -30,7 +30,8 @@ export class Panel {
   frame({ told, words, health, guidance, beams }, rooms, turn) {
     const status = told?.status ?? 'waiting';
     this.status(status, words);
-    $('place').textContent = told ? whereabouts(told, rooms, beams) : '';
+    $('place').textContent = told ? whereabouts(told, rooms) : '';
+    $('echoes').textContent = told ? echoes(beams) : '';
     $('health').textContent = health ? streams(health) : 'no bytes yet';
     $('guidance').hidden = !guidance;
     if (guidance) {
@@ -76,17 +77,22 @@ function near({ x_m, y_m }, rooms) {
   return away.length ? `near ${away[0][1]}` : '';
 }
 
-function whereabouts(told, rooms, beams) {
+function whereabouts(told, rooms) {
   const degrees = ((told.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((told.heading_sd_rad * 180) / Math.PI);
-  const heading = told.heading_known ? `heading ${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ± ${spread}°` : 'heading unknown';
-  const heard = beams.map(({ ranger, measured_m, expected_m }) => `${ranger ? 'right' : 'left'} ${length(measured_m)} (plan ${length(expected_m)})`);
-  return [near(told, rooms), `x ${told.x_m.toFixed(2)} m, y ${told.y_m.toFixed(2)} m`, heading, ...heard].filter(Boolean).join(' · ');
+  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ± ${spread}°` : 'heading unknown';
+  return [near(told, rooms), `x ${told.x_m.toFixed(1)} m, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
 }
 
-const length = (metres) => (metres === null ? 'no echo' : `${metres.toFixed(2)} m`);
+function echoes(beams) {
+  const one = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
+  const heard = beams.map((beam) => `${beam.ranger ? 'right' : 'left'} ${one(beam)}`);
+  return heard.length ? heard.join(' · ') : 'no echoes';
+}
+
+const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
 
 function streams({ mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
   const rate = (value, unit) => (value === null ? '…' : `${Math.round(value)}${unit}`);
   const late = late_pings ? ` · ${late_pings} late` : '';
-  return `MTx ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected} · clock: ${synchronised ? 'SyncOut' : 'arrival'}`;
+  return `MTx ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected} · ${synchronised ? 'SyncOut' : 'no SyncOut'}`;
 }
