@@ -36,7 +36,7 @@ class LivePage:
         self.wanted = True  # until Ctrl-C
         self._tracker = tracker
         self._stage = Stage(tracker.plan, title, replay=replay)
-        self._server = PageServer(self._stage, address)
+        self.server = PageServer(self._stage, address)
         self._model = echo_model(tracker.settings.echo)
         self._pulse = Pulse()
         self._pulsed_ns = 0
@@ -54,21 +54,21 @@ class LivePage:
     @property
     def url(self) -> str:
         """Address of the page."""
-        return self._server.url
+        return self.server.url
 
     @property
     def pages(self) -> int:
         """How many pages look."""
-        return self._server.pages
+        return self.server.pages
 
     def __enter__(self) -> Self:
         self._tracker.watch = self._watch
-        self._server.__enter__()
+        self.server.__enter__()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._tracker.watch = None
-        self._server.__exit__(kind, error, at)
+        self.server.__exit__(kind, error, at)
 
     def said(self) -> Iterator[bytes]:
         """Check-ins that pages made since, as the tracker takes them."""

@@ -43,7 +43,9 @@ class Session:
     """Speaks with one page until it goes away."""
 
     def __init__(self, socket: WebSocket, stage: Stage, guide: Guide, counts: PageCounts) -> None:
-        self.latency_s: deque[float] = deque(maxlen=512)  # from the bytes' coming to the word that they are drawn
+        self.latency_s: deque[float] = deque(
+            maxlen=512
+        )  # from the coming of an estimate's bytes to the word that it is drawn
         self._socket = socket
         self._stage = stage
         self._guide = guide
@@ -51,7 +53,9 @@ class Session:
         self._cursor = Cursor(stage.film) if stage.film is not None else None
         self._goal: Place | None = None
         self._news = asyncio.Event()
-        self._undrawn: dict[int, int] = {}  # serial number of a frame sent: birth of its scene
+        self._undrawn: dict[
+            int, int | None
+        ] = {}  # serial number of a frame sent: birth of the estimate that is new in it
         self._serial = 0
         self._last: Scene | None = None
         self._specks: Specks | None = None
@@ -95,7 +99,7 @@ class Session:
                 self._counts.unknown += 1
                 return
             case wire.Drawn(serial):
-                if (born_ns := self._undrawn.pop(serial, None)) is not None and self._cursor is None:
+                if (born_ns := self._undrawn.pop(serial, None)) is not None:
                     self.latency_s.append((time.monotonic_ns() - born_ns) * 1e-9)
             case CheckIn():
                 if not self._stage.check_in(request):
@@ -126,7 +130,7 @@ class Session:
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._stage.latest
             if scene is None or (scene is self._last and not self._asked and not runs):
                 continue
-            due_s = time.monotonic() + FRAME_S
+            due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
             try:
                 await self._socket.send_bytes(self._frame(scene))
             except (WebSocketDisconnect, RuntimeError):
@@ -136,7 +140,8 @@ class Session:
         """A frame with what this page has not seen; it is then counted as sent."""
         self._asked = False
         self._serial += 1
-        self._undrawn[self._serial] = scene.born_ns
+        news = self._cursor is None and (self._last is None or scene.told is not self._last.told)
+        self._undrawn[self._serial] = scene.born_ns if news else None
         begin = min(self._walked, scene.walked)
         new = scene.specks if scene.specks is not self._specks else None
         guidance = self._guide(scene.told, self._goal) if scene.told and self._goal else None

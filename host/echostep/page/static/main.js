@@ -22,7 +22,7 @@ const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('N
 const replay = new Replay((kind, fields) => link.say(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.say('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, last: null });  // what tests look at
+const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // what tests look at
 
 async function hello(said) {
   plan = said.plan;
