@@ -50,6 +50,10 @@ uint8_t spi_exchange(uint8_t out);
 void spi_release(void);
 bool pressure_ready(void); /* level of the SCP1000's DRDY */
 
+/* The self-test inputs, common to the three gyros. */
+enum excitation { EXCITE_NONE, EXCITE_ST1, EXCITE_ST2 };
+void gyro_excite(enum excitation excitation);
+
 /* USB CDC-ACM. */
 #define USB_ROOM 1023u /* bytes that can wait for the host */
 

@@ -35,10 +35,10 @@ static void finish(enum twi_state state, uint32_t now)
 	uint16_t bearing = (uint16_t)((uint16_t)(transfer.bytes[0] << 8) | transfer.bytes[1]);
 	reading = false;
 	if (state == TWI_DONE && bearing <= BEARING_MAX) {
-		status_ok(HEALTHY_COMPASS);
+		status_ok(DEVICE_COMPASS);
 		report(transfer.ticks, bearing);
 	} else {
-		status_failed(HEALTHY_COMPASS, &status.errors_compass);
+		status_failed(DEVICE_COMPASS, state == TWI_DONE ? FAULT_BAD_VALUE : state == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK);
 		report(now, INVALID);
 	}
 }

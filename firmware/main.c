@@ -7,10 +7,11 @@
 #include "link.h"
 #include "ranger.h"
 #include "scp1000.h"
+#include "selftest.h"
 #include "status.h"
 
 #define VERSION_MAJOR 1
-#define VERSION_MINOR 0
+#define VERSION_MINOR 1
 #define VERSION_PATCH 0
 
 #define NAP_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed no later than that */
@@ -92,6 +93,14 @@ static bool obey_identify(const struct link_command *command)
 	return true;
 }
 
+static bool obey_check_gyros(const struct link_command *command)
+{
+	if (command->length != MSG_CHECK_GYROS_SIZE)
+		return false;
+	selftest_begin();
+	return true;
+}
+
 static bool obey(const struct link_command *command)
 {
 	switch (command->id) {
@@ -101,6 +110,8 @@ static bool obey(const struct link_command *command)
 		return obey_clock_query(command, clock_now());
 	case MSG_CONFIGURE:
 		return obey_configure(command);
+	case MSG_CHECK_GYROS:
+		return obey_check_gyros(command);
 	default:
 		return false;
 	}
@@ -166,6 +177,8 @@ int main(void)
 {
 	board_start();
 	start_sensors();
+	if (!(board_reset_cause() & RESET_CAUSE_WATCHDOG)) /* that one comes in mid-walk */
+		selftest_begin();
 	for (;;) {
 		usb_run(); /* what came in */
 		greet_new_host();

@@ -98,6 +98,13 @@ uint8_t pack_status(uint8_t *out, const struct msg_status *m)
 	end = put16(end, m->errors_pressure);
 	end = put16(end, m->bus_recoveries);
 	end = put16(end, m->bad_frames);
+	end = put8(end, m->fault_ranger_left);
+	end = put8(end, m->fault_ranger_right);
+	end = put8(end, m->fault_compass);
+	end = put8(end, m->fault_thigh);
+	end = put8(end, m->fault_calf);
+	end = put8(end, m->fault_belt);
+	end = put8(end, m->fault_pressure);
 	end = put8(end, m->healthy);
 	end = put16(end, m->memory_used);
 	return (uint8_t)(end - out);
@@ -120,6 +127,18 @@ uint8_t pack_configuration(uint8_t *out, const struct msg_configuration *m)
 	end = put8(end, m->gyro_rate_hz);
 	end = put8(end, m->compass_rate_hz);
 	end = put8(end, m->pressure_mode);
+	return (uint8_t)(end - out);
+}
+
+uint8_t pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put8(end, m->gyro);
+	end = put16(end, (uint16_t)m->temperature);
+	end = put8(end, m->self_test);
+	end = put16(end, (uint16_t)m->response_st1);
+	end = put16(end, (uint16_t)m->response_st2);
 	return (uint8_t)(end - out);
 }
 

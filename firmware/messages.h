@@ -5,10 +5,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SCHEMA_HASH 0x28A8D697ul
-#define SCHEMA_SEED 0xFE3Fu
+#define SCHEMA_HASH 0x79028015ul
+#define SCHEMA_SEED 0xF917u
 #define IDENTITY_SEED 0xFFFFu
-#define MSG_MAX_SIZE 37u /* longest body */
+#define MSG_MAX_SIZE 44u /* longest body */
 
 enum {
 	MSG_IDENTITY = 0x01,
@@ -20,9 +20,11 @@ enum {
 	MSG_STATUS = 0x07,
 	MSG_CLOCK_REPLY = 0x08,
 	MSG_CONFIGURATION = 0x09,
+	MSG_GYRO_HEALTH = 0x0A,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
+	MSG_CHECK_GYROS = 0x84,
 };
 
 enum {
@@ -32,12 +34,14 @@ enum {
 	MSG_PRESSURE_SIZE = 10,
 	MSG_COMPASS_SIZE = 6,
 	MSG_SYNC_SIZE = 6,
-	MSG_STATUS_SIZE = 37,
+	MSG_STATUS_SIZE = 44,
 	MSG_CLOCK_REPLY_SIZE = 6,
 	MSG_CONFIGURATION_SIZE = 9,
+	MSG_GYRO_HEALTH_SIZE = 12,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
+	MSG_CHECK_GYROS_SIZE = 0,
 };
 
 enum {
@@ -58,6 +62,19 @@ enum {
 	OUTCOME_ECHO = 0,
 	OUTCOME_NO_ECHO = 1,
 	OUTCOME_BUS_ERROR = 2,
+};
+
+enum {
+	FAULT_NONE = 0,
+	FAULT_NO_ANSWER = 1,
+	FAULT_BUS_STUCK = 2,
+	FAULT_TOO_LATE = 3,
+	FAULT_WRONG_CHANNEL = 4,
+	FAULT_BAD_VALUE = 5,
+	FAULT_NEVER_STARTED = 6,
+	FAULT_EEPROM = 7,
+	FAULT_NEVER_READY = 8,
+	FAULT_ALWAYS_READY = 9,
 };
 
 enum {
@@ -89,6 +106,21 @@ enum {
 enum {
 	PRESSURE_MODE_HIGH_SPEED = 0,
 	PRESSURE_MODE_HIGH_RESOLUTION = 1,
+};
+
+enum {
+	GYRO_THIGH = 0,
+	GYRO_CALF = 1,
+	GYRO_BELT = 2,
+};
+
+enum {
+	SELF_TEST_NOT_RUN = 0,
+	SELF_TEST_RUNNING = 1,
+	SELF_TEST_PASSED = 2,
+	SELF_TEST_FAILED = 3,
+	SELF_TEST_MOVED = 4,
+	SELF_TEST_NO_ANSWER = 5,
 };
 
 /* Who is speaking. Sent when the port opens, when asked, and once a second. Layout and CRC seed of this message never change, so that any host can name any firmware's schema. */
@@ -160,6 +192,13 @@ struct msg_status {
 	uint16_t errors_pressure;
 	uint16_t bus_recoveries;
 	uint16_t bad_frames;
+	uint8_t fault_ranger_left;
+	uint8_t fault_ranger_right;
+	uint8_t fault_compass;
+	uint8_t fault_thigh;
+	uint8_t fault_calf;
+	uint8_t fault_belt;
+	uint8_t fault_pressure;
 	uint8_t healthy;
 	uint16_t memory_used; /* byte */
 };
@@ -183,6 +222,17 @@ struct msg_configuration {
 };
 uint8_t pack_configuration(uint8_t *out, const struct msg_configuration *m);
 
+/* Once a second for each gyro: its temperature and how its last self-test ended. While a test runs `gyros` holds no values. */
+struct msg_gyro_health {
+	uint32_t ticks; /* 0.5 us */
+	uint8_t gyro;
+	int16_t temperature; /* 0.1453 degC, -32768: invalid */
+	uint8_t self_test;
+	int16_t response_st1; /* 0.2439 deg/s, -32768: invalid */
+	int16_t response_st2; /* 0.2439 deg/s, -32768: invalid */
+};
+uint8_t pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m);
+
 /* Ask for identity and configuration. Like identity, it always carries the fixed seed. */
 /* identify has no fields. */
 
@@ -201,5 +251,8 @@ struct msg_configure {
 	uint8_t pressure_mode;
 };
 bool unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length);
+
+/* Run the self-test of the gyros: half a second without rates, then its outcome in gyro_health. Stand still meanwhile. */
+/* check_gyros has no fields. */
 
 #endif

@@ -37,11 +37,11 @@ static struct ranger {
 } rangers[2];
 
 static const struct {
-	uint8_t address, sensor, healthy;
-	uint16_t *errors;
+	uint8_t address, sensor;
+	enum device device;
 } devices[2] = {
-	[RANGER_LEFT] = { 0x70, SENSORS_RANGER_LEFT, HEALTHY_RANGER_LEFT, &status.errors_ranger_left },
-	[RANGER_RIGHT] = { 0x71, SENSORS_RANGER_RIGHT, HEALTHY_RANGER_RIGHT, &status.errors_ranger_right },
+	[RANGER_LEFT] = { 0x70, SENSORS_RANGER_LEFT, DEVICE_RANGER_LEFT },
+	[RANGER_RIGHT] = { 0x71, SENSORS_RANGER_RIGHT, DEVICE_RANGER_RIGHT },
 };
 
 static uint16_t lfsr;
@@ -89,9 +89,9 @@ static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_fli
 	link_send(MSG_PING, pack_ping(link_body(), &ping));
 }
 
-static void fail(struct ranger *r, uint32_t now)
+static void fail(struct ranger *r, uint32_t now, uint8_t fault)
 {
-	status_failed(devices[r->index].healthy, devices[r->index].errors);
+	status_failed(devices[r->index].device, fault);
 	report(r, OUTCOME_BUS_ERROR, 0);
 	schedule_next(r, now);
 }
@@ -99,7 +99,7 @@ static void fail(struct ranger *r, uint32_t now)
 static void succeed(struct ranger *r, uint32_t now)
 {
 	uint16_t time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
-	status_ok(devices[r->index].healthy);
+	status_ok(devices[r->index].device);
 	report(r, time_of_flight_us ? OUTCOME_ECHO : OUTCOME_NO_ECHO, time_of_flight_us);
 	schedule_next(r, now);
 }
@@ -131,7 +131,7 @@ static void check_trigger(struct ranger *r, uint32_t now)
 		r->due = now + RETRY_TICKS;
 		r->stage = WAITING;
 	} else if (state != TWI_BUSY) {
-		fail(r, now);
+		fail(r, now, state == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK);
 	}
 }
 
@@ -152,7 +152,7 @@ static void check_answer(struct ranger *r, uint32_t now)
 	if (state == TWI_DONE && r->transfer.bytes[0] != REVISION_BUSY) {
 		succeed(r, now);
 	} else if (ticks_reached(now, r->trigger + RANGING_MAX_TICKS)) {
-		fail(r, now);
+		fail(r, now, state == TWI_FAILED ? FAULT_BUS_STUCK : FAULT_TOO_LATE);
 	} else {
 		r->due = now + POLL_TICKS;
 		r->stage = RANGING;

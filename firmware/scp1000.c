@@ -5,6 +5,7 @@
 #include "status.h"
 
 /* Registers and the start-up sequence [SCP1000-D01 datasheet]. */
+#define REGISTER_REVISION 0x00u /* never all zeros or ones */
 #define REGISTER_OPERATION 0x03u
 #define REGISTER_RESET 0x06u
 #define REGISTER_STATUS 0x07u
@@ -19,6 +20,7 @@
 #define OPERATION_HIGH_RESOLUTION 0x0Au
 #define PRESSURE_HIGH_MASK 0x07u
 #define NOBODY 0xFFu /* what an empty bus reads */
+#define HELD_LOW 0x00u
 #define TEMPERATURE_MASK 0x3FFFu
 #define TEMPERATURE_SIGN 0x2000
 
@@ -69,9 +71,9 @@ static void wait(enum stage next, uint32_t until)
 	due = until;
 }
 
-static void fail(uint32_t now)
+static void fail(uint32_t now, uint8_t fault)
 {
-	status_failed(HEALTHY_PRESSURE, &status.errors_pressure);
+	status_failed(DEVICE_PRESSURE, fault);
 	wait(FAILED, now + RETRY_TICKS);
 }
 
@@ -99,13 +101,16 @@ static void measure(uint32_t now)
 
 static void check_start(uint32_t now)
 {
-	if (!(read8(REGISTER_STATUS) & STATUS_STARTING)) {
+	uint8_t revision = read8(REGISTER_REVISION);
+	if (revision == NOBODY || revision == HELD_LOW) {
+		fail(now, FAULT_NO_ANSWER);
+	} else if (!(read8(REGISTER_STATUS) & STATUS_STARTING)) {
 		if (read8(REGISTER_DATARD8) & EEPROM_OK)
 			measure(now);
 		else
-			fail(now);
+			fail(now, FAULT_EEPROM);
 	} else if (ticks_reached(now, deadline)) {
-		fail(now);
+		fail(now, FAULT_NEVER_STARTED);
 	} else {
 		due = now + STARTING_POLL_TICKS;
 	}
@@ -119,10 +124,14 @@ static void sample(uint32_t now)
 	m.pressure = (uint32_t)(high & PRESSURE_HIGH_MASK) << 16 | read16(REGISTER_DATARD16);
 	m.temperature = (int16_t)((int16_t)(temperature ^ TEMPERATURE_SIGN) - TEMPERATURE_SIGN);
 	if (high == NOBODY) {
-		fail(now);
+		fail(now, FAULT_NO_ANSWER);
 		return;
 	}
-	status_ok(HEALTHY_PRESSURE);
+	if (m.pressure == 0) {
+		fail(now, FAULT_BAD_VALUE);
+		return;
+	}
+	status_ok(DEVICE_PRESSURE);
 	link_send(MSG_PRESSURE, pack_pressure(link_body(), &m));
 	await_sample(now);
 }
@@ -133,7 +142,7 @@ static void check_sample(uint32_t now)
 	if (ready && ticks_reached(now, earliest))
 		sample(now);
 	else if (ready || ticks_reached(now, deadline))
-		fail(now);
+		fail(now, ready ? FAULT_ALWAYS_READY : FAULT_NEVER_READY);
 	else
 		due = now + READY_POLL_TICKS;
 }

@@ -4,13 +4,16 @@
 
 #include "messages.h"
 
-/* Each counter is written by one module: dropped_* by link, errors_* and healthy through the two functions below. */
+/* Each counter is written by one module: dropped_* by link, errors_*, fault_* and healthy through the two functions below. */
 extern struct msg_status status;
 
-/* A device answered properly; `healthy_flag` is its HEALTHY_*. */
-void status_ok(uint8_t healthy_flag);
+/* In the order of the bits of `healthy`. */
+enum device { DEVICE_RANGER_LEFT, DEVICE_RANGER_RIGHT, DEVICE_COMPASS, DEVICE_THIGH, DEVICE_CALF, DEVICE_BELT, DEVICE_PRESSURE };
 
-/* A device failed; `errors` is its counter in `status`. */
-void status_failed(uint8_t healthy_flag, uint16_t *errors);
+/* A device answered properly. */
+void status_ok(enum device device);
+
+/* A device failed, and how: FAULT_*. */
+void status_failed(enum device device, uint8_t fault);
 
 #endif

@@ -42,6 +42,7 @@ class Field:
     invalid: int | None = None
     enum: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
+    enum_name: str = ""  # of the enumeration in code: its own name in [enums], or the field's
 
     @property
     def size(self) -> int:
@@ -76,16 +77,23 @@ def camel(name: str) -> str:
     return "".join(part.capitalize() for part in name.split("_"))
 
 
-def read_field(row: dict[str, Any]) -> Field:
+def read_field(row: dict[str, Any], shared: dict[str, list[str]]) -> Field:
+    """One field; `enum` is a list of names, or the name of a list in [enums]."""
     values: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
+    values["enum_name"] = values["name"]
+    if isinstance(name := values.get("enum"), str):
+        if name not in shared:
+            raise ValueError(f"messages.toml: {values['name']}: [enums] has no {name}")
+        values |= {"enum": tuple(shared[name]), "enum_name": name}
     return Field(**values)
 
 
 def read_schema(path: Path) -> list[Message]:
     """Messages of the schema file; raises ValueError naming the message when one is malformed."""
     messages = []
-    for table in tomllib.loads(path.read_text())["message"]:
-        fields = tuple(read_field(row) for row in table.pop("fields"))
+    tree = tomllib.loads(path.read_text())
+    for table in tree["message"]:
+        fields = tuple(read_field(row, tree.get("enums", {})) for row in table.pop("fields"))
         message = Message(fields=fields, **table)
         if unknown := {f.type for f in fields} - set(CODES):
             raise ValueError(f"{path.name}: message {message.name}: unknown type {unknown}")
@@ -112,12 +120,12 @@ def seed_of(value: int) -> int:
 
 
 def enums_of(messages: list[Message]) -> dict[str, tuple[tuple[str, ...], bool]]:
-    """Enumeration name -> (members, whether they are bit flags); one definition per field name."""
+    """Enumeration name -> (members, whether they are bit flags); one definition per name."""
     found: dict[str, tuple[tuple[str, ...], bool]] = {}
     for field in (f for m in messages for f in m.fields if f.enum or f.flags):
         entry = (field.enum or field.flags, bool(field.flags))
-        if found.setdefault(field.name, entry) != entry:
-            raise ValueError(f"messages.toml: {field.name} is defined twice, differently")
+        if found.setdefault(field.enum_name, entry) != entry:
+            raise ValueError(f"messages.toml: {field.enum_name} is defined twice, differently")
     return found
 
 

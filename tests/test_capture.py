@@ -39,7 +39,9 @@ def test_the_missing_bytes_are_counted() -> None:
     counts = decoder.board.counts
     assert 1 <= counts.rejected <= 2
     assert 1 <= counts.lost <= 5
-    assert {"Identity", "Configuration", "Ping", "Gyros", "Pressure", "Compass", "Sync", "Status"} == set(kinds)
+    assert {"Identity", "Configuration", "Ping", "Gyros", "Pressure", "Compass", "Sync", "Status", "GyroHealth"} == set(
+        kinds
+    )
 
 
 def test_the_example_of_the_readme() -> None:

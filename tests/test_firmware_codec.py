@@ -21,7 +21,7 @@ FIRMWARE = ROOT / "firmware"
 CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
 FUZZ = [ROOT / "tests" / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
 FLAGS = ["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE}", "-fno-sanitize-recover=all"]
-HOST_MESSAGES = ("identify", "clock_query", "configure")
+HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros")
 TIMEOUT_S = 60
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

@@ -601,7 +601,12 @@ def test_the_python_board_sends_every_stream_at_its_rate() -> None:
     assert abs(count["Compass"] - 100) <= 2
     assert abs(count["Pressure"] - 90) <= 2
     assert 9 <= count["Status"] <= 10
-    assert {x[1:] for x in found if isinstance(x, m.Gyros)} == {(41, -82, 5)}
+    rates = [x[1:] for x in found if isinstance(x, m.Gyros)]
+    assert set(rates[:112]) == {(-32768, -32768, -32768)}  # the self-test
+    assert set(rates[112:]) == {(41, -82, 5)}
+    assert {x[1:] for x in found if isinstance(x, m.GyroHealth)} == {
+        (gyro, -34, m.SelfTest.PASSED, -221, 221) for gyro in m.Gyro
+    }
     assert {x.time_of_flight_us for x in found if isinstance(x, m.Ping) and x.ranger == m.Ranger.LEFT} == {5_831}
     assert [x.edge for x in found if isinstance(x, m.Sync)][:3] == [0, 1, 2]
     assert {x.ticks % 20_000 for x in found if isinstance(x, m.Sync)} == {666}

@@ -1,5 +1,5 @@
 /* SPI master: polled bytes to one of four chips, each with its own mode and rate. SCK PB1, MOSI PB2, MISO PB3; chip selects
- * PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6. */
+ * PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7, ST2 on PF6. */
 #include <avr/io.h>
 #include "shared.h"
 
@@ -10,6 +10,8 @@
 #define GYRO_SELECTS (BIT(PB4) | BIT(PB5) | BIT(PB6))
 #define PRESSURE_SELECT BIT(PD7)
 #define DRDY BIT(PE6)
+#define ST1 BIT(PF7)
+#define ST2 BIT(PF6)
 
 #define MASTER (BIT(SPE) | BIT(MSTR))
 #define GYRO_MODE (MASTER | BIT(CPOL) | BIT(SPR0)) /* mode 2; with SPI2X 16 MHz / 8 = 2 MHz */
@@ -22,6 +24,7 @@ void spi_start(void)
 	DDRB |= SS | SCK | MOSI | GYRO_SELECTS;
 	PORTD |= PRESSURE_SELECT;
 	DDRD |= PRESSURE_SELECT;
+	DDRF |= ST1 | ST2; /* low */
 }
 
 void spi_select(enum chip chip)
@@ -54,4 +57,9 @@ void spi_release(void)
 bool pressure_ready(void)
 {
 	return PINE & DRDY;
+}
+
+void gyro_excite(enum excitation excitation)
+{
+	PORTF = excitation == EXCITE_ST1 ? ST1 : excitation == EXCITE_ST2 ? ST2 : 0;
 }

@@ -19,7 +19,8 @@ from echostep.calibration import RangerSettings, heights, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, TrunkPath
-from echostep.messages import BY_ID, ROWS, Identity, Outcome, Ping, Pressure, Status, Sync
+from echostep.health import BoardWords
+from echostep.messages import BY_ID, ROWS, Configuration, GyroHealth, Identity, Outcome, Ping, Pressure, Status, Sync
 from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.waiting import HEIGHT, Passage, Silence, Waiting
@@ -30,6 +31,7 @@ Ints = NDArray[np.int64]
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
+_WORDS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth)]
 _TIMED = np.array(
     [i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)]
 )  # the body begins with them
@@ -58,6 +60,7 @@ class Intake:
         self.status: Status | None = None
         self.identity: Identity | None = None
         self.pings = 0
+        self.words = BoardWords()
         self._ranger = ranger
         self._waiting = Waiting()
         self._unknown_ports = 0
@@ -98,6 +101,9 @@ class Intake:
 
     def _note(self, frames: Frames, times: Times) -> None:
         """Keep the board's last words about itself."""
+        for identifier in _WORDS:
+            for row in frames.rows(identifier)[1]:
+                self.words.take(BY_ID[identifier].unpack(row.tobytes()))
         if (status := _last(frames, times, STATUS)) is not None:
             self.status = Status.unpack(status)
         if (identity := _last(frames, times, IDENTITY)) is not None:

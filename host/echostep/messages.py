@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-SCHEMA_HASH = 0x28A8D697
-SCHEMA_SEED = 0xFE3F
+SCHEMA_HASH = 0x79028015
+SCHEMA_SEED = 0xF917
 FIXED_SEED = 0xFFFF
 
 
@@ -35,6 +35,19 @@ class Outcome(IntEnum):
     ECHO = 0
     NO_ECHO = 1
     BUS_ERROR = 2
+
+
+class Fault(IntEnum):
+    NONE = 0
+    NO_ANSWER = 1
+    BUS_STUCK = 2
+    TOO_LATE = 3
+    WRONG_CHANNEL = 4
+    BAD_VALUE = 5
+    NEVER_STARTED = 6
+    EEPROM = 7
+    NEVER_READY = 8
+    ALWAYS_READY = 9
 
 
 class Healthy(IntFlag):
@@ -66,6 +79,21 @@ class Schedule(IntEnum):
 class PressureMode(IntEnum):
     HIGH_SPEED = 0
     HIGH_RESOLUTION = 1
+
+
+class Gyro(IntEnum):
+    THIGH = 0
+    CALF = 1
+    BELT = 2
+
+
+class SelfTest(IntEnum):
+    NOT_RUN = 0
+    RUNNING = 1
+    PASSED = 2
+    FAILED = 3
+    MOVED = 4
+    NO_ANSWER = 5
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -232,7 +260,7 @@ class Sync(NamedTuple):
         return cls._make(_SYNC.unpack(body))
 
 
-_STATUS = struct.Struct("<IHHHHHHHHHHHHHHHBH")
+_STATUS = struct.Struct("<IHHHHHHHHHHHHHHHBBBBBBBBH")
 
 
 class Status(NamedTuple):
@@ -254,6 +282,13 @@ class Status(NamedTuple):
     errors_pressure: int
     bus_recoveries: int
     bad_frames: int
+    fault_ranger_left: int
+    fault_ranger_right: int
+    fault_compass: int
+    fault_thigh: int
+    fault_calf: int
+    fault_belt: int
+    fault_pressure: int
     healthy: int
     memory_used: int  # byte
 
@@ -268,9 +303,24 @@ class Status(NamedTuple):
     @classmethod
     def unpack(cls, body: bytes) -> Status:
         """Values of a body; raises ValueError when length or an enumeration is wrong."""
-        if len(body) != 37:
-            raise ValueError(f"status: {len(body)} bytes, expected 37")
-        return cls._make(_STATUS.unpack(body))
+        if len(body) != 44:
+            raise ValueError(f"status: {len(body)} bytes, expected 44")
+        message = cls._make(_STATUS.unpack(body))
+        if message.fault_ranger_left >= 10:
+            raise ValueError(f"status: fault_ranger_left {message.fault_ranger_left} is unknown")
+        if message.fault_ranger_right >= 10:
+            raise ValueError(f"status: fault_ranger_right {message.fault_ranger_right} is unknown")
+        if message.fault_compass >= 10:
+            raise ValueError(f"status: fault_compass {message.fault_compass} is unknown")
+        if message.fault_thigh >= 10:
+            raise ValueError(f"status: fault_thigh {message.fault_thigh} is unknown")
+        if message.fault_calf >= 10:
+            raise ValueError(f"status: fault_calf {message.fault_calf} is unknown")
+        if message.fault_belt >= 10:
+            raise ValueError(f"status: fault_belt {message.fault_belt} is unknown")
+        if message.fault_pressure >= 10:
+            raise ValueError(f"status: fault_pressure {message.fault_pressure} is unknown")
+        return message
 
 
 _CLOCK_REPLY = struct.Struct("<IH")
@@ -329,6 +379,40 @@ class Configuration(NamedTuple):
             raise ValueError(f"configuration: schedule {message.schedule} is unknown")
         if message.pressure_mode >= 2:
             raise ValueError(f"configuration: pressure_mode {message.pressure_mode} is unknown")
+        return message
+
+
+_GYRO_HEALTH = struct.Struct("<IBhBhh")
+
+
+class GyroHealth(NamedTuple):
+    """Once a second for each gyro: its temperature and how its last self-test ended."""
+
+    ticks: int  # 0.5 us
+    gyro: int
+    temperature: int  # 0.1453 degC, -32768 = invalid
+    self_test: int
+    response_st1: int  # 0.2439 deg/s, -32768 = invalid
+    response_st2: int  # 0.2439 deg/s, -32768 = invalid
+
+    @property
+    def id(self) -> int:
+        return 0x0A
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _GYRO_HEALTH.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> GyroHealth:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 12:
+            raise ValueError(f"gyro_health: {len(body)} bytes, expected 12")
+        message = cls._make(_GYRO_HEALTH.unpack(body))
+        if message.gyro >= 3:
+            raise ValueError(f"gyro_health: gyro {message.gyro} is unknown")
+        if message.self_test >= 6:
+            raise ValueError(f"gyro_health: self_test {message.self_test} is unknown")
         return message
 
 
@@ -411,6 +495,28 @@ class Configure(NamedTuple):
         return message
 
 
+_CHECK_GYROS = struct.Struct("<")
+
+
+class CheckGyros(NamedTuple):
+    """Run the self-test of the gyros: half a second without rates, then its outcome in gyro_health."""
+
+    @property
+    def id(self) -> int:
+        return 0x84
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _CHECK_GYROS.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> CheckGyros:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 0:
+            raise ValueError(f"check_gyros: {len(body)} bytes, expected 0")
+        return cls._make(_CHECK_GYROS.unpack(body))
+
+
 Message = (
     Identity
     | Ping
@@ -421,9 +527,11 @@ Message = (
     | Status
     | ClockReply
     | Configuration
+    | GyroHealth
     | Identify
     | ClockQuery
     | Configure
+    | CheckGyros
 )
 
 BY_ID: dict[int, type[Message]] = {
@@ -436,9 +544,11 @@ BY_ID: dict[int, type[Message]] = {
     0x07: Status,
     0x08: ClockReply,
     0x09: Configuration,
+    0x0A: GyroHealth,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
+    0x84: CheckGyros,
 }
 
 ROWS: dict[int, np.dtype[np.void]] = {
@@ -505,6 +615,13 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("errors_pressure", "<u2"),
             ("bus_recoveries", "<u2"),
             ("bad_frames", "<u2"),
+            ("fault_ranger_left", "u1"),
+            ("fault_ranger_right", "u1"),
+            ("fault_compass", "u1"),
+            ("fault_thigh", "u1"),
+            ("fault_calf", "u1"),
+            ("fault_belt", "u1"),
+            ("fault_pressure", "u1"),
             ("healthy", "u1"),
             ("memory_used", "<u2"),
         ]
@@ -525,6 +642,16 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("pressure_mode", "u1"),
         ]
     ),
+    0x0A: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("gyro", "u1"),
+            ("temperature", "<i2"),
+            ("self_test", "u1"),
+            ("response_st1", "<i2"),
+            ("response_st2", "<i2"),
+        ]
+    ),
     0x81: np.dtype([]),
     0x82: np.dtype([("token", "<u2")]),
     0x83: np.dtype(
@@ -536,12 +663,22 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("pressure_mode", "u1"),
         ]
     ),
+    0x84: np.dtype([]),
 }
 GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x02, 4, 1),  # ping.ranger
     (0x02, 5, 2),  # ping.outcome
+    (0x07, 34, 9),  # status.fault_ranger_left
+    (0x07, 35, 9),  # status.fault_ranger_right
+    (0x07, 36, 9),  # status.fault_compass
+    (0x07, 37, 9),  # status.fault_thigh
+    (0x07, 38, 9),  # status.fault_calf
+    (0x07, 39, 9),  # status.fault_belt
+    (0x07, 40, 9),  # status.fault_pressure
     (0x09, 5, 1),  # configuration.schedule
     (0x09, 8, 1),  # configuration.pressure_mode
+    (0x0A, 4, 2),  # gyro_health.gyro
+    (0x0A, 7, 5),  # gyro_health.self_test
     (0x83, 1, 1),  # configure.schedule
     (0x83, 4, 1),  # configure.pressure_mode
 )

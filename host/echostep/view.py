@@ -20,10 +20,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.estimate import Estimate
+from echostep.health import Finding, Severity, board_findings
 from echostep.plan import Level
 from echostep.tracker import Tracker
 
 REFRESH_S = 0.1
+MOST_FINDINGS = 3
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille dots by row and column
 
 
@@ -131,6 +133,7 @@ class TerminalView:
             self._canvas.render(self._last),
             Text(describe(self._last) + self._storey()),
             Text(health(self._tracker), style="grey62"),
+            *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
         ]
         if notice:
             parts.append(Text(notice, style="bold"))
@@ -153,3 +156,9 @@ def health(tracker: Tracker) -> str:
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
     return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}"
+
+
+def findings(tracker: Tracker) -> list[Finding]:
+    """The worst that the board says is wrong, in words."""
+    found = board_findings(tracker.intake.words)
+    return [finding for finding in found if finding.severity > Severity.NOTE][:MOST_FINDINGS]

@@ -2,37 +2,93 @@
  * Three ADIS16100 rate gyros [data sheet, and public drivers where it is silent].
  *
  * 16-bit frames; the answer to a frame comes with the next one: channel in bits 13:12, value in 11:0. Bit 15 writes the control register:
- * channel 11:10 (rate, temperature, AIN1, AIN2), power 9:8 (11 = on), coding bit 4 (1 = offset binary). */
+ * channel 11:10 (rate, temperature, AIN1, AIN2), power 9:8 (11 = on), coding bit 4 (1 = offset binary).
+ *
+ * ST1 (PF7) and ST2 (PF6), wired to all three, push the rate down or up by 221 counts, with a tenth of spread from part to part, through the
+ * 40 Hz filter. The temperature is the board's [row], 6.88 counts a degree from 25 degC. */
+#include <math.h>
 #include <string.h>
+
+#include <simavr/avr_ioport.h>
 
 #include "twin.h"
 
 #define WRITE 0x8000u
 #define OFFSET_BINARY 0x0010u
 #define MAX_HERTZ 2500000u
-#define TEMPERATURE_25C 0
 #define FALLING_EDGE(mode) ((mode) == 1 || (mode) == 2)
 #define MID_SCALE 2048
+#define FULL_SCALE 2047
+#define FILTER_S 0.004 /* 40 Hz */
+enum { ST2 = 6, ST1 = 7 };
+
+enum fault { GOOD, ABSENT, WRONG_CHANNEL, STUCK, WEAK, ZEROS, FAULTS };
+static const char *const fault_names[FAULTS] = { "ok", "absent", "wrong_channel", "stuck", "no_self_test", "zeros" };
 
 static struct gyro {
 	struct spi_device spi;
 	const char *name;
 	int channel_of_row;
-	bool absent, wrong_channel;
+	enum fault fault;
+	int stuck_at;
+	double excited; /* counts by ST1 and ST2, at `excited_at` */
+	int response;   /* of this part */
 	uint16_t control, answer, incoming, count;
 	bool garbled; /* the processor's edges are not the chip's */
 } gyros[3] = { { .name = "thigh", .channel_of_row = 0 }, { .name = "calf", .channel_of_row = 1 }, { .name = "belt", .channel_of_row = 2 } };
 
+static bool inputs[2]; /* ST1, ST2 */
+static avr_cycle_count_t excited_at;
+
+static double target(const struct gyro *g)
+{
+	double response = g->fault == WEAK ? g->response * 0.1 : g->response;
+
+	return (inputs[1] ? response : 0.0) - (inputs[0] ? response : 0.0);
+}
+
+/* Counts that the self-test inputs add now. */
+static double excitation(const struct gyro *g)
+{
+	double passed_s = (double)(avr->cycle - excited_at) / 16e6;
+
+	return target(g) + (g->excited - target(g)) * exp(-passed_s / FILTER_S);
+}
+
+static void input_changed(struct avr_irq_t *irq, uint32_t level, void *param)
+{
+	(void)irq;
+	for (int k = 0; k < 3; k++)
+		gyros[k].excited = excitation(&gyros[k]);
+	excited_at = avr->cycle;
+	*(bool *)param = level;
+}
+
+static int rate_of(const struct gyro *g)
+{
+	int rate = row.rate[g->channel_of_row] + (int)lround(excitation(g));
+
+	return rate > FULL_SCALE ? FULL_SCALE : rate < -MID_SCALE ? -MID_SCALE : rate;
+}
+
+static int temperature(void)
+{
+	return (int)lround((row.temperature / 20.0 - 25.0) * 6.88);
+}
+
 static uint16_t convert(const struct gyro *g)
 {
 	unsigned channel = (g->control >> 10) & 3;
-	int value = channel == 0 ? row.rate[g->channel_of_row] : channel == 1 ? TEMPERATURE_25C : 0;
+	int value = channel == 0 ? rate_of(g) : channel == 1 ? temperature() : 0;
+
+	if (g->fault == STUCK && channel == 0)
+		value = g->stuck_at;
 
 	if ((g->control & 0x0300u) != 0x0300u)
 		return 0; /* powered down */
 	if (g->control & OFFSET_BINARY)
 		value += MID_SCALE;
-	if (g->wrong_channel)
+	if (g->fault == WRONG_CHANNEL)
 		channel ^= 1u;
 	return (uint16_t)((channel << 12) | ((unsigned)value & 0xFFFu));
 }
@@ -67,30 +123,49 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 	}
 	g->incoming = (uint16_t)(g->incoming << 8 | out);
 	g->count++;
-	return g->absent ? 0xFF : in;
+	return g->fault == ABSENT ? 0xFF : g->fault == ZEROS ? 0 : in;
 }
 
 void adis16100_power(void)
 {
+	static bool wired;
+
 	for (int k = 0; k < 3; k++) {
 		struct gyro *g = &gyros[k];
 
 		if (!g->spi.select) {
 			g->spi = (struct spi_device){ 'B', (uint8_t)(4 + k), on_select, on_exchange, false, NULL };
 			spi_add(&g->spi);
+			g->response = 199 + (int)random_below(45);
 		}
+		if (k == 0 && !wired) {
+			wired = true;
+			avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST1), input_changed, &inputs[0]);
+			avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), ST2), input_changed, &inputs[1]);
+		}
+		g->excited = 0.0;
 		g->control = g->answer = g->count = 0;
 		g->spi.selected = false;
 	}
+}
+
+/* The processor was reset: its pins are inputs, and the chips pull ST1 and ST2 low. */
+void adis16100_resume(void)
+{
+	memset(inputs, 0, sizeof inputs);
+	excited_at = avr->cycle;
 }
 
 bool adis16100_fault(const char *name, const char *value)
 {
 	for (int k = 0; k < 3; k++)
 		if (!strcmp(name, gyros[k].name)) {
-			gyros[k].absent = !strcmp(value, "absent");
-			gyros[k].wrong_channel = !strcmp(value, "wrong_channel");
-			return gyros[k].absent || gyros[k].wrong_channel || !strcmp(value, "ok");
+			for (int f = 0; f < FAULTS; f++)
+				if (!strcmp(value, fault_names[f])) {
+					gyros[k].stuck_at = row.rate[gyros[k].channel_of_row];
+					gyros[k].fault = (enum fault)f;
+					return true;
+				}
 		}
 	return false;
 }

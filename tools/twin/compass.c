@@ -5,16 +5,19 @@
 #include "twin.h"
 
 #define VERSION 13
+#define STRETCHED US(500)
 
 static struct twi_device twi;
-static bool absent, fresh;
+static enum fault { GOOD, ABSENT, NACK, STRETCH, BAD_VALUE, FAULTS } fault;
+static const char *const fault_names[FAULTS] = { "ok", "absent", "nack", "stretch", "bad_value" };
+static bool fresh;
 static uint8_t pointer;
 
 static bool on_start(struct twi_device *self, bool read)
 {
-	(void)self;
 	fresh = !read;
-	return !absent;
+	self->stretch = fault == STRETCH ? STRETCHED : 0;
+	return fault != ABSENT;
 }
 
 static bool on_write(struct twi_device *self, uint8_t byte)
@@ -23,12 +26,16 @@ static bool on_write(struct twi_device *self, uint8_t byte)
 	if (fresh)
 		pointer = byte;
 	fresh = false;
-	return true;
+	return fault != NACK;
 }
 
 static uint8_t on_read(struct twi_device *self)
 {
 	(void)self;
+	if (fault == BAD_VALUE) {
+		pointer++;
+		return 0xFF;
+	}
 	switch (pointer++) {
 	case 0: return VERSION;
 	case 1: return (uint8_t)(row.bearing * 256u / 3600u);
@@ -50,6 +57,10 @@ bool compass_fault(const char *name, const char *value)
 {
 	if (strcmp(name, "compass"))
 		return false;
-	absent = !strcmp(value, "absent");
-	return absent || !strcmp(value, "ok");
+	for (int f = 0; f < FAULTS; f++)
+		if (!strcmp(value, fault_names[f])) {
+			fault = (enum fault)f;
+			return true;
+		}
+	return false;
 }

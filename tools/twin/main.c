@@ -115,6 +115,7 @@ static void after_reset(avr_t *a)
 		power_devices();
 	else
 		scp1000_resume();
+	adis16100_resume();
 	next_cause = WATCHDOG; /* the only one that nobody announces */
 	usb_host_start();
 }

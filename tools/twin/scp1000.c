@@ -9,14 +9,17 @@
 
 #include "twin.h"
 
-enum { OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 0x20, TEMPOUT = 0x21 };
+enum { REVISION = 0x00, OPERATION = 0x03, RSTR = 0x06, STATUS = 0x07, DATARD8 = 0x1F, DATARD16 = 0x20, TEMPOUT = 0x21 };
 #define MAX_HERTZ 500000u
 #define START_UP US(60000)
+#define REVISION_D01 0x03
 #define FAST US(111000)
 #define SLOW US(556000)
 
 static struct spi_device spi;
-static bool absent, no_eeprom, drdy_stuck, ready, garbled;
+static enum fault { GOOD, ABSENT, NO_EEPROM, NO_START, DRDY_STUCK, DRDY_LOW, ZEROS, FAULTS } fault;
+static const char *const fault_names[FAULTS] = { "ok", "absent", "no_eeprom", "no_start", "drdy_stuck", "drdy_low", "zeros" };
+static bool ready, garbled;
 static uint8_t command, count, answer[2], mode;
 static avr_cycle_count_t up_at, sample_at;
 static uint32_t pressure;
@@ -25,7 +28,7 @@ static int16_t temperature;
 static void set_ready(bool on)
 {
 	ready = on;
-	drive_pin('E', 6, (on || drdy_stuck) && !absent);
+	drive_pin('E', 6, fault == DRDY_STUCK || (on && fault != DRDY_LOW && fault != ABSENT && fault != ZEROS));
 }
 
 static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
@@ -47,8 +50,9 @@ static void load(uint8_t address)
 	uint16_t word = 0;
 
 	switch (address) {
-	case STATUS: word = avr->cycle < up_at ? 0x0100 : ready ? 0x2000 : 0; break;
-	case DATARD8: word = (uint16_t)(mode ? (pressure >> 16) << 8 : no_eeprom ? 0 : 0x0100); break;
+	case REVISION: word = REVISION_D01 << 8; break;
+	case STATUS: word = avr->cycle < up_at || fault == NO_START ? 0x0100 : ready ? 0x2000 : 0; break;
+	case DATARD8: word = (uint16_t)(mode ? (pressure >> 16) << 8 : fault == NO_EEPROM ? 0 : 0x0100); break;
 	case DATARD16:
 		word = (uint16_t)pressure;
 		set_ready(false);
@@ -90,8 +94,8 @@ static void restart(void)
 
 static uint8_t exchange(uint8_t out)
 {
-	if (absent)
-		return 0xFF;
+	if (fault == ABSENT || fault == ZEROS)
+		return fault == ABSENT ? 0xFF : 0;
 	if (count++ == 0) {
 		command = out;
 		if (!(command & 2))
@@ -142,9 +146,11 @@ bool scp1000_fault(const char *name, const char *value)
 {
 	if (strcmp(name, "scp1000"))
 		return false;
-	absent = !strcmp(value, "absent");
-	no_eeprom = !strcmp(value, "no_eeprom");
-	drdy_stuck = !strcmp(value, "drdy_stuck");
-	set_ready(ready);
-	return absent || no_eeprom || drdy_stuck || !strcmp(value, "ok");
+	for (int f = 0; f < FAULTS; f++)
+		if (!strcmp(value, fault_names[f])) {
+			fault = (enum fault)f;
+			set_ready(ready);
+			return true;
+		}
+	return false;
 }

@@ -26,7 +26,7 @@ static struct ranger {
 	struct twi_device twi;
 	const char *name;
 	int side;
-	bool absent, refuses, stretches;
+	bool absent, refuses, stretches, mute, deaf;
 	uint8_t pointer, written[2], count, sequence; /* of an address change */
 	avr_cycle_count_t busy_until, began;
 	bool emitted, listening;
@@ -57,6 +57,8 @@ static void finish(struct ranger *r)
 	uint16_t us = earliest(r);
 
 	r->listening = false;
+	if (r->deaf)
+		us = 0;
 	r->result = r->unit == 2 ? us : (uint16_t)(us / (r->unit == 1 ? 58u : 148u));
 }
 
@@ -85,7 +87,7 @@ static bool on_start(struct twi_device *self, bool read)
 {
 	struct ranger *r = (struct ranger *)self;
 
-	if (r->absent || r->refuses || avr->cycle < r->busy_until)
+	if (r->absent || r->refuses || (r->mute && r->listening) || avr->cycle < r->busy_until)
 		return false;
 	if (r->listening)
 		finish(r);
@@ -165,7 +167,11 @@ bool srf02_fault(const char *name, const char *value)
 			r->absent = !strcmp(value, "absent");
 			r->refuses = !strcmp(value, "nack");
 			r->stretches = !strcmp(value, "stretch");
-			return r->absent || r->refuses || r->stretches || !strcmp(value, "ok");
+			r->mute = !strcmp(value, "mute");
+			r->deaf = !strcmp(value, "deaf");
+			if (!r->mute)
+				r->listening = r->listening && avr->cycle < r->busy_until;
+			return r->absent || r->refuses || r->stretches || r->mute || r->deaf || !strcmp(value, "ok");
 		}
 	return false;
 }

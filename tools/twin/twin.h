@@ -104,6 +104,7 @@ unsigned spi_mode(void);
 void srf02_power(void);
 bool srf02_fault(const char *name, const char *value);
 void adis16100_power(void);
+void adis16100_resume(void); /* after a reset of the processor, which let its pins go */
 bool adis16100_fault(const char *name, const char *value);
 void scp1000_power(void);
 void scp1000_resume(void); /* after a reset of the processor, which lost the timers */

@@ -30,6 +30,8 @@ TIMEOUT_S = 60.0
 ALL_SENSORS = 0xFF
 ABSENT = -32768
 GYROS = ("thigh", "calf", "belt")
+SELF_TEST_US = 560_000  # after the start the gyros test themselves and give no rates
+GYRO_COUNTS_PER_DEGREE, GYRO_RESPONSE = 6.88, 221  # [ADIS16100 data sheet]
 PRESSURE_US = {m.PressureMode.HIGH_SPEED: 1e6 / 9.0, m.PressureMode.HIGH_RESOLUTION: 1e6 / 1.8}  # [SCP1000 data sheet]
 
 
@@ -67,7 +69,7 @@ class PythonBoard:
         start_us = 1000 * self._ms
         found: list[tuple[int, m.Message]] = [(start_us, answer) for answer in self._answers]
         self._answers = []
-        found += self._reports(len(rows)) + self._edges(rows) + self._samples(rows)
+        found += self._reports(rows) + self._edges(rows) + self._samples(rows)
         found += self._rangers.advance(start_us, rows, self._configuration.sensors)
         found.sort(key=itemgetter(0))
         self._ms += len(rows)
@@ -110,20 +112,31 @@ class PythonBoard:
         identity = m.Identity(_ticks(us), m.SCHEMA_HASH, 0, 0, 0, m.ResetCause.POWER_ON)
         return [identity, self._configuration._replace(ticks=_ticks(us))]
 
-    def _reports(self, n: int) -> list[tuple[int, m.Message]]:
+    def _reports(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
         """Who it is at the start; once a second, and how it is."""
         found: list[tuple[int, m.Message]] = []
-        for ms in range(self._ms, self._ms + n):
+        for ms in range(self._ms, self._ms + len(rows)):
             if ms == 0:
                 found += [(0, message) for message in self._introduction(0)]
             elif ms % 1000 == 0:
                 us = 1000 * ms
                 found += [(us, self._introduction(us)[0]), (us, self._status(us))]
+                found += self._gyro_health(us, rows[ms - self._ms])
         return found
 
     def _status(self, us: int) -> m.Status:
         bad = self._inbox.counts.rejected & 0xFFFF
-        return m.Status(_ticks(us), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, bad, healthy=0x7F, memory_used=0)
+        none = dict.fromkeys(m.Status._fields, 0)
+        return m.Status(**none | {"ticks": _ticks(us), "bad_frames": bad, "healthy": 0x7F})
+
+    def _gyro_health(self, us: int, row: Any) -> list[tuple[int, m.Message]]:
+        """Gyros that passed their self-test, as warm as the barometer."""
+        counts = round((int(row["temperature"]) / 20.0 - 25.0) * GYRO_COUNTS_PER_DEGREE)
+        return [
+            (us, m.GyroHealth(_ticks(us), gyro, counts, m.SelfTest.PASSED, -GYRO_RESPONSE, GYRO_RESPONSE))
+            for gyro, sensor in zip(m.Gyro, (m.Sensors.THIGH, m.Sensors.CALF, m.Sensors.BELT), strict=True)
+            if self._configuration.sensors & sensor
+        ]
 
     def _edges(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
         found: list[tuple[int, m.Message]] = []
@@ -140,7 +153,10 @@ class PythonBoard:
         on = [bool(c.sensors & one) for one in (m.Sensors.THIGH, m.Sensors.CALF, m.Sensors.BELT)]
         found: list[tuple[int, m.Message]] = []
         for us, row in self._due(rows, 1e6 / c.gyro_rate_hz) if any(on) else ():
-            rates = [int(row[name]) if there else ABSENT for name, there in zip(GYROS, on, strict=True)]
+            rates = [
+                int(row[name]) if there and us >= SELF_TEST_US else ABSENT
+                for name, there in zip(GYROS, on, strict=True)
+            ]
             found.append((us, m.Gyros(_ticks(us), *rates)))
         for us, row in self._due(rows, 1e6 / c.compass_rate_hz) if c.sensors & m.Sensors.COMPASS else ():
             found.append((us, m.Compass(_ticks(us), int(row["bearing"]))))
