@@ -205,7 +205,7 @@ def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
             frame = next_frame(looking)
     assert digest(found) == digest(expected)
     assert frame["told"]["x_m"] == expected[-1].x_m
-    health = frame["health"]
+    health = frame["streams"]
     assert abs(health["mtx_hz"] - 100.0) < 3.0
     assert 25.0 < health["pings_hz"] < 33.0
     assert health["lost"] == 0

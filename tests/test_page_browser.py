@@ -208,7 +208,7 @@ def test_a_tap_and_a_drag_check_in(browser: Any, tmp_path: Path) -> None:
         picture(page, "check-in", tmp_path)
         page.mouse.up()
         assert until(lambda: walk.taken == 1)
-        wait_for(page, "echostep.scene.frame.health.check_ins === 1")
+        wait_for(page, "echostep.scene.frame.streams.check_ins === 1")
         told = page.evaluate("echostep.scene.frame.told")
         page.context.close()
     assert np.hypot(told["x_m"] - 13.0, told["y_m"] - 2.0) < 3.0

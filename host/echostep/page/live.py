@@ -15,10 +15,10 @@ from typing import Self
 from echostep.estimate import Estimate
 from echostep.likelihoods import echo_model
 from echostep.page.beams import beams, expected_range
-from echostep.page.health import Pulse
 from echostep.page.scene import MOST_SHOWN, Scene, specks, words
 from echostep.page.server import Address, PageServer
 from echostep.page.stage import Stage
+from echostep.page.streams import Pulse
 from echostep.sources import Portion
 from echostep.tracker import Tracker
 from echostep.waiting import Passage
@@ -89,11 +89,11 @@ class LivePage:
             return
         if self._arrived_ns - self._pulsed_ns >= PULSE_NS:
             self._pulsed_ns = self._arrived_ns
-            self._scene = replace(self._scene, health=self._pulse.health(self._tracker, self._arrived_ns))
+            self._scene = replace(self._scene, streams=self._pulse.streams(self._tracker, self._arrived_ns))
         if self._scene.told is None:
             self._scene = replace(self._scene, words=words(None, waits=self._tracker.lost_at_start))
         for scene in self._new or [self._scene]:
-            self._stage.publish(replace(scene, health=self._scene.health))
+            self._stage.publish(replace(scene, streams=self._scene.streams))
         self._new = []
 
     def _watch(self, passage: Passage | None, told: Estimate) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from echostep.estimate import Estimate, Status
 from echostep.page.beams import Beam
-from echostep.page.health import Health
+from echostep.page.streams import Streams
 from echostep.particles import Cloud
 
 KNOWN_HEADING_RAD = 1.0  # beyond this standard deviation the arrow is a circle
@@ -39,7 +39,7 @@ class Scene:
     told: Estimate | None
     specks: Specks | None
     beams: tuple[Beam, ...]
-    health: Health | None
+    streams: Streams | None
     walked: int
     words: str
 

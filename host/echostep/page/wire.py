@@ -188,7 +188,7 @@ def frame(
         "words": scene.words,
         "told": _told(scene),
         "beams": [asdict(beam) for beam in scene.beams],
-        "health": asdict(scene.health) if scene.health else None,
+        "streams": asdict(scene.streams) if scene.streams else None,
         "trail": {"from": trail_from, "count": len(trail) // 12},
         "cloud": grid,
         "guidance": asdict(guidance) if guidance else None,

@@ -27,19 +27,21 @@ export class Panel {
     }));
   }
 
-  frame({ told, words, health, guidance, beams }, rooms, turn) {
+  frame({ told, words, streams, guidance, beams }, rooms, turn) {
     const status = told?.status ?? 'waiting';
     this.status(status, words);
     $('place').textContent = told ? whereabouts(told, rooms) : '';
     $('echoes').textContent = told ? echoes(beams) : '';
-    $('health').textContent = health ? streams(health) : 'no bytes yet';
+    $('health').textContent = streams ? rates(streams) : 'no bytes yet';
+    $('wrong').textContent = streams?.wrong ?? '';
+    $('wrong').hidden = !streams?.wrong;
     $('guidance').hidden = !guidance;
     if (guidance) {
       $('way').textContent = guidance.text;
       $('turn').style.visibility = guidance.arrow_rad === null ? 'hidden' : 'visible';
       $('turn').style.transform = `rotate(${Math.PI / 2 - (guidance.arrow_rad ?? 0) - turn}rad)`;
     }
-    this.speak(status, told ? `${words}. ${near(told, rooms)}` : words);
+    this.speak(`${status} ${streams?.wrong ?? ''}`, [words, told ? near(told, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
   }
 
   status(status, words) {
@@ -91,7 +93,7 @@ function echoes(beams) {
 
 const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
 
-function streams({ mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
+function rates({ mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
   const rate = (value, unit) => (value === null ? '…' : `${Math.round(value)}${unit}`);
   const late = late_pings ? ` · ${late_pings} late` : '';
   return `MTx ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected} · ${synchronised ? 'SyncOut' : 'no SyncOut'}`;
