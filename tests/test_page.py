@@ -211,6 +211,28 @@ def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     assert health["lost"] == 0
 
 
+def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
+    tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
+    with LivePage(tracker, "test", LOCAL) as page, opened_url(page.url) as looking:
+        begin_ns = time.monotonic_ns() - chunks[-1].t_arrival_ns
+        for chunk in [
+            *(replace(chunk, t_arrival_ns=chunk.t_arrival_ns + begin_ns - 3_000_000_000) for chunk in chunks),
+            None,
+        ]:
+            portion = portion_of([chunk] if chunk else [])
+            tracker.take(portion)
+            page.shown(portion)
+        looking.recv(timeout=5)
+        frame = next_frame(looking)
+        while not frame["words"].startswith("lost"):
+            looking.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
+            frame = next_frame(looking)
+    assert frame["words"].startswith("lost: nothing from the foot for ")
+    assert frame["told"]["status"] == "lost"
+    assert not frame["told"]["heading_known"]
+    assert frame["told"]["major_m"] > 5.0
+
+
 def test_a_page_gets_plan_walls_and_frames() -> None:
     with served() as (server, stage):
         stage.trail.add(1.0, 2.0, 0)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from echostep.estimate import Estimate
+from echostep.estimate import Estimate, unwatched
 from echostep.likelihoods import echo_model
 from echostep.page.beams import beams, expected_range
 from echostep.page.scene import MOST_SHOWN, Scene, specks, words
@@ -25,6 +25,7 @@ from echostep.waiting import Passage
 
 STEP_M = 0.02  # the trail gets a point when he has moved so far
 PULSE_NS = 250_000_000
+SILENT_S = 2.0
 STALE_S = 1.5  # echoes are shown no longer
 MOST_KEPT = 2000  # specks of each scene of a film
 
@@ -41,6 +42,7 @@ class LivePage:
         self._pulse = Pulse()
         self._pulsed_ns = 0
         self._arrived_ns = 0
+        self._told_ns = 0
         self._new: list[Scene] = []
         self._scene = Scene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
         self._replay = replay
@@ -85,16 +87,26 @@ class LivePage:
             self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
         else:
             self._arrived_ns = max(self._arrived_ns, time.monotonic_ns())
-        if not self._new and (self._replay or self._arrived_ns - self._pulsed_ns < PULSE_NS):
-            return
-        if self._arrived_ns - self._pulsed_ns >= PULSE_NS:
+        if self._new:
+            self._told_ns = self._arrived_ns
+        due = self._arrived_ns - self._pulsed_ns >= PULSE_NS
+        if due:
             self._pulsed_ns = self._arrived_ns
             self._scene = replace(self._scene, streams=self._pulse.streams(self._tracker, self._arrived_ns))
-        if self._scene.told is None:
-            self._scene = replace(self._scene, words=words(None, waits=self._tracker.lost_at_start))
-        for scene in self._new or [self._scene]:
-            self._stage.publish(replace(scene, streams=self._scene.streams))
-        self._new = []
+        if self._new or (due and not self._replay):
+            for scene in self._new or [self._meanwhile()]:
+                self._stage.publish(replace(scene, streams=self._scene.streams))
+            self._new = []
+
+    def _meanwhile(self) -> Scene:
+        """What is known without news: when nothing has come from the foot for a while, that he may be anywhere near."""
+        scene, silent_s = replace(self._scene, born_ns=self._born_ns), (self._arrived_ns - self._told_ns) * 1e-9
+        if scene.told is None:
+            return replace(scene, words=words(None, waits=self._tracker.lost_at_start))
+        if silent_s < SILENT_S:
+            return scene
+        told = unwatched(scene.told, scene.told.t_s + silent_s)
+        return replace(scene, told=told, beams=(), words=f"lost: nothing from the foot for {silent_s:.0f} s")
 
     def _watch(self, passage: Passage | None, told: Estimate) -> None:
         """The tracker told an estimate."""

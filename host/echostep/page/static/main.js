@@ -16,7 +16,7 @@ const LEAST_SD_M = 0.3;
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((k) => { setFollows(false); showFloor(k); });
 const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetAt = null, turned = 0, fitted = false, wanted = 0;
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetAt = null, turned = 0, fitted = false, wanted = 0, invited = false;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('Not taken: this is a replay, or it is too busy.', 3000), onState: connection });
 const replay = new Replay((kind, fields) => link.say(kind, fields));
@@ -27,6 +27,7 @@ const drawn = (window.echostep = { frames: 0, view, scene, link, last: null }); 
 async function hello(said) {
   plan = said.plan;
   scene.trail.count = 0;
+  invited = false;
   panel.hello(said);
   replay.show(said.replay);
   $('here').hidden = $('sheet-here').hidden = said.replay;
@@ -46,7 +47,7 @@ async function showFloor(k) {
 }
 
 function connection(open) {
-  if (!open) panel.status('waiting', 'no connection: the run is over, or trying again');
+  if (!open) panel.status('waiting', 'not connected');
 }
 
 // Catch up with what the server sent; draw with the next picture. A page that is not seen draws nothing and says so by its silence.
@@ -89,7 +90,7 @@ function draw() {
     panel.frame(scene.frame, plan.levels[scene.level].rooms, view.turn);
     panel.floors(scene.level, told);
     replay.frame(scene.frame.play);
-    if (!told && scene.frame.words.startsWith('tap') && !mode) enter('here');
+    if (!told && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
   }
   dirty = false;
   if (undrawn.length) {
