@@ -27,6 +27,7 @@ from echostep.checkin import PERSON, CheckIn, parse_check_in
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, Status, digest
 from echostep.page import wire
+from echostep.page.ahead import ahead
 from echostep.page.beams import Beam
 from echostep.page.cursor import Cursor
 from echostep.page.guide import Place, straight
@@ -458,6 +459,24 @@ def test_status_in_words() -> None:
     assert words(told(sd_m=1.2, status=Status.UNCERTAIN)) == "uncertain, 3 m"
     assert words(told(status=Status.LOST)) == "lost: walk along a wall or tap where you are"
     assert words(None, waits=True) == "tap where you stand to start"
+
+
+def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
+    tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
+    off_m, last, then = [], None, None
+    for chunk in chunks:
+        new = tracker.feed(chunk)
+        if new and then:
+            off_m.append(math.hypot(new[0].x_m - then.x_m, new[0].y_m - then.y_m))
+            assert new[0].t_s == then.t_s
+        if new:
+            last, then = new[-1], None
+        if last and (since := tracker.intake.ahead) and tracker.leg and not then:
+            then = ahead(last, tracker.leg, since[:1])
+            assert then.xx_m2 > last.xx_m2
+    assert len(off_m) > 5
+    assert max(off_m) < 0.3
+    assert np.median(off_m) < 0.1
 
 
 def test_guidance_points_and_arrives() -> None:

@@ -89,6 +89,11 @@ class Intake:
         self._bad_times = 0
 
     @property
+    def ahead(self) -> tuple[Leg, ...]:
+        """Legs that the foot has told already, but whose pings are not all in."""
+        return self._waiting.legs
+
+    @property
     def counts(self) -> IntakeCounts:
         """What was not used so far."""
         return IntakeCounts(self._unknown_ports, self._waiting.late, self._waiting.dropped, self._bad_times)

@@ -65,7 +65,7 @@ class Tracker:
         self.bad_check_ins = 0
         self._rng = np.random.default_rng(seed)
         self._last: Estimate | None = None
-        self._leg: Leg | None = None  # the last one
+        self.leg: Leg | None = None  # the last one
         self._said: CheckIn | None = None
 
     @property
@@ -100,19 +100,19 @@ class Tracker:
         """
         self.check_ins += 1
         self._said = said
-        if self._leg is None:
+        if self.leg is None:
             return []
-        self.filter = self._drawn(said, self._leg.heading1_rad)
-        t_s = max(self._leg.t1_s, self._last.t_s) if self._last else self._leg.t1_s
-        self._last = estimate(self.filter.cloud, t_s, self._leg.heading1_rad, self._leg.step)
-        self._tell(Passage(self._leg, *NO_PINGS), self._last)
+        self.filter = self._drawn(said, self.leg.heading1_rad)
+        t_s = max(self.leg.t1_s, self._last.t_s) if self._last else self.leg.t1_s
+        self._last = estimate(self.filter.cloud, t_s, self.leg.heading1_rad, self.leg.step)
+        self._tell(Passage(self.leg, *NO_PINGS), self._last)
         return [self._last]
 
     def _take(self, portion: Portion) -> list[Estimate]:
         estimates: list[Estimate] = []
         for piece in self.intake.take(portion):
             if isinstance(piece, Passage):
-                self._leg = piece.leg
+                self.leg = piece.leg
                 self.filter = self.filter or self._first(piece.leg.heading0_rad)
                 if self.filter is None:
                     continue

@@ -14,6 +14,7 @@ from typing import Self
 
 from echostep.estimate import Estimate, unwatched
 from echostep.likelihoods import echo_model
+from echostep.page.ahead import ahead
 from echostep.page.beams import beams, expected_range
 from echostep.page.scene import MOST_SHOWN, Scene, specks, words
 from echostep.page.server import Address, PageServer
@@ -43,6 +44,8 @@ class LivePage:
         self._pulsed_ns = 0
         self._arrived_ns = 0
         self._told_ns = 0
+        self._ahead: Scene | None = None  # of the foot's last step, as long as its echoes are not in
+        self._ahead_s = -math.inf
         self._new: list[Scene] = []
         self._scene = Scene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
         self._replay = replay
@@ -89,6 +92,8 @@ class LivePage:
             self._arrived_ns = max(self._arrived_ns, time.monotonic_ns())
         if self._new:
             self._told_ns = self._arrived_ns
+        else:
+            self._look_ahead()
         due = self._arrived_ns - self._pulsed_ns >= PULSE_NS
         if due:
             self._pulsed_ns = self._arrived_ns
@@ -98,9 +103,22 @@ class LivePage:
                 self._stage.publish(replace(scene, streams=self._scene.streams))
             self._new = []
 
+    def _look_ahead(self) -> None:
+        """A step that the foot has told is shown at once; its echoes correct it a quarter of a second later."""
+        told, since = self._scene.told, self._tracker.intake.ahead
+        if self._replay or told is None or self._tracker.leg is None or not since or since[-1].t1_s <= self._ahead_s:
+            return
+        self._ahead_s = since[-1].t1_s
+        there = ahead(told, self._tracker.leg, since)
+        self._ahead = replace(self._scene, born_ns=self._born_ns, t_s=there.t_s, told=there, words=words(there))
+        self._stage.publish(self._ahead)
+
     def _meanwhile(self) -> Scene:
         """What is known without news: when nothing has come from the foot for a while, that he may be anywhere near."""
-        scene, silent_s = replace(self._scene, born_ns=self._born_ns), (self._arrived_ns - self._told_ns) * 1e-9
+        scene, silent_s = (
+            replace(self._ahead or self._scene, born_ns=self._born_ns),
+            (self._arrived_ns - self._told_ns) * 1e-9,
+        )
         if scene.told is None:
             return replace(scene, words=words(None, waits=self._tracker.lost_at_start))
         if silent_s < SILENT_S:
@@ -111,6 +129,7 @@ class LivePage:
     def _watch(self, passage: Passage | None, told: Estimate) -> None:
         """The tracker told an estimate."""
         tracker = self._tracker
+        self._ahead = None
         last = self._last
         if last is None or max(abs(told.x_m - last.x_m), abs(told.y_m - last.y_m)) > STEP_M or told.level != last.level:
             if tracker.check_ins != self._check_ins:
