@@ -256,6 +256,27 @@ def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
         page.context.close()
 
 
+def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
+    stage = Stage(PLAN, "test", replay=False)
+    with PageServer(stage, LOCAL) as server:
+        stage.publish(scene())
+        page = looking(browser, server.url, "bright")
+        before = page.evaluate("[echostep.view.scale, echostep.view.turn]")
+        fingers, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
+        for k in range(10):
+            reach, angle = 40.0 + 6.0 * k, 0.05 * k  # clockwise on the screen
+            ends = [(side * reach * np.cos(angle), side * reach * np.sin(angle)) for side in (-1, 1)]
+            points = [{"x": box["x"] + 180 + u, "y": box["y"] + 160 + v, "id": i} for i, (u, v) in enumerate(ends)]
+            fingers.send(
+                "Input.dispatchTouchEvent", {"type": "touchMove" if k else "touchStart", "touchPoints": points}
+            )
+        fingers.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        scale, turn = page.evaluate("[echostep.view.scale, echostep.view.turn]")
+        page.context.close()
+    assert scale / before[0] == pytest.approx(94.0 / 40.0, rel=0.02)
+    assert turn == pytest.approx(-0.45, abs=0.02)
+
+
 def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
     scenario = demo_scenario(PLAN, 1, PythonBoard(seed=1))
     tracker = Tracker(PLAN, scenario.start, seed=1)

@@ -157,7 +157,7 @@ function closeSheet() {
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
   const deeds = {
-    n: () => view.rotate(-view.turn), w: () => { setFollows(false); view.fit(planView.box); }, f: () => setFollows(!follows),
+    n: () => view.rotate(-view.turn), w: () => { setFollows(false); view.fit(planView.box); }, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
     Escape: () => { enter(null); posing(null, null); },
     Enter: () => mode && posed(middle, mode === 'here' ? turned : null),
@@ -173,9 +173,15 @@ function setFollows(on) {
   $('follow').setAttribute('aria-pressed', String(on));
 }
 
+function toggleFollow() {
+  const { told } = scene.frame ?? {};
+  setFollows(!follows);
+  if (follows && told && !view.shows(planView.box)) view.centre(told.x_m, told.y_m);
+}
+
 new Gestures($('map'), view, { takes: () => mode !== null, tapped, posing, posed, key, moved: () => { setFollows(false); closeSheet(); } });
 $('here').onclick = (e) => enter(mode === 'here' ? null : 'here', e.detail === 0);
-$('follow').onclick = () => setFollows(!follows);
+$('follow').onclick = () => toggleFollow();
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = () => { setFollows(false); view.fit(planView.box); };

@@ -62,6 +62,11 @@ export class View {
     this.changed();
   }
 
+  centre(x, y) {
+    [this.x, this.y] = [x, y];
+    this.changed();
+  }
+
   shows([x0, y0, x1, y1]) {
     return [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].every(([x, y]) => {
       const [sx, sy] = this.toScreen(x, y);
@@ -71,7 +76,7 @@ export class View {
 
   // Keep a place of the map in the inner part of the screen.
   keep(x, y) {
-    const [sx, sy] = this.toScreen(x, y), mx = 0.2 * this.width, my = 0.2 * this.height;
+    const [sx, sy] = this.toScreen(x, y), mx = 0.3 * this.width, my = 0.3 * this.height;
     const dx = Math.min(this.width - mx - sx, 0) + Math.max(mx - sx, 0), dy = Math.min(this.height - my - sy, 0) + Math.max(my - sy, 0);
     if (dx || dy) this.pan(dx, dy);
   }
