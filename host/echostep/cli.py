@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | foot | legs | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """
@@ -19,6 +19,7 @@ from echostep.plan_commands import app as plan_app
 if TYPE_CHECKING:
     from echostep.plan import Pose
     from echostep.runs import Views
+    from echostep.team.endpoint import Outlet
 
 LOCAL = "127.0.0.1"
 app = typer.Typer(
@@ -54,6 +55,16 @@ Host = Annotated[
 Port = Annotated[int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Tell a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://, several times if you like.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
 
 
 @app.command()
@@ -61,6 +72,9 @@ def demo(
     out: Out = Path("out/demo"),
     headless: Headless = False,
     seed: Seed = 1,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
     board_command: Annotated[
         str | None,
         typer.Option(
@@ -76,7 +90,7 @@ def demo(
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, _views(headless, page, host, port))
+    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team))
 
 
 @app.command()
@@ -93,11 +107,15 @@ def live(
     page: Page = None,
     host: Host = LOCAL,
     port: Port = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track the wearer of a board and an MTx; everything is recorded."""
     from echostep import runs
 
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, _views(headless, page, host, port))
+    views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
+    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet)
 
 
 @app.command()
@@ -128,12 +146,15 @@ def replay(
     page: Page = None,
     host: Host = LOCAL,
     port: Port = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
     views = _views(headless, page, host, port, stays=sys.stdout.isatty())
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views)
+    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, _outlet(publish, name, team))
 
 
 @app.command()
@@ -173,6 +194,23 @@ def legs(
 
 
 @app.command()
+def command(
+    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    plan: Plan,
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first."""
+    from echostep.team import commander
+
+    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
@@ -180,6 +218,70 @@ def decode(
     from echostep import runs
 
     runs.decode(file)
+
+
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
+) -> None:
+    """Look at ports, board and MTx, and say what is wrong and what to do; exit status 1 when something is."""
+    from echostep import doctor as examination
+
+    if udev:
+        typer.echo(examination.rules_text(), nl=False)
+    elif not examination.run(board, mtx, seconds):
+        raise typer.Exit(1)
+
+
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); else the one shipped with this program."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from rich.console import Console
+
+    from echostep import flash as flashing
+
+    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[
+        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; all of them when none is named.")
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
+    ] = Path("calibration.toml"),
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
+    walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
+) -> None:
+    """Measure the wearer's gyros, mounting, compass and legs, and write them as settings."""
+    from rich.console import Console
+
+    from echostep import calibrate as calibration
+
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
+
+
+def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
+    from echostep.team.endpoint import parse_outlet
+
+    return parse_outlet(publish, name, team) if publish else None
 
 
 def _pose(text: str | None) -> Pose | None:

@@ -14,15 +14,18 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
 
 from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
+from echostep.building.formats import open_plan
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.checkin import PERSON
 from echostep.errors import EchostepError
@@ -38,7 +41,7 @@ from echostep.page.live import LivePage
 from echostep.page.server import Address
 from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
-from echostep.plan import Plan, Pose, load_plan
+from echostep.plan import Plan, Pose
 from echostep.recording import Recorder, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
@@ -48,11 +51,18 @@ from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 from echostep.xsens.reader import warm_up
 
+if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
+    from echostep.team.publish import Source
+
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
 TAPPED = "tapped"  # where a recording says that its start is a check-in
 BAUD = {BOARD: 115200, MTX: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
+
+
+Tell = Callable[[list[Estimate]], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +74,7 @@ class Views:
     stays: bool = False
 
 
-def demo(out: Path, seed: int, board_command: str | None, views: Views) -> None:
+def demo(out: Path, seed: int, board_command: str | None, views: Views, outlet: Outlet | None = None) -> None:
     """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
     from echostep.simulation.board import BoardProcess, PythonBoard
     from echostep.simulation.scenario import demo_scenario
@@ -74,7 +84,7 @@ def demo(out: Path, seed: int, board_command: str | None, views: Views) -> None:
     console.print(f"A simulated walk in a simulated building; the sensor board is {player}.")
     out = _folder(out)
     with as_file(files("echostep") / "plans" / "demo.json") as plan_path:
-        plan = load_plan(plan_path)
+        plan = open_plan(plan_path)
     scenario = demo_scenario(plan, seed, board)
     try:
         scenario.write_truth(out / "truth.csv")
@@ -83,11 +93,11 @@ def demo(out: Path, seed: int, board_command: str | None, views: Views) -> None:
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
         title = "echostep demo (simulated)"
         watched = views.terminal or views.page is not None
-        with _page(tracker, title, views) as page:
+        with _page(tracker, title, views) as page, _published(outlet, tracker, "simulated") as tell:
             with Recorder(out / "walk.mcap", about) as recorder:
                 chunks = _with_check_ins(_paced(scenario.chunks()) if watched else scenario.chunks(), page)
                 portions = _portions(_kept(chunks, recorder), 1 if watched else HEADLESS_CHUNKS)
-                estimates = _run(tracker, portions, title, lambda: scenario.fraction, views, page)
+                estimates = _run(tracker, portions, title, lambda: scenario.fraction, views, page, tell)
             _finish(out, tracker, estimates, truth, "simulated walk")
             _linger(page, views)
     finally:
@@ -96,10 +106,10 @@ def demo(out: Path, seed: int, board_command: str | None, views: Views) -> None:
 
 def live(
     plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
-    settings_path: Path | None, seed: int, seconds: float | None, views: Views,
+    settings_path: Path | None, seed: int, seconds: float | None, views: Views, outlet: Outlet | None = None,
 ) -> None:  # fmt: skip
     """Track from two serial ports until Ctrl-C."""
-    plan = load_plan(plan_path)
+    plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
     tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed, waits=views.page is not None)
     tracker.warm_up()
@@ -108,9 +118,13 @@ def live(
     try:
         ports.send(BOARD, encode(Identify(), 0))
         about = _about(plan, tracker.start, seed, text, "live")
-        with _page(tracker, "echostep live", views) as page, Recorder(out / "walk.mcap", about) as recorder:
+        with (
+            _page(tracker, "echostep live", views) as page,
+            _published(outlet, tracker, "live") as tell,
+            Recorder(out / "walk.mcap", about) as recorder,
+        ):
             chunks = _until(ports, recorder, tracker.settings.mtx.rate_hz, seconds, page)
-            estimates = _run(tracker, _one_by_one(chunks), "echostep live", None, views, page)
+            estimates = _run(tracker, _one_by_one(chunks), "echostep live", None, views, page, tell)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live")
@@ -133,10 +147,10 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
 
 def replay(
     path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
-    seed: int | None, truth_path: Path | None, views: Views,
+    seed: int | None, truth_path: Path | None, views: Views, outlet: Outlet | None = None,
 ) -> None:  # fmt: skip
     """Track a recording again."""
-    recording, plan = open_recording(path), load_plan(plan_path)
+    recording, plan = open_recording(path), open_plan(plan_path)
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
@@ -150,9 +164,9 @@ def replay(
         console.print(f"Recording: {note}")
     tracker.warm_up()
     title = f"echostep replay {path.name}"
-    with _page(tracker, title, views, replay=True) as page:
+    with _page(tracker, title, views, replay=True) as page, _published(outlet, tracker, "replay") as tell:
         began = time.perf_counter()
-        estimates = _run(tracker, recording.portions(), title, lambda: recording.fraction, views, page)
+        estimates = _run(tracker, recording.portions(), title, lambda: recording.fraction, views, page, tell)
         elapsed_s = time.perf_counter() - began
         if recording.truncated:
             console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
@@ -238,7 +252,8 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, views: Views, page: LivePage | None
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None,
+    views: Views, page: LivePage | None, tell: Tell,
 ) -> list[Estimate]:  # fmt: skip
     """Feed everything; Ctrl-C ends a run like its last chunk does."""
     view = TerminalView(tracker, title, progress, console) if views.terminal else None
@@ -253,6 +268,7 @@ def _run(
                 if page:
                     page.shown(portion)
                 estimates += new
+                tell(new)
                 if view:
                     view.show(new)
         except KeyboardInterrupt:
@@ -293,6 +309,18 @@ def _with_check_ins(chunks: Iterable[Chunk], page: LivePage | None) -> Iterator[
         for said in page.said() if page else ():
             yield Chunk(PERSON, chunk.t_arrival_ns, said)
         yield chunk
+
+
+@contextmanager
+def _published(outlet: Outlet | None, tracker: Tracker, source: Source) -> Iterator[Tell]:
+    """What to do with new estimates: tell a commander, or nothing."""
+    if outlet is None:
+        yield lambda _: None
+        return
+    from echostep.team.publish import Publishing
+
+    with Publishing(outlet, tracker, source, partial(console.print, markup=False, highlight=False)) as publishing:
+        yield publishing.tell
 
 
 def _paced(chunks: Iterable[Chunk]) -> Iterator[Chunk]:

@@ -16,6 +16,7 @@ from echostep.checkin import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, estimate, unwatched
 from echostep.gait import Leg
+from echostep.heading import Iron
 from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import CloudSettings, Move, systematic
@@ -57,7 +58,9 @@ class Tracker:
         self.plan = plan
         self.start = pose
         s = self.settings
-        self.intake = Intake(s.mtx, s.ranger, s.foot, s.gait, s.wearer)
+        self.intake = Intake(
+            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == Iron() else s.compass
+        )
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self.watch: Watch | None = None
