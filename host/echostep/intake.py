@@ -80,6 +80,7 @@ class Intake:
         self.path = TrunkPath(gait)
         self.status: Status | None = None
         self.identity: Identity | None = None
+        self.pings = 0
         self.words = BoardWords()
         self._ranger = ranger
         self.journey = Journey(wearer or WearerSettings(), iron)
@@ -87,6 +88,11 @@ class Intake:
         self._waiting = Waiting()
         self._unknown_ports = 0
         self._bad_times = 0
+
+    @property
+    def ahead(self) -> tuple[Leg, ...]:
+        """Legs that the foot has told already, but whose pings are not all in."""
+        return self._waiting.legs
 
     @property
     def counts(self) -> IntakeCounts:
@@ -134,6 +140,7 @@ class Intake:
     def _hear(self, frames: Frames, times: Times) -> None:
         """Pings that say something about walls, and heights by pressure, wait for their leg."""
         place, pings = frames.rows(PING)
+        self.pings += len(place)
         t_s = times.board_s[place] + self._ranger.delay_s
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
         rows = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[kept]
