@@ -7,6 +7,7 @@ ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
+TEST_PACKAGES := mosquitto
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -45,7 +46,7 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python tools/real_walk.py --out out/real
 
 test: $(READY) ## run every test
-	@tools/apt.sh $(APT_PACKAGES) || echo "No right to install the AVR tools: tests that need them are skipped."
+	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools and Mosquitto: tests that need them are skipped."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 	$(MAKE) --quiet check
 	$(BIN)/python -m pytest -q

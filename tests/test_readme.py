@@ -16,6 +16,7 @@ READMES = [
     "README.md",
     "host/README.md",
     "host/DESIGN.md",
+    "host/TEAMS.md",
     "protocol/README.md",
     "firmware/README.md",
     "tools/twin/README.md",
@@ -71,6 +72,7 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
         "doctor",
         "flash",
         "calibrate",
+        "command",
         *(f"evaluate {name}" for name in ("feet", "girard2011", "echoes", "trails")),
     ],
 )

@@ -18,6 +18,7 @@ from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
+    from echostep.team.endpoint import Outlet
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
@@ -40,6 +41,16 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", 
 Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Tell a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://, several times if you like.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
 
 
 @app.command()
@@ -47,6 +58,9 @@ def demo(
     out: Out = Path("out/demo"),
     headless: Headless = False,
     seed: Seed = 1,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
     board_command: Annotated[
         str | None,
         typer.Option(
@@ -59,7 +73,7 @@ def demo(
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, headless=headless)
+    runs.demo(out, seed, board_command, _outlet(publish, name, team), headless=headless)
 
 
 @app.command()
@@ -73,11 +87,16 @@ def live(
     seed: Seed = 0,
     headless: Headless = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track the wearer of a board and an MTx; everything is recorded."""
     from echostep import runs
 
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, headless=headless)
+    runs.live(
+        plan, board, mtx, out, _pose(start), settings, seed, seconds, _outlet(publish, name, team), headless=headless
+    )
 
 
 @app.command()
@@ -105,11 +124,16 @@ def replay(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
     headless: Headless = False,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, headless=headless)
+    runs.replay(
+        recording, plan, out, _pose(start), settings, seed, truth, _outlet(publish, name, team), headless=headless
+    )
 
 
 @app.command()
@@ -146,6 +170,23 @@ def legs(
     from echostep import runs
 
     runs.legs(samples, thigh, shank, out, profile, scale, walked)
+
+
+@app.command()
+def command(
+    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    plan: Plan,
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first."""
+    from echostep.team import commander
+
+    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
 
 
 @app.command()
@@ -214,6 +255,12 @@ def calibrate(
 
     wearer = calibration.Wearer(thigh, shank, walked)
     calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
+
+
+def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
+    from echostep.team.endpoint import parse_outlet
+
+    return parse_outlet(publish, name, team) if publish else None
 
 
 def _pose(text: str | None) -> Pose | None:

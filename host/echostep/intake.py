@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.alignment import Alignment
-from echostep.calibration import GyroSettings, RangerSettings, compass_headings, gyro_rates, heights, ranges
+from echostep.calibration import GyroSettings, RangerSettings, compass_headings, heights, ranges, rates
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, Leg, TrunkPath
-from echostep.heading import Iron
 from echostep.health import BoardWords
 from echostep.journey import Journey
-from echostep.legpath import Block, WearerSettings
+from echostep.legpath import Block, Wearer
 from echostep.messages import (
     BY_ID,
     ROWS,
@@ -70,7 +69,7 @@ class Intake:
 
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
-        wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: Iron | None = None,
+        wearer: Wearer | None = None,
     ) -> None:  # fmt: skip
         self.board = BoardReader()
         self.mtx = MtxReader()
@@ -82,8 +81,8 @@ class Intake:
         self.identity: Identity | None = None
         self.words = BoardWords()
         self._ranger = ranger
-        self.journey = Journey(wearer or WearerSettings(), iron)
-        self._stride = GyroBlocks(gyro or GyroSettings())
+        self.journey = Journey(wearer or Wearer())
+        self._stride = GyroBlocks((wearer or Wearer()).gyro)
         self._waiting = Waiting()
         self._unknown_ports = 0
         self._bad_times = 0
@@ -191,8 +190,8 @@ class Intake:
 class GyroBlocks:
     """Cuts the board's gyro samples into blocks of BLOCK, with the compass read since the sample before; counted from the first one."""
 
-    def __init__(self, gyro: GyroSettings) -> None:
-        self._gyro = gyro
+    def __init__(self, settings: GyroSettings) -> None:
+        self._settings = settings
         self._rows = np.empty((0, 6))  # t_s, thigh, calf, belt, compass; the place of the message
         self._compass = np.nan
 
@@ -205,7 +204,7 @@ class GyroBlocks:
         compass[np.searchsorted(place, read)] = compass_headings(bearings)
         self._compass = compass[-1]
         new = np.column_stack(
-            [times.board_s[place], gyro_rates(samples, self._gyro), compass[:-1], times.board_at[place]]
+            [times.board_s[place], rates(samples, self._settings), compass[:-1], times.board_at[place]]
         )
         rows = np.concatenate([self._rows, new[~np.isnan(new[:, 0])]])
         count = len(rows) // BLOCK

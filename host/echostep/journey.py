@@ -15,8 +15,7 @@ from collections import deque
 from dataclasses import replace
 
 from echostep.gait import Leg, wrap
-from echostep.heading import Iron
-from echostep.legpath import Block, LegPath, WearerSettings, rest_of, turned
+from echostep.legpath import Block, LegPath, Wearer, rest_of, turned
 
 SILENT_S = 0.5  # a foot that is this far behind the board does not tell
 KEPT_S = 30.0
@@ -24,15 +23,16 @@ LIKE = 0.35  # the legs' way against the foot's may be off by this share: else n
 LEAST_M = 3.0  # of a way that tells whether
 USUAL_M = 10.0  # a way as telling as what is known of all people
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over
-BRIDGE_M_S = 0.4
+BRIDGE_M_S, BRIDGE_M = 0.4, 0.7
+STRAIGHT_M, STRAIGHT_RAD = 0.5, math.radians(20.0)
 PATIENCE_S = 4.0  # a foot that is back waits for the legs to catch up
 
 
 class Journey:
     """`foot` and `legs` take what comes, in order, and return what is certain."""
 
-    def __init__(self, settings: WearerSettings, iron: Iron | None = None) -> None:
-        self._settings, self._iron = settings, iron
+    def __init__(self, wearer: Wearer) -> None:
+        self._wearer = wearer
         self._path: LegPath | None = None  # while the legs carry
         self._kept: deque[Block] = deque()
         self._known: deque[Leg] = deque()  # that the foot told, as long ago as the kept blocks
@@ -76,7 +76,7 @@ class Journey:
         """Go through what was kept; the legs carry if they are worn."""
         if self._foot_seen and not self._known:
             return []
-        path = LegPath(self._settings, self._iron)
+        path = LegPath(self._wearer)
         told = [leg for block in self._kept for leg in path.feed(block)]
         if self._foot_seen and not self._learn(path, told):
             self._known.clear()  # until the foot has told more, they are not asked again
@@ -93,8 +93,10 @@ class Journey:
         if way_m < LEAST_M or not abs(legs_m / way_m - 1.0) < LIKE:
             return False
         self._leg_scale = (way_m + USUAL_M) / (legs_m + USUAL_M)
-        last = self._known[-1]
-        self._leg_turn = wrap(last.heading1_rad + self._foot_turn - path.heading_rad(last.t1_s))
+        straight = [leg for leg in self._known if _straight(leg) and leg.t1_s >= path.remembered_s] or [self._known[-1]]
+        between = [leg.heading1_rad - path.heading_rad(leg.t1_s) for leg in straight]
+        mean = math.atan2(sum(math.sin(a) for a in between), sum(math.cos(a) for a in between))
+        self._leg_turn = wrap(mean + self._foot_turn)
         return True
 
     def _carried(self, told: list[Leg]) -> list[Leg]:
@@ -103,16 +105,21 @@ class Journey:
         ]
 
     def _rejoined(self) -> list[Leg]:
-        """Back to the foot, once its path begins before the legs' ends; not to a leg that bridges its silence."""
+        """Back to the foot with a straight stride, where foot and trunk look the same way, once the legs have told all before it."""
         assert self._path is not None
-        while self._waiting and (self._waiting[0].unwatched or self._waiting[0].t1_s <= self._covered_s):
+        nobody = self._covered_s == -math.inf
+        while (
+            self._waiting
+            and not nobody
+            and (not _straight(self._waiting[0]) or self._waiting[0].t1_s <= self._covered_s)
+        ):
             del self._waiting[0]
         if not self._waiting:
             return []
         first = self._waiting[0]
         if first.t0_s > self._covered_s and self._waiting[-1].t1_s < self._covered_s + PATIENCE_S:
             return []
-        if self._covered_s > -math.inf:
+        if not nobody:
             at_s = max(first.t0_s, self._covered_s)
             self._foot_turn = wrap(self._path.heading_rad(at_s) + self._leg_turn - first.heading_rad(at_s))
             self._waiting[0] = replace(first, turn_sd_rad=math.hypot(first.turn_sd_rad, REJOIN_SD_RAD))
@@ -126,9 +133,10 @@ class Journey:
         """From where the legs left off to where the foot begins, in the foot's frame: nobody told, but it was not long."""
         if not -math.inf < self._covered_s < first.t0_s:
             return []
-        span_s = first.t0_s - self._covered_s
-        heading = first.heading0_rad
-        return [Leg(self._covered_s, first.t0_s, 0.0, 0.0, heading, heading, BRIDGE_M_S * span_s, 0.0, first.step)]
+        assert self._path is not None
+        sd = min(BRIDGE_M_S * (first.t0_s - self._covered_s), BRIDGE_M)
+        heading = self._path.heading_rad(self._covered_s) + self._leg_turn - self._foot_turn
+        return [Leg(self._covered_s, first.t0_s, 0.0, 0.0, heading, first.heading0_rad, sd, 0.0, first.step)]
 
     def _on(self, leg: Leg, turn_rad: float) -> Leg:
         """The leg, from where the way is covered on, as a part of the one way."""
@@ -138,6 +146,12 @@ class Journey:
         leg = turned(rest_of(leg, self._covered_s), turn_rad)
         self._covered_s = max(self._covered_s, leg.t1_s)
         return leg if leg.step == self._step else replace(leg, step=self._step)
+
+
+def _straight(leg: Leg) -> bool:
+    """Whether it is a stride straight on."""
+    long = math.hypot(leg.dx_m, leg.dy_m) > STRAIGHT_M
+    return long and not leg.unwatched and abs(wrap(leg.heading1_rad - leg.heading0_rad)) < STRAIGHT_RAD
 
 
 def _length(legs: list[Leg] | deque[Leg], since_s: float, until_s: float) -> float:

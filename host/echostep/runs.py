@@ -12,10 +12,12 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -44,13 +46,20 @@ from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 from echostep.xsens.reader import warm_up
 
+if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
+    from echostep.team.publish import Source
+
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
 BAUD = {BOARD: 115200, MTX: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
 
-def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> None:
+Tell = Callable[[list[Estimate]], None]
+
+
+def demo(out: Path, seed: int, board_command: str | None, outlet: Outlet | None = None, *, headless: bool) -> None:
     """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
     from echostep.simulation.board import BoardProcess, PythonBoard
     from echostep.simulation.scenario import demo_scenario
@@ -67,7 +76,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
         truth = load_truth(out / "truth.csv")
         tracker = Tracker(plan, scenario.start, seed=seed)
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
-        with Recorder(out / "walk.mcap", about) as recorder:
+        with _published(outlet, tracker, "simulated") as tell, Recorder(out / "walk.mcap", about) as recorder:
             chunks = scenario.chunks() if headless else _paced(scenario.chunks())
             estimates = _run(
                 tracker,
@@ -75,6 +84,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
                 "echostep demo (simulated)",
                 lambda: scenario.fraction,
                 headless,
+                tell,
             )
     finally:
         scenario.close()
@@ -83,7 +93,7 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
 
 def live(
     plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
-    settings_path: Path | None, seed: int, seconds: float | None, *, headless: bool,
+    settings_path: Path | None, seed: int, seconds: float | None, outlet: Outlet | None = None, *, headless: bool,
 ) -> None:  # fmt: skip
     """Track from two serial ports until Ctrl-C."""
     plan = load_plan(plan_path)
@@ -94,9 +104,10 @@ def live(
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
+        about = _about(plan, tracker.start, seed, text, "live")
+        with _published(outlet, tracker, "live") as tell, Recorder(out / "walk.mcap", about) as recorder:
             chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
-            estimates = _run(tracker, chunks, "echostep live", None, headless)
+            estimates = _run(tracker, chunks, "echostep live", None, headless, tell)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live")
@@ -119,7 +130,7 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
 
 def replay(
     path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
-    seed: int | None, truth_path: Path | None, *, headless: bool,
+    seed: int | None, truth_path: Path | None, outlet: Outlet | None = None, *, headless: bool,
 ) -> None:  # fmt: skip
     """Track a recording again."""
     recording, plan = open_recording(path), load_plan(plan_path)
@@ -135,9 +146,10 @@ def replay(
         console.print(f"Recording: {note}")
     tracker.warm_up()
     began = time.perf_counter()
-    estimates = _run(
-        tracker, recording.portions(), f"echostep replay {path.name}", lambda: recording.fraction, headless
-    )
+    with _published(outlet, tracker, "replay") as tell:
+        estimates = _run(
+            tracker, recording.portions(), f"echostep replay {path.name}", lambda: recording.fraction, headless, tell
+        )
     elapsed_s = time.perf_counter() - began
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
@@ -222,7 +234,12 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool
+    tracker: Tracker,
+    portions: Iterable[Portion],
+    title: str,
+    progress: Callable[[], float] | None,
+    headless: bool,
+    tell: Tell,
 ) -> list[Estimate]:
     """Feed everything; Ctrl-C ends a run like its last chunk does."""
     view = None if headless else TerminalView(tracker, title, progress, console)
@@ -233,11 +250,24 @@ def _run(
             for portion in portions:
                 new = tracker.take(portion)
                 estimates += new
+                tell(new)
                 if view:
                     view.show(new)
         except KeyboardInterrupt:
             pass
     return estimates
+
+
+@contextmanager
+def _published(outlet: Outlet | None, tracker: Tracker, source: Source) -> Iterator[Tell]:
+    """What to do with new estimates: tell a commander, or nothing."""
+    if outlet is None:
+        yield lambda _: None
+        return
+    from echostep.team.publish import Publishing
+
+    with Publishing(outlet, tracker, source, partial(console.print, markup=False, highlight=False)) as publishing:
+        yield publishing.tell
 
 
 def _paced(chunks: Iterable[Chunk]) -> Iterator[Chunk]:

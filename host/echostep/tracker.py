@@ -11,8 +11,8 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, unwatched
 from echostep.gait import Leg
-from echostep.heading import Iron
 from echostep.intake import Intake
+from echostep.legpath import Wearer
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
 from echostep.plan import Plan, Pose
@@ -36,9 +36,7 @@ class Tracker:
         self.plan = plan
         self.start = pose
         s = self.settings
-        self.intake = Intake(
-            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == Iron() else s.compass
-        )
+        self.intake = Intake(s.mtx, s.ranger, s.foot, s.gait, Wearer(s.gyro, s.compass, s.legs))
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self._rng = np.random.default_rng(seed)
