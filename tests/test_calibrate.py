@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from echostep import messages as m
-from echostep.calibration import GyroSettings, rates
+from echostep.calibration import GyroSettings, gyro_rates
 from echostep.errors import EchostepError
 from echostep.fitting import find_compass, find_gyros, find_legs, find_mounting, still_bias
 from echostep.leg_kinematics import Segments
@@ -121,11 +121,11 @@ def test_the_scale_of_the_legs_follows_the_walk() -> None:
     leg = Person().leg
     segments = Segments(leg.thigh_m, leg.shank_m)
     found, line = find_legs(walked(10.0), GyroSettings(), segments, 10.0)
-    assert found["legs"]["scale"] == pytest.approx(1.0, abs=0.06)
+    assert found["wearer"]["leg_scale"] == pytest.approx(1.0, abs=0.06)
     twice, _ = find_legs(walked(10.0), GyroSettings(), segments, 11.0)
-    assert twice["legs"]["scale"] == pytest.approx(1.1 * found["legs"]["scale"], abs=0.001)
+    assert twice["wearer"]["leg_scale"] == pytest.approx(1.1 * found["wearer"]["leg_scale"], abs=0.001)
     assert "10 m was seen as" in line
-    assert parse_settings("[legs]\nscale = 1.02\nthigh_m = 0.4\n", "x").legs.scale == 1.02
+    assert parse_settings("[wearer]\nleg_scale = 1.02\nthigh_m = 0.4\n", "x").wearer.leg_scale == 1.02
 
 
 def test_a_walk_that_cannot_be_is_told() -> None:
@@ -166,7 +166,7 @@ def test_a_gyro_that_does_not_answer_is_named_and_left_out() -> None:
 def test_rates_without_bias() -> None:
     rows = np.array([(0, 41, -82, 5), (1, 41, -32768, 6)], m.ROWS[m.Gyros(0, 0, 0, 0).id])
     settings = GyroSettings(41 * COUNT_RAD_S, 0.0, 5 * COUNT_RAD_S, belt_reversed=True)
-    assert rates(rows, settings) == pytest.approx(
+    assert gyro_rates(rows, settings) == pytest.approx(
         COUNT_RAD_S * np.array([[0.0, -82.0, 0.0], [0.0, np.nan, -1.0]]), nan_ok=True
     )
 

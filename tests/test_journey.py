@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from echostep.estimate import Estimate, Status, digest
 from echostep.gait import Leg
 from echostep.journey import KEPT_S, Journey
-from echostep.legpath import Block, LegPath, Wearer, rest_of, turned
+from echostep.legpath import Block, LegPath, WearerSettings, rest_of, turned
 from echostep.plan import load_plan
 from echostep.simulation.board import PythonBoard
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario
@@ -77,7 +77,7 @@ def test_a_turned_leg_leads_elsewhere() -> None:
 
 
 def test_a_foot_alone_is_left_as_it_is() -> None:
-    journey = Journey(Wearer())
+    journey = Journey(WearerSettings())
     legs = [leg(float(k), k + 1.0) for k in range(100)]
     assert [gone for one in legs for gone in journey.foot([one])] == legs
     assert len(journey._known) <= KEPT_S + 2
@@ -85,7 +85,7 @@ def test_a_foot_alone_is_left_as_it_is() -> None:
 
 def test_nobody_who_lies_still_is_believed_to_stand() -> None:
     """The foot walks, then falls silent; the leg gyros lie in a drawer."""
-    journey = Journey(Wearer())
+    journey = Journey(WearerSettings())
     for k in range(100):
         journey.foot([leg(0.1 * k, 0.1 * k + 0.1, 0.1)])
         journey.legs(lying_block(k), 0.1 * k + 0.1)
@@ -101,7 +101,7 @@ def test_blocks_of_any_size_give_the_same_way() -> None:
     columns = [w.t_s[at], w.thigh_rad_s[at], w.calf_rad_s[at], w.belt_rad_s[at], np.full(len(at), np.nan)]
 
     def way(size: int) -> Floats:
-        path = LegPath(Wearer())
+        path = LegPath(WearerSettings())
         legs = [x for k in range(0, len(at), size) for x in path.feed(Block(*(c[k : k + size] for c in columns)))]
         return np.array([sum(x.dx_m for x in legs), sum(x.dy_m for x in legs)])
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from echostep.messages import Outcome
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
+ABSENT = -32768
 ADIS16100_RAD_S = math.radians(0.2439)  # per count [ADIS16100 datasheet, sensitivity]
 
 
@@ -35,7 +36,6 @@ class RangerSettings:
 
 
 GYROS = ("thigh", "calf", "belt")
-NO_RATE = -32768
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,24 +48,22 @@ class GyroSettings:
     belt_reversed: bool = False
 
 
-def rates(gyros: NDArray[np.void], settings: GyroSettings) -> NDArray[np.float64]:
-    """Rates (n, 3) of thigh, calf and belt in rad/s, from messages (n,) by the schema's dtype.
-
-    NaN where a gyro gave none, as while it tests itself.
-    """
-    counts = np.column_stack([gyros[name] for name in GYROS]).astype(np.float64)
-    counts[counts == NO_RATE] = np.nan
-    biases = np.array([settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s])
-    rate = ADIS16100_RAD_S * counts - biases
-    rate[:, 2] *= -1.0 if settings.belt_reversed else 1.0
-    return rate
-
-
 def ranges(pings: NDArray[np.void], settings: RangerSettings) -> NDArray[np.float64]:
     """Ranges (n,) of pings (n,) by the schema's dtype: half the way of the sound; NaN when nothing was heard."""
     range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
     range_m[(pings["outcome"] != Outcome.ECHO) | (pings["time_of_flight_us"] == 0)] = np.nan
     return range_m
+
+
+def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> NDArray[np.float64]:
+    """Rates (n, 3) of thigh, calf and belt in rad/s of gyro samples (n,) by the schema's dtype; NaN where a gyro is absent or tests itself."""
+    counts = np.column_stack([samples[name] for name in GYROS]).astype(np.float64)
+    counts[counts == ABSENT] = np.nan
+    found: NDArray[np.float64] = counts * ADIS16100_RAD_S - [
+        settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s
+    ]  # fmt: skip
+    found[:, 2] *= -1.0 if settings.belt_reversed else 1.0
+    return found
 
 
 def compass_headings(samples: NDArray[np.void]) -> NDArray[np.float64]:

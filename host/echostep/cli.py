@@ -14,16 +14,20 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.logs_cli import app as logs
 from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
+    from echostep.runs import Views
     from echostep.team.endpoint import Outlet
 
+LOCAL = "127.0.0.1"
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
@@ -38,7 +42,19 @@ Start = Annotated[
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
-Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
+Headless = Annotated[bool, typer.Option("--headless", help="No view at all.")]
+Page = Annotated[
+    bool | None,
+    typer.Option(
+        "--page/--no-page",
+        help="Serve the live page (the default), also when a replay is over; or do not.",
+        show_default=False,
+    ),
+]
+Host = Annotated[
+    str, typer.Option("--host", metavar="ADDRESS", help="Serve the page to others too; its address then holds a token.")
+]
+Port = Annotated[int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
 Publish = Annotated[
@@ -69,11 +85,14 @@ def demo(
             help="Program that plays the sensor board; without it the Python board does.",
         ),
     ] = None,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, _outlet(publish, name, team), headless=headless)
+    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team))
 
 
 @app.command()
@@ -87,6 +106,9 @@ def live(
     seed: Seed = 0,
     headless: Headless = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
@@ -94,9 +116,8 @@ def live(
     """Track the wearer of a board and an MTx; everything is recorded."""
     from echostep import runs
 
-    runs.live(
-        plan, board, mtx, out, _pose(start), settings, seed, seconds, _outlet(publish, name, team), headless=headless
-    )
+    views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
+    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet)
 
 
 @app.command()
@@ -124,6 +145,9 @@ def replay(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
     headless: Headless = False,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
@@ -131,9 +155,8 @@ def replay(
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
-    runs.replay(
-        recording, plan, out, _pose(start), settings, seed, truth, _outlet(publish, name, team), headless=headless
-    )
+    views = _views(headless, page, host, port, stays=sys.stdout.isatty())
+    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, _outlet(publish, name, team))
 
 
 @app.command()
@@ -187,6 +210,27 @@ def command(
     from echostep.team import commander
 
     commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option("--heights", metavar="METRES", help="Heights of the storeys, as 0,3.5,7; auto: from the record."),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="The floor at the start, when it is known.", min=0)
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
+) -> None:
+    """Floors of a recorded barometer: t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep import floor_run
+
+    floor_run.floors(pressure, heights, out, start, plot=plot)
 
 
 @app.command()
@@ -269,6 +313,16 @@ def _pose(text: str | None) -> Pose | None:
     return None if text is None else parse_pose(text)
 
 
+def _views(headless: bool, page: bool | None, host: str, port: int | None, *, stays: bool = False) -> Views:
+    from echostep.page.server import Address
+    from echostep.runs import Views
+
+    if headless and page:
+        raise EchostepError("--headless shows nothing: leave it out, or leave out --page")
+    served = not headless and page is not False
+    return Views(not headless, Address(host, port) if served else None, stays=bool(page) or stays)
+
+
 def main() -> None:
     """Entry point: mistakes end with one line and status 2; Ctrl-C and SIGTERM end a run with its files."""
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -281,5 +335,8 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        print(f"echostep: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)

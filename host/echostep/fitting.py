@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.calibration import ADIS16100_RAD_S, GYROS, NO_RATE, GyroSettings
+from echostep.calibration import ABSENT, ADIS16100_RAD_S, GYROS, GyroSettings
 from echostep.errors import EchostepError
 from echostep.heading import compass_heading, fit_iron
 from echostep.leg_file import calibrated_scale
@@ -37,7 +37,7 @@ def gyro_rates(heard: Heard, settings: GyroSettings | None = None) -> tuple[Floa
     known = settings or GyroSettings()
     t_s = np.array(heard.ticks.get("Gyros", []), float) / TICKS_PER_S
     counts = np.array([g[1:] for g in heard.gyros], float).reshape(-1, len(GYROS))
-    counts[counts == NO_RATE] = np.nan
+    counts[counts == ABSENT] = np.nan
     return t_s, ADIS16100_RAD_S * counts - np.array(
         [known.thigh_bias_rad_s, known.calf_bias_rad_s, known.belt_bias_rad_s]
     )
@@ -155,6 +155,6 @@ def find_legs(heard: Heard, settings: GyroSettings, segments: Segments, walked_m
         seen = f"{distance_m:.1f} m in {len(strides)} strides were seen"
         raise EchostepError(f"{seen}: walk {walked_m:g} m straight on, stand still before and after, and do it again")
     scale = calibrated_scale(distance_m, walked_m)
-    values: Values = {"thigh_m": segments.thigh_m, "shank_m": segments.shank_m, "scale": round(scale, 4)}
+    values: Values = {"thigh_m": segments.thigh_m, "shank_m": segments.shank_m, "leg_scale": round(scale, 4)}
     line = f"The walk of {walked_m:g} m was seen as {distance_m:.2f} m in {len(strides)} strides: scale {scale:.3f}"
-    return {"legs": values}, line
+    return {"wearer": values}, line

@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.alignment import Alignment
-from echostep.calibration import GyroSettings, RangerSettings, compass_headings, heights, ranges, rates
+from echostep.calibration import GyroSettings, RangerSettings, compass_headings, gyro_rates, heights, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, Leg, TrunkPath
+from echostep.heading import Iron
 from echostep.health import BoardWords
 from echostep.journey import Journey
-from echostep.legpath import Block, Wearer
+from echostep.legpath import Block, WearerSettings
 from echostep.messages import (
     BY_ID,
     ROWS,
@@ -69,7 +70,7 @@ class Intake:
 
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
-        wearer: Wearer | None = None,
+        wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: Iron | None = None,
     ) -> None:  # fmt: skip
         self.board = BoardReader()
         self.mtx = MtxReader()
@@ -79,13 +80,19 @@ class Intake:
         self.path = TrunkPath(gait)
         self.status: Status | None = None
         self.identity: Identity | None = None
+        self.pings = 0
         self.words = BoardWords()
         self._ranger = ranger
-        self.journey = Journey(wearer or Wearer())
-        self._stride = GyroBlocks((wearer or Wearer()).gyro)
+        self.journey = Journey(wearer or WearerSettings(), iron)
+        self._stride = GyroBlocks(gyro or GyroSettings())
         self._waiting = Waiting()
         self._unknown_ports = 0
         self._bad_times = 0
+
+    @property
+    def ahead(self) -> tuple[Leg, ...]:
+        """Legs that the foot has told already, but whose pings are not all in."""
+        return self._waiting.legs
 
     @property
     def counts(self) -> IntakeCounts:
@@ -133,6 +140,7 @@ class Intake:
     def _hear(self, frames: Frames, times: Times) -> None:
         """Pings that say something about walls, and heights by pressure, wait for their leg."""
         place, pings = frames.rows(PING)
+        self.pings += len(place)
         t_s = times.board_s[place] + self._ranger.delay_s
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
         rows = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[kept]
@@ -190,8 +198,8 @@ class Intake:
 class GyroBlocks:
     """Cuts the board's gyro samples into blocks of BLOCK, with the compass read since the sample before; counted from the first one."""
 
-    def __init__(self, settings: GyroSettings) -> None:
-        self._settings = settings
+    def __init__(self, gyro: GyroSettings) -> None:
+        self._gyro = gyro
         self._rows = np.empty((0, 6))  # t_s, thigh, calf, belt, compass; the place of the message
         self._compass = np.nan
 
@@ -204,7 +212,7 @@ class GyroBlocks:
         compass[np.searchsorted(place, read)] = compass_headings(bearings)
         self._compass = compass[-1]
         new = np.column_stack(
-            [times.board_s[place], rates(samples, self._settings), compass[:-1], times.board_at[place]]
+            [times.board_s[place], gyro_rates(samples, self._gyro), compass[:-1], times.board_at[place]]
         )
         rows = np.concatenate([self._rows, new[~np.isnan(new[:, 0])]])
         count = len(rows) // BLOCK

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.calibration import GyroSettings
 from echostep.gait import STANDING_PIECE_S, Leg
 from echostep.heading import Heading, HeadingSettings, Iron
 from echostep.leg_kinematics import Segments
@@ -31,12 +30,12 @@ RECENT_S = 0.3  # who stands is told of so much later
 
 
 @dataclass(frozen=True, slots=True)
-class Wearer:
-    """What is set of the gyros, the iron about the compass, and the legs; `echostep calibrate` finds it."""
+class WearerSettings:
+    """Hip to knee and knee to ankle of the wearer; `leg_scale`: how much longer his strides are than these tell, from a walk of known length."""
 
-    gyro: GyroSettings = field(default_factory=GyroSettings)
-    compass: Iron = field(default_factory=Iron)
-    legs: Segments = field(default_factory=Segments)
+    thigh_m: float = 0.43
+    shank_m: float = 0.43
+    leg_scale: float = 1.0
 
 
 class Block(NamedTuple):
@@ -52,9 +51,11 @@ class Block(NamedTuple):
 class LegPath:
     """Feed it blocks of samples; what comes out does not depend on their size, but for when it comes."""
 
-    def __init__(self, wearer: Wearer) -> None:
-        self._legs = Legs(LegsSettings(wearer.legs, calibrated=wearer.legs.scale != Segments().scale))
-        self._heading = Heading(HeadingSettings(iron=wearer.compass if wearer.compass != Iron() else None))
+    def __init__(self, settings: WearerSettings, iron: Iron | None = None) -> None:
+        """`iron`: the compass', when it was calibrated."""
+        segments = Segments(settings.thigh_m, settings.shank_m, settings.leg_scale)
+        self._legs = Legs(LegsSettings(segments, calibrated=settings.leg_scale != 1.0))
+        self._heading = Heading(HeadingSettings(iron=iron))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
         self._told_s = -math.inf  # up to where legs were told
         self._begun = False

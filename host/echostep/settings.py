@@ -18,7 +18,7 @@ from echostep.errors import EchostepError
 from echostep.foot import FootSettings
 from echostep.gait import GaitSettings
 from echostep.heading import Iron
-from echostep.leg_kinematics import Segments
+from echostep.legpath import WearerSettings
 from echostep.likelihoods import EchoSettings
 from echostep.particles import CloudSettings
 from echostep.timeline import MtxTiming
@@ -32,12 +32,12 @@ class Settings:
     ranger: RangerSettings = field(default_factory=RangerSettings)
     gyro: GyroSettings = field(default_factory=GyroSettings)
     compass: Iron = field(default_factory=Iron)
-    legs: Segments = field(default_factory=Segments)
     foot: FootSettings = field(default_factory=FootSettings)
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
+    wearer: WearerSettings = field(default_factory=WearerSettings)
 
 
 def read_settings(path: Path | str) -> str:
