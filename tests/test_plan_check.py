@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import warnings
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -191,6 +193,19 @@ def test_pictures(tmp_path: Path) -> None:
         draw_plan(plan, tmp_path / "plan.pdf", [0])
     with pytest.raises(EchostepError, match="cannot write"):
         draw_plan(plan, tmp_path / "none" / "plan.png", [0])
+
+
+@pytest.mark.parametrize("name", ["$x^$", "$\\frac{1}", "a\x00b\nc", "x" * 5000, "\U0001f600", "$$", "&<>"])
+def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
+    plan = house(
+        [{"name": name, "walls": box(), "rooms": [{"name": name, "at": [2, 1]}]}] * 2,
+        connectors=[STAIRS | {"name": name}],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # letters that the font lacks
+        draw_plan(plan, tmp_path / "plan.svg", [0, 1], None, check_plan(plan))
+        draw_plan(plan, tmp_path / "plan.png", [0])
+    ET.parse(tmp_path / "plan.svg")
 
 
 def test_many_walls_become_pixels(tmp_path: Path) -> None:

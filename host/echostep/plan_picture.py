@@ -102,7 +102,8 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Fi
     for way in ways:
         axes.text(
             *way.outline_m.mean(axis=0),
-            way.name,
+            shown(way.name),
+            parse_math=False,
             size=6,
             ha="center",
             va="center",
@@ -113,7 +114,17 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Fi
     named = [room for room in level.rooms if x0 <= room.at_m[0] <= x1 and y0 <= room.at_m[1] <= y1]
     for room in named if len(named) <= MOST_NAMES else ():
         size = _letter_pt(room, view.points_m)
-        axes.text(*room.at_m, room.name, size=size, ha="center", va="center", color="#555555", clip_on=True, zorder=5)
+        axes.text(
+            *room.at_m,
+            shown(room.name),
+            parse_math=False,
+            size=size,
+            ha="center",
+            va="center",
+            color="#555555",
+            clip_on=True,
+            zorder=5,
+        )
     if plan.start is not None and plan.start.level == i:
         axes.plot(
             plan.start.x_m,
@@ -127,10 +138,15 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Fi
         _mark(axes, finding)
     axes.set_xlim(x0, x1)
     axes.set_ylim(y0, y1)
-    axes.set_title(f"{level.name}, {level.height_m:g} m", size=9)
+    axes.set_title(shown(f"{level.name}, {level.height_m:g} m"), size=9, parse_math=False)
     axes.tick_params(labelsize=6, colors="#888888")
     for side in axes.spines.values():
         side.set_color("#dddddd")
+
+
+def shown(name: str) -> str:
+    """A name in a picture: one line, without what is not printed, not too long."""
+    return "".join(letter if letter.isprintable() else " " for letter in name)[:80]
 
 
 def _letter_pt(room: Room, points_m: float) -> float:

@@ -6,6 +6,7 @@ In: a file. Out: entities with the layers that they really lie on; chains of str
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,6 +74,7 @@ def read_drawing(file: Path) -> Any:
     from ezdxf.lldxf.const import DXFError
 
     raw = read_bytes(file)
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # its words about single values; the audit counts them
     try:
         drawing, auditor = recover.read(io.BytesIO(raw))
     except Exception as error:  # a damaged drawing breaks ezdxf in many ways
