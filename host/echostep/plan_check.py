@@ -11,13 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from echostep.plan import Level, Plan
-from echostep.plan_faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead, longer
+from echostep.plan_faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead, longer, shared
 from echostep.plan_leaks import leak
 
 NEAR_M = 0.1  # walls that end so near to each other were meant to meet
 OVERLAP_M = 0.02
+ELBOW_M2 = 1.0  # less room than this beside stairs is no way out
 PARALLEL = 0.02  # sine of the angle
 
 Lines = tuple[tuple[float, float, float, float], ...]
@@ -178,12 +180,26 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
                     at,
                     f"{connector.kind} {connector.name!r} is not enclosed by walls and doors",
                 )
+            elif _sealed(shapely.make_valid(area), plan.levels[i], faces[i]):
+                yield Finding(
+                    "way", i, at, f"{connector.kind} {connector.name!r} has no door and no way out to this level"
+                )
     joined = {i for connector in plan.connectors for i in connector.levels}
     if len(plan.levels) > 1:
         for i in sorted(set(range(len(plan.levels))) - joined):
             ends = plan.levels[i].solid.reshape(-1, 2)
             x, y = ends.mean(axis=0) if len(ends) else (0.0, 0.0)
             yield Finding("way", i, (float(x), float(y)), "no stairs, lift or ramp leads to this level")
+
+
+def _sealed(area: BaseGeometry, level: Level, faces: Faces) -> bool:
+    """Whether walls close stairs or a lift off from all that is about them."""
+    held = shared(area, faces)
+    if OUTSIDE in held or held[1:]:
+        return False
+    room = faces.areas[held[0]]
+    near = [door for door in level.doors if shapely.LineString((door.line[:2], door.line[2:])).distance(room) < JAMB_M]
+    return not near and room.area - room.intersection(area).area < ELBOW_M2
 
 
 def _beside(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
