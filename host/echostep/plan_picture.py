@@ -29,7 +29,7 @@ WALL, WINDOW, DOOR, ROOM, WAY, OBSTACLE, WRONG = (
     "#bbbbbb",
     "#d0021b",
 )
-WIDTH_PX = 1500
+WIDTH_PX = 1500  # of a picture; a level has 900 at least
 MANY = 20_000  # more lines than these are drawn as pixels
 MOST_NAMES = 500  # of rooms in one picture, after which none could be read
 
@@ -53,20 +53,21 @@ def draw_plan(
     if path.suffix.casefold() not in (".png", ".svg"):
         raise EchostepError(f"{path}: pictures are .png or .svg")
     columns = math.ceil(math.sqrt(len(levels)))
+    wide_px = max(WIDTH_PX, 900 * columns)
     rows = math.ceil(len(levels) / columns)
     x0, y0, x1, y1 = bounds or _about([plan.levels[i] for i in levels])
     shape = min(max((y1 - y0) / (x1 - x0), 0.3), 2.5)
     cell = 10.0 if columns == 1 else 6.0  # inches
     figure = Figure(figsize=(cell * columns, ((cell - 0.4) * shape + 0.5) * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    view = View((x0, y0, x1, y1), 72.0 * cell / (x1 - x0), 1.1 * max(x1 - x0, (y1 - y0) / shape) * columns / WIDTH_PX)
+    view = View((x0, y0, x1, y1), 72.0 * cell / (x1 - x0), 1.1 * max(x1 - x0, (y1 - y0) / shape) * columns / wide_px)
     for number, i in enumerate(levels):
         axes = figure.add_subplot(rows, columns, number + 1, aspect="equal")
         _draw_level(axes, plan, i, view, [f for f in findings if f.level == i])
     try:
         figure.savefig(
             path,
-            dpi=max(60, round(WIDTH_PX / figure.get_figwidth())),
+            dpi=max(60, round(wide_px / figure.get_figwidth())),
             metadata={"Date": None} if path.suffix == ".svg" else None,
         )
     except OSError as error:

@@ -96,6 +96,8 @@ def entities(space: Any, file: Path, whole: Callable[[str], bool]) -> Iterator[t
             raise EchostepError(f"{file}: its blocks have more than {MOST_PARTS} parts")
         layer = outer if entity.dxf.layer == "0" else str(entity.dxf.layer)
         yield entity, layer
+        if entity.dxftype() == "INSERT":
+            stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
         if entity.dxftype() == "INSERT" and depth < DEEPEST_BLOCK and not whole(layer):
             stack += [(part, layer, depth + 1) for part in parts(entity, file)]
 
