@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | foot | legs | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """
@@ -14,15 +14,20 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.logs_cli import app as logs
 from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
+    from echostep.runs import Views
+    from echostep.team.endpoint import Outlet
 
+LOCAL = "127.0.0.1"
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
@@ -37,9 +42,31 @@ Start = Annotated[
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
-Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
+Headless = Annotated[bool, typer.Option("--headless", help="No view at all.")]
+Page = Annotated[
+    bool | None,
+    typer.Option(
+        "--page/--no-page",
+        help="Serve the live page (the default), also when a replay is over; or do not.",
+        show_default=False,
+    ),
+]
+Host = Annotated[
+    str, typer.Option("--host", metavar="ADDRESS", help="Serve the page to others too; its address then holds a token.")
+]
+Port = Annotated[int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Tell a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://, several times if you like.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
 
 
 @app.command()
@@ -47,6 +74,9 @@ def demo(
     out: Out = Path("out/demo"),
     headless: Headless = False,
     seed: Seed = 1,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
     board_command: Annotated[
         str | None,
         typer.Option(
@@ -55,11 +85,14 @@ def demo(
             help="Program that plays the sensor board; without it the Python board does.",
         ),
     ] = None,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, headless=headless)
+    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team))
 
 
 @app.command()
@@ -73,11 +106,18 @@ def live(
     seed: Seed = 0,
     headless: Headless = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track the wearer of a board and an MTx; everything is recorded."""
     from echostep import runs
 
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, headless=headless)
+    views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
+    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet)
 
 
 @app.command()
@@ -105,11 +145,18 @@ def replay(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
     headless: Headless = False,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, headless=headless)
+    views = _views(headless, page, host, port, stays=sys.stdout.isatty())
+    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, _outlet(publish, name, team))
 
 
 @app.command()
@@ -149,6 +196,44 @@ def legs(
 
 
 @app.command()
+def command(
+    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    plan: Plan,
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first."""
+    from echostep.team import commander
+
+    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option("--heights", metavar="METRES", help="Heights of the storeys, as 0,3.5,7; auto: from the record."),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="The floor at the start, when it is known.", min=0)
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
+) -> None:
+    """Floors of a recorded barometer: t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep import floor_run
+
+    floor_run.floors(pressure, heights, out, start, plot=plot)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
@@ -158,10 +243,84 @@ def decode(
     runs.decode(file)
 
 
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
+) -> None:
+    """Look at ports, board and MTx, and say what is wrong and what to do; exit status 1 when something is."""
+    from echostep import doctor as examination
+
+    if udev:
+        typer.echo(examination.rules_text(), nl=False)
+    elif not examination.run(board, mtx, seconds):
+        raise typer.Exit(1)
+
+
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); else the one shipped with this program."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from rich.console import Console
+
+    from echostep import flash as flashing
+
+    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[
+        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; all of them when none is named.")
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
+    ] = Path("calibration.toml"),
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
+    walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
+) -> None:
+    """Measure the wearer's gyros, mounting, compass and legs, and write them as settings."""
+    from rich.console import Console
+
+    from echostep import calibrate as calibration
+
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
+
+
+def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
+    from echostep.team.endpoint import parse_outlet
+
+    return parse_outlet(publish, name, team) if publish else None
+
+
 def _pose(text: str | None) -> Pose | None:
     from echostep.runs import parse_pose
 
     return None if text is None else parse_pose(text)
+
+
+def _views(headless: bool, page: bool | None, host: str, port: int | None, *, stays: bool = False) -> Views:
+    from echostep.page.server import Address
+    from echostep.runs import Views
+
+    if headless and page:
+        raise EchostepError("--headless shows nothing: leave it out, or leave out --page")
+    served = not headless and page is not False
+    return Views(not headless, Address(host, port) if served else None, stays=bool(page) or stays)
 
 
 def main() -> None:
@@ -176,5 +335,8 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        print(f"echostep: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)

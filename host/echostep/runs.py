@@ -8,14 +8,20 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import math
+import platform
 import shlex
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -24,19 +30,23 @@ from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
 from echostep.building.formats import open_plan
 from echostep.capture import Decoder, as_json, read_capture
+from echostep.checkin import PERSON
+from echostep.derived import Derived
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.legs import LegsSettings
-from echostep.messages import Identify
+from echostep.messages import SCHEMA_HASH, Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
+from echostep.page.live import LivePage
+from echostep.page.server import Address
 from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose
-from echostep.recording import Recorder, open_recording
+from echostep.recording import Recorder, Recording, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
 from echostep.timeline import MtxTiming
@@ -45,13 +55,30 @@ from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 from echostep.xsens.reader import warm_up
 
+if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
+    from echostep.team.publish import Source
+
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
+TAPPED = "tapped"  # where a recording says that its start is a check-in
 BAUD = {BOARD: 115200, MTX: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
 
-def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> None:
+Tell = Callable[[list[Estimate]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """Who looks at a run: the terminal, the page at an address; `stays`: the page is served until Ctrl-C when a replay is over."""
+
+    terminal: bool = True
+    page: Address | None = None
+    stays: bool = False
+
+
+def demo(out: Path, seed: int, board_command: str | None, views: Views, outlet: Outlet | None = None) -> None:
     """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
     from echostep.simulation.board import BoardProcess, PythonBoard
     from echostep.simulation.scenario import demo_scenario
@@ -68,36 +95,42 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
         truth = load_truth(out / "truth.csv")
         tracker = Tracker(plan, scenario.start, seed=seed)
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
-        with Recorder(out / "walk.mcap", about) as recorder:
-            chunks = scenario.chunks() if headless else _paced(scenario.chunks())
-            estimates = _run(
-                tracker,
-                _portions(_kept(chunks, recorder), HEADLESS_CHUNKS if headless else 1),
-                "echostep demo (simulated)",
-                lambda: scenario.fraction,
-                headless,
-            )
+        title = "echostep demo (simulated)"
+        watched = views.terminal or views.page is not None
+        with _page(tracker, title, views) as page, _published(outlet, tracker, "simulated") as tell:
+            with Recorder(out / "walk.mcap", about) as recorder:
+                chunks = _with_check_ins(_paced(scenario.chunks()) if watched else scenario.chunks(), page)
+                portions = _portions(_kept(chunks, recorder), 1 if watched else HEADLESS_CHUNKS)
+                estimates = _run(tracker, portions, title, lambda: scenario.fraction, views, page, tell, recorder)
+            _say(recorder.notices)
+            _finish(out, tracker, estimates, truth, "simulated walk")
+            _linger(page, views)
     finally:
         scenario.close()
-    _finish(out, tracker, estimates, truth, "simulated walk")
 
 
 def live(
     plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
-    settings_path: Path | None, seed: int, seconds: float | None, *, headless: bool,
+    settings_path: Path | None, seed: int, seconds: float | None, views: Views, outlet: Outlet | None = None,
 ) -> None:  # fmt: skip
     """Track from two serial ports until Ctrl-C."""
     plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
-    tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed)
+    tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed, waits=views.page is not None)
     tracker.warm_up()
     out = _folder(out)
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
-            chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
-            estimates = _run(tracker, chunks, "echostep live", None, headless)
+        about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
+        with (
+            _page(tracker, "echostep live", views) as page,
+            _published(outlet, tracker, "live") as tell,
+            Recorder(out / "walk.mcap", about) as recorder,
+        ):
+            chunks = _until(ports, recorder, tracker.settings.mtx.rate_hz, seconds, page)
+            estimates = _run(tracker, _one_by_one(chunks), "echostep live", None, views, page, tell, recorder)
+        _say(recorder.notices)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live")
@@ -110,9 +143,10 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
     count = {BOARD: 0, MTX: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
-            for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
+        with Recorder(out, {**_versions(), **_now(), "note": "recorded without tracking"}) as recorder:
+            for chunk in filter(None, _until(ports, recorder, MtxTiming().rate_hz, seconds, None)):
                 count[chunk.port] += len(chunk.data)
+        _say(recorder.notices)
     finally:
         ports.close()
     console.print(f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx")
@@ -120,29 +154,39 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
 
 def replay(
     path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
-    seed: int | None, truth_path: Path | None, *, headless: bool,
+    seed: int | None, truth_path: Path | None, views: Views, outlet: Outlet | None = None,
 ) -> None:  # fmt: skip
     """Track a recording again."""
     recording, plan = open_recording(path), open_plan(plan_path)
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
-    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
-    settings = parse_settings(text, str(settings_path or path))
     truth = load_truth(truth_path) if truth_path else None
-    tracker = Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
+    tracker = tracker_of(recording, plan, start, settings_path, seed)
     out = _folder(out)
     if note := about.get("note"):
         console.print(f"Recording: {note}")
     tracker.warm_up()
-    began = time.perf_counter()
-    estimates = _run(
-        tracker, recording.portions(), f"echostep replay {path.name}", lambda: recording.fraction, headless
-    )
-    elapsed_s = time.perf_counter() - began
-    if recording.truncated:
-        console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
-    _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+    title = f"echostep replay {path.name}"
+    with _page(tracker, title, views, replay=True) as page, _published(outlet, tracker, "replay") as tell:
+        began = time.perf_counter()
+        estimates = _run(tracker, recording.portions(), title, lambda: recording.fraction, views, page, tell)
+        elapsed_s = time.perf_counter() - began
+        if recording.truncated:
+            console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
+        _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+        _linger(page, views)
+
+
+def tracker_of(
+    recording: Recording, plan: Plan, start: Pose | None, settings_path: Path | None, seed: int | None
+) -> Tracker:
+    """A tracker as the recording was tracked, but for what is given; raises EchostepError when something is missing or damaged."""
+    about, path = recording.about, recording.path
+    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
+    settings = parse_settings(text, str(settings_path or path))
+    first, seed = start or _recorded_start(about, path), _recorded_seed(about, path, seed)
+    return Tracker(plan, first, settings, seed, waits=about.get("start") == TAPPED)
 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
@@ -223,22 +267,78 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool
-) -> list[Estimate]:
-    """Feed everything; Ctrl-C ends a run like its last chunk does."""
-    view = None if headless else TerminalView(tracker, title, progress, console)
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None,
+    views: Views, page: LivePage | None, tell: Tell, recorder: Recorder | None = None,
+) -> list[Estimate]:  # fmt: skip
+    """Feed everything; Ctrl-C ends a run like its last chunk does. `recorder`: what is derived is recorded, once it has been shown."""
+    derived = Derived(tracker)
+    view = TerminalView(tracker, title, progress, console) if views.terminal else None
     estimates: list[Estimate] = []
     shown: AbstractContextManager[object] = view or nullcontext()
     with shown:
         try:
             for portion in portions:
+                if page:
+                    page.coming()
                 new = tracker.take(portion)
+                if page:
+                    page.shown(portion)
                 estimates += new
+                tell(new)
                 if view:
                     view.show(new)
+                if recorder:
+                    recorder.notes(derived.take(portion, new))
         except KeyboardInterrupt:
-            pass
+            if page:
+                page.wanted = False
     return estimates
+
+
+@contextmanager
+def _page(tracker: Tracker, title: str, views: Views, *, replay: bool = False) -> Iterator[LivePage | None]:
+    """The live page while the run lasts, if anybody wants one; its address is said."""
+    if views.page is None:
+        yield None
+        return
+    with LivePage(tracker, title, views.page, replay=replay) as page:
+        console.print(f"The page: {page.url}", highlight=False)
+        yield page
+
+
+def _linger(page: LivePage | None, views: Views) -> None:
+    """Serve the page when the run is over: as long as somebody looks, or until Ctrl-C if asked."""
+    if page is None or not page.wanted or not (views.stays or page.pages):
+        return
+    console.print(
+        f"The page stays at {page.url} {'until' if views.stays else 'while it is open, or until'} Ctrl-C.",
+        highlight=False,
+    )
+    try:
+        while views.stays or page.pages:
+            time.sleep(0.2)
+    except KeyboardInterrupt:
+        pass
+
+
+def _with_check_ins(chunks: Iterable[Chunk], page: LivePage | None) -> Iterator[Chunk]:
+    """Every chunk, and before it what people said on the page since the last one."""
+    for chunk in chunks:
+        for said in page.said() if page else ():
+            yield Chunk(PERSON, chunk.t_arrival_ns, said)
+        yield chunk
+
+
+@contextmanager
+def _published(outlet: Outlet | None, tracker: Tracker, source: Source) -> Iterator[Tell]:
+    """What to do with new estimates: tell a commander, or nothing."""
+    if outlet is None:
+        yield lambda _: None
+        return
+    from echostep.team.publish import Publishing
+
+    with Publishing(outlet, tracker, source, partial(console.print, markup=False, highlight=False)) as publishing:
+        yield publishing.tell
 
 
 def _paced(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
@@ -256,7 +356,14 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
     """Every chunk, after it has been written."""
     for chunk in chunks:
         recorder.write(chunk)
+        recorder.settle(chunk)
+        _say(recorder.notices)
         yield chunk
+
+
+def _say(notices: deque[str]) -> None:
+    while notices:
+        console.print(notices.popleft())
 
 
 def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
@@ -266,22 +373,33 @@ def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
         yield portion_of(taken)
 
 
-def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None) -> Iterator[Chunk]:
-    """Chunks of the ports, for so long or until Ctrl-C, each recorded before anything looks at it; the MTx is set up on the way.
+def _one_by_one(chunks: Iterable[Chunk | None]) -> Iterator[Portion]:
+    """Portions of one chunk; an empty one when nothing came, so that the views go on."""
+    for chunk in chunks:
+        yield portion_of([chunk] if chunk else [])
 
-    What happens to the ports and to the MTx is said.
+
+def _until(
+    ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None, page: LivePage | None
+) -> Iterator[Chunk | None]:
+    """Chunks of the ports and check-ins, for so long or until Ctrl-C, each recorded before anything looks at it; None when nothing came for a while.
+
+    The MTx is set up on the way. What happens to the ports and to the MTx is said.
     """
     end = math.inf if seconds is None else time.monotonic() + seconds
     start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:
         for chunk in ports.chunks():
-            while ports.notices:
-                console.print(ports.notices.popleft())
+            _say(ports.notices)
+            _say(recorder.notices)
             if chunk is not None:
                 recorder.write(chunk)
             start.follow(chunk)
-            if chunk is not None:
-                yield chunk
+            yield chunk
+            for said in page.said() if page else ():
+                check_in = Chunk(PERSON, time.monotonic_ns(), said)
+                recorder.write(check_in)
+                yield check_in
             if time.monotonic() >= end:
                 return
     except KeyboardInterrupt:
@@ -296,11 +414,15 @@ def _finish(
     title: str,
     elapsed_s: float | None = None,
 ) -> None:
-    """Write the track and say how it went."""
-    write_track(out / "track.csv", estimates)
+    """Write the track and say how it went; a disk that is full is said last."""
     off = errors(estimates, truth) if truth else None
     title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
-    draw_track(out / "track.png", tracker.plan, estimates, truth, title)
+    trouble = None
+    try:
+        write_track(out / "track.csv", estimates)
+        draw_track(out / "track.png", tracker.plan, estimates, truth, title)
+    except OSError as error:
+        trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
@@ -312,15 +434,21 @@ def _finish(
     if elapsed_s:
         span = estimates[-1].t_s - estimates[0].t_s
         console.print(f"{span:.0f} s of walk in {elapsed_s:.2f} s: {span / elapsed_s:.0f} x real time")
-    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}; track.csv and track.png are in {out}")
+    written = f"; track.csv and track.png are in {out}" if trouble is None else ""
+    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}{written}")
+    if trouble is not None:
+        raise trouble
 
 
-def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
-    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"
+def _about(plan: Plan, start: Pose | None, seed: int, settings_toml: str, note: str) -> dict[str, str]:
+    first = {"start": TAPPED}
+    if start is not None:
+        first = {"start_x_y_rad": f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"}
     return {
-        "version": _version(),
+        **_versions(),
+        "plan_name": plan.name,
         "plan_sha256": plan.digest,
-        "start_x_y_rad": pose,
+        **first,
         "seed": str(seed),
         "settings_toml": settings_toml,
         "note": note,
@@ -334,8 +462,8 @@ def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
             return None
         x, y, heading, *level = (float(v) for v in text.split(","))
         return Pose(x, y, heading, int(level[0]) if level else 0)
-    except (ValueError, TypeError) as error:
-        raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
+    except (ValueError, TypeError, OverflowError) as error:
+        raise EchostepError(f"{path}: its recorded start is not known: give one with --start X,Y,DEG") from error
 
 
 def _recorded_seed(about: dict[str, str], path: Path, seed: int | None) -> int:
@@ -353,5 +481,18 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _version() -> str:
-    return importlib.metadata.version("echostep")
+def _versions() -> dict[str, str]:
+    """Of everything that an estimate depends on."""
+    named = {name: importlib.metadata.version(name) for name in ("numpy", "numba")}
+    return {
+        "version": importlib.metadata.version("echostep"),
+        "versions": ", ".join(
+            f"{name} {version}" for name, version in {"python": platform.python_version(), **named}.items()
+        ),
+        "protocol": f"0x{SCHEMA_HASH:08X}",
+    }
+
+
+def _now() -> dict[str, str]:
+    """What the clock on the wall says, and the clock of the arrivals at the same time."""
+    return {"started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"), "started_ns": str(time.monotonic_ns())}

@@ -78,6 +78,13 @@ class Portion:
         for port, t_arrival_ns, start, end in zip(*columns, strict=True):
             yield Chunk(self.ports[port], t_arrival_ns, self.received[start:end])
 
+    def rows(self, begin: int, end: int) -> Portion:
+        """The chunks from row `begin` up to row `end`."""
+        kept = slice(begin, end)
+        return Portion(
+            self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
+        )
+
     def of(self, name: str) -> PortBytes:
         """What the port of that name delivered."""
         if name not in self.ports:
