@@ -39,7 +39,8 @@ class Finding:
 
 def check_plan(plan: Plan) -> list[Finding]:
     """All findings."""
-    faces = [faces_of(level) for level in plan.levels]
+    asked = bool(plan.connectors) or any(level.rooms for level in plan.levels)  # does anything ask for enclosed spaces?
+    faces = [faces_of(level if asked else Level(level.name, level.height_m, level.walls[:0])) for level in plan.levels]
     found = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
     found += _unreachable(plan, faces)
     found += _ways(plan, faces)
