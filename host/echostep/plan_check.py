@@ -20,6 +20,8 @@ from echostep.plan_leaks import leak
 NEAR_M = 0.1  # walls that end so near to each other were meant to meet
 OVERLAP_M = 0.02
 ELBOW_M2 = 1.0  # less room than this beside stairs is no way out
+MOST_WAYS_OUT = 20  # are looked for in one plan
+NOT_ENCLOSED = "is not enclosed by walls and doors"
 PARALLEL = 0.02  # sine of the angle
 
 Lines = tuple[tuple[float, float, float, float], ...]
@@ -45,6 +47,9 @@ def check_plan(plan: Plan) -> list[Finding]:
     found += _unreachable(plan, faces)
     found += _ways(plan, faces)
     found.sort(key=lambda finding: finding.level)
+    opened = [k for k, finding in enumerate(found) if finding.text.endswith(NOT_ENCLOSED)]
+    for k in opened[:MOST_WAYS_OUT]:
+        found[k] = _way_out(found[k], plan.levels[found[k].level])
     return [replace(finding, number=number) for number, finding in enumerate(found, 1)]
 
 
@@ -128,17 +133,18 @@ def _open_rooms(level: Level, faces: Faces, i: int) -> Iterator[Finding]:
     at = faces.at(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
     for room, face in zip(level.rooms, at, strict=True):
         if face == OUTSIDE:
-            yield _opened("open room", level, i, room.at_m, f"room {room.name!r} is not enclosed by walls and doors")
+            yield Finding("open room", i, room.at_m, f"room {room.name!r} {NOT_ENCLOSED}")
 
 
-def _opened(kind: str, level: Level, i: int, at_m: tuple[float, float], text: str) -> Finding:
+def _way_out(finding: Finding, level: Level) -> Finding:
     """A finding about a place that should be enclosed, with its narrowest way out where that can be found."""
     doors = np.array([door.line for door in level.doors]).reshape(-1, 4)
-    gap = leak(np.concatenate((level.solid, longer(doors, JAMB_M))), at_m)
+    gap = leak(np.concatenate((level.solid, longer(doors, JAMB_M))), finding.at_m)
     if gap is None:
-        return Finding(kind, i, at_m, text)
+        return finding
     x, y, width = gap
-    return Finding(kind, i, (x, y), f"{text}; the narrowest way out is {width:g} m wide or less", ((*at_m, x, y),))
+    text = f"{finding.text}; the narrowest way out is {width:g} m wide or less"
+    return replace(finding, at_m=(x, y), text=text, lines_m=((*finding.at_m, x, y),))
 
 
 def _unreachable(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
@@ -174,13 +180,7 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
             )
         for i in connector.levels:
             if faces[i].at(np.array([at]))[0] == OUTSIDE:
-                yield _opened(
-                    "way",
-                    plan.levels[i],
-                    i,
-                    at,
-                    f"{connector.kind} {connector.name!r} is not enclosed by walls and doors",
-                )
+                yield Finding("way", i, at, f"{connector.kind} {connector.name!r} {NOT_ENCLOSED}")
             elif _sealed(shapely.make_valid(area), plan.levels[i], faces[i]):
                 yield Finding(
                     "way", i, at, f"{connector.kind} {connector.name!r} has no door and no way out to this level"

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from echostep.plan_tiles import within
+
 REACH_M = 25.0
 WIDTHS_M = (0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 
@@ -19,8 +21,7 @@ def leak(segments: NDArray[np.float64], at_m: tuple[float, float]) -> tuple[floa
     """X and y of the narrowest way out, and its width at most, in metres; None when it is wider than 6 m, or the room than 25 m."""
     x, y = at_m
     window = shapely.box(x - REACH_M, y - REACH_M, x + REACH_M, y + REACH_M)
-    lines = shapely.linestrings(segments.reshape(-1, 2, 2))
-    walls = shapely.union_all(lines[shapely.intersects(lines, window)])
+    walls = shapely.union_all(shapely.linestrings(within(segments, window.bounds).reshape(-1, 2, 2)))
     if walls.is_empty or walls.distance(Point(at_m)) < WIDTHS_M[0]:
         return None
     for width in WIDTHS_M:
