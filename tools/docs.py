@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import typer
 import typer.models
@@ -82,8 +82,9 @@ def _row(name: str, hint: Any, default: Any) -> str:
         given = (
             (info.default, *(info.param_decls or ())) if info else ()
         )  # in Annotated[], the first name stands where a default would
-        declared = [d for d in given if isinstance(d, str) and d.startswith("-")]
-        value = "" if plain is bool else f" `{(info.metavar if info else None) or 'VALUE'}`"
+        declared = [name for d in given if isinstance(d, str) and d.startswith("-") for name in d.split("/")]
+        flag = plain is bool or bool in get_args(plain)
+        value = "" if flag else f" `{(info.metavar if info else None) or 'VALUE'}`"
         written = ", ".join(f"`{d}`" for d in declared or [f"--{name.replace('_', '-')}"]) + value
     text = " ".join(((info.help if info else None) or "").split()).replace("|", "\\|")
     return f"| {written} | {_default(default)} | {text} |\n"
@@ -92,7 +93,7 @@ def _row(name: str, hint: Any, default: Any) -> str:
 def _default(value: Any) -> str:
     if value is inspect.Parameter.empty:
         return "required"
-    if value is None or value is False or (isinstance(value, float) and math.isinf(value)):
+    if value is None or value is False or value == "" or (isinstance(value, float) and math.isinf(value)):
         return ""
     return f"`{value}`"
 

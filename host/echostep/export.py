@@ -20,10 +20,11 @@ from rich.console import Console
 from rich.progress import Progress
 
 from echostep.building.earth import Earth
+from echostep.building.formats import open_plan
 from echostep.derived import Derived, earth_of
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate
-from echostep.plan import Plan, load_plan
+from echostep.plan import Plan
 from echostep.recording import Recorder, Recording, open_recording
 from echostep.sources import Portion
 from echostep.tracker import Tracker
@@ -43,7 +44,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
     """
     if out.suffix not in FORMATS:
         raise EchostepError(f"{out}: unknown kind of file; there are {', '.join(FORMATS)}")
-    recording, plan = open_recording(path), load_plan(plan_path)
+    recording, plan = open_recording(path), open_plan(plan_path)
     if earth_of(plan) is None and out.suffix in ON_EARTH:
         raise EchostepError(
             f"{plan_path}: has no georeference, which {out.suffix} needs: the longitude and latitude of the map's origin"
