@@ -119,7 +119,7 @@ def looking(browser: Any, url: str, look: str) -> Any:
     return page
 
 
-def until(holds: Callable[[], bool], timeout_s: float = 5.0) -> bool:
+def until(holds: Callable[[], bool], timeout_s: float = 15.0) -> bool:
     deadline = time.monotonic() + timeout_s
     while not holds():
         if time.monotonic() > deadline:
@@ -199,7 +199,8 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
         wait_for(page, "echostep.scene.frame.guidance")
         if look == "dark":
             page.evaluate("echostep.view.zoom(4)")
-        page.wait_for_timeout(1500)
+        wait_for(page, "echostep.scene.frame.guidance.text.includes('to go')")
+        page.wait_for_timeout(700)
         found = Axe().run(
             page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]}
         )
