@@ -56,7 +56,10 @@ Host = Annotated[
 ]
 Port = Annotated[int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
-MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+MtxPort = Annotated[
+    str | None,
+    typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the leg gyros of the board carry."),
+]
 Publish = Annotated[
     list[str] | None,
     typer.Option(
@@ -99,7 +102,7 @@ def demo(
 def live(
     plan: Plan,
     board: BoardPort,
-    mtx: MtxPort,
+    mtx: MtxPort = None,
     out: Out = Path("out/live"),
     start: Start = None,
     settings: SettingsFile = None,
@@ -113,7 +116,7 @@ def live(
     name: Name = "",
     team: Team = "team",
 ) -> None:
-    """Track the wearer of a board and an MTx; everything is recorded."""
+    """Track the wearer of a board and an MTx, or of the board alone; everything is recorded."""
     from echostep import runs
 
     views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
@@ -123,7 +126,7 @@ def live(
 @app.command()
 def record(
     board: BoardPort,
-    mtx: MtxPort,
+    mtx: MtxPort = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
         "out/recording.mcap"
     ),

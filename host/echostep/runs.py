@@ -110,16 +110,16 @@ def demo(out: Path, seed: int, board_command: str | None, views: Views, outlet: 
 
 
 def live(
-    plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
+    plan_path: Path, board: str, mtx: str | None, out: Path, start: Pose | None,
     settings_path: Path | None, seed: int, seconds: float | None, views: Views, outlet: Outlet | None = None,
 ) -> None:  # fmt: skip
-    """Track from two serial ports until Ctrl-C."""
+    """Track from one or two serial ports until Ctrl-C."""
     plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
     tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed, waits=views.page is not None)
     tracker.warm_up()
     out = _folder(out)
-    ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
+    ports = _ports(board, mtx)
     try:
         ports.send(BOARD, encode(Identify(), 0))
         about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
@@ -136,10 +136,10 @@ def live(
     _finish(out, tracker, estimates, None, "live")
 
 
-def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
-    """Record from two serial ports until Ctrl-C."""
+def record(board: str, mtx: str | None, out: Path, seconds: float | None) -> None:
+    """Record from one or two serial ports until Ctrl-C."""
     warm_up()
-    ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
+    ports = _ports(board, mtx)
     count = {BOARD: 0, MTX: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
@@ -379,6 +379,10 @@ def _one_by_one(chunks: Iterable[Chunk | None]) -> Iterator[Portion]:
         yield portion_of([chunk] if chunk else [])
 
 
+def _ports(board: str, mtx: str | None) -> SerialPorts:
+    return SerialPorts({BOARD: board} if mtx is None else {BOARD: board, MTX: mtx}, BAUD)
+
+
 def _until(
     ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None, page: LivePage | None
 ) -> Iterator[Chunk | None]:
@@ -387,14 +391,15 @@ def _until(
     The MTx is set up on the way. What happens to the ports and to the MTx is said.
     """
     end = math.inf if seconds is None else time.monotonic() + seconds
-    start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
+    start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print) if MTX in ports.names else None
     try:
         for chunk in ports.chunks():
             _say(ports.notices)
             _say(recorder.notices)
             if chunk is not None:
                 recorder.write(chunk)
-            start.follow(chunk)
+            if start is not None:
+                start.follow(chunk)
             yield chunk
             for said in page.said() if page else ():
                 check_in = Chunk(PERSON, time.monotonic_ns(), said)
@@ -424,7 +429,7 @@ def _finish(
     except OSError as error:
         trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
-        console.print("No estimate: the foot never stood still, or no MTx bytes came.")
+        console.print("No estimate: the foot never stood still, or no MTx bytes came; without an MTx, nobody walked.")
         return
     if off is not None:
         console.print(

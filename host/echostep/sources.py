@@ -122,7 +122,7 @@ def _join(received: Octets, start: Ints, end: Ints, joined: Octets) -> None:
 
 
 class SerialPorts:
-    """Two serial ports (pyserial URLs) read by a thread each; a port that goes away is opened again.
+    """Serial ports (pyserial URLs) read by a thread each; a port that goes away is opened again.
 
     Raises EchostepError when a port cannot be opened at the start. `notices` says in words what happened to the ports.
     """
@@ -138,6 +138,11 @@ class SerialPorts:
         ]
         for thread in self._threads:
             thread.start()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the ports that are read."""
+        return tuple(self._ports)
 
     def chunks(self) -> Iterator[Chunk | None]:
         """Chunks in order of arrival until `close`; None when nothing came for `IDLE_S`."""
