@@ -30,13 +30,14 @@ from echostep.page import wire
 from echostep.page.ahead import ahead
 from echostep.page.beams import Beam
 from echostep.page.cursor import Cursor
-from echostep.page.guide import Place, straight
+from echostep.page.guide import Errand, Ways, straight
 from echostep.page.live import LivePage
 from echostep.page.scene import Scene, Specks, words
 from echostep.page.server import MOST_PAGES, Address, PageServer
 from echostep.page.session import MOST_UNDRAWN
 from echostep.page.stage import MOST_CHECK_INS, Film, Stage
 from echostep.plan import Pose, load_plan
+from echostep.routes import Place
 from echostep.simulation.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.sources import Chunk, portion_of
@@ -461,6 +462,24 @@ def test_status_in_words() -> None:
     assert words(None, waits=True) == "tap where you stand to start"
 
 
+def test_an_errand_finds_its_way_around_walls() -> None:
+    errand, here, goal = Errand(Place(13.0, 4.5)), told(9.0, 7.5), Place(13.0, 4.5)
+    assert "straight line" in errand.guidance(here).text
+    assert errand.lacks_way(here)
+    errand.found(Ways(PLAN).way(here, goal), "", here)
+    way = errand.guidance(here)
+    assert not errand.lacks_way(here)
+    assert way.distance_m > 5.5  # through the door at (13, 6.5)
+    assert way.path[-1] == (13.0, 4.5)
+    assert abs(way.arrow_rad or 0.0) < 0.3
+    with pytest.raises(EchostepError) as outside:
+        Ways(PLAN).way(here, Place(500.0, 500.0))
+    errand.found(None, str(outside.value), here)
+    assert "outside the plan" in errand.guidance(here).text
+    assert not errand.lacks_way(here)
+    assert errand.lacks_way(told(9.0, 7.5, t_s=10.0))
+
+
 def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
     off_m, last, then = [], None, None
@@ -483,5 +502,5 @@ def test_guidance_points_and_arrives() -> None:
     way = straight(told(), Place(2.0, 17.5, 0))
     assert way.distance_m == 10.0
     assert way.arrow_rad == pytest.approx(math.pi / 2)
-    assert straight(told(), Place(2.3, 7.5, 0)).text == "you are there"
+    assert straight(told(), Place(2.3, 7.5, 0)).text == "You have arrived"
     assert "1 level up" in straight(told(), Place(2.3, 7.5, 1)).text

@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from operator import attrgetter
 from types import TracebackType
 from typing import Self
 
@@ -110,7 +111,10 @@ class LivePage:
             return
         self._ahead_s = since[-1].t1_s
         there = ahead(told, self._tracker.leg, since)
-        self._ahead = replace(self._scene, born_ns=self._born_ns, t_s=there.t_s, told=there, words=words(there))
+        cloud = self._scene.specks and self._scene.specks.moved(there.x_m - told.x_m, there.y_m - told.y_m)
+        self._ahead = replace(
+            self._scene, born_ns=self._born_ns, t_s=there.t_s, told=there, specks=cloud, words=words(there)
+        )
         self._stage.publish(self._ahead)
 
     def _meanwhile(self) -> Scene:
@@ -142,7 +146,7 @@ class LivePage:
             sheet = tracker.building
             new = beams(passage, told, told.level * sheet.storeys.pitch_m, sheet.walls.index, self._model)
             heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)
-        heard = tuple(beam for beam in heard if told.t_s - beam.t_s < STALE_S)
+        heard = tuple(sorted((b for b in heard if told.t_s - b.t_s < STALE_S), key=attrgetter("ranger")))
         self._scene = replace(
             self._scene, born_ns=self._born_ns, t_s=told.t_s, told=told, walked=len(self._stage.trail),
             words=words(told, taps=not self._replay), specks=shown, beams=heard,

@@ -6,7 +6,7 @@ In: a tracker, in the tracker's thread. Out: `Scene`s that any thread may read. 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ class Specks:
     y_m: NDArray[np.float32]
     weight: NDArray[np.uint8]
     level: NDArray[np.uint8]
+
+    def moved(self, dx_m: float, dy_m: float) -> Specks:
+        """The cloud elsewhere."""
+        return replace(self, x_m=self.x_m + np.float32(dx_m), y_m=self.y_m + np.float32(dy_m))
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,8 +28,8 @@ from starlette.websockets import WebSocket
 from echostep.errors import EchostepError
 from echostep.page import wire
 from echostep.page.guard import LOOPBACK, Guard
-from echostep.page.guide import straight
-from echostep.page.session import Guide, PageCounts, Session
+from echostep.page.guide import Ways
+from echostep.page.session import PageCounts, Session
 from echostep.page.stage import Stage
 
 STATIC = Path(__file__).parent / "static"
@@ -51,11 +51,11 @@ class Address:
 class PageServer:
     """Serves a stage until it is closed; raises EchostepError when the address cannot be had."""
 
-    def __init__(self, stage: Stage, address: Address = Address(), guide: Guide = straight) -> None:
+    def __init__(self, stage: Stage, address: Address = Address()) -> None:
         self.counts = PageCounts()
         self.sessions: set[Session] = set()
         self._stage = stage
-        self._guide = guide
+        self._ways = Ways(stage.plan)
         self._listening = _listen(address)
         token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
         host, port = self._listening.getsockname()[:2]
@@ -133,7 +133,7 @@ class PageServer:
             self.counts.refused += 1
             await opened.close(FULL)
             return
-        session = Session(opened, self._stage, self._guide, self.counts)
+        session = Session(opened, self._stage, self._ways, self.counts)
         self.sessions.add(session)
         try:
             session.wake()

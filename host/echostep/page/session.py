@@ -10,16 +10,16 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from echostep.checkin import CheckIn
+from echostep.errors import EchostepError
 from echostep.estimate import Estimate
 from echostep.page import wire
 from echostep.page.cursor import Cursor
-from echostep.page.guide import Guidance, Place
+from echostep.page.guide import Errand, Ways
 from echostep.page.scene import Scene, Specks
 from echostep.page.stage import Stage
 
@@ -27,7 +27,6 @@ FRAME_S = 1.0 / 30.0
 MOST_UNDRAWN = 2
 MOST_REQUESTS_A_SECOND = 240
 POLICY = 1008
-Guide = Callable[[Estimate, Place], Guidance]
 
 
 @dataclass(slots=True)
@@ -42,16 +41,17 @@ class PageCounts:
 class Session:
     """Speaks with one page until it goes away."""
 
-    def __init__(self, socket: WebSocket, stage: Stage, guide: Guide, counts: PageCounts) -> None:
+    def __init__(self, socket: WebSocket, stage: Stage, ways: Ways, counts: PageCounts) -> None:
         self.latency_s: deque[float] = deque(
             maxlen=512
         )  # from the coming of an estimate's bytes to the word that it is drawn
         self._socket = socket
         self._stage = stage
-        self._guide = guide
+        self._ways = ways
         self._counts = counts
         self._cursor = Cursor(stage.film) if stage.film is not None else None
-        self._goal: Place | None = None
+        self._errand: Errand | None = None
+        self._looking: set[asyncio.Task[None]] = set()
         self._news = asyncio.Event()
         self._undrawn: dict[
             int, int | None
@@ -106,9 +106,9 @@ class Session:
                     self._counts.refused += 1
                     await self._socket.send_text('{"kind":"refused","what":"check_in"}')
             case wire.GoTo(goal) if goal.level < len(self._stage.plan.levels):
-                self._goal, self._asked = goal, True
+                self._errand, self._asked = Errand(goal), True
             case wire.GoNowhere():
-                self._goal, self._asked = None, True
+                self._errand, self._asked = None, True
             case _ if self._cursor is not None:
                 self._cursor.take(request)
                 self._asked = True
@@ -144,7 +144,23 @@ class Session:
         self._undrawn[self._serial] = scene.born_ns if news else None
         begin = min(self._walked, scene.walked)
         new = scene.specks if scene.specks is not self._specks else None
-        guidance = self._guide(scene.told, self._goal) if scene.told and self._goal else None
+        guidance = None
+        if scene.told and self._errand:
+            guidance = self._errand.guidance(scene.told)
+            if self._errand.lacks_way(scene.told):
+                self._errand.looking = True
+                task = asyncio.create_task(self._look(self._errand, scene.told))
+                self._looking.add(task)
+                task.add_done_callback(self._looking.discard)
         play = self._cursor.state() if self._cursor else None
         self._last, self._walked, self._specks = scene, scene.walked, scene.specks
         return wire.frame(scene, self._serial, self._stage.trail.part(begin, scene.walked), begin, new, guidance, play)
+
+    async def _look(self, errand: Errand, told: Estimate) -> None:
+        """Look for the way of an errand; the pages go on meanwhile."""
+        try:
+            errand.found(await asyncio.to_thread(self._ways.way, told, errand.goal), "", told)
+        except EchostepError as error:
+            errand.found(None, str(error), told)
+        self._asked = True
+        self._news.set()

@@ -17,9 +17,10 @@ import numpy as np
 
 from echostep.checkin import MOST_LEVELS, CheckIn, check_in_of
 from echostep.fields import LIMIT_M
-from echostep.page.guide import Guidance, Place
+from echostep.page.guide import Guidance
 from echostep.page.scene import KNOWN_HEADING_RAD, Scene, Specks
 from echostep.plan import Plan
+from echostep.routes import Place
 
 MOST_REQUEST = 2048  # bytes
 GRID = 65535.0

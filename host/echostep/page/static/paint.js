@@ -26,7 +26,7 @@ export class Painter {
     if (scene.cloud) this.specks(view, scene.cloud, scene.level);
     this.trail(view, scene.trail, scene.level);
     const { told } = scene.frame ?? {};
-    if (scene.frame?.guidance) this.way(view, scene.frame.guidance.path);
+    if (scene.frame?.guidance?.path.length && told?.level === scene.level) this.way(view, scene.frame.guidance.path);
     if (told && told.level === scene.level) {
       for (const beam of scene.frame.beams) this.beam(view, beam);
       this.ellipse(view, told);
