@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from echostep.messages import Outcome
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
+ABSENT = -32768
 ADIS16100_RAD_S = math.radians(0.2439)  # per count [ADIS16100 datasheet, sensitivity]
 
 
@@ -39,6 +40,20 @@ def ranges(pings: NDArray[np.void], settings: RangerSettings) -> NDArray[np.floa
     range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
     range_m[(pings["outcome"] != Outcome.ECHO) | (pings["time_of_flight_us"] == 0)] = np.nan
     return range_m
+
+
+def gyro_rates(samples: NDArray[np.void]) -> NDArray[np.float64]:
+    """Rates (n, 3) of thigh, calf and belt in rad/s of gyro samples (n,) by the schema's dtype; NaN where a gyro is absent."""
+    counts = np.column_stack([samples[name] for name in ("thigh", "calf", "belt")]).astype(np.float64)
+    counts[counts == ABSENT] = np.nan
+    return counts * ADIS16100_RAD_S
+
+
+def compass_headings(samples: NDArray[np.void]) -> NDArray[np.float64]:
+    """Headings (n,) in radians, counter-clockwise from east, of compass samples (n,) by the schema's dtype; NaN when nothing was read."""
+    bearing = np.where(samples["bearing"] < 3600, samples["bearing"], np.nan)
+    found: NDArray[np.float64] = 0.5 * math.pi - np.radians(0.1 * bearing)
+    return found
 
 
 STANDARD_PA = 101_325.0

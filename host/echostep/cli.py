@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | foot | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | legs | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """
@@ -166,6 +166,27 @@ def command(
     from echostep.team import commander
 
     commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
+def legs(
+    samples: Annotated[Path, typer.Argument(help="CSV: t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad].")],
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")],
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, or to the floor, metres.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    profile: Annotated[
+        str, typer.Option("--profile", metavar="NAME", help="default, or lee2010: that paper's method.")
+    ] = "default",
+    scale: Annotated[float | None, typer.Option("--scale", help="The wearer's, as --walked printed it.")] = None,
+    walked: Annotated[
+        float | None,
+        typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
+    ] = None,
+) -> None:
+    """Distance and track from gyros on thigh and shank, and on the belt."""
+    from echostep import runs
+
+    runs.legs(samples, thigh, shank, out, profile, scale, walked)
 
 
 @app.command()

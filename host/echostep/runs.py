@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from echostep import fischer2008
+from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
@@ -30,6 +30,7 @@ from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
+from echostep.legs import LegsSettings
 from echostep.messages import Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
@@ -186,6 +187,28 @@ def _fischer2008_track(imu: Imu, name: str) -> Track:
 
 
 FOOT_PROFILES = {"default": _own_track, "fischer2008": _fischer2008_track}
+
+
+def legs(
+    path: Path, thigh_m: float, shank_m: float, out: Path, profile: str, scale: float | None, walked_m: float | None
+) -> None:
+    """Track a recorded leg by our own method or a paper's."""
+    if profile not in leg_file.PROFILES:
+        raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(leg_file.PROFILES)}")
+    if scale is not None and not 0.5 < scale < 2.0:
+        raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
+    lengths = leg_file.segments(thigh_m, shank_m, scale or 1.0)
+    samples = leg_file.load_legs(path)
+    for note in samples.notes:
+        console.print(f"{path.name}: {note}")
+    if lengths.measured_to_floor and profile == "default":
+        console.print(f"--shank {shank_m:g} is taken as knee to floor: {lengths.to_ankle_m:.3f} m to the ankle")
+    track = leg_file.PROFILES[profile](samples, LegsSettings(lengths, calibrated=scale is not None))
+    leg_file.write_leg_track(out, track)
+    console.print(f"{path.name}: {leg_file.describe_legs(track)}")
+    if walked_m is not None:
+        found = leg_file.calibrated_scale(float(track.rows[-1, 1]) if len(track.rows) else 0.0, walked_m)
+        console.print(f"--scale {(scale or 1.0) * found:.4f} makes this walk {walked_m:g} m long")
 
 
 def decode(path: Path) -> None:

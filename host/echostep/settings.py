@@ -17,6 +17,7 @@ from echostep.climbing import ClimbSettings
 from echostep.errors import EchostepError
 from echostep.foot import FootSettings
 from echostep.gait import GaitSettings
+from echostep.legpath import WearerSettings
 from echostep.likelihoods import EchoSettings
 from echostep.particles import CloudSettings
 from echostep.timeline import MtxTiming
@@ -33,6 +34,7 @@ class Settings:
     echo: EchoSettings = field(default_factory=EchoSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
+    wearer: WearerSettings = field(default_factory=WearerSettings)
 
 
 def read_settings(path: Path | str) -> str:

@@ -34,7 +34,8 @@ class Tracker:
         self.settings = settings or Settings()
         self.plan = plan
         self.start = pose
-        self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
+        s = self.settings
+        self.intake = Intake(s.mtx, s.ranger, s.foot, s.gait, s.wearer)
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self._rng = np.random.default_rng(seed)

@@ -39,10 +39,24 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
         return import_dxf([path, *above], hints.storey_m, hints.layers, hints.units)
     if above:
         raise EchostepError(f"{above[0]}: only drawings (DXF) come in several files")
+    if path.suffix.casefold() in (".osm", ".xml") or (
+        path.suffix.casefold() == ".json" and _starts(path, '"elements"')
+    ):
+        from echostep.building.osm import import_osm
+
+        return import_osm(path, hints.storey_m)
     if path.name == "main.json" or (path / "main.json").exists():
         from echostep.building.wrld import import_wrld
 
         return import_wrld(path / "main.json" if path.is_dir() else path, hints.storey_m)
+    if path.suffix.casefold() == ".ifc":
+        from echostep.building.ifc import import_ifc
+
+        return import_ifc(path)
+    if path.suffix.casefold() in (".zip", ".imdf") or (path / "manifest.json").exists():
+        from echostep.building.imdf import import_imdf
+
+        return import_imdf(path, hints.storey_m)
     if path.name == "core.txt" or (path / "core.txt").exists():
         from echostep.building.nodelink import import_nodelink
 
@@ -50,3 +64,12 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
     if not path.exists():
         raise EchostepError(f"{path}: no such file")
     raise EchostepError(f"{path}: no format of plans that echostep knows")
+
+
+def _starts(path: Path, text: str) -> bool:
+    """Whether these letters stand near the beginning of a file."""
+    try:
+        with path.open("rb") as file:
+            return text.encode() in file.read(4096)
+    except OSError:
+        return False

@@ -7,6 +7,7 @@ The angles are the normal ones for natural walking, read every 5 % of the cycle 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +41,53 @@ TERMS = 5
 SWAY_M = 0.02  # of the trunk toward the foot that stands [Perry 1992]
 TWIST_RAD = math.radians(4.0)  # of the pelvis, forward with the leg that lands [Perry 1992]
 MID_STANCE = 0.27  # phase
+HALF_PELVIS_M = 0.085  # from the middle to a hip joint [Winter 2009]
+SURGE_M = 0.010  # of the trunk about its even way
+VAULT, LOWEST = 0.63, 0.05
+STRAIGHT = 0.998  # of the leg's length: knees do not lock in walking
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """Hip to knee, and knee to ankle (m)."""
+
+    thigh_m: float = 0.43
+    shank_m: float = 0.43
 
 
 def leg_rates(phase: Floats, effort: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Pitch rates (n,) of thigh and calf in rad/s, forward positive."""
+    """Pitch rates (n,) of thigh and calf in rad/s by the normal curves, forward positive."""
     thigh = effort * _series(THIGH_DEG, phase)
     calf = thigh - effort * _series(KNEE_DEG, phase)
     return np.gradient(thigh) * rate_hz, np.gradient(calf) * rate_hz
+
+
+def leg_angles(ankle_m: Floats, hip_m: Floats, leg: Leg) -> tuple[Floats, Floats]:
+    """Thigh and calf against the vertical (n,), forward positive: the one way in which a knee can join hip and ankle, (n, 2) each, forward and up.
+
+    Where the ankle is out of reach the knee is straight.
+    """
+    to_ankle = ankle_m - hip_m
+    reach = np.clip(
+        np.hypot(*to_ankle.T), abs(leg.thigh_m - leg.shank_m) + 1e-6, STRAIGHT * (leg.thigh_m + leg.shank_m)
+    )
+    direction = np.arctan2(to_ankle[:, 0], -to_ankle[:, 1])
+    at_hip = np.arccos((leg.thigh_m**2 + reach**2 - leg.shank_m**2) / (2.0 * leg.thigh_m * reach))
+    at_ankle = np.arccos((leg.shank_m**2 + reach**2 - leg.thigh_m**2) / (2.0 * leg.shank_m * reach))
+    return direction + at_hip, direction - at_ankle
+
+
+def hip_path(phase: Floats, effort: Floats, stride_m: float, leg: Leg) -> tuple[Floats, Floats]:
+    """How far one hip is ahead of the trunk's even way and below where it stands (m), (n,) each.
+
+    Trunk: fastest and lowest while both feet carry [Perry 1992]. A vault over stiff legs would drop it by stride^2 / 32 legs; knees and ankles
+    take a third.
+    """
+    drop_m = VAULT * (effort * stride_m) ** 2 / (32.0 * (leg.thigh_m + leg.shank_m))
+    low = 0.5 * drop_m * (1.0 + np.cos(4.0 * np.pi * (phase - LOWEST)))
+    surge = -SURGE_M * effort * np.cos(4.0 * np.pi * phase)
+    turned: Floats = HALF_PELVIS_M * np.sin(TWIST_RAD * effort * np.cos(2.0 * np.pi * phase))
+    return surge + turned, low
 
 
 def sway(phase: Floats, effort: Floats) -> tuple[Floats, Floats]:

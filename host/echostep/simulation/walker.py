@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.simulation.attitude import rotations
 from echostep.simulation.footpath import Foot, Strides, foot_path
-from echostep.simulation.legs import leg_rates, sway
+from echostep.simulation.legs import STRAIGHT, Leg, hip_path, leg_angles, sway
 
 Floats = NDArray[np.float64]
 Waypoint = (  # x, y, how long to pause there (s), height (m; 0 when not given)
@@ -32,6 +33,9 @@ STEEP = 0.1  # rise over run; less is a ramp, walked as the flat
 STAIR_STRIDE_M = 0.58  # of run: two treads of 29 cm
 LIFT_M_S, LIFT_M_S2 = 1.0, 0.8  # a passenger lift's speed and its change [ISO 8100-32, typical]
 DOORS_S = 3.0  # before and after a ride
+STEADY, LOADED = 0.85, 0.1  # effort, phase: when the hip is so low that the knee is all but straight
+LEG_SMOOTH_MS = 41  # soft parts round off what a sensor on them feels
+ANKLE = np.array([-0.06, 0.0, 0.0])  # from the sensor on the instep, foot frame (m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +48,7 @@ class Person:
     corner_m: float = 0.6
     stand_s: float = 3.0
     foot: Foot = field(default_factory=Foot)
+    leg: Leg = field(default_factory=Leg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,11 +193,30 @@ class _Schedule:
         strides = self._landings(trunk, heading, height)
         foot_m, rpy, flat = foot_path(t, strides, self._person.foot, height)
         phase, effort = strides.phase(t), _smooth(strides.effort(t, self._person.stride_m))
-        thigh, calf = leg_rates(phase, effort, RATE_HZ)
+        above_floor = foot_m - height[:, None] * np.array([0.0, 0.0, 1.0])
+        thigh, calf = self._leg(trunk, heading, above_floor, rpy, phase, effort)
         left_m, twist = sway(phase, effort)
         worn = heading + twist
         trunk = trunk + left_m[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
         return Walk(t, trunk, worn, foot_m, rpy, thigh, calf, np.gradient(worn) * RATE_HZ, flat, height)
+
+    def _leg(
+        self, trunk: Floats, heading: Floats, foot_m: Floats, rpy: Floats, phase: Floats, effort: Floats
+    ) -> tuple[Floats, Floats]:
+        """Rates of thigh and calf, by the foot above the floor that carries the trunk: what joins the hip on its way to the ankle on its own."""
+        person, along = self._person, np.column_stack([np.cos(heading), np.sin(heading)])
+        lever = rotations(rpy) @ ANKLE
+        ankle = np.column_stack(
+            [np.einsum("ni,ni->n", foot_m[:, :2] + lever[:, :2] - trunk, along), foot_m[:, 2] + lever[:, 2]]
+        )
+        ahead, low = hip_path(phase, effort, person.stride_m, person.leg)
+        length = STRAIGHT * (person.leg.thigh_m + person.leg.shank_m)
+        most = ankle[:, 1] + np.sqrt(np.maximum(length**2 - (ankle[:, 0] - ahead) ** 2, 0.01))
+        upright = ankle[0, 1] + length - low
+        lower = float(np.max((upright - most)[(effort > STEADY) & (phase < LOADED)], initial=0.0))
+        high = np.minimum(upright - lower * np.minimum(effort, 1.0) ** 2, most)
+        thigh, calf = leg_angles(ankle, np.column_stack([ahead, _smooth(high, LEG_SMOOTH_MS)]), person.leg)
+        return np.gradient(_smooth(thigh, LEG_SMOOTH_MS)) * RATE_HZ, np.gradient(_smooth(calf, LEG_SMOOTH_MS)) * RATE_HZ
 
     def _turn_to(self, at: Floats, course: float) -> None:
         """Turn on the spot, the short way, a few strides if it takes that."""
@@ -269,8 +293,8 @@ def _hermite(t: Floats, knots: Floats, values: Floats) -> Floats:
     return found
 
 
-def _smooth(values: Floats) -> Floats:
+def _smooth(values: Floats, width_ms: int = SMOOTH_MS) -> Floats:
     """Running mean, ends held."""
-    padded = np.pad(values, SMOOTH_MS // 2, mode="edge")
+    padded = np.pad(values, width_ms // 2, mode="edge")
     total = np.concatenate([[0.0], np.cumsum(padded)])
-    return (total[SMOOTH_MS:] - total[:-SMOOTH_MS]) / SMOOTH_MS
+    return (total[width_ms:] - total[:-width_ms]) / width_ms
