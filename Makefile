@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 ELF := firmware/build/echostep.elf
+SHIPPED := host/echostep/firmware/echostep.hex
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
 TEST_PACKAGES := mosquitto
@@ -22,8 +23,9 @@ $(READY): host/pyproject.toml
 tools-apt:
 	@tools/apt.sh $(APT_PACKAGES)
 
-firmware: ## build the firmware (firmware/build/echostep.elf and .hex)
+firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
 	$(MAKE) -C firmware
+	cp firmware/build/echostep.hex $(SHIPPED)
 
 twin: $(READY) ## play the board and the MTx on two pseudo terminals, in real time, until Ctrl-C
 	@tools/apt.sh $(APT_PACKAGES)
@@ -72,11 +74,12 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
-flash: ## write the firmware to a board: make flash PORT=/dev/ttyACM0
+flash: $(READY) ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
 	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }
 	@[ -e "$(PORT)" ] || { echo "$(PORT): there is no such port; see ls /dev/serial/by-id"; exit 2; }
 	@tools/apt.sh avrdude || { echo "avrdude is not installed and this user may not install it: apt install avrdude"; exit 2; }
-	$(MAKE) -C firmware flash PORT=$(PORT)
+	@if command -v avr-gcc >/dev/null || tools/apt.sh $(APT_PACKAGES); then $(MAKE) -C firmware && $(BIN)/echostep flash --port $(PORT) --hex firmware/build/echostep.hex; \
+	else echo "avr-gcc is not installed: the firmware that comes with the package is written"; $(BIN)/echostep flash --port $(PORT); fi
 
 clean: ## remove everything that was built
 	$(MAKE) -C firmware clean

@@ -54,7 +54,8 @@ def leg(t0: float, t1: float, dx: float = 1.0, heading: float = 0.0) -> Leg:
 
 def lying_block(k: int) -> Block:
     none = np.zeros(20)
-    return Block(0.1 * k + 0.005 * np.arange(20), none, none, none, np.full(20, np.nan))
+    t_s: Floats = 0.1 * k + np.linspace(0.0, 0.095, 20)
+    return Block(t_s, none, none, none, np.full(20, np.nan))
 
 
 # Pieces

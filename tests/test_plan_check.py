@@ -57,7 +57,14 @@ def test_sound_plans() -> None:
 
 
 def test_an_open_room() -> None:
-    assert kinds(flat(box(), rooms=[ROOM])) == ["open room"]
+    (finding,) = check_plan(flat(box(), rooms=[ROOM]))
+    assert finding.kind == "open room"
+    assert "is 1 m wide or less" in finding.text
+    assert finding.at_m == pytest.approx((1.5, 0.0), abs=0.3)
+    assert kinds(flat([], rooms=[ROOM])) == ["open room"]
+    (finding,) = check_plan(flat([[0, 0, 4, 0], [4, 0, 4, 2.6], [4, 3, 0, 3], [0, 3, 0, 0]], rooms=[ROOM]))
+    assert finding.at_m == pytest.approx((4.0, 2.8), abs=0.3)
+    assert "is 0.5 m wide or less" in finding.text
 
 
 def test_walls_that_almost_meet() -> None:

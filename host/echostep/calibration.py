@@ -35,6 +35,19 @@ class RangerSettings:
     delay_s: float = 0.0
 
 
+GYROS = ("thigh", "calf", "belt")
+
+
+@dataclass(frozen=True, slots=True)
+class GyroSettings:
+    """Biases of the board's gyros, and whether the belt's is worn upside down; found by `echostep calibrate`."""
+
+    thigh_bias_rad_s: float = 0.0
+    calf_bias_rad_s: float = 0.0
+    belt_bias_rad_s: float = 0.0
+    belt_reversed: bool = False
+
+
 def ranges(pings: NDArray[np.void], settings: RangerSettings) -> NDArray[np.float64]:
     """Ranges (n,) of pings (n,) by the schema's dtype: half the way of the sound; NaN when nothing was heard."""
     range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
@@ -42,11 +55,15 @@ def ranges(pings: NDArray[np.void], settings: RangerSettings) -> NDArray[np.floa
     return range_m
 
 
-def gyro_rates(samples: NDArray[np.void]) -> NDArray[np.float64]:
-    """Rates (n, 3) of thigh, calf and belt in rad/s of gyro samples (n,) by the schema's dtype; NaN where a gyro is absent."""
-    counts = np.column_stack([samples[name] for name in ("thigh", "calf", "belt")]).astype(np.float64)
+def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> NDArray[np.float64]:
+    """Rates (n, 3) of thigh, calf and belt in rad/s of gyro samples (n,) by the schema's dtype; NaN where a gyro is absent or tests itself."""
+    counts = np.column_stack([samples[name] for name in GYROS]).astype(np.float64)
     counts[counts == ABSENT] = np.nan
-    return counts * ADIS16100_RAD_S
+    found: NDArray[np.float64] = counts * ADIS16100_RAD_S - [
+        settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s
+    ]  # fmt: skip
+    found[:, 2] *= -1.0 if settings.belt_reversed else 1.0
+    return found
 
 
 def compass_headings(samples: NDArray[np.void]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | foot | legs | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """
@@ -152,23 +152,6 @@ def foot(
 
 
 @app.command()
-def command(
-    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
-    plan: Plan,
-    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
-    picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
-) -> None:
-    """Follow a team on one plan, lost and silent ones first."""
-    from echostep.team import commander
-
-    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
-
-
-@app.command()
 def legs(
     samples: Annotated[Path, typer.Argument(help="CSV: t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad].")],
     thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")],
@@ -190,6 +173,23 @@ def legs(
 
 
 @app.command()
+def command(
+    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    plan: Plan,
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first."""
+    from echostep.team import commander
+
+    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
@@ -197,6 +197,64 @@ def decode(
     from echostep import runs
 
     runs.decode(file)
+
+
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
+) -> None:
+    """Look at ports, board and MTx, and say what is wrong and what to do; exit status 1 when something is."""
+    from echostep import doctor as examination
+
+    if udev:
+        typer.echo(examination.rules_text(), nl=False)
+    elif not examination.run(board, mtx, seconds):
+        raise typer.Exit(1)
+
+
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); else the one shipped with this program."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from rich.console import Console
+
+    from echostep import flash as flashing
+
+    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[
+        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; all of them when none is named.")
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
+    ] = Path("calibration.toml"),
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
+    walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
+) -> None:
+    """Measure the wearer's gyros, mounting, compass and legs, and write them as settings."""
+    from rich.console import Console
+
+    from echostep import calibrate as calibration
+
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
 
 
 def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.alignment import Alignment
-from echostep.calibration import RangerSettings, compass_headings, gyro_rates, heights, ranges
+from echostep.calibration import GyroSettings, RangerSettings, compass_headings, gyro_rates, heights, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
 from echostep.gait import GaitSettings, Leg, TrunkPath
+from echostep.heading import Iron
 from echostep.health import BoardWords
 from echostep.journey import Journey
 from echostep.legpath import Block, WearerSettings
@@ -69,7 +70,7 @@ class Intake:
 
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
-        wearer: WearerSettings | None = None,
+        wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: Iron | None = None,
     ) -> None:  # fmt: skip
         self.board = BoardReader()
         self.mtx = MtxReader()
@@ -81,8 +82,8 @@ class Intake:
         self.identity: Identity | None = None
         self.words = BoardWords()
         self._ranger = ranger
-        self.journey = Journey(wearer or WearerSettings())
-        self._stride = GyroBlocks()
+        self.journey = Journey(wearer or WearerSettings(), iron)
+        self._stride = GyroBlocks(gyro or GyroSettings())
         self._waiting = Waiting()
         self._unknown_ports = 0
         self._bad_times = 0
@@ -190,7 +191,8 @@ class Intake:
 class GyroBlocks:
     """Cuts the board's gyro samples into blocks of BLOCK, with the compass read since the sample before; counted from the first one."""
 
-    def __init__(self) -> None:
+    def __init__(self, gyro: GyroSettings) -> None:
+        self._gyro = gyro
         self._rows = np.empty((0, 6))  # t_s, thigh, calf, belt, compass; the place of the message
         self._compass = np.nan
 
@@ -202,7 +204,9 @@ class GyroBlocks:
         compass[0] = self._compass
         compass[np.searchsorted(place, read)] = compass_headings(bearings)
         self._compass = compass[-1]
-        new = np.column_stack([times.board_s[place], gyro_rates(samples), compass[:-1], times.board_at[place]])
+        new = np.column_stack(
+            [times.board_s[place], gyro_rates(samples, self._gyro), compass[:-1], times.board_at[place]]
+        )
         rows = np.concatenate([self._rows, new[~np.isnan(new[:, 0])]])
         count = len(rows) // BLOCK
         self._rows = rows[count * BLOCK :].copy()

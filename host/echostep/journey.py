@@ -15,6 +15,7 @@ from collections import deque
 from dataclasses import replace
 
 from echostep.gait import Leg, wrap
+from echostep.heading import Iron
 from echostep.legpath import Block, LegPath, WearerSettings, rest_of, turned
 
 SILENT_S = 0.5  # a foot that is this far behind the board does not tell
@@ -31,8 +32,9 @@ PATIENCE_S = 4.0  # a foot that is back waits for the legs to catch up
 class Journey:
     """`foot` and `legs` take what comes, in order, and return what is certain."""
 
-    def __init__(self, settings: WearerSettings) -> None:
-        self._settings = settings
+    def __init__(self, settings: WearerSettings, iron: Iron | None = None) -> None:
+        """`iron`: the compass', when it was calibrated."""
+        self._settings, self._iron = settings, iron
         self._path: LegPath | None = None  # while the legs carry
         self._kept: deque[Block] = deque()
         self._known: deque[Leg] = deque()  # that the foot told, as long ago as the kept blocks
@@ -76,7 +78,7 @@ class Journey:
         """Go through what was kept; the legs carry if they are worn."""
         if self._foot_seen and not self._known:
             return []
-        path = LegPath(self._settings)
+        path = LegPath(self._settings, self._iron)
         told = [leg for block in self._kept for leg in path.feed(block)]
         if self._foot_seen and not self._learn(path, told):
             self._known.clear()  # until the foot has told more, they are not asked again

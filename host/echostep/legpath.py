@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.gait import STANDING_PIECE_S, Leg
-from echostep.heading import Heading, HeadingSettings
+from echostep.heading import Heading, HeadingSettings, Iron
 from echostep.leg_kinematics import Segments
 from echostep.legs import Flag, Legs, LegsSettings, Stride
 
@@ -51,10 +51,11 @@ class Block(NamedTuple):
 class LegPath:
     """Feed it blocks of samples; what comes out does not depend on their size, but for when it comes."""
 
-    def __init__(self, settings: WearerSettings) -> None:
+    def __init__(self, settings: WearerSettings, iron: Iron | None = None) -> None:
+        """`iron`: the compass', when it was calibrated."""
         segments = Segments(settings.thigh_m, settings.shank_m, settings.leg_scale)
         self._legs = Legs(LegsSettings(segments, calibrated=settings.leg_scale != 1.0))
-        self._heading = Heading(HeadingSettings())
+        self._heading = Heading(HeadingSettings(iron=iron))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
         self._told_s = -math.inf  # up to where legs were told
         self._begun = False

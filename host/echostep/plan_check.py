@@ -13,7 +13,8 @@ import shapely
 from numpy.typing import NDArray
 
 from echostep.plan import Level, Plan
-from echostep.plan_faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead
+from echostep.plan_faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead, longer
+from echostep.plan_leaks import leak
 
 NEAR_M = 0.1  # walls that end so near to each other were meant to meet
 OVERLAP_M = 0.02
@@ -124,7 +125,17 @@ def _open_rooms(level: Level, faces: Faces, i: int) -> Iterator[Finding]:
     at = faces.at(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
     for room, face in zip(level.rooms, at, strict=True):
         if face == OUTSIDE:
-            yield Finding("open room", i, room.at_m, f"room {room.name!r} is not enclosed by walls and doors")
+            yield _opened("open room", level, i, room.at_m, f"room {room.name!r} is not enclosed by walls and doors")
+
+
+def _opened(kind: str, level: Level, i: int, at_m: tuple[float, float], text: str) -> Finding:
+    """A finding about a place that should be enclosed, with its narrowest way out where that can be found."""
+    doors = np.array([door.line for door in level.doors]).reshape(-1, 4)
+    gap = leak(np.concatenate((level.solid, longer(doors, JAMB_M))), at_m)
+    if gap is None:
+        return Finding(kind, i, at_m, text)
+    x, y, width = gap
+    return Finding(kind, i, (x, y), f"{text}; the narrowest way out is {width:g} m wide or less", ((*at_m, x, y),))
 
 
 def _unreachable(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
@@ -160,7 +171,13 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
             )
         for i in connector.levels:
             if faces[i].at(np.array([at]))[0] == OUTSIDE:
-                yield Finding("way", i, at, f"{connector.kind} {connector.name!r}: outside of all walls")
+                yield _opened(
+                    "way",
+                    plan.levels[i],
+                    i,
+                    at,
+                    f"{connector.kind} {connector.name!r} is not enclosed by walls and doors",
+                )
     joined = {i for connector in plan.connectors for i in connector.levels}
     if len(plan.levels) > 1:
         for i in sorted(set(range(len(plan.levels))) - joined):

@@ -79,7 +79,7 @@ def _layers(texts: list[str]) -> dict[str, list[str]]:
     return layers
 
 
-PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON).")]
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
 
 
 @app.command()
@@ -90,11 +90,11 @@ def check(
     ] = None,
 ) -> None:
     """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
-    from echostep.plan import load_plan
+    from echostep.building.formats import open_plan
     from echostep.plan_check import check_plan
     from echostep.plan_picture import draw_plan
 
-    plan = load_plan(file)
+    plan = open_plan(file)
     findings = check_plan(plan)
     for finding in findings[:MOST_LINES]:
         x, y = finding.at_m
@@ -122,10 +122,10 @@ def show(
     ] = None,
 ) -> None:
     """Draw a plan."""
-    from echostep.plan import load_plan
+    from echostep.building.formats import open_plan
     from echostep.plan_picture import draw_plan
 
-    plan = load_plan(file)
+    plan = open_plan(file)
     draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
 
 

@@ -24,6 +24,7 @@ from rich.console import Console
 
 from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
+from echostep.building.formats import open_plan
 from echostep.capture import Decoder, as_json, read_capture
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
@@ -36,7 +37,7 @@ from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
-from echostep.plan import Plan, Pose, load_plan
+from echostep.plan import Plan, Pose
 from echostep.recording import Recorder, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
@@ -69,7 +70,7 @@ def demo(out: Path, seed: int, board_command: str | None, outlet: Outlet | None 
     console.print(f"A simulated walk in a simulated building; the sensor board is {player}.")
     out = _folder(out)
     with as_file(files("echostep") / "plans" / "demo.json") as plan_path:
-        plan = load_plan(plan_path)
+        plan = open_plan(plan_path)
     scenario = demo_scenario(plan, seed, board)
     try:
         scenario.write_truth(out / "truth.csv")
@@ -96,7 +97,7 @@ def live(
     settings_path: Path | None, seed: int, seconds: float | None, outlet: Outlet | None = None, *, headless: bool,
 ) -> None:  # fmt: skip
     """Track from two serial ports until Ctrl-C."""
-    plan = load_plan(plan_path)
+    plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
     tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed)
     tracker.warm_up()
@@ -133,7 +134,7 @@ def replay(
     seed: int | None, truth_path: Path | None, outlet: Outlet | None = None, *, headless: bool,
 ) -> None:  # fmt: skip
     """Track a recording again."""
-    recording, plan = open_recording(path), load_plan(plan_path)
+    recording, plan = open_recording(path), open_plan(plan_path)
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")

@@ -11,6 +11,7 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, unwatched
 from echostep.gait import Leg
+from echostep.heading import Iron
 from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
@@ -35,7 +36,9 @@ class Tracker:
         self.plan = plan
         self.start = pose
         s = self.settings
-        self.intake = Intake(s.mtx, s.ranger, s.foot, s.gait, s.wearer)
+        self.intake = Intake(
+            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == Iron() else s.compass
+        )
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self._rng = np.random.default_rng(seed)

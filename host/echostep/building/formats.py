@@ -11,10 +11,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan
+from echostep.plan import Plan, load_plan
 from echostep.plan_writer import plan_json
 
 STOREY_M = 3.5  # from floor to floor, where a format does not say
+OTHERS = {".dxf", ".ifc", ".imdf", ".osm", ".xml", ".zip"}  # what is no plan.json, by its name
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,14 @@ def import_plan(path: Path, hints: Hints | None = None, above: Sequence[Path] = 
     """The plan in a file of another program (drawings: one file a storey, more of them `above`); EchostepError names the file and the place in it."""
     plan = _imported(path, hints or Hints(), above)
     return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
+
+
+def open_plan(path: Path | str) -> Plan:
+    """A plan.json as it is; anything else by import, where it says enough about itself. EchostepError names the file and the place in it."""
+    path = Path(path)
+    if path.is_dir() or path.suffix.casefold() in OTHERS or path.name in ("main.json", "core.txt"):
+        return import_plan(path)
+    return load_plan(path)
 
 
 def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
