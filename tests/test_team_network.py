@@ -161,6 +161,25 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
 
 
 @needs_broker
+def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
+    with Broker(tmp_path) as broker, listening(broker.url) as ear:
+        boxes = [box_to(broker.url, name=f"n{k:02d}", run=f"{k:08x}") for k in range(20)]
+        for n in range(20):
+            for k, box in enumerate(boxes):
+                box.offer(replace(at(float(n), f"n{k:02d}"), run=f"{k:08x}", status="lost" if k == 7 else "tracking"))
+            ear.members()
+            time.sleep(0.05)
+        until(lambda: [m.report.position.t_s for m in ear.members() if m.report.position] == [19.0] * 20)
+        first = ear.members()[0]
+        assert (first.report.name, first.need(time.monotonic())) == ("n07", Need.LOST)
+        assert sum(m.missed for m in ear.members()) == 0
+        assert ear.roster.counts == {}
+        for box in boxes:
+            box.end()
+        assert [box.close().split(", ")[0].rpartition(": ")[2] for box in boxes] == ["20 of 20 reports sent"] * 20
+
+
+@needs_broker
 def test_two_trackers_of_one_name_do_not_throw_each_other_out(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker, listening(broker.url) as ear:
         boxes = [box_to(broker.url, run=run) for run in ("11111111", "22222222")]
@@ -461,7 +480,7 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
 def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
         commander = subprocess.Popen(
-            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "60", "--picture", tmp_path / "team.png"],
+            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "300", "--picture", tmp_path / "team.png"],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         try:
