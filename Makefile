@@ -57,6 +57,7 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
+	$(BIN)/python tools/docs.py --check
 	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
 size: ## flash, static RAM and stack of the firmware
@@ -74,6 +75,17 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
+wheel: $(READY) ## build the wheel, install it in a fresh environment without compiler, run the demo in there, and pipx
+	$(BIN)/python tools/wheel.py
+
+docs: $(READY) ## make all pages anew that come from the code: messages, plan, commands, settings, recordings
+	$(BIN)/python protocol/generate.py
+	$(BIN)/python tools/plan_fields.py
+	$(BIN)/python tools/docs.py
+
+kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
+	$(BIN)/python tools/kill_recorder.py
+
 flash: $(READY) ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
 	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }
 	@[ -e "$(PORT)" ] || { echo "$(PORT): there is no such port; see ls /dev/serial/by-id"; exit 2; }
@@ -87,4 +99,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup tools-apt firmware twin demo real test check size measure bench flash clean
+.PHONY: help setup tools-apt firmware twin demo real test check size measure bench wheel kill docs flash clean

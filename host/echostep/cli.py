@@ -14,6 +14,7 @@ import typer
 
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.logs_cli import app as logs
 from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
@@ -190,6 +192,27 @@ def command(
 
 
 @app.command()
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option("--heights", metavar="METRES", help="Heights of the storeys, as 0,3.5,7; auto: from the record."),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="The floor at the start, when it is known.", min=0)
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
+) -> None:
+    """Floors of a recorded barometer: t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep import floor_run
+
+    floor_run.floors(pressure, heights, out, start, plot=plot)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
@@ -281,5 +304,8 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        print(f"echostep: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)

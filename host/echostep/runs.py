@@ -8,11 +8,14 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import math
+import platform
 import shlex
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from datetime import UTC, datetime
 from functools import partial
 from importlib.resources import as_file, files
 from itertools import islice
@@ -26,19 +29,20 @@ from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
 from echostep.building.formats import open_plan
 from echostep.capture import Decoder, as_json, read_capture
+from echostep.derived import Derived
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.legs import LegsSettings
-from echostep.messages import Identify
+from echostep.messages import SCHEMA_HASH, Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose
-from echostep.recording import Recorder, open_recording
+from echostep.recording import Recorder, Recording, open_recording
 from echostep.settings import parse_settings, read_settings
 from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
 from echostep.timeline import MtxTiming
@@ -86,7 +90,9 @@ def demo(out: Path, seed: int, board_command: str | None, outlet: Outlet | None 
                 lambda: scenario.fraction,
                 headless,
                 tell,
+                recorder,
             )
+        _say(recorder.notices)
     finally:
         scenario.close()
     _finish(out, tracker, estimates, truth, "simulated walk")
@@ -105,10 +111,11 @@ def live(
     ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        about = _about(plan, tracker.start, seed, text, "live")
+        about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
         with _published(outlet, tracker, "live") as tell, Recorder(out / "walk.mcap", about) as recorder:
             chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
-            estimates = _run(tracker, chunks, "echostep live", None, headless, tell)
+            estimates = _run(tracker, chunks, "echostep live", None, headless, tell, recorder)
+        _say(recorder.notices)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live")
@@ -121,9 +128,10 @@ def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
     count = {BOARD: 0, MTX: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
+        with Recorder(out, {**_versions(), **_now(), "note": "recorded without tracking"}) as recorder:
             for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
                 count[chunk.port] += len(chunk.data)
+        _say(recorder.notices)
     finally:
         ports.close()
     console.print(f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx")
@@ -138,10 +146,8 @@ def replay(
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
-    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
-    settings = parse_settings(text, str(settings_path or path))
     truth = load_truth(truth_path) if truth_path else None
-    tracker = Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
+    tracker = tracker_of(recording, plan, start, settings_path, seed)
     out = _folder(out)
     if note := about.get("note"):
         console.print(f"Recording: {note}")
@@ -155,6 +161,16 @@ def replay(
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
     _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+
+
+def tracker_of(
+    recording: Recording, plan: Plan, start: Pose | None, settings_path: Path | None, seed: int | None
+) -> Tracker:
+    """A tracker as the recording was tracked, but for what is given; raises EchostepError when something is missing or damaged."""
+    about, path = recording.about, recording.path
+    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
+    settings = parse_settings(text, str(settings_path or path))
+    return Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
@@ -235,14 +251,11 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker,
-    portions: Iterable[Portion],
-    title: str,
-    progress: Callable[[], float] | None,
-    headless: bool,
-    tell: Tell,
-) -> list[Estimate]:
-    """Feed everything; Ctrl-C ends a run like its last chunk does."""
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool,
+    tell: Tell, recorder: Recorder | None = None,
+) -> list[Estimate]:  # fmt: skip
+    """Feed everything; Ctrl-C ends a run like its last chunk does. `recorder`: what is derived is recorded, once it has been shown."""
+    derived = Derived(tracker)
     view = None if headless else TerminalView(tracker, title, progress, console)
     estimates: list[Estimate] = []
     shown: AbstractContextManager[object] = view or nullcontext()
@@ -254,6 +267,8 @@ def _run(
                 tell(new)
                 if view:
                     view.show(new)
+                if recorder:
+                    recorder.notes(derived.take(portion, new))
         except KeyboardInterrupt:
             pass
     return estimates
@@ -286,7 +301,14 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
     """Every chunk, after it has been written."""
     for chunk in chunks:
         recorder.write(chunk)
+        recorder.settle(chunk)
+        _say(recorder.notices)
         yield chunk
+
+
+def _say(notices: deque[str]) -> None:
+    while notices:
+        console.print(notices.popleft())
 
 
 def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
@@ -305,8 +327,8 @@ def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: floa
     start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:
         for chunk in ports.chunks():
-            while ports.notices:
-                console.print(ports.notices.popleft())
+            _say(ports.notices)
+            _say(recorder.notices)
             if chunk is not None:
                 recorder.write(chunk)
             start.follow(chunk)
@@ -326,11 +348,15 @@ def _finish(
     title: str,
     elapsed_s: float | None = None,
 ) -> None:
-    """Write the track and say how it went."""
-    write_track(out / "track.csv", estimates)
+    """Write the track and say how it went; a disk that is full is said last."""
     off = errors(estimates, truth) if truth else None
     title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
-    draw_track(out / "track.png", tracker.plan, estimates, truth, title)
+    trouble = None
+    try:
+        write_track(out / "track.csv", estimates)
+        draw_track(out / "track.png", tracker.plan, estimates, truth, title)
+    except OSError as error:
+        trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
@@ -342,13 +368,17 @@ def _finish(
     if elapsed_s:
         span = estimates[-1].t_s - estimates[0].t_s
         console.print(f"{span:.0f} s of walk in {elapsed_s:.2f} s: {span / elapsed_s:.0f} x real time")
-    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}; track.csv and track.png are in {out}")
+    written = f"; track.csv and track.png are in {out}" if trouble is None else ""
+    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}{written}")
+    if trouble is not None:
+        raise trouble
 
 
 def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
     pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"
     return {
-        "version": _version(),
+        **_versions(),
+        "plan_name": plan.name,
         "plan_sha256": plan.digest,
         "start_x_y_rad": pose,
         "seed": str(seed),
@@ -364,8 +394,8 @@ def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
             return None
         x, y, heading, *level = (float(v) for v in text.split(","))
         return Pose(x, y, heading, int(level[0]) if level else 0)
-    except (ValueError, TypeError) as error:
-        raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
+    except (ValueError, TypeError, OverflowError) as error:
+        raise EchostepError(f"{path}: its recorded start is not known: give one with --start X,Y,DEG") from error
 
 
 def _recorded_seed(about: dict[str, str], path: Path, seed: int | None) -> int:
@@ -383,5 +413,18 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _version() -> str:
-    return importlib.metadata.version("echostep")
+def _versions() -> dict[str, str]:
+    """Of everything that an estimate depends on."""
+    named = {name: importlib.metadata.version(name) for name in ("numpy", "numba")}
+    return {
+        "version": importlib.metadata.version("echostep"),
+        "versions": ", ".join(
+            f"{name} {version}" for name, version in {"python": platform.python_version(), **named}.items()
+        ),
+        "protocol": f"0x{SCHEMA_HASH:08X}",
+    }
+
+
+def _now() -> dict[str, str]:
+    """What the clock on the wall says, and the clock of the arrivals at the same time."""
+    return {"started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"), "started_ns": str(time.monotonic_ns())}

@@ -79,6 +79,20 @@ def trails(
     study(runs, seed, out, json, scheduler)
 
 
+@app.command("floors")
+def floors_command(
+    runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/floors"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
+    from echostep.evaluate.floors import evaluate_floors
+
+    evaluate_floors(runs, seed, json, out, scheduler)
+
+
 @app.command("feet")
 def feet_command(
     folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
@@ -93,3 +107,17 @@ def feet_command(
     from echostep.evaluate.feet import feet
 
     feet(folder, json, out, left_out=left_out)
+
+
+@app.command()
+def fischer2008(
+    runs: Annotated[int, typer.Option("--runs", help="Guided returns to simulate.", min=1)] = 1000,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/fischer2008"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated)."""
+    from echostep.evaluate.fischer2008 import evaluate_fischer2008
+
+    evaluate_fischer2008(runs, seed, json, out, scheduler)
