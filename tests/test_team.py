@@ -323,7 +323,7 @@ def test_a_slow_line_sends_the_newest_and_counts_the_rest(monkeypatch: pytest.Mo
     assert len(line.sent) < 1200
     assert box.counts.sent + box.counts.overtaken == box.counts.offered == 3000
     assert line.sent[-1].superseded == box.counts.overtaken
-    assert slowest < 0.2
+    assert slowest < 1.0  # a queue that waits for the line would need seconds
 
 
 def test_a_broken_line_is_opened_again_and_no_later_report_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:

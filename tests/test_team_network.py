@@ -140,7 +140,7 @@ def test_a_frozen_broker_neither_slows_the_tracker_nor_keeps_old_reports(
         broker.thaw()
         until(lambda: 100.0 in ear.times)
         box.close()
-    assert slowest < 0.1
+    assert slowest < 1.0  # a queue that waits for the line would need seconds
     assert len(ear.times) < 80
     assert box.counts.overtaken > 30
 
@@ -158,6 +158,25 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
             assert (member.retained, member.need(time.monotonic())) == (True, Need.STALE)
             assert member.report.position
             assert member.report.position.t_s == 7.0
+
+
+@needs_broker
+def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
+    with Broker(tmp_path) as broker, listening(broker.url) as ear:
+        boxes = [box_to(broker.url, name=f"n{k:02d}", run=f"{k:08x}") for k in range(20)]
+        for n in range(20):
+            for k, box in enumerate(boxes):
+                box.offer(replace(at(float(n), f"n{k:02d}"), run=f"{k:08x}", status="lost" if k == 7 else "tracking"))
+            ear.members()
+            time.sleep(0.05)
+        until(lambda: [m.report.position.t_s for m in ear.members() if m.report.position] == [19.0] * 20)
+        first = ear.members()[0]
+        assert (first.report.name, first.need(time.monotonic())) == ("n07", Need.LOST)
+        assert sum(m.missed for m in ear.members()) == 0
+        assert ear.roster.counts == {}
+        for box in boxes:
+            box.end()
+        assert [box.close().split(", ")[0].rpartition(": ")[2] for box in boxes] == ["20 of 20 reports sent"] * 20
 
 
 @needs_broker
@@ -428,7 +447,7 @@ def test_a_stream_server_that_stops_reading_does_not_hold_old_positions() -> Non
             slowest = max(slowest, time.perf_counter() - began)
         until(lambda: words, 12.0)
         assert "timed out" in words[0]
-        assert slowest < 0.2
+        assert slowest < 1.0  # a queue that waits for the line would need seconds
         assert box.counts.sent < 500
         box.close()
 
@@ -461,7 +480,7 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
 def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
         commander = subprocess.Popen(
-            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "60", "--picture", tmp_path / "team.png"],
+            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "300", "--picture", tmp_path / "team.png"],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         try:
