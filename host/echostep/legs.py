@@ -279,7 +279,7 @@ class Legs:
         if top > 0.0 and rate < 0.35 * top:
             self._top = (0.0, 0)
             if not self._bout.peaks or at - self._bout.peaks[-1] >= leg_swings.SHORTEST_CYCLE:
-                self.swings.peaks.append(top)
+                self.swings.saw(top)
                 self._swing(at)
         peaks = self._bout.peaks
         if peaks and k - peaks[-1] > leg_swings.LONGEST_CYCLE:
@@ -288,6 +288,11 @@ class Legs:
     def _watch_rest(self, k: int) -> None:
         """Standing ends a walk, tells the biases, and the leg is upright."""
         first = k - leg_swings.STILL
+        if (
+            self._still_since is None
+            and abs(self._shank[k] - self._shank[k - 10]) * GRID_HZ / 10.0 > leg_swings.MOVING_RAD_S
+        ):
+            return
         window = np.column_stack([self._thigh[first : k + 1], self._shank[first : k + 1]])
         rates = np.diff(window, axis=0) * GRID_HZ
         smoothed = np.column_stack([leg_swings.smooth(rates[:, 0]), leg_swings.smooth(rates[:, 1])])
