@@ -217,9 +217,19 @@ def track_default(samples: LegSamples, settings: LegsSettings, heading_rad: floa
         angles = np.zeros_like(angles)
     rows = _rows(samples.t_s, strides, angles[:, 0])
     seen = (f"compass believed in {heading.read - heading.refused} of {heading.read} readings",) if heading.read else ()
-    notes = (*how, *seen)
+    notes = (*how, *seen, *_doubts(strides))
     strides = with_turns(strides, samples.t_s, angles[:, 0])
     return LegTrack(rows, strides, legs.counts, _source(samples), float(angles[-1, 1]), notes)
+
+
+def _doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
+    """What speaks against these samples being a walk."""
+    steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
+    if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
+        return ("most steps go backward: are the columns of thigh and shank exchanged?",)
+    if len(steps) > 2 and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) > 0.5 * len(steps):
+        return ("most of this is no walk that one leg can see: do not trust the distance",)
+    return () if steps else ("no step was seen",)
 
 
 def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:
