@@ -250,8 +250,9 @@ def track_lee2010(samples: LegSamples, settings: LegsSettings) -> LegTrack:
     """The paper's: 10 Hz, each sign found as ours is."""
     rates = np.column_stack([samples.thigh, samples.shank])
     swings = leg_swings.Swings()
-    grid = np.arange(samples.t_s[0], samples.t_s[-1], 1.0 / leg_swings.GRID_HZ)
-    even = np.column_stack([np.interp(grid, samples.t_s, column) for column in rates.T])
+    watched_s = np.cumsum(np.minimum(np.diff(samples.t_s, prepend=samples.t_s[0]), lee2010.LONGEST_GAP_S))
+    grid = np.arange(0.0, watched_s[-1], 1.0 / leg_swings.GRID_HZ)
+    even = np.column_stack([np.interp(grid, watched_s, column) for column in rates.T])
     thigh, shank = swings.sign if swings.decide(even, final=True) else (1.0, 1.0)
     sign, how = belt_sign(samples)
     lee = lee2010.LeeSettings(legs=lee2010.Legs(settings.segments.thigh_m, settings.segments.shank_m))
