@@ -162,7 +162,8 @@ def test_noise_is_no_walk(size: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     nothing = np.full(3000, np.nan)
     thigh, shank = size * rng.standard_normal((2, 3000))
-    samples = LegSamples(np.arange(3000) * 0.01, thigh, shank, nothing, nothing)
+    t: Floats = np.arange(3000.0) * 0.01
+    samples = LegSamples(t, thigh, shank, nothing, nothing)
     found = describe_legs(track_default(samples, LegsSettings()))
     assert "do not trust" in found or "no step was seen" in found or "exchanged" in found
 
