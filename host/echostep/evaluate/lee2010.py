@@ -3,7 +3,8 @@
 In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8.
 Owns the routes.
 Everything is simulated, from the bytes of the simulated board on: frames, clock and counts are read as live. Each run is another person in another
-magnetic field. All methods are given the place and the heading of the start, and the wearer's legs to within a centimetre.
+magnetic field. All methods are given the place and the heading of the start, and the wearer's legs to within a centimetre; with the plan the wearer
+is calibrated by a walk of 10 m before.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ LAP: tuple[Waypoint, ...] = ((0.0, 0.0), (40.0, 0.0), (40.0, 30.0), (0.0, 30.0),
 CORRIDOR_M, STOREY_M, STOREYS = 80.0, 3.5, 5  # [Lee 2010, Figure 7]; the storey's height is not printed
 PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
 BLOCK_MS = 50
+CALIBRATION_M = 10.0
 HALF_WIDE_M = 1.0  # of the corridor
 START_NS, PORTION = 1_000_000_000, 1000
 NO_PINGS = m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT | m.Sensors.COMPASS | m.Sensors.PRESSURE
@@ -246,11 +248,19 @@ def by_default(measured: Measured, start: tuple[float, float, float]) -> Found:
     return Found(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
 
 
+def scale_of(segments: Segments, seed: int) -> float:
+    """What `echostep calibrate` finds of this person on 10 m straight on."""
+    walked = walk(((0.0, 0.0), (CALIBRATION_M, 0.0)), person_of(seed), np.random.default_rng([seed, 36]))
+    measured = measure(chunks_of(walked, storeys()[:1], seed), seed)
+    return CALIBRATION_M / float(track_default(measured.samples, LegsSettings(segments), 0.0).rows[-1, 1])
+
+
 def with_plan(
     plan: Plan, chunks: Sequence[Chunk], measured: Measured, start: tuple[float, float, float], seed: int
 ) -> Found:
     """Ours on the plan: the tracker with the board's bytes alone, legs and pings and no foot."""
-    wearer = WearerSettings(measured.segments.thigh_m, measured.segments.shank_m)
+    scale = scale_of(measured.segments, seed)
+    wearer = WearerSettings(measured.segments.thigh_m, measured.segments.shank_m, scale)
     tracker = Tracker(plan, Pose(*start), Settings(wearer=wearer), seed)
     portions = (portion_of(chunks[k : k + PORTION]) for k in range(0, len(chunks), PORTION))
     track = np.array([(e.t_s, e.x_m, e.y_m) for portion in portions for e in tracker.take(portion)])
