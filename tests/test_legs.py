@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from echostep.cli import app
 from echostep.errors import EchostepError
-from echostep.leg_file import LegSamples, load_legs, track_default, track_lee2010
+from echostep.leg_file import LegSamples, describe_legs, load_legs, track_default, track_lee2010
 from echostep.leg_kinematics import Segments
 from echostep.legs import Flag, Legs, LegsSettings, Stride, distance_sd_m
 from echostep.simulation.gaits import FAST, NATURAL, SLOW, Manner, draw_stroller, stroll
@@ -142,6 +142,36 @@ def test_a_gap_is_bridged_and_said() -> None:
     strides = _strides(t[kept], thigh[kept], shank[kept])
     assert sum(Flag.GAP in s.flags for s in strides) == 1
     assert _total(strides) == pytest.approx(20.0, rel=0.1)
+
+
+def test_nobody_knows_what_was_done_in_a_long_gap() -> None:
+    t, thigh, shank = _walked([(0.0, 0.0), (20.0, 0.0)])
+    later = np.where(t > 9.0, t + 1e6, t)
+    strides = _strides(later, thigh, shank)
+    assert _total(strides) < 21.0
+    assert any(Flag.GAP in s.flags and s.length_m == 0.0 and s.length_sd_m > 10.0 for s in strides)
+    for method in (track_default, track_lee2010):
+        nothing = np.full(len(t), np.nan)
+        rows = method(LegSamples(later, thigh, shank, nothing, nothing), LegsSettings(STANDARD)).rows
+        assert rows[-1, 1] < 25.0
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 10.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_is_no_walk(size: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    nothing = np.full(3000, np.nan)
+    thigh, shank = size * rng.standard_normal((2, 3000))
+    t: Floats = np.arange(3000.0) * 0.01
+    samples = LegSamples(t, thigh, shank, nothing, nothing)
+    found = describe_legs(track_default(samples, LegsSettings()))
+    assert "do not trust" in found or "no step was seen" in found or "exchanged" in found
+
+
+def test_exchanged_columns_are_guessed() -> None:
+    t, thigh, shank = _walked([(0.0, 0.0), (20.0, 0.0)])
+    nothing = np.full(len(t), np.nan)
+    assert "exchanged" in describe_legs(track_default(LegSamples(t, shank, thigh, nothing, nothing), LegsSettings()))
 
 
 def test_nonsense_is_counted() -> None:

@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 
 THIGH_M, CALF_M = 0.48, 0.56  # L1, L2 [Lee 2010, section 2]
 RATE_HZ = 10.0  # of eqs. 19 and 20 [Lee 2010, section 3]
+LONGEST_GAP_S = 0.25  # without samples: what happened in it is not known
 ISO_PRESSURE_PA, ISO_EXPONENT, ISO_LAPSE_1_M = 101_325.0, 5.25588, 2.25577e-5  # [ISO 2533]
 
 
@@ -206,6 +207,9 @@ class Walker:
             self._t_s, self._next_s = t_s, t_s + 1.0 / RATE_HZ
             return None
         dt_s, self._t_s = t_s - self._t_s, t_s
+        if not 0.0 < dt_s < LONGEST_GAP_S:
+            self._next_s, self._sum, self._since_s = t_s + 1.0 / RATE_HZ, [0.0, 0.0], 0.0
+            return None
         self.thigh.turn(thigh, dt_s)
         self.calf.turn(calf, dt_s)
         self._sum = [self._sum[0] + thigh * dt_s, self._sum[1] + calf * dt_s]

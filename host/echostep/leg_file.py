@@ -217,9 +217,19 @@ def track_default(samples: LegSamples, settings: LegsSettings, heading_rad: floa
         angles = np.zeros_like(angles)
     rows = _rows(samples.t_s, strides, angles[:, 0])
     seen = (f"compass believed in {heading.read - heading.refused} of {heading.read} readings",) if heading.read else ()
-    notes = (*how, *seen)
+    notes = (*how, *seen, *_doubts(strides))
     strides = with_turns(strides, samples.t_s, angles[:, 0])
     return LegTrack(rows, strides, legs.counts, _source(samples), float(angles[-1, 1]), notes)
+
+
+def _doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
+    """What speaks against these samples being a walk."""
+    steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
+    if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
+        return ("most steps go backward: are the columns of thigh and shank exchanged?",)
+    if len(steps) > 2 and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) > 0.5 * len(steps):
+        return ("most of this is no walk that one leg can see: do not trust the distance",)
+    return () if steps else ("no step was seen",)
 
 
 def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:
@@ -240,8 +250,9 @@ def track_lee2010(samples: LegSamples, settings: LegsSettings) -> LegTrack:
     """The paper's: 10 Hz, each sign found as ours is."""
     rates = np.column_stack([samples.thigh, samples.shank])
     swings = leg_swings.Swings()
-    grid = np.arange(samples.t_s[0], samples.t_s[-1], 1.0 / leg_swings.GRID_HZ)
-    even = np.column_stack([np.interp(grid, samples.t_s, column) for column in rates.T])
+    watched_s = np.cumsum(np.minimum(np.diff(samples.t_s, prepend=samples.t_s[0]), lee2010.LONGEST_GAP_S))
+    grid = np.arange(0.0, watched_s[-1], 1.0 / leg_swings.GRID_HZ)
+    even = np.column_stack([np.interp(grid, watched_s, column) for column in rates.T])
     thigh, shank = swings.sign if swings.decide(even, final=True) else (1.0, 1.0)
     sign, how = belt_sign(samples)
     lee = lee2010.LeeSettings(legs=lee2010.Legs(settings.segments.thigh_m, settings.segments.shank_m))

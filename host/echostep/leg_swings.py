@@ -10,6 +10,8 @@ backward is walking forward in reversed time: then the shank leads, in either si
 from __future__ import annotations
 
 import math
+from collections import deque
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +43,8 @@ class Swings:
 
     def __init__(self) -> None:
         self.sign = (0.0, 0.0)
-        self.peaks: list[float] = []
+        self._peaks: deque[float] = deque(maxlen=9)
+        self.usual_rad_s = 0.0
 
     @property
     def known(self) -> bool:
@@ -71,10 +74,14 @@ class Swings:
         self.sign = (thigh * shank, shank)
         return True
 
+    def saw(self, peak_rad_s: float) -> None:
+        """There was a swing."""
+        self._peaks.append(peak_rad_s)
+        self.usual_rad_s = median(self._peaks)
+
     def threshold(self) -> float:
         """What a peak of the shank's rate must reach."""
-        usual = float(np.median(self.peaks[-9:])) if self.peaks else 0.0
-        return max(LEAST_PEAK_RAD_S, OF_USUAL * usual)
+        return max(LEAST_PEAK_RAD_S, OF_USUAL * self.usual_rad_s)
 
 
 def lopsided(rate: Floats) -> float:

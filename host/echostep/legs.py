@@ -39,6 +39,8 @@ from echostep.leg_swings import GRID_HZ, Swings
 Floats = NDArray[np.float64]
 
 LONGEST_GAP_S = 0.25
+BRIDGED_S = 3.0  # by the pace before it; nobody knows what is done in a longer gap
+UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0
 FASTEST_RAD_S = 35.0
 USUAL_STRIDE_S = 1.2
 SHORTEST_M = 0.25  # a stride: less is a step in place or sideways
@@ -248,8 +250,9 @@ class Legs:
             pace = 0.0 if self._still_since is not None else self._bout.pace_m_s or 0.0
             if self._still_since is None and len(self._thigh) > 1:
                 self._end_bout(len(self._thigh) - 1, stands=False)
-        way = pace * (t_s - t0)
-        self._tell(t0, t_s, way, max(0.3 * way, min(1.0 * (t_s - t0), 30.0) * 0.3), 0.0, Flag.GAP)
+        span_s = t_s - t0
+        way = pace * span_s if span_s < BRIDGED_S else 0.0
+        self._tell(t0, t_s, way, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
         self._origin_s, self._turned = t_s, (0.0, 0.0)
         self._thigh, self._shank, self._done = [0.0], [0.0], 0
         self._bout, self._still_since, self._top, self._keep = _Bout(0, stood=False), None, (0.0, 0), 0
@@ -279,7 +282,7 @@ class Legs:
         if top > 0.0 and rate < 0.35 * top:
             self._top = (0.0, 0)
             if not self._bout.peaks or at - self._bout.peaks[-1] >= leg_swings.SHORTEST_CYCLE:
-                self.swings.peaks.append(top)
+                self.swings.saw(top)
                 self._swing(at)
         peaks = self._bout.peaks
         if peaks and k - peaks[-1] > leg_swings.LONGEST_CYCLE:
@@ -288,6 +291,11 @@ class Legs:
     def _watch_rest(self, k: int) -> None:
         """Standing ends a walk, tells the biases, and the leg is upright."""
         first = k - leg_swings.STILL
+        if (
+            self._still_since is None
+            and abs(self._shank[k] - self._shank[k - 10]) * GRID_HZ / 10.0 > leg_swings.MOVING_RAD_S
+        ):
+            return
         window = np.column_stack([self._thigh[first : k + 1], self._shank[first : k + 1]])
         rates = np.diff(window, axis=0) * GRID_HZ
         smoothed = np.column_stack([leg_swings.smooth(rates[:, 0]), leg_swings.smooth(rates[:, 1])])
@@ -323,12 +331,11 @@ class Legs:
         bout.cycle = k - previous
         if len(bout.peaks) > 2 or not bout.stood:
             self._learn_closure(previous, k)
-        thigh, shank = self._angles(previous, k)
         if bout.level is None:
             bout.level, bout.level_at = (0.0, 0.0), previous
             thigh, shank = self._angles(previous, k)
             bout.level = (MEAN_THIGH_RAD - float(thigh.mean()), MEAN_SHANK_RAD - float(shank.mean()))
-            thigh, shank = self._angles(previous, k)
+        thigh, shank = self._angles(previous, k)
         length, rise, flags, sd = self._stride(thigh, shank)
         pace = length * GRID_HZ / bout.cycle
         bout.blind = flags & (Flag.UNSEEN | Flag.BACKWARD)

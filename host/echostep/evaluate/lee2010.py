@@ -1,13 +1,16 @@
 """The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track; theirs and ours.
 
-In: seeds. Out: rows `lap/lee2010`, `lap/default`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8. Owns the routes.
+In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8.
+Owns the routes.
 Everything is simulated, from the bytes of the simulated board on: frames, clock and counts are read as live. Each run is another person in another
-magnetic field. Both methods are given the place and the heading of the start, and the wearer's legs to within a centimetre.
+magnetic field. All methods are given the place and the heading of the start, and the wearer's legs to within a centimetre; with the plan the wearer
+is calibrated by a walk of 10 m before.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,14 +24,18 @@ from echostep.evaluate.study import Row, Study, console, print_table, write_json
 from echostep.frames import BoardReader, Frames, encode
 from echostep.leg_file import LegSamples, track_default
 from echostep.leg_kinematics import Segments
+from echostep.legpath import WearerSettings
 from echostep.legs import LegsSettings
-from echostep.plan import Level
+from echostep.plan import Level, Plan, Pose
+from echostep.settings import Settings
 from echostep.simulation.board import PythonBoard
 from echostep.simulation.legs import Leg
 from echostep.simulation.magnetism import Magnetism
 from echostep.simulation.stimulus import BoardSensors
 from echostep.simulation.walker import Person, Walk, Waypoint, walk
+from echostep.sources import BOARD, Chunk, portion_of
 from echostep.timeline import PLAIN, Arrivals, MtxTiming, Timeline
+from echostep.tracker import Tracker
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +43,10 @@ LAP: tuple[Waypoint, ...] = ((0.0, 0.0), (40.0, 0.0), (40.0, 30.0), (0.0, 30.0),
 CORRIDOR_M, STOREY_M, STOREYS = 80.0, 3.5, 5  # [Lee 2010, Figure 7]; the storey's height is not printed
 PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
 BLOCK_MS = 50
-SENSORS = m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT | m.Sensors.COMPASS | m.Sensors.PRESSURE
+CALIBRATION_M = 10.0
+HALF_WIDE_M = 1.0  # of the corridor
+START_NS, PORTION = 1_000_000_000, 1000
+NO_PINGS = m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT | m.Sensors.COMPASS | m.Sensors.PRESSURE
 TAPE_SD_M = 0.01  # of a thigh or a shank that somebody measures
 KNOWN_S = 2.0  # of standing on the floor where the walk begins: its pressure is the reference
 COLUMNS = {
@@ -84,25 +94,19 @@ def evaluate_lee2010(runs: int, seed: int, json_path: Path | None, out: Path, sc
 
 def one_run(seed: int) -> list[Row]:
     """All rows of one person."""
-    lap = lap_of(seed)
-    measured = measure(lap, seed)
+    lap, plan = lap_of(seed), lap_plan()
+    chunks = chunks_of(lap, plan.levels, seed)
+    measured = measure(chunks, seed)
     rows = [_row(f"lap/{name}", name, seed, lap, method(measured, start_of(lap))) for name, method in METHODS.items()]
+    rows.append(_row("lap/default+plan", "default", seed, lap, with_plan(plan, chunks, measured, start_of(lap), seed)))
     descent = descent_of(seed)
-    measured = measure(descent, seed)
+    measured = measure(chunks_of(descent, storeys(), seed), seed)
     floors = floors_of(measured.pressure)
-    right = floor_right(floors, descent)
+    right = {"floor_right": floor_right(floors, descent)}
     for name, method in METHODS.items():
-        row = _row(
-            "storeys" if name == "lee2010" else f"storeys/{name}",
-            name,
-            seed,
-            descent,
-            method(measured, start_of(descent)),
-        )
-        rows.append(row | {"floor_right": right})
-    rows.append(
-        {"name": "floors", "profile": "lee2010", "seed": seed, "floor_right": right, **_heights_off(floors, descent)}
-    )
+        shown = "storeys" if name == "lee2010" else f"storeys/{name}"
+        rows.append(_row(shown, name, seed, descent, method(measured, start_of(descent))) | right)
+    rows.append({"name": "floors", "profile": "lee2010", "seed": seed, **right, **_heights_off(floors, descent)})
     return rows
 
 
@@ -139,20 +143,55 @@ def descent_waypoints() -> list[Waypoint]:
     return way
 
 
-def measure(walked: Walk, seed: int) -> Measured:
-    """What reaches the host of a walk: bytes of the simulated board, read as live."""
-    rng = np.random.default_rng([seed, 33])
+def lap_plan() -> Plan:
+    """The corridor that the lap goes through, 2 m wide, with doors set back by 20 cm at no regular places."""
+    rng = np.random.default_rng(40)
+    walls: list[tuple[float, ...]] = []
+    for off in (-HALF_WIDE_M, HALF_WIDE_M):
+        box = np.array([(-off, -off), (40.0 + off, -off), (40.0 + off, 30.0 + off), (-off, 30.0 + off)])
+        for a, b in zip(box, np.roll(box, -1, axis=0), strict=True):
+            walls += _with_doors(a, b, 0.2 if off > 0.0 else -0.2, rng)
+    return Plan("lap", (Level("0", 0.0, np.array(walls)),), None, "lap of Lee 2010")
+
+
+def _with_doors(a: Floats, b: Floats, deep_m: float, rng: np.random.Generator) -> list[tuple[float, ...]]:
+    """A wall from a to b, with doors about every 6 m; positive: set back to its right."""
+    length = float(np.hypot(*(b - a)))
+    along = (b - a) / length
+    right = deep_m * np.array([along[1], -along[0]])
+    points = [a]
+    for at in np.arange(2.0, length - 4.0, 6.0) + rng.uniform(0.0, 3.0, len(np.arange(2.0, length - 4.0, 6.0))):
+        first, last = a + at * along, a + (at + 0.9) * along
+        points += [first, first + right, last + right, last]
+    points.append(b)
+    return [(*p.tolist(), *q.tolist()) for p, q in zip(points, points[1:], strict=False)]
+
+
+def chunks_of(walked: Walk, levels: Sequence[Level], seed: int) -> list[Chunk]:
+    """The bytes of a board that is worn on this walk, as they reach the host; pings where there are walls."""
     magnetism = Magnetism(np.random.default_rng([seed, 34]))
-    levels = [Level(str(k), k * STOREY_M, np.empty((0, 4))) for k in range(STOREYS)]
     sensors = BoardSensors(walked, levels, np.empty(0), np.random.default_rng([seed, 35]), magnetism)
     board = PythonBoard(seed=seed)
-    board.send(encode(m.Configure(SENSORS, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED), 0))
-    sent: list[bytes] = []
+    if not len(levels[0].walls):
+        board.send(encode(m.Configure(NO_PINGS, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED), 0))
+    gathered: dict[int, bytes] = {}
     for start in range(0, len(walked.t_s), BLOCK_MS):
-        sent += [part for _, part in board.advance(sensors.rows(start, start + BLOCK_MS))]
+        for t_ns, part in board.advance(sensors.rows(start, start + BLOCK_MS)):
+            gathered[t_ns] = gathered.get(t_ns, b"") + part
+    return [Chunk(BOARD, START_NS + t_ns, part) for t_ns, part in gathered.items()]
+
+
+def storeys() -> list[Level]:
+    """Five floors without walls."""
+    return [Level(str(k), k * STOREY_M, np.empty((0, 4))) for k in range(STOREYS)]
+
+
+def measure(chunks: Sequence[Chunk], seed: int) -> Measured:
+    """What the host reads of the board's bytes, and the wearer's legs by tape."""
     leg = person_of(seed).leg
-    tape = TAPE_SD_M * rng.standard_normal(2)
-    return replace(_read(b"".join(sent)), segments=Segments(leg.thigh_m + tape[0], leg.shank_m + tape[1]))
+    tape = TAPE_SD_M * np.random.default_rng([seed, 33]).standard_normal(2)
+    segments = Segments(leg.thigh_m + tape[0], leg.shank_m + tape[1])
+    return replace(_read(b"".join(chunk.data for chunk in chunks)), segments=segments)
 
 
 def _read(received: bytes) -> Measured:
@@ -207,6 +246,25 @@ def by_default(measured: Measured, start: tuple[float, float, float]) -> Found:
     """Ours."""
     rows = track_default(measured.samples, LegsSettings(measured.segments), start[2]).rows[::20]
     return Found(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
+
+
+def scale_of(segments: Segments, seed: int) -> float:
+    """What `echostep calibrate` finds of this person on 10 m straight on."""
+    walked = walk(((0.0, 0.0), (CALIBRATION_M, 0.0)), person_of(seed), np.random.default_rng([seed, 36]))
+    measured = measure(chunks_of(walked, storeys()[:1], seed), seed)
+    return CALIBRATION_M / float(track_default(measured.samples, LegsSettings(segments), 0.0).rows[-1, 1])
+
+
+def with_plan(
+    plan: Plan, chunks: Sequence[Chunk], measured: Measured, start: tuple[float, float, float], seed: int
+) -> Found:
+    """Ours on the plan: the tracker with the board's bytes alone, legs and pings and no foot."""
+    scale = scale_of(measured.segments, seed)
+    wearer = WearerSettings(measured.segments.thigh_m, measured.segments.shank_m, scale)
+    tracker = Tracker(plan, Pose(*start), Settings(wearer=wearer), seed)
+    portions = (portion_of(chunks[k : k + PORTION]) for k in range(0, len(chunks), PORTION))
+    track = np.array([(e.t_s, e.x_m, e.y_m) for portion in portions for e in tracker.take(portion)])
+    return Found(track, float(np.hypot(*np.diff(track[:, 1:], axis=0).T).sum()))
 
 
 METHODS = {"lee2010": by_lee, "default": by_default}

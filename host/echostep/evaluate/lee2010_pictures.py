@@ -17,11 +17,16 @@ from echostep.evaluate.lee2010 import (
     STOREY_M,
     STOREYS,
     Found,
+    Measured,
+    chunks_of,
     descent_of,
     floors_of,
     lap_of,
+    lap_plan,
     measure,
     start_of,
+    storeys,
+    with_plan,
 )
 from echostep.simulation.walker import Walk
 
@@ -31,24 +36,33 @@ STYLES: dict[str, dict[str, Any]] = {
     "truth": {"color": "#d55e00", "linewidth": 1.2, "label": "the way (truth)"},
     "lee2010": {"color": "#0072b2", "linewidth": 1.4, "label": "lee2010"},
     "default": {"color": "#009e73", "linewidth": 1.4, "linestyle": "--", "label": "default, ours"},
+    "default+plan": {
+        "color": "#cc79a7",
+        "linewidth": 1.4,
+        "linestyle": ":",
+        "label": "default with the plan and echoes",
+    },
 }
 
 
 def draw(folder: Path, seed: int) -> None:
     """Draw the run of this seed; raises EchostepError when a file cannot be written."""
     lap, descent = lap_of(seed), descent_of(seed)
-    measured = measure(descent, seed)
-    floors = floors_of(measured.pressure)
+    down = measure(chunks_of(descent, storeys(), seed), seed)
+    floors = floors_of(down.pressure)
+    plan = lap_plan()
+    chunks = chunks_of(lap, plan.levels, seed)
+    round_ = measure(chunks, seed)
+    tracks = _tracks(lap, round_) | {"default+plan": with_plan(plan, chunks, round_, start_of(lap), seed)}
     try:
-        _lap(folder / "figure6.png", lap, _tracks(lap, seed))
-        _pressure(folder / "figure7.png", measured.pressure, descent)
-        _three(folder / "figure8.png", descent, _tracks(descent, seed), floors)
+        _lap(folder / "figure6.png", lap, tracks)
+        _pressure(folder / "figure7.png", down.pressure, descent)
+        _three(folder / "figure8.png", descent, _tracks(descent, down), floors)
     except OSError as error:
         raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
 
 
-def _tracks(walked: Walk, seed: int) -> dict[str, Found]:
-    measured = measure(walked, seed)
+def _tracks(walked: Walk, measured: Measured) -> dict[str, Found]:
     return {name: method(measured, start_of(walked)) for name, method in METHODS.items()}
 
 
