@@ -33,21 +33,21 @@ DT, CLAIMED, NOISE, GAIT, PLACE, FOOT, FOOT_SD, LOWEST, HIGHEST = range(9)  # wh
 
 LONGEST_STEP_S = 0.5  # modes may change so often
 MOST_STEPS = 240  # in one gap
-TINY = 1e-9  # weights below are forgotten
+TINY, TINIEST = 1e-9, 1e-14  # hypotheses below are forgotten; successors below are not looked at
 
 # How often what begins and ends, 1/s
 GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.3
 HELD_FADES, FADING_HOLDS = 0.3, 0.1
 SHIFTS, GUST_SHIFTS = 1 / 1200, 1 / 60  # the pressure of the building changes for good
-CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 200, 0.5, 1 / 60
-RIDE_BEGINS, RIDE_ENDS = 1 / 400, 1.0
+CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 150, 0.5, 1 / 60
+RIDE_BEGINS, RIDE_ENDS = 1 / 200, 1.0
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
 GUST_M = 1.5  # sd of doors and fans: 18 Pa
 HELD_WANDERS_M, FADING_WANDERS_M, FADING_WANDERS = 0.2, 0.4, 0.2  # in a second; the last one times the gust
 FADES_S = 1.5
-SHIFT_M = 1.5
+SHIFT_M = 1.2
 GUST_OVER_M = 0.3
 CLIMB_M_S, CLIMB_SD_M_S, CLIMB_S = 0.25, 0.25, 1.5  # mean, sd, time constant of vertical speed
 RIDE_M_S, RIDE_SD_M_S, RIDE_S = 1.0, 0.7, 2.0
@@ -313,7 +313,7 @@ def _drawn(x: Floats, c: Floats, a: int, off: float, spread: float) -> None:
 def _take(x: Floats, c: Floats, weight: float, target: int, source: int, seen: Floats, merged: Merged) -> None:
     """A hypothesis goes on as `target` for dt, meets what was seen, and is merged."""
     w, m, p, xi, _, _ = merged
-    if weight < TINY * TINY:
+    if weight < TINIEST:
         return
     way, air, dt = target % WAYS, target % MODES // WAYS, seen[DT]
     _predict(x, c, way, air, dt)
