@@ -48,6 +48,9 @@ GUST_M = 1.5  # sd of doors and fans: 18 Pa
 HELD_WANDERS_M, FADING_WANDERS_M, FADING_WANDERS = 0.2, 0.4, 0.2  # in a second; the last one times the gust
 FADES_S = 1.5
 SHIFT_M = 1.2
+# All that was known of the weather is wrong: an air lock, a first sample that was a spike. How often, 1/s; sd; only for what is far off
+SEALED, SEALED_M, SEALED_OFF_M = 1e-6, 100.0, 15.0
+FREE_RATES = 0.5  # without storeys each metre is a place to stop at, so setting off is the rarer
 GUST_OVER_M = 0.3
 CLIMB_M_S, CLIMB_SD_M_S, CLIMB_S = 0.25, 0.25, 1.5  # mean, sd, time constant of vertical speed
 RIDE_M_S, RIDE_SD_M_S, RIDE_S = 1.0, 0.7, 2.0
@@ -147,7 +150,7 @@ def _step(state: State, heights_m: Floats, free: bool, dt: float, seen: Floats, 
             continue
         left = weights[s] - _air(state, s, dt, seen, merged)
         if s % WAYS == ON:
-            left -= _sets_off(state, s, dt, seen, merged)
+            left -= _sets_off(state, s, free, dt, seen, merged)
         else:
             left -= _arrives(state, s, heights_m, free, dt, seen, merged)
             left *= math.exp(-dt / BETWEEN_S)
@@ -169,10 +172,10 @@ def _step(state: State, heights_m: Floats, free: bool, dt: float, seen: Floats, 
 
 
 @njit(cache=True, error_model="numpy")
-def _sets_off(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
+def _sets_off(state: State, s: int, free: bool, dt: float, seen: Floats, merged: Merged) -> float:
     """From level ground to stairs and lifts; the weight that goes."""
     weights, here = state[0], s - s % WAYS
-    often = 10.0 if seen[PLACE] == CONNECTOR else 1.0
+    often = (10.0 if seen[PLACE] == CONNECTOR else 1.0) * (FREE_RATES if free else 1.0)
     gone = 0.0
     for target in range(STAIRS_UP, WAYS):
         share = weights[s] * _share(often * (CLIMB_BEGINS if target < LIFT_UP else RIDE_BEGINS), dt)
@@ -202,6 +205,14 @@ def _air(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float
             c[2, 2] += SHIFT_M**2
             _take(x, c, share, s, s, seen, merged)
             gone += share
+            if (
+                abs(seen[CLAIMED] - state[1][s, 0] - state[1][s, 2]) > SEALED_OFF_M
+            ):  # never for a sample without pressure
+                share = weights[s] * _share(SEALED, dt)
+                x, c = _copied(state, s, merged)
+                c[2, 2] += SEALED_M**2
+                _take(x, c, share, s, s, seen, merged)
+                gone += share
         return gone
     share = weights[s] * _share(GUST_JUMPS, dt)
     x, c = _copied(state, s, merged)
