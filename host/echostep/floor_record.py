@@ -105,7 +105,7 @@ def stays(floors: Floors) -> list[Stay]:
 def climbed_m(heights_m: Floats, visited: list[Stay]) -> tuple[float, float]:
     """Metres up and metres down between the stays, by the storeys' heights."""
     rises = np.diff([heights_m[stay.floor] for stay in visited])
-    return float(rises[rises > 0].sum()), float(-rises[rises < 0].sum())
+    return float(rises[rises > 0].sum()), float(np.abs(rises[rises < 0]).sum())
 
 
 def describe(floors: Floors) -> str:

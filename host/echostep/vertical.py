@@ -33,21 +33,24 @@ DT, CLAIMED, NOISE, GAIT, PLACE, FOOT, FOOT_SD, LOWEST, HIGHEST = range(9)  # wh
 
 LONGEST_STEP_S = 0.5  # modes may change so often
 MOST_STEPS = 240  # in one gap
-TINY = 1e-9  # weights below are forgotten
+TINY, TINIEST = 1e-9, 1e-14  # hypotheses below are forgotten; successors below are not looked at
 
 # How often what begins and ends, 1/s
 GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.3
 HELD_FADES, FADING_HOLDS = 0.3, 0.1
 SHIFTS, GUST_SHIFTS = 1 / 1200, 1 / 60  # the pressure of the building changes for good
-CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 200, 0.5, 1 / 60
-RIDE_BEGINS, RIDE_ENDS = 1 / 400, 1.0
+CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 150, 0.5, 1 / 60
+RIDE_BEGINS, RIDE_ENDS = 1 / 200, 1.0
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
 WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
 GUST_M = 1.5  # sd of doors and fans: 18 Pa
 HELD_WANDERS_M, FADING_WANDERS_M, FADING_WANDERS = 0.2, 0.4, 0.2  # in a second; the last one times the gust
 FADES_S = 1.5
-SHIFT_M = 1.5
+SHIFT_M = 1.2
+# All that was known of the weather is wrong: an air lock, a first sample that was a spike. How often, 1/s; sd; only for what is far off
+SEALED, SEALED_M, SEALED_OFF_M = 1e-6, 100.0, 15.0
+FREE_RATES = 0.5  # without storeys each metre is a place to stop at, so setting off is the rarer
 GUST_OVER_M = 0.3
 CLIMB_M_S, CLIMB_SD_M_S, CLIMB_S = 0.25, 0.25, 1.5  # mean, sd, time constant of vertical speed
 RIDE_M_S, RIDE_SD_M_S, RIDE_S = 1.0, 0.7, 2.0
@@ -147,7 +150,7 @@ def _step(state: State, heights_m: Floats, free: bool, dt: float, seen: Floats, 
             continue
         left = weights[s] - _air(state, s, dt, seen, merged)
         if s % WAYS == ON:
-            left -= _sets_off(state, s, dt, seen, merged)
+            left -= _sets_off(state, s, free, dt, seen, merged)
         else:
             left -= _arrives(state, s, heights_m, free, dt, seen, merged)
             left *= math.exp(-dt / BETWEEN_S)
@@ -169,10 +172,10 @@ def _step(state: State, heights_m: Floats, free: bool, dt: float, seen: Floats, 
 
 
 @njit(cache=True, error_model="numpy")
-def _sets_off(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float:
+def _sets_off(state: State, s: int, free: bool, dt: float, seen: Floats, merged: Merged) -> float:
     """From level ground to stairs and lifts; the weight that goes."""
     weights, here = state[0], s - s % WAYS
-    often = 10.0 if seen[PLACE] == CONNECTOR else 1.0
+    often = (10.0 if seen[PLACE] == CONNECTOR else 1.0) * (FREE_RATES if free else 1.0)
     gone = 0.0
     for target in range(STAIRS_UP, WAYS):
         share = weights[s] * _share(often * (CLIMB_BEGINS if target < LIFT_UP else RIDE_BEGINS), dt)
@@ -202,6 +205,14 @@ def _air(state: State, s: int, dt: float, seen: Floats, merged: Merged) -> float
             c[2, 2] += SHIFT_M**2
             _take(x, c, share, s, s, seen, merged)
             gone += share
+            if (
+                abs(seen[CLAIMED] - state[1][s, 0] - state[1][s, 2]) > SEALED_OFF_M
+            ):  # never for a sample without pressure
+                share = weights[s] * _share(SEALED, dt)
+                x, c = _copied(state, s, merged)
+                c[2, 2] += SEALED_M**2
+                _take(x, c, share, s, s, seen, merged)
+                gone += share
         return gone
     share = weights[s] * _share(GUST_JUMPS, dt)
     x, c = _copied(state, s, merged)
@@ -313,7 +324,7 @@ def _drawn(x: Floats, c: Floats, a: int, off: float, spread: float) -> None:
 def _take(x: Floats, c: Floats, weight: float, target: int, source: int, seen: Floats, merged: Merged) -> None:
     """A hypothesis goes on as `target` for dt, meets what was seen, and is merged."""
     w, m, p, xi, _, _ = merged
-    if weight < TINY * TINY:
+    if weight < TINIEST:
         return
     way, air, dt = target % WAYS, target % MODES // WAYS, seen[DT]
     _predict(x, c, way, air, dt)
