@@ -19,13 +19,13 @@ from echostep.altitude import Altitude, BarometerSettings, Heights, Pressures, n
 from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.evaluate.floors import Scene, judge, longest_s
+from echostep.floor_record import find_storeys, stays
 from echostep.floor_run import parse_heights, record_floors
 from echostep.floors import FloorFilter, checked_heights
 from echostep.pressure_csv import load_pressures
 from echostep.simulation.climbs import climb
 from echostep.simulation.sensors import Scp1000
 from echostep.simulation.weather import Weather, device_temperatures, pressures
-from echostep.floor_record import find_storeys, stays
 
 Floats = NDArray[np.float64]
 
