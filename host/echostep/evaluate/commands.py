@@ -93,6 +93,23 @@ def floors_command(
     evaluate_floors(runs, seed, json, out, scheduler)
 
 
+@app.command("storeys")
+def storeys_command(
+    runs: Annotated[int, typer.Option("--runs", help="Walks through each building.", min=1)] = 10,
+    seed: Seed = 1,
+    folder: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
+    ] = None,
+    json: Json = None,
+    out: Out = Path("out/storeys"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Walks through all floors of a building by stairs and lift (simulated)."""
+    from echostep.evaluate.storeys import evaluate_storeys
+
+    evaluate_storeys(runs, seed, folder, json, out, scheduler)
+
+
 @app.command("feet")
 def feet_command(
     folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
