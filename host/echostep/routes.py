@@ -181,7 +181,7 @@ def _search(
     last = end[0] * size + end[1] * columns + end[2]
     cost[first] = 0.0
     heap = [(0.0, first)]
-    while len(heap):
+    while heap:
         spent, here = heapq.heappop(heap)
         if here == last:
             break

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 import serial
@@ -20,6 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
+from echostep.udp import UdpPort
 
 IDLE_S = 0.05  # no longer, so that the MTx is asked again in time
 READ_TIMEOUT_S = 0.1
@@ -27,6 +28,7 @@ WRITE_TIMEOUT_S = 0.5
 REOPEN_S = 0.5
 BOARD = "board"
 MTX = "mtx"
+GATEWAY = "gateway"
 LATEST_NS = 1 << 62  # later arrivals (damage in a recording) count as this one
 
 Ints = NDArray[np.int64]
@@ -77,6 +79,15 @@ class Portion:
         columns = (self.port.tolist(), self.t_arrival_ns.tolist(), self.start.tolist(), self.end.tolist())
         for port, t_arrival_ns, start, end in zip(*columns, strict=True):
             yield Chunk(self.ports[port], t_arrival_ns, self.received[start:end])
+
+    def cut_after(self, name: str) -> Iterator[Portion]:
+        """The portion cut behind each chunk of the port of that name."""
+        at = (self.port == self.ports.index(name)).nonzero()[0] + 1 if name in self.ports else np.empty(0, np.int64)
+        edges = [0, *at.tolist(), len(self.port)]
+        for a, b in pairwise(dict.fromkeys(edges)):
+            yield Portion(
+                self.ports, self.port[a:b], self.t_arrival_ns[a:b], self.start[a:b], self.end[a:b], self.received
+            )
 
     def of(self, name: str) -> PortBytes:
         """What the port of that name delivered."""
@@ -180,8 +191,10 @@ class SerialPorts:
             return
 
 
-def _open(url: str, baud: int) -> serial.SerialBase:
+def _open(url: str, baud: int) -> serial.SerialBase | UdpPort:
     try:
+        if url.startswith("udp://"):
+            return UdpPort(url)
         return serial.serial_for_url(url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S)
     except (serial.SerialException, OSError, ValueError) as error:
         raise EchostepError(

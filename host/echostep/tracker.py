@@ -11,14 +11,17 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, unwatched
 from echostep.gait import Leg
+from echostep.gateway import Gateway, Word
 from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
 from echostep.plan import Plan, Pose
 from echostep.settings import Settings
-from echostep.sources import Chunk, Portion, portion_of
+from echostep.sources import GATEWAY, Chunk, Portion, portion_of
 from echostep.storeys import building
 from echostep.waiting import Passage
+
+MOST_WORDS = 4096  # of beacons that wait for the foot; older ones are forgotten
 
 
 class Tracker:
@@ -37,6 +40,8 @@ class Tracker:
         self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
+        self.gateway = Gateway()
+        self._words: list[Word] = []  # that wait for their leg
         self._rng = np.random.default_rng(seed)
         self._last: Estimate | None = None
 
@@ -46,15 +51,27 @@ class Tracker:
 
     def take(self, portion: Portion) -> list[Estimate]:
         """Take many chunks; the estimates are those that the chunks would have given one by one."""
+        return [e for piece in portion.cut_after(GATEWAY) for e in self._take(piece)]
+
+    def _take(self, portion: Portion) -> list[Estimate]:
+        """Take chunks of which the last alone may be the gateway's: what beacons said is known from then on."""
         estimates: list[Estimate] = []
         for piece in self.intake.take(portion):
             if isinstance(piece, Passage):
                 self.filter = self.filter or self._begin(piece.leg.heading0_rad, self._rng)
-                self._last = self.filter.follow(piece)
+                self._last = self.filter.follow(piece, self._words_until(piece.leg.t1_s))
                 estimates.append(self._last)
             elif self._last is not None:
                 estimates.append(unwatched(self._last, piece.t_s))
+        if said := portion.of(GATEWAY).received:
+            self._words += self.gateway.take(said, self.intake.newest_s)
         return estimates
+
+    def _words_until(self, t_s: float) -> list[Word]:
+        """What beacons have said up to then and nobody has heard yet."""
+        words = [word for word in self._words if word.t_s <= t_s]
+        self._words = [word for word in self._words if word.t_s > t_s][-MOST_WORDS:]
+        return words
 
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
@@ -66,4 +83,4 @@ class Tracker:
 
     def _begin(self, walk_heading_rad: float, rng: np.random.Generator) -> MapFilter:
         s, b = self.settings, self.building
-        return MapFilter(b.walls, self.start, walk_heading_rad, rng, s.cloud, s.echo, b.storeys, s.climb)
+        return MapFilter(b.walls, self.start, walk_heading_rad, rng, s.cloud, s.echo, b.storeys, s.climb, s.beacons)
