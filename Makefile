@@ -4,8 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 ELF := firmware/build/echostep.elf
+SHIPPED := host/echostep/firmware/echostep.hex
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
+TEST_PACKAGES := mosquitto
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -21,8 +23,9 @@ $(READY): host/pyproject.toml
 tools-apt:
 	@tools/apt.sh $(APT_PACKAGES)
 
-firmware: ## build the firmware (firmware/build/echostep.elf and .hex)
+firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
 	$(MAKE) -C firmware
+	cp firmware/build/echostep.hex $(SHIPPED)
 
 twin: $(READY) ## play the board and the MTx on two pseudo terminals, in real time, until Ctrl-C
 	@tools/apt.sh $(APT_PACKAGES)
@@ -43,7 +46,7 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python tools/real_walk.py --out out/real
 
 test: $(READY) ## run every test
-	@tools/apt.sh $(APT_PACKAGES) || echo "No right to install the AVR tools: tests that need them are skipped."
+	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools and Mosquitto: tests that need them are skipped."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 	$(MAKE) --quiet check
 	$(BIN)/python -m pytest -q
@@ -54,6 +57,7 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
+	$(BIN)/python tools/docs.py --check
 	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
 size: ## flash, static RAM and stack of the firmware
@@ -71,11 +75,23 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
-flash: ## write the firmware to a board: make flash PORT=/dev/ttyACM0
+wheel: $(READY) ## build the wheel, install it in a fresh environment without compiler, run the demo in there, and pipx
+	$(BIN)/python tools/wheel.py
+
+docs: $(READY) ## make all pages anew that come from the code: messages, plan, commands, settings, recordings
+	$(BIN)/python protocol/generate.py
+	$(BIN)/python tools/plan_fields.py
+	$(BIN)/python tools/docs.py
+
+kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
+	$(BIN)/python tools/kill_recorder.py
+
+flash: $(READY) ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
 	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }
 	@[ -e "$(PORT)" ] || { echo "$(PORT): there is no such port; see ls /dev/serial/by-id"; exit 2; }
 	@tools/apt.sh avrdude || { echo "avrdude is not installed and this user may not install it: apt install avrdude"; exit 2; }
-	$(MAKE) -C firmware flash PORT=$(PORT)
+	@if command -v avr-gcc >/dev/null || tools/apt.sh $(APT_PACKAGES); then $(MAKE) -C firmware && $(BIN)/echostep flash --port $(PORT) --hex firmware/build/echostep.hex; \
+	else echo "avr-gcc is not installed: the firmware that comes with the package is written"; $(BIN)/echostep flash --port $(PORT); fi
 
 clean: ## remove everything that was built
 	$(MAKE) -C firmware clean
@@ -83,4 +99,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup tools-apt firmware twin demo real test check size measure bench flash clean
+.PHONY: help setup tools-apt firmware twin demo real test check size measure bench wheel kill docs flash clean

@@ -6,9 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_runs import Bench, needs_twin
+from board_runs import ROOT, Bench, needs_twin
 from echostep import messages as m
+from echostep.frames import encode
 from echostep.health import BoardWords, Severity, board_findings, expected_rates, gyro_celsius, rate_findings
+from echostep.plan import load_plan
+from echostep.sources import BOARD, Chunk
+from echostep.tracker import Tracker
+from echostep.view import findings
 
 CONFIGURATION = m.Configuration(0, 0xFF, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
 
@@ -73,7 +78,7 @@ def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
     ("said", "part", "severity"),
     [
         (m.GyroHealth(0, 1, 0, m.SelfTest.FAILED, -20, 20), "calf gyro: failed its self-test (responses -20 and 20", 2),
-        (m.GyroHealth(0, 1, 0, m.SelfTest.MOVED, -221, 0), "calf gyro: was turning", 1),
+        (m.GyroHealth(0, 1, 0, m.SelfTest.MOVED, -221, 0), "calf gyro: was turning", 0),
         (m.GyroHealth(0, 1, 0, m.SelfTest.NOT_RUN, -32768, -32768), "calf gyro: was not tested", 0),
         (m.GyroHealth(0, 1, -32768, m.SelfTest.PASSED, -221, 221), "calf gyro: answers, but not with its temp", 2),
         (m.GyroHealth(0, 1, 600, m.SelfTest.PASSED, -221, 221), "calf gyro: says it has 112 degrees", 1),
@@ -85,6 +90,16 @@ def test_what_a_gyro_says_of_itself(said: m.GyroHealth, part: str, severity: int
     assert finding.severity == severity
     absent = status(healthy=0x7F & ~0x10, errors_calf=7, fault_calf=m.Fault.NO_ANSWER)
     assert [f.what for f in board_findings(words(absent, said))] == ["does not answer"]  # nothing is said twice
+
+
+def test_self_test_inputs_that_are_not_wired_are_said_once() -> None:
+    tests = [m.GyroHealth(0, gyro, 0, m.SelfTest.FAILED, 1, -2) for gyro in m.Gyro]
+    (finding,) = board_findings(words(status(), *tests))
+    assert "none of them responds" in finding.what
+    assert "A0 to ST1" in finding.remedy
+    assert finding.severity is Severity.WARNING
+    passed = m.GyroHealth(0, m.Gyro.BELT, 0, m.SelfTest.PASSED, -200, 200)
+    assert [f.subject for f in board_findings(words(status(), *tests, passed))] == ["thigh gyro", "calf gyro"]
 
 
 def test_rates_below_what_is_configured_are_said() -> None:
@@ -101,6 +116,17 @@ def test_rates_below_what_is_configured_are_said() -> None:
 
 def test_temperature_of_a_gyro() -> None:
     assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
+
+
+def test_the_live_view_says_it_too() -> None:
+    plan = load_plan(ROOT / "host/echostep/plans/demo.json")
+    tracker = Tracker(plan)
+    said: list[m.Message] = [CONFIGURATION, status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM)]
+    for k, message in enumerate(said):
+        tracker.feed(Chunk(BOARD, k, encode(message, k)))
+    shown = [str(finding) for finding in findings(tracker)]
+    assert len(shown) == 1
+    assert shown[0].startswith("barometer: EEPROM check failed")
 
 
 u16 = st.integers(0, 65_535)

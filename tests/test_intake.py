@@ -220,7 +220,7 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
         ours.hear(np.array(at, np.int64), np.array([p for k in range(a, b) for p in pings[k]]).reshape(-1, 3))
         for k in range(a, b):
             ours.go(k - a, legs[k])
-        for piece in ours.release(board[a:b], mtx[a:b]):
+        for piece in ours.release(board[a:b], mtx[a:b], mtx[a:b]):
             if isinstance(piece, Passage):
                 heard = zip(piece.t_s.tolist(), piece.ranger.tolist(), piece.range_m.tolist(), strict=True)
                 found.append((piece.leg, list(heard)))

@@ -16,6 +16,7 @@ READMES = [
     "README.md",
     "host/README.md",
     "host/DESIGN.md",
+    "host/TEAMS.md",
     "protocol/README.md",
     "firmware/README.md",
     "tools/twin/README.md",
@@ -68,6 +69,10 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
         "replay",
         "foot",
         "decode",
+        "doctor",
+        "flash",
+        "calibrate",
+        "command",
         *(f"evaluate {name}" for name in ("feet", "girard2011", "echoes", "trails")),
     ],
 )
@@ -100,4 +105,6 @@ def test_a_wheel_holds_everything_that_the_demo_needs(tmp_path: Path) -> None:
         [sys.executable, "-m", "zipfile", "-l", wheel], capture_output=True, text=True, check=True
     ).stdout
     assert "echostep/plans/demo.json" in listed
+    assert "echostep/firmware/echostep.hex" in listed
+    assert "echostep/firmware/99-echostep.rules" in listed
     assert "__pycache__" not in listed

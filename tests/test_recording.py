@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import struct
+import time
 from io import BytesIO
 from pathlib import Path
 
 import pytest
+import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.reader import NonSeekingReader
 from mcap.records import Channel
+from mcap.writer import CompressionType, Writer
 
 from echostep.errors import EchostepError
-from echostep.recording import MCAP_MAGIC, PIECE, Recorder, open_recording
+from echostep.recording import PIECE, Recorder, open_recording
+from echostep.records import MCAP_MAGIC, RECORD_LIMIT, opened, port_of
 from echostep.sources import LATEST_NS, Chunk
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]
@@ -78,7 +83,10 @@ def naive_chunks(file: bytes) -> list[Chunk]:
         elif opcode == Opcode.CHANNEL:
             with contextlib.suppress(McapError, struct.error, UnicodeDecodeError):
                 record = Channel.read(ReadDataStream(BytesIO(body)))
-                ports[record.id] = record.topic.removeprefix("/").removesuffix("/bytes")
+                if port_of(record):
+                    ports[record.id] = record.topic.removeprefix("/").removesuffix("/bytes")
+                else:
+                    ports.pop(record.id, None)
     return found
 
 
@@ -103,14 +111,62 @@ def test_arrival_times_from_another_age_are_bounded(tmp_path: Path) -> None:
     assert list(open_recording(tmp_path / "a.mcap").chunks()) == [Chunk("board", LATEST_NS, b"x")]
 
 
-def test_before_the_file_is_closed_all_but_the_last_second_is_on_disk(tmp_path: Path) -> None:
+def test_a_source_that_can_wait_is_never_more_than_half_a_second_ahead_of_the_file(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.mcap", {})
     for chunk in CHUNKS:
         recorder.write(chunk)
+        recorder.settle(chunk)
     found = list(open_recording(tmp_path / "a.mcap").chunks())
     assert found == CHUNKS[: len(found)]
-    assert CHUNKS[-1].t_arrival_ns - found[-1].t_arrival_ns <= 1_000_000_000
+    assert CHUNKS[-1].t_arrival_ns - found[-1].t_arrival_ns <= 500_000_000
     recorder.close()
+
+
+def test_who_does_not_wait_finds_everything_in_the_file_half_a_second_later(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", {})
+    for chunk in CHUNKS:
+        recorder.write(chunk)
+    time.sleep(0.5)
+    assert list(open_recording(tmp_path / "a.mcap").chunks()) == CHUNKS
+    recorder.close()
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_recording_that_another_tool_has_packed_into_chunks_is_the_same(
+    tmp_path: Path, compression: CompressionType
+) -> None:
+    write(tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file, (tmp_path / "b.mcap").open("wb") as packed:
+        writer = Writer(packed, chunk_size=1000, compression=compression)
+        writer.start()
+        reader = NonSeekingReader(file)
+        topics: dict[str, int] = {}
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.topic not in topics:
+                topics[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, 0)
+            writer.add_message(topics[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.add_metadata("echostep", {"seed": "4", "note": "a test"})
+        writer.finish()  # type: ignore[no-untyped-call]
+    recording = open_recording(tmp_path / "b.mcap")
+    assert recording.about == {"seed": "4", "note": "a test"}
+    assert list(recording.chunks()) == CHUNKS
+    assert not recording.truncated
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "", "unheard"])
+@given(junk=st.binary(max_size=200), claimed=st.integers(0, (1 << 64) - 1))
+@settings(max_examples=40)
+def test_a_damaged_chunk_is_left_closed(compression: str, junk: bytes, claimed: int) -> None:
+    name = compression.encode()
+    body = struct.pack("<QQQII", 0, 0, claimed, 0, len(name)) + name + struct.pack("<Q", len(junk)) + junk
+    assert opened(body) in (None, b"", junk)
+
+
+def test_a_chunk_that_would_fill_the_memory_is_left_closed() -> None:
+    squeezed = zstandard.ZstdCompressor(level=19).compress(bytes(RECORD_LIMIT + 5))
+    head = struct.pack("<QQQII", 0, 0, 10, 0, 4) + b"zstd" + struct.pack("<Q", len(squeezed))
+    assert len(squeezed) < 100_000
+    assert opened(head + squeezed) is None
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n"])

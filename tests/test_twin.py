@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from board_runs import ELF, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
+from board_runs import ELF, ROOT, TWIN, Bench, kinds, needs_twin, pings, quiet_rows
 from echostep import messages as m
 from echostep.errors import EchostepError
 from echostep.simulation.board import BoardProcess
@@ -294,6 +295,26 @@ def test_a_compass_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -
     assert bench.status.errors_compass > 0
     assert bench.status.fault_compass == cause
     assert kinds(found)["Ping"] >= 2 * 28
+
+
+def test_a_compass_that_stretches_the_clock_is_borne(bench: Bench) -> None:
+    bench.fault("compass=stretch")
+    bench.run(1_000)
+    assert {c.bearing for c in bench.run(1_000) if isinstance(c, m.Compass)} == {900}
+
+
+def test_every_fault_that_is_documented_exists(bench: Bench) -> None:
+    rows = re.findall(r"^\| (`[a-z_0-9`, ]+`) \| (.*) \|$", (ROOT / "tools/twin/README.md").read_text(), flags=re.M)
+    switches = [
+        f"{name}={value}"
+        for names, values in rows
+        for name in re.findall(r"`(\w+)`", names)
+        for value in re.findall(r"`(\w+)`", values)
+    ]
+    assert len(switches) > 45
+    for switch in switches:
+        bench.fault(switch)
+    bench.run(10)
 
 
 def test_a_host_that_does_not_read_costs_counted_frames_and_heals_at_once(bench: Bench) -> None:

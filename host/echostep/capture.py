@@ -14,7 +14,8 @@ from typing import Any
 from echostep.errors import EchostepError
 from echostep.frames import BoardReader
 from echostep.messages import BY_ID, Message
-from echostep.recording import MCAP_MAGIC, open_recording
+from echostep.recording import open_recording
+from echostep.records import MCAP_MAGIC
 from echostep.sources import BOARD, MTX
 from echostep.xsens import MtSample, MtxReader
 

@@ -1,4 +1,4 @@
-"""The command line: `echostep demo | live | record | replay | foot | legs | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode`.
 
 In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
 """
@@ -12,17 +12,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echostep.beacon_commands import app as beacon_app
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
+from echostep.logs_cli import app as logs
 from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
+    from echostep.team.endpoint import Outlet
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(beacon_app, name="beacons")
+app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
@@ -40,6 +45,25 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", 
 Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Tell a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://, several times if you like.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
+
+
+BeaconsPort = Annotated[
+    str | None,
+    typer.Option("--beacons", metavar="PORT", help="Port of a beacon gateway: serial, or udp://127.0.0.1:9000."),
+]
+GuideTo = Annotated[
+    str | None, typer.Option("--guide", metavar="TO", help="Guide the wearer there: a room, X,Y[,LEVEL], or start.")
+]
 
 
 @app.command()
@@ -47,6 +71,9 @@ def demo(
     out: Out = Path("out/demo"),
     headless: Headless = False,
     seed: Seed = 1,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
     board_command: Annotated[
         str | None,
         typer.Option(
@@ -55,11 +82,12 @@ def demo(
             help="Program that plays the sensor board; without it the Python board does.",
         ),
     ] = None,
+    guide: Annotated[bool, typer.Option("--guide", help="With beacons, and guidance to the end of the walk.")] = False,
 ) -> None:
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, headless=headless)
+    runs.demo(out, seed, board_command, _outlet(publish, name, team), headless=headless, guide=guide)
 
 
 @app.command()
@@ -73,11 +101,29 @@ def live(
     seed: Seed = 0,
     headless: Headless = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
+    beacons: BeaconsPort = None,
+    guide: GuideTo = None,
 ) -> None:
     """Track the wearer of a board and an MTx; everything is recorded."""
     from echostep import runs
 
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, headless=headless)
+    runs.live(
+        plan,
+        board,
+        mtx,
+        out,
+        _pose(start),
+        settings,
+        seed,
+        seconds,
+        _outlet(publish, name, team),
+        headless=headless,
+        beacons=beacons,
+        guide=guide,
+    )
 
 
 @app.command()
@@ -88,11 +134,12 @@ def record(
         "out/recording.mcap"
     ),
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    beacons: BeaconsPort = None,
 ) -> None:
     """Record both ports without tracking."""
     from echostep import runs
 
-    runs.record(board, mtx, out, seconds)
+    runs.record(board, mtx, out, seconds, beacons)
 
 
 @app.command()
@@ -105,11 +152,26 @@ def replay(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
     headless: Headless = False,
+    publish: Publish = None,
+    name: Name = "",
+    team: Team = "team",
+    guide: GuideTo = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, headless=headless)
+    runs.replay(
+        recording,
+        plan,
+        out,
+        _pose(start),
+        settings,
+        seed,
+        truth,
+        _outlet(publish, name, team),
+        headless=headless,
+        guide=guide,
+    )
 
 
 @app.command()
@@ -149,6 +211,44 @@ def legs(
 
 
 @app.command()
+def command(
+    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    plan: Plan,
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first."""
+    from echostep.team import commander
+
+    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+
+
+@app.command()
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option("--heights", metavar="METRES", help="Heights of the storeys, as 0,3.5,7; auto: from the record."),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="The floor at the start, when it is known.", min=0)
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
+) -> None:
+    """Floors of a recorded barometer: t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep import floor_run
+
+    floor_run.floors(pressure, heights, out, start, plot=plot)
+
+
+@app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
@@ -156,6 +256,70 @@ def decode(
     from echostep import runs
 
     runs.decode(file)
+
+
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
+) -> None:
+    """Look at ports, board and MTx, and say what is wrong and what to do; exit status 1 when something is."""
+    from echostep import doctor as examination
+
+    if udev:
+        typer.echo(examination.rules_text(), nl=False)
+    elif not examination.run(board, mtx, seconds):
+        raise typer.Exit(1)
+
+
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); else the one shipped with this program."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from rich.console import Console
+
+    from echostep import flash as flashing
+
+    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[
+        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; all of them when none is named.")
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
+    ] = Path("calibration.toml"),
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
+    walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
+) -> None:
+    """Measure the wearer's gyros, mounting, compass and legs, and write them as settings."""
+    from rich.console import Console
+
+    from echostep import calibrate as calibration
+
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
+
+
+def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
+    from echostep.team.endpoint import parse_outlet
+
+    return parse_outlet(publish, name, team) if publish else None
 
 
 def _pose(text: str | None) -> Pose | None:
@@ -176,5 +340,8 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:
+        print(f"echostep: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -42,6 +42,7 @@ class Leg:
 
     `sd_m` is the move's standard deviation per axis, `turn_sd_rad` the growth of the yaw error. `step` counts steps so far. `anchor_sd_m`: of
     both ends, alike. `rise_m`: how much higher the foot has landed, with its standard deviation; infinite when no foot tells.
+    `scale_sd`: how much the error that all lengths share has grown.
     """
 
     t0_s: float
@@ -56,6 +57,7 @@ class Leg:
     anchor_sd_m: float = 0.0
     rise_m: float = 0.0
     rise_sd_m: float = math.inf
+    scale_sd: float = 0.0
 
     @property
     def unwatched(self) -> bool:

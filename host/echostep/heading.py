@@ -50,7 +50,7 @@ class HeadingSettings:
     """
 
     disturbance_rad: float = math.radians(8.0)
-    same_s: float = 4.0
+    same_s: float = 8.0
     steady_rad: float = math.radians(12.0)
     walk_rad: float = math.radians(0.06)
     drift_rad_s2: float = math.radians(0.002)
@@ -138,7 +138,7 @@ class Heading:
         ):
             row = np.zeros(SIZE)
             row[BIAS] = 1.0
-            self._update(row, rate - float(self.state[BIAS]), 4.0 * self.settings.rest_sd_rad_s**2)
+            self._update(row, rate - float(self.state[BIAS]), 1.5 * self.settings.rest_sd_rad_s**2)
 
     def _see(self, t_s: float, compass: float) -> None:
         """One reading of the compass."""

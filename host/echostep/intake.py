@@ -16,12 +16,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.alignment import Alignment
-from echostep.calibration import RangerSettings, heights, ranges
+from echostep.calibration import GyroSettings, RangerSettings, compass_headings, gyro_rates, heights, ranges
 from echostep.foot import Foot, Footfall, FootSettings, Step
 from echostep.frames import BoardReader, Frames, encode
-from echostep.gait import GaitSettings, TrunkPath
+from echostep.gait import GaitSettings, Leg, TrunkPath
+from echostep.heading import Iron
 from echostep.health import BoardWords
-from echostep.messages import BY_ID, ROWS, Configuration, GyroHealth, Identity, Outcome, Ping, Pressure, Status, Sync
+from echostep.journey import Journey
+from echostep.legpath import Block, WearerSettings
+from echostep.messages import (
+    BY_ID,
+    ROWS,
+    Compass,
+    Configuration,
+    GyroHealth,
+    Gyros,
+    Identity,
+    Outcome,
+    Ping,
+    Pressure,
+    Status,
+    Sync,
+)
 from echostep.sources import BOARD, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.waiting import HEIGHT, Passage, Silence, Waiting
@@ -31,7 +47,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
+IDENTITY, PING, SYNC, STATUS = (_IDS[kind] for kind in (Identity, Ping, Sync, Status))
+PRESSURE, GYROS, COMPASS = (_IDS[kind] for kind in (Pressure, Gyros, Compass))
+BLOCK = 20  # gyro samples that go through the legs at a time: a tenth of a second
 _WORDS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth)]
 _TIMED = np.array(
     [i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)]
@@ -51,7 +69,10 @@ class IntakeCounts:
 class Intake:
     """Feed it every chunk; it returns what the chunks make certain."""
 
-    def __init__(self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings) -> None:
+    def __init__(
+        self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
+        wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: Iron | None = None,
+    ) -> None:  # fmt: skip
         self.board = BoardReader()
         self.mtx = MtxReader()
         self.timeline = Timeline(mtx)
@@ -62,6 +83,8 @@ class Intake:
         self.identity: Identity | None = None
         self.words = BoardWords()
         self._ranger = ranger
+        self.journey = Journey(wearer or WearerSettings(), iron)
+        self._stride = GyroBlocks(gyro or GyroSettings())
         self._waiting = Waiting()
         self._unknown_ports = 0
         self._bad_times = 0
@@ -86,8 +109,8 @@ class Intake:
         self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
         self._note(frames, times)
         self._hear(frames, times)
-        self._follow(batch, times)
-        return self._waiting.release(times.board_newest_s, times.mtx_newest_s)
+        watched_s = self._go(self._follow(batch, times), self._stride.cut(frames, times), times)
+        return self._waiting.release(times.board_newest_s, times.mtx_newest_s, watched_s)
 
     def warm_up(self) -> None:
         """Compile the kernels, so that no chunk waits for it later; leaves the intake as it was."""
@@ -131,29 +154,77 @@ class Intake:
         order = np.argsort(places, kind="stable")
         self._waiting.hear(times.board_at[places[order]], np.concatenate([rows, more])[order])
 
-    def _follow(self, batch: MtBatch, times: Times) -> None:
-        """Samples go through the foot to the path, whose legs wait for their pings."""
+    def _go(self, by_foot: list[tuple[int, list[Leg]]], by_leg: list[tuple[int, Block]], times: Times) -> Floats:
+        """What foot and legs tell goes on one journey, message by message, and waits for its pings.
+
+        Returns up to when somebody watched him, after each message (n,).
+        """
+        watched_s = times.mtx_newest_s.copy()
+        foot_at, k = [at for at, _ in by_foot], 0
+        by_legs_s, since = self.journey.watched_s, 0
+        for at, block in [*by_leg, (len(watched_s), None)]:
+            while k < len(foot_at) and (foot_at[k] < at or block is None):
+                self._waiting.go(foot_at[k], self.journey.foot(by_foot[k][1]))
+                k += 1
+            if block is not None:
+                self._waiting.go(at, self.journey.legs(block, float(times.mtx_newest_s[at])))
+            watched_s[since:at] = np.fmax(watched_s[since:at], by_legs_s)
+            by_legs_s, since = self.journey.watched_s, at
+        return watched_s
+
+    def _follow(self, batch: MtBatch, times: Times) -> list[tuple[int, list[Leg]]]:
+        """Samples go through the foot to its path: the legs, and the place of the message that tells them."""
+        found: list[tuple[int, list[Leg]]] = []
         kept = np.flatnonzero(~np.isnan(times.mtx_s))
         if not len(kept):
-            return
+            return found
         t_s, at = times.mtx_s[kept], times.mtx_at[kept]
         fall = self.foot.follow(t_s, batch.accel[kept], batch.gyro[kept], batch.mag[kept])
         begin = 0
         for event, told in zip(fall.events, fall.told.tolist(), strict=True):
-            self._stand(fall, t_s, at, begin, told)
+            found += self._stand(fall, t_s, at, begin, told)
             for known in self.alignment.feed([event], float(t_s[told])):
                 legs = self.path.step(known) if isinstance(known, Step) else self.path.stance(known)
-                self._waiting.go(int(at[told]), legs)
+                found.append((int(at[told]), legs))
             begin = told
-        self._stand(fall, t_s, at, begin, len(t_s))
+        return found + self._stand(fall, t_s, at, begin, len(t_s))
 
-    def _stand(self, fall: Footfall, t_s: Floats, at: Ints, begin: int, end: int) -> None:
+    def _stand(self, fall: Footfall, t_s: Floats, at: Ints, begin: int, end: int) -> list[tuple[int, list[Leg]]]:
         """What the samples [begin, end) between two events say of a trunk that stands."""
         if self.alignment.waiting:
-            return
+            return []
         still = begin + np.flatnonzero(fall.stance[begin:end])
-        for k, leg in self.path.stand(t_s[still], fall.heading_rad[still]):
-            self._waiting.go(int(at[still[k]]), [leg])
+        return [(int(at[still[k]]), [leg]) for k, leg in self.path.stand(t_s[still], fall.heading_rad[still])]
+
+
+class GyroBlocks:
+    """Cuts the board's gyro samples into blocks of BLOCK, with the compass read since the sample before; counted from the first one."""
+
+    def __init__(self, gyro: GyroSettings) -> None:
+        self._gyro = gyro
+        self._rows = np.empty((0, 6))  # t_s, thigh, calf, belt, compass; the place of the message
+        self._compass = np.nan
+
+    def cut(self, frames: Frames, times: Times) -> list[tuple[int, Block]]:
+        """The blocks that are full, each with the place of the message that fills it."""
+        place, samples = frames.rows(GYROS)
+        read, bearings = frames.rows(COMPASS)
+        compass = np.full(len(place) + 1, np.nan)
+        compass[0] = self._compass
+        compass[np.searchsorted(place, read)] = compass_headings(bearings)
+        self._compass = compass[-1]
+        new = np.column_stack(
+            [times.board_s[place], gyro_rates(samples, self._gyro), compass[:-1], times.board_at[place]]
+        )
+        rows = np.concatenate([self._rows, new[~np.isnan(new[:, 0])]])
+        count = len(rows) // BLOCK
+        self._rows = rows[count * BLOCK :].copy()
+        self._rows[:, 5] = -1.0
+        found = []
+        for k in range(count):
+            t_s, thigh, calf, belt, shown, at = rows[k * BLOCK : (k + 1) * BLOCK].T
+            found.append((int(at[-1]), Block(t_s, thigh, calf, belt, shown)))
+        return found
 
 
 def _board_arrivals(frames: Frames, row: Ints, t_arrival_ns: Ints) -> Arrivals:

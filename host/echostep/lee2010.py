@@ -200,6 +200,8 @@ class Walker:
         return np.array([row for row in rows if row is not None]).reshape(-1, 6)
 
     def _sample(self, t_s: float, thigh: float, calf: float, belt: float, compass: float) -> tuple[float, ...] | None:
+        if any(map(math.isnan, (t_s, thigh, calf, belt))):
+            return None
         if self._t_s is None or self._next_s is None:
             self._t_s, self._next_s = t_s, t_s + 1.0 / RATE_HZ
             return None

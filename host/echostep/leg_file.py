@@ -34,6 +34,7 @@ FASTEST_LEG_RAD_S = 20.0  # of one sample in a hundred; a sprinter's shank reach
 MOST_TURNS = 4  # of a compass that was not wrapped
 MOST_BACK, FEW = 0.02, 100
 SEGMENT_RANGE_M = (0.2, 0.75)
+START_SD_RAD = math.radians(3.0)  # of a heading that somebody knows
 SIGN_TURN_RAD = math.radians(30.0)
 
 
@@ -202,12 +203,12 @@ def _notes(table: Floats) -> tuple[str, ...]:
     return tuple(found)
 
 
-def track_default(samples: LegSamples, settings: LegsSettings) -> LegTrack:
-    """Ours: strides by both segments, heading by gyro and compass."""
+def track_default(samples: LegSamples, settings: LegsSettings, heading_rad: float | None = None) -> LegTrack:
+    """Ours: strides by both segments, heading by gyro and compass; `heading_rad` at the beginning, when it is known."""
     legs = Legs(settings)
     strides = (*legs.feed(samples.t_s, samples.thigh, samples.shank), *legs.finish())
     sign, how = belt_sign(samples)
-    heading, source = Heading(), _source(samples)
+    heading = Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD)
     still = standing(strides, samples.t_s)
     angles = heading.feed(
         samples.t_s, np.where(np.isnan(samples.belt), 0.0, sign * samples.belt), samples.compass, still
@@ -218,7 +219,7 @@ def track_default(samples: LegSamples, settings: LegsSettings) -> LegTrack:
     seen = (f"compass believed in {heading.read - heading.refused} of {heading.read} readings",) if heading.read else ()
     notes = (*how, *seen)
     strides = with_turns(strides, samples.t_s, angles[:, 0])
-    return LegTrack(rows, strides, legs.counts, source, float(angles[-1, 1]), notes)
+    return LegTrack(rows, strides, legs.counts, _source(samples), float(angles[-1, 1]), notes)
 
 
 def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 # Dorsiflexion of the ankle every 4 % of the stride from heel strike to toe off, degrees [Perry 1992; Winter 2009; Kadaba 1990, read to a degree].
-DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 12, 14, 15, 16, 15, 12, 5, -4, -11, -8)
+DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 14, 14, 11, 5, -4, -10, -14, -14)
 DORSIFLEXION_STEP = 0.04
 ANKLE_HEIGHT = (
     0.16  # of the shank: 0.039 of the body's height, the shank is 0.246 [Winter 2009, after Drillis and Contini]
@@ -30,7 +30,8 @@ FLAT = 0.08  # share of the stride at which the foot is flat on the floor [Perry
 HEEL_RISES = 0.25  # not before
 TOE_OFF = 0.62
 PELVIS = 1.017  # of a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
-HALVES = (0.03, 0.05, 0.07, 0.09)  # where half strides begin, foot all but flat
+HALVES = (0.06, 0.08, 0.10)  # where half strides begin, foot all but flat
+ALONE = (0.14, 0.42)  # phases
 WITH_FOOT = 1.09  # of the thigh: a longer shank is measured to the floor (0.285 of the height, not 0.246; the thigh has 0.245) [Winter 2009]
 TO_FLOOR = 0.285 / 0.246
 
@@ -71,18 +72,34 @@ class Travel:
         forward, up = (np.interp(at, self.phase, c) for c in (self.forward_m, self.up_m))
         return float(forward[1] - forward[0]), float(up[1] - up[0])
 
+    def passed(self) -> float:
+        """How far forward while this leg carries alone and its foot is flat."""
+        begin, end = np.interp(ALONE, self.phase, self.forward_m)
+        return float(end - begin)
+
     def stride(self) -> tuple[float, float]:
         """Forward and up in a whole stride: both legs do what this one does."""
         halves = np.array([self.half(begin) for begin in HALVES]).mean(axis=0)
         return 2.0 * PELVIS * float(halves[0]), 2.0 * float(halves[1])
 
 
-def travel(phase: Floats, thigh: Floats, shank: Floats, segments: Segments, struck: float | None = 0.0) -> Travel:
-    """The hips over the standing foot at phases (n,) of the stride; `struck`: phase of the heel's strike, None when the foot stood already."""
+def knee_at(phase: Floats, thigh: Floats, shank: Floats, at: float) -> float:
+    """Flexion of the knee at a phase."""
+    return float(np.interp(at, phase, thigh - shank))
+
+
+def travel(
+    phase: Floats, thigh: Floats, shank: Floats, segments: Segments, struck: float | None = 0.0, *, rolls: bool = True
+) -> Travel:
+    """The hips over the standing foot at phases (n,) of the stride; `struck`: phase of the heel's strike, None when the foot stood already.
+
+    `rolls`: the foot rises about its ball; on stairs it hardly does while it carries.
+    """
     shank_m = segments.to_ankle_m
     ankle_ahead = segments.thigh_m * np.sin(thigh) + shank_m * np.sin(shank)
     above = segments.thigh_m * np.cos(thigh) + shank_m * np.cos(shank)
-    rise_x, rise_z = _about_ball(heel_rise(phase, shank), shank_m)
+    pitch = heel_rise(phase, shank) if rolls else np.zeros_like(shank)
+    rise_x, rise_z = _about_ball(pitch, shank_m)
     down_x = _about_heel(phase, shank, struck, shank_m) if struck is not None else 0.0
     forward = (rise_x + down_x - ankle_ahead) * segments.scale
     return Travel(phase, forward, (above + rise_z) * segments.scale)

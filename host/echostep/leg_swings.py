@@ -26,9 +26,10 @@ DECIDE_S = 2.2  # of motion
 MOVING_RAD_S = 0.35
 CLEAR = 0.12  # of the score that tells the sign
 OF_SKEW = 0.3  # in it, beside how the leads of forward and of backward turns differ
+OF_LEAD = 0.25
 BACKWARD = -0.1  # of the thigh's lead
 LAGS = range(5, 26, 5)  # places by which the thigh may lead
-SPENT = 0.03  # of its way from mid swing: a last step to a stand comes to rest slowly
+NEAR, SPENT = 0.2, 0.05  # of the way from mid swing, of the rate there
 LATEST_STRIKE_S = 0.45
 STILL = int(0.35 * GRID_HZ)
 STILL_RANGE_RAD_S = 0.16
@@ -55,7 +56,10 @@ class Swings:
         if not final and moving.sum() < DECIDE_S * GRID_HZ:
             return False
         rates = rates - np.median(rates[~moving], axis=0) if (~moving).sum() > STILL else rates
-        thigh = 1.0 if together(rates) >= 0.0 else -1.0
+        pair = together(rates) + OF_LEAD * leads(rates)  # hardly anybody walks backward
+        if abs(pair) < CLEAR and not final:
+            return False
+        thigh = 1.0 if pair >= 0.0 else -1.0
         rates = rates * np.array([thigh, 1.0])
         ahead = leads(rates)
         skew = lopsided(rates[:, 0]) + lopsided(rates[:, 1])
@@ -90,7 +94,8 @@ def together(rates: Floats) -> float:
         angles = angles[width // 2 : width // 2 + len(mean)] - mean
     else:
         angles = angles - angles.mean(axis=0)
-    return float((angles[:, 0] * angles[:, 1]).sum())
+    size = math.sqrt(float((angles[:, 0] ** 2).sum() * (angles[:, 1] ** 2).sum()))
+    return float((angles[:, 0] * angles[:, 1]).sum()) / size if size > 0.0 else 0.0
 
 
 def leads(rates: Floats) -> float:
@@ -108,10 +113,13 @@ def is_still(rates: Floats) -> bool:
 
 
 def strike_after(shank: Floats) -> int:
-    """Heel strike after the middle of a swing, from which on these angles are: where the shank has all but reached its foremost angle."""
+    """Heel strike after the middle of a swing, from which on these angles are: the shank has all but stopped, near its foremost angle."""
     swing = shank[: int(LATEST_STRIKE_S * GRID_HZ)]
     foremost = float(swing.max())
-    return int(np.argmax(swing >= foremost - SPENT * (foremost - shank[0])))
+    near = swing >= foremost - NEAR * (foremost - shank[0])
+    rate = np.diff(smooth(swing), append=swing[-1])
+    stops = near & (rate <= SPENT * max(float(rate[:SMOOTH].max()), 1e-9))
+    return int(np.argmax(stops)) if stops.any() else int(np.argmax(swing))
 
 
 def toe_off_before(shank: Floats, peak: int, begin: int) -> int:

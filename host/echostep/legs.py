@@ -31,7 +31,7 @@ from echostep.leg_kinematics import (
     STANDING_THIGH_RAD,
     TOE_OFF,
     Segments,
-    Travel,
+    knee_at,
     travel,
 )
 from echostep.leg_swings import GRID_HZ, Swings
@@ -42,9 +42,19 @@ LONGEST_GAP_S = 0.25
 FASTEST_RAD_S = 35.0
 USUAL_STRIDE_S = 1.2
 SHORTEST_M = 0.25  # a stride: less is a step in place or sideways
-STAIRS_UP_M, STAIRS_DOWN_M = 0.17, -0.17  # rise in a stride, against about 0.33 on stairs
+LEAST_PASSED = 0.12  # of the stride, which the hips pass over the foot that stands alone; 0.25 to 0.3 in walking
+BENT_RAD = math.radians(
+    33.0
+)  # of the knee at the strike (up) or half a stride later (down); on the flat 5 to 25 degrees
+LONGEST_ON_STAIRS_M = 1.0
+STAIRS_M, STAIRS_RISE_M = (
+    0.57,
+    0.34,
+)  # two treads of 28.5 and 17 cm: houses differ by 2 cm each, our angles by more [DIN 18065]
+STAIRS_WEIGHT = 0.15  # of what the angles say
 PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
-LEVEL_GAIN, LEVEL_LIMIT_RAD = 0.15, math.radians(8.0)
+LEVEL_STRIDE_M = 0.85  # longer than any on stairs
+LEVEL_GAIN = 0.15
 BIAS_SD_RAD_S = math.radians(3.0)
 CLOSURE_SD_RAD = math.radians(2.5)  # of an angle after a stride
 SCALE_SD = 0.035  # of all strides of a person whose legs alone are known
@@ -54,7 +64,8 @@ EDGE_SD_M = 0.08  # of a beginning or an end
 BLIND_SD_M = 0.4  # of what this leg cannot see
 REST_SD_RAD_S = math.radians(0.15)
 LOOK = 3  # places on either side for a rate
-EDGE = 12  # places over which a speed is taken at the beginning and the end of a stance
+STANCE = 62  # percent of a stride
+FIRST_SWING = 0.62  # of the pace: from rest to the full pace it takes about a stride [Breniere and Do 1986]
 STAYS = 0.44  # phase after which a foot that stays does not rise
 FORGET = 500
 
@@ -141,6 +152,7 @@ class _Bout:
     level_at: int = 0
     cycle: int = int(USUAL_STRIDE_S * GRID_HZ)
     pace_m_s: float | None = None
+    blind: Flag = Flag.NONE  # of the newest stride
 
 
 class Legs:
@@ -163,6 +175,11 @@ class Legs:
         self._top = (0.0, 0)  # of the swing under way: rate, place
         self._found: list[Stride] = []
         self._keep = 0  # places before it can be forgotten
+
+    @property
+    def standing_since_s(self) -> float | None:
+        """Since when he stands; None: he does not, as far as is known."""
+        return None if self._still_since is None else self._time(self._still_since)
 
     def feed(self, t_s: Floats, thigh: Floats, shank: Floats) -> list[Stride]:
         """Samples (n,) each: time, rates in rad/s."""
@@ -314,11 +331,12 @@ class Legs:
             thigh, shank = self._angles(previous, k)
         length, rise, flags, sd = self._stride(thigh, shank)
         pace = length * GRID_HZ / bout.cycle
-        if len(bout.peaks) == 2:
-            self._begin_piece(previous, pace)
+        bout.blind = flags & (Flag.UNSEEN | Flag.BACKWARD)
+        if len(bout.peaks) == 2 and previous > bout.begin:
+            self._tell_edge(bout.begin, previous, self._begin_piece(previous, pace))
         self._tell(self._time(previous), self._time(k), length, sd, rise, flags)
         bout.pace_m_s = pace
-        self._relevel(k, thigh, shank)
+        self._relevel(k, thigh, shank, length)
         self._keep = previous
 
     def _stride(self, thigh: Floats, shank: Floats) -> tuple[float, float, Flag, float]:
@@ -326,19 +344,19 @@ class Legs:
         cycle = len(shank) - 1
         strike = leg_swings.strike_after(shank)
         phase = np.arange(len(shank)) / cycle - strike / cycle
-        way = travel(phase[strike:], thigh[strike:], shank[strike:], self.settings.segments)
-        length, rise = way.stride()
+        stance = phase[strike:], thigh[strike:], shank[strike:]
+        stairs = _stairs(knee_at(*stance, at=0.02), knee_at(*stance, at=0.5))
+        way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
+        length = way.stride()[0]
         rates = np.column_stack([np.diff(thigh), np.diff(shank)])
         if leg_swings.leads(rates) < leg_swings.BACKWARD:
             return 0.0, 0.0, Flag.BACKWARD, max(BLIND_SD_M, abs(length))
-        if length < SHORTEST_M:
+        if length < SHORTEST_M or way.passed() < LEAST_PASSED * length:
             return 0.0, 0.0, Flag.UNSEEN, BLIND_SD_M
-        flags = self._pace_flag(length * GRID_HZ / cycle)
-        if rise > STAIRS_UP_M or rise < STAIRS_DOWN_M:
-            flags = Flag.STAIRS_UP if rise > 0.0 else Flag.STAIRS_DOWN
-        else:
-            rise = 0.0
-        return length, rise, flags, OWN_SD_M
+        if stairs and length < LONGEST_ON_STAIRS_M:
+            length = STAIRS_M + STAIRS_WEIGHT * (length - STAIRS_M)
+            return length, STAIRS_RISE_M if Flag.STAIRS_UP in stairs else -STAIRS_RISE_M, stairs, 2.0 * OWN_SD_M
+        return length, 0.0, self._pace_flag(length * GRID_HZ / cycle), OWN_SD_M
 
     def _pace_flag(self, speed_m_s: float) -> Flag:
         """Slow or fast, against the length of the leg [Froude 1868; Alexander 1989]."""
@@ -352,56 +370,78 @@ class Legs:
         for bias, sign, angle in zip(self.bias, self.swings.sign, (self._thigh, self._shank), strict=True):
             bias.learn(sign * (angle[end] - angle[begin]) / span_s, CLOSURE_SD_RAD / span_s)
 
-    def _relevel(self, k: int, thigh: Floats, shank: Floats) -> None:
-        """Go on from the angles at the end of a stride, drawn a little toward those whose mean over the stride is the usual one."""
-        ends = []
+    def _relevel(self, k: int, thigh: Floats, shank: Floats, length_m: float) -> None:
+        """Go on from the angles at the end of a stride, drawn a little toward those whose mean over the stride is the usual one.
+
+        Not after a short one, which may be on stairs.
+        """
+        ends, gain = [], LEVEL_GAIN if length_m > LEVEL_STRIDE_M else 0.0
         for angle, usual in ((thigh, MEAN_THIGH_RAD), (shank, MEAN_SHANK_RAD)):
             off = float(angle.mean()) - usual
-            ends.append(float(angle[-1]) - (LEVEL_GAIN * off if abs(off) < LEVEL_LIMIT_RAD else 0.0))
+            ends.append(float(angle[-1]) - gain * off)
         self._bout.level, self._bout.level_at = (ends[0], ends[1]), k
 
-    def _begin_piece(self, peak: int, pace_m_s: float) -> None:
-        """From the beginning of the walk to the first middle of a swing."""
+    def _begin_piece(self, peak: int, pace_m_s: float) -> float:
+        """How far from the beginning of the walk to the first middle of a swing."""
         bout = self._bout
         span = peak - bout.begin
-        if span <= 0:
-            return
-        length = pace_m_s * span / GRID_HZ
-        if bout.stood:
-            thigh, shank = self._angles(bout.begin, peak)
-            rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
-            off = leg_swings.toe_off_before(rate, span - 1, 0)
-            phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
-            way = travel(phase, thigh, shank, self.settings.segments, struck=None)
-            swing_m_s = 0.5 * (pace_m_s + _slope(way, max(off - EDGE, 0), off))
-            length = PELVIS * float(way.forward_m[off] - way.forward_m[0]) + swing_m_s * (span - off) / GRID_HZ
-        self._tell(self._time(bout.begin), self._time(peak), max(length, 0.0), EDGE_SD_M, 0.0, Flag.EDGE)
+        thigh, shank = self._angles(bout.begin, peak)
+        rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
+        off = leg_swings.toe_off_before(rate, span - 1, 0)
+        phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
+        stood = bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
+        stance = 0 if stood else int(np.argmax(phase > 0.0))
+        swinging = FIRST_SWING if bout.stood or (stood and phase[0] < -0.1) else 1.0
+        way = travel(phase, thigh, shank, self.settings.segments, struck=None)
+        length = PELVIS * float(way.forward_m[off] - way.forward_m[stance])
+        return length + pace_m_s * (stance + swinging * (span - off)) / GRID_HZ
+
+    def _calm(self, rate: Floats) -> bool:
+        """Whether the shank (rates (n,)) was on a foot that stood: no swing in it."""
+        return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.OF_USUAL
 
     def _end_bout(self, end: int, *, stands: bool) -> None:
         """The walk is over at this place, because he stands or because there is no more to see."""
         bout = self._bout
         if len(bout.peaks) == 1:
-            if bout.level is None:
-                bout.level, bout.level_at = (MEAN_THIGH_RAD, 0.0), bout.peaks[0]
-            self._begin_piece(bout.peaks[0], bout.pace_m_s or 0.0)
-        if bout.peaks and end > bout.peaks[-1]:
-            self._end_piece(bout.peaks[-1], end, stands=stands)
+            self._end_step(bout.peaks[0], end, stands=stands)
+        elif bout.peaks and end > bout.peaks[-1]:
+            self._tell_edge(bout.peaks[-1], end, self._end_piece(bout.peaks[-1], end, stands=stands))
         self._bout = _Bout(end, stood=False)
         self._keep = end - leg_swings.STILL
 
-    def _end_piece(self, peak: int, end: int, *, stands: bool) -> None:
-        """From the last middle of a swing to the end of the walk."""
+    def _end_step(self, peak: int, end: int, *, stands: bool) -> None:
+        """There was one swing only: a step, or a foot that was lifted."""
+        bout = self._bout
+        if bout.level is None:
+            bout.level, bout.level_at = (MEAN_THIGH_RAD, 0.0), peak
+        begins = self._begin_piece(peak, bout.pace_m_s or 0.0) if peak > bout.begin else 0.0
+        length = begins + (self._end_piece(peak, end, stands=stands) if end > peak else 0.0)
+        if length < SHORTEST_M:
+            bout.blind = Flag.UNSEEN
+        self._tell_edge(bout.begin, end, length)
+
+    def _end_piece(self, peak: int, end: int, *, stands: bool) -> float:
+        """How far from the last middle of a swing to the end of the walk."""
         bout, span = self._bout, end - peak
         pace = bout.pace_m_s or 0.0
-        length = pace * span / GRID_HZ
+        thigh, shank = self._angles(peak, end)
+        strike = leg_swings.strike_after(shank)
+        phase = (np.arange(strike, len(shank)) - strike) / bout.cycle
+        last = len(phase) - 1
         if stands:
-            thigh, shank = self._angles(peak, end)
-            strike = leg_swings.strike_after(shank)
-            phase = np.minimum((np.arange(strike, len(shank)) - strike) / bout.cycle, STAYS)
-            way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
-            landing = 0.5 * (pace + _slope(way, 0, min(EDGE, len(phase) - 1)))
-            length = PELVIS * float(way.forward_m[-1] - way.forward_m[0]) + landing * strike / GRID_HZ
-        self._tell(self._time(peak), self._time(end), max(length, 0.0), EDGE_SD_M, 0.0, Flag.EDGE)
+            phase = np.minimum(phase, STAYS)
+        else:
+            last = min(last, int(TOE_OFF * bout.cycle))
+        way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
+        length = PELVIS * float(way.forward_m[last] - way.forward_m[0])
+        return length + pace * ((FIRST_SWING if stands else 1.0) * strike + span - strike - last) / GRID_HZ
+
+    def _tell_edge(self, begin: int, end: int, length: float) -> None:
+        """A beginning or an end is certain; beside strides that cannot be seen it cannot either."""
+        blind = self._bout.blind
+        way, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
+        self._tell(self._time(begin), self._time(end), way, sd, 0.0, Flag.EDGE | blind)
 
     def _angles(self, begin: int, end: int) -> tuple[Floats, Floats]:
         """Angles (n,) of thigh and shank at the places begin..end, by the present biases from the last known level."""
@@ -440,11 +480,11 @@ class Legs:
         self._top = (self._top[0], self._top[1] - k)
 
 
-def _slope(way: Travel, first: int, last: int) -> float:
-    """Mean speed of the hips between two places of a stance (m/s)."""
-    if last <= first:
-        return 0.0
-    return float(way.forward_m[last] - way.forward_m[first]) * GRID_HZ / (last - first)
+def _stairs(knee_at_strike: float, knee_half_later: float) -> Flag:
+    """Up stairs a foot is set down with a bent knee; down stairs the knee that carries gives way [Riener 2002]."""
+    if knee_at_strike > BENT_RAD:
+        return Flag.STAIRS_UP
+    return Flag.STAIRS_DOWN if knee_half_later > BENT_RAD else Flag.NONE
 
 
 def distance_sd_m(strides: Iterable[Stride]) -> float:

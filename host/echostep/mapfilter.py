@@ -69,7 +69,7 @@ class MapFilter:
     def follow(self, passage: Passage, words: Sequence[Word] = ()) -> Estimate:
         """Move along a leg and weigh by its pings and by what beacons said on it."""
         leg = passage.leg
-        move = Move(leg.dx_m, leg.dy_m, leg.sd_m, leg.turn_sd_rad)
+        move = Move(leg.dx_m, leg.dy_m, leg.sd_m, leg.turn_sd_rad, leg.scale_sd)
         rise = _rise(leg, passage.height_m)
         if leg.unwatched:
             self.cloud.scatter(move, rise)

@@ -67,12 +67,13 @@ class CloudSettings:
 
 
 class Move(NamedTuple):
-    """A straight piece of the path in the walk frame, and the standard deviations that it adds: per axis, of the rotation."""
+    """A straight piece of the path in the walk frame, and the standard deviations that it adds: per axis, of the rotation, of the scale."""
 
     dx_m: float
     dy_m: float
     sd_m: float
     turn_sd_rad: float
+    scale_sd: float = 0.0
 
 
 class Heard(NamedTuple):
@@ -186,7 +187,8 @@ class Cloud:
         sd = math.hypot(move.sd_m, s.step_sd * math.sqrt(length))
         turn_sd = math.hypot(move.turn_sd_rad, math.radians(s.turn_sd_deg) * math.sqrt(length))
         noise = self._rng.standard_normal((4, len(self.x_m)))
-        noise *= np.array([[sd], [sd], [turn_sd], [s.scale_sd * math.sqrt(length)]]) * math.sqrt(share)
+        scale_sd = math.hypot(move.scale_sd, s.scale_sd * math.sqrt(length))
+        noise *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
         return noise
 
     def _widen(self) -> None:

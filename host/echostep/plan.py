@@ -143,8 +143,11 @@ def parse_plan(raw: bytes) -> Plan:
 
 def _plan(tree: Any, digest: str) -> Plan:
     tree = typed(tree, "the file", dict)
-    if (version := tree.get("echostep_plan")) != FORMAT_VERSION:
-        raise ValueError(f"echostep_plan is {version!r}, expected {FORMAT_VERSION}: is this an echostep plan?")
+    version = tree.get("echostep_plan")
+    if version != FORMAT_VERSION or version is True:
+        raise ValueError(
+            f"echostep_plan is {str(version)[:40]!r}, expected {FORMAT_VERSION}: is this an echostep plan?"
+        )
     rows = typed(tree.get("levels"), "levels", list)
     if not rows:
         raise ValueError("levels: a plan needs at least one level")

@@ -5,12 +5,18 @@ In: what the user typed. Out: plans, pictures, findings. Heavy imports wait unti
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from echostep.errors import EchostepError
+
+if TYPE_CHECKING:
+    from echostep.plan import Plan
+
+MOST_LINES, MOST_MARKS = 200, 300  # in a terminal, in a picture
 
 app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show.")
 
@@ -71,3 +77,74 @@ def _layers(texts: list[str]) -> dict[str, list[str]]:
             raise EchostepError(f"--layer {text}: expected KIND=PATTERN with KIND one of {', '.join(LAYERS)}")
         layers.setdefault(kind, []).append(pattern)
     return layers
+
+
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
+
+
+@app.command()
+def check(
+    file: PlanFile,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw what is wrong (.png, .svg).")
+    ] = None,
+) -> None:
+    """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
+    from echostep.building.formats import open_plan
+    from echostep.plan_check import check_plan
+    from echostep.plan_picture import draw_plan
+
+    plan = open_plan(file)
+    findings = check_plan(plan)
+    for finding in findings[:MOST_LINES]:
+        x, y = finding.at_m
+        print(f"{finding.number}. {plan.levels[finding.level].name}, x {x:.2f} m, y {y:.2f} m: {finding.text}")
+    if len(findings) > MOST_LINES:
+        print(f"... and {len(findings) - MOST_LINES} more")
+    counts = Counter(finding.kind for finding in findings)
+    print(f"{file}: " + (", ".join(f"{count} x {kind}" for kind, count in counts.items()) or "nothing wrong"))
+    if picture is not None:
+        levels = sorted({finding.level for finding in findings}) or list(range(len(plan.levels)))
+        draw_plan(plan, picture, levels, None, findings[:MOST_MARKS])
+    if findings:
+        raise typer.Exit(1)
+
+
+@app.command()
+def show(
+    file: PlanFile,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The picture to write (.png, .svg).")],
+    level: Annotated[
+        str | None, typer.Option("--level", metavar="NAME", help="One level, by name or index; all without it.")
+    ] = None,
+    bounds: Annotated[
+        str | None, typer.Option("--bounds", metavar="X0,Y0,X1,Y1", help="Show this rectangle only, in metres.")
+    ] = None,
+) -> None:
+    """Draw a plan."""
+    from echostep.building.formats import open_plan
+    from echostep.plan_picture import draw_plan
+
+    plan = open_plan(file)
+    draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
+
+
+def _level(plan: Plan, name: str) -> int:
+    names = [level.name for level in plan.levels]
+    if name in names:
+        return names.index(name)
+    if name.isascii() and name.isdigit() and int(name) < len(names):
+        return int(name)
+    raise EchostepError(f"--level {name}: the levels are {', '.join(names)[:300]}")
+
+
+def _bounds(text: str | None) -> tuple[float, float, float, float] | None:
+    if text is None:
+        return None
+    try:
+        x0, y0, x1, y1 = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise EchostepError(f"--bounds {text}: expected X0,Y0,X1,Y1 in metres") from error
+    if not (abs(x0) < 1e6 and abs(y0) < 1e6 and x0 < x1 < 1e6 and y0 < y1 < 1e6):
+        raise EchostepError(f"--bounds {text}: expected X0 < X1 and Y0 < Y1")
+    return x0, y0, x1, y1

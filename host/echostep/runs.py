@@ -8,51 +8,77 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import math
+import platform
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from datetime import UTC, datetime
+from functools import partial
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
 
 from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
+from echostep.building.formats import open_plan
 from echostep.capture import Decoder, as_json, read_capture
+from echostep.derived import Derived
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
+from echostep.guidance import Cue, arrow_sign, describe_cue
+from echostep.guided import Guided, destination
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.legs import LegsSettings
-from echostep.messages import Identify
+from echostep.messages import SCHEMA_HASH, Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
 from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
-from echostep.plan import Plan, Pose, load_plan
-from echostep.recording import Recorder, open_recording
+from echostep.plan import Plan, Pose
+from echostep.recording import Recorder, Recording, open_recording
+from echostep.routes import Place
 from echostep.settings import parse_settings, read_settings
-from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
+from echostep.sources import BOARD, GATEWAY, MTX, Chunk, Portion, SerialPorts, portion_of
 from echostep.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
 from echostep.view import TerminalView
 from echostep.xsens.reader import warm_up
 
+if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
+    from echostep.team.publish import Source
+
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
-BAUD = {BOARD: 115200, MTX: 115200}
+BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
 
-def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> None:
+Tell = Callable[[list[Estimate]], None]
+
+
+def demo(
+    out: Path,
+    seed: int,
+    board_command: str | None,
+    outlet: Outlet | None = None,
+    *,
+    headless: bool,
+    guide: bool = False,
+) -> None:
     """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
     from echostep.simulation.board import BoardProcess, PythonBoard
+    from echostep.simulation.gateway import with_beacons
     from echostep.simulation.scenario import demo_scenario
 
     board = BoardProcess(shlex.split(board_command)) if board_command else PythonBoard(seed=seed)
@@ -60,88 +86,120 @@ def demo(out: Path, seed: int, board_command: str | None, *, headless: bool) -> 
     console.print(f"A simulated walk in a simulated building; the sensor board is {player}.")
     out = _folder(out)
     with as_file(files("echostep") / "plans" / "demo.json") as plan_path:
-        plan = load_plan(plan_path)
+        plan = open_plan(plan_path)
     scenario = demo_scenario(plan, seed, board)
     try:
         scenario.write_truth(out / "truth.csv")
         truth = load_truth(out / "truth.csv")
         tracker = Tracker(plan, scenario.start, seed=seed)
+        guided = Guided(tracker, Place(*scenario.truth[-1, 1:3].tolist())) if guide else None
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
-        with Recorder(out / "walk.mcap", about) as recorder:
-            chunks = scenario.chunks() if headless else _paced(scenario.chunks())
+        with _published(outlet, tracker, "simulated") as tell, Recorder(out / "walk.mcap", about) as recorder:
+            walked = with_beacons(scenario, plan, seed) if guide else scenario.chunks()
+            chunks = walked if headless else _paced(walked)
             estimates = _run(
                 tracker,
                 _portions(_kept(chunks, recorder), HEADLESS_CHUNKS if headless else 1),
                 "echostep demo (simulated)",
                 lambda: scenario.fraction,
                 headless,
+                tell,
+                recorder,
+                guided,
             )
+        _say(recorder.notices)
     finally:
         scenario.close()
-    _finish(out, tracker, estimates, truth, "simulated walk")
+    _finish(out, tracker, estimates, truth, "simulated walk", guided=guided)
 
 
 def live(
     plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
-    settings_path: Path | None, seed: int, seconds: float | None, *, headless: bool,
+    settings_path: Path | None, seed: int, seconds: float | None, outlet: Outlet | None = None, *, headless: bool,
+    beacons: str | None = None, guide: str | None = None,
 ) -> None:  # fmt: skip
-    """Track from two serial ports until Ctrl-C."""
-    plan = load_plan(plan_path)
+    """Track from two serial ports, and a beacon gateway's if there is one, until Ctrl-C."""
+    plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
     tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed)
+    guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
     out = _folder(out)
-    ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
+    ports = SerialPorts(_urls(board, mtx, beacons), BAUD)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out / "walk.mcap", _about(plan, tracker.start, seed, text, "live")) as recorder:
+        about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
+        with _published(outlet, tracker, "live") as tell, Recorder(out / "walk.mcap", about) as recorder:
             chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
-            estimates = _run(tracker, chunks, "echostep live", None, headless)
+            estimates = _run(tracker, chunks, "echostep live", None, headless, tell, recorder, guided)
+        _say(recorder.notices)
     finally:
         ports.close()
-    _finish(out, tracker, estimates, None, "live")
+    _finish(out, tracker, estimates, None, "live", guided=guided)
 
 
-def record(board: str, mtx: str, out: Path, seconds: float | None) -> None:
-    """Record from two serial ports until Ctrl-C."""
+def record(board: str, mtx: str, out: Path, seconds: float | None, beacons: str | None = None) -> None:
+    """Record from two serial ports, and a beacon gateway's if there is one, until Ctrl-C."""
     warm_up()
-    ports = SerialPorts({BOARD: board, MTX: mtx}, BAUD)
-    count = {BOARD: 0, MTX: 0}
+    urls = _urls(board, mtx, beacons)
+    ports = SerialPorts(urls, BAUD)
+    count = dict.fromkeys(urls, 0)
     try:
         ports.send(BOARD, encode(Identify(), 0))
-        with Recorder(out, {"version": _version(), "note": "recorded without tracking"}) as recorder:
+        with Recorder(out, {**_versions(), **_now(), "note": "recorded without tracking"}) as recorder:
             for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
                 count[chunk.port] += len(chunk.data)
+        _say(recorder.notices)
     finally:
         ports.close()
-    console.print(f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx")
+    console.print(
+        f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx"
+        + (f", {count[GATEWAY]} from the gateway" if beacons else "")
+    )
 
 
 def replay(
     path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
-    seed: int | None, truth_path: Path | None, *, headless: bool,
+    seed: int | None, truth_path: Path | None, outlet: Outlet | None = None, *, headless: bool,
+    guide: str | None = None,
 ) -> None:  # fmt: skip
     """Track a recording again."""
-    recording, plan = open_recording(path), load_plan(plan_path)
+    recording, plan = open_recording(path), open_plan(plan_path)
     about = recording.about
     if about.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {plan_path} is not the plan that {path} was tracked on.")
-    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
-    settings = parse_settings(text, str(settings_path or path))
     truth = load_truth(truth_path) if truth_path else None
-    tracker = Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
+    tracker = tracker_of(recording, plan, start, settings_path, seed)
     out = _folder(out)
     if note := about.get("note"):
         console.print(f"Recording: {note}")
+    guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
     began = time.perf_counter()
-    estimates = _run(
-        tracker, recording.portions(), f"echostep replay {path.name}", lambda: recording.fraction, headless
-    )
+    with _published(outlet, tracker, "replay") as tell:
+        estimates = _run(
+            tracker,
+            recording.portions(),
+            f"echostep replay {path.name}",
+            lambda: recording.fraction,
+            headless,
+            tell,
+            guided=guided,
+        )
     elapsed_s = time.perf_counter() - began
     if recording.truncated:
         console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
-    _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+    _finish(out, tracker, estimates, truth, path.name, elapsed_s, guided)
+
+
+def tracker_of(
+    recording: Recording, plan: Plan, start: Pose | None, settings_path: Path | None, seed: int | None
+) -> Tracker:
+    """A tracker as the recording was tracked, but for what is given; raises EchostepError when something is missing or damaged."""
+    about, path = recording.about, recording.path
+    text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
+    settings = parse_settings(text, str(settings_path or path))
+    return Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
@@ -222,9 +280,11 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool
-) -> list[Estimate]:
-    """Feed everything; Ctrl-C ends a run like its last chunk does."""
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool,
+    tell: Tell, recorder: Recorder | None = None, guided: Guided | None = None,
+) -> list[Estimate]:  # fmt: skip
+    """Feed everything; Ctrl-C ends a run like its last chunk does. `recorder`: what is derived is recorded, once it has been shown."""
+    derived = Derived(tracker)
     view = None if headless else TerminalView(tracker, title, progress, console)
     estimates: list[Estimate] = []
     shown: AbstractContextManager[object] = view or nullcontext()
@@ -233,11 +293,41 @@ def _run(
             for portion in portions:
                 new = tracker.take(portion)
                 estimates += new
+                tell(new)
+                cues = guided.take(new) if guided else []
                 if view:
-                    view.show(new)
+                    view.show(new, describe_cue(guided.cue) if guided and guided.cue else "")
+                else:
+                    _speak(cues)
+                if recorder:
+                    recorder.notes(derived.take(portion, new))
         except KeyboardInterrupt:
             pass
     return estimates
+
+
+def _speak(cues: Sequence[Cue]) -> None:
+    """Sentences as they would be spoken, for a run without a view."""
+    for cue in cues:
+        if cue.spoken:
+            console.print(f"{cue.t_s:7.1f} s  {arrow_sign(cue.arrow_rad)}  {cue.spoken}")
+
+
+def _urls(board: str, mtx: str, beacons: str | None) -> dict[str, str]:
+    """Ports by name."""
+    return {BOARD: board, MTX: mtx} | ({GATEWAY: beacons} if beacons else {})
+
+
+@contextmanager
+def _published(outlet: Outlet | None, tracker: Tracker, source: Source) -> Iterator[Tell]:
+    """What to do with new estimates: tell a commander, or nothing."""
+    if outlet is None:
+        yield lambda _: None
+        return
+    from echostep.team.publish import Publishing
+
+    with Publishing(outlet, tracker, source, partial(console.print, markup=False, highlight=False)) as publishing:
+        yield publishing.tell
 
 
 def _paced(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
@@ -255,7 +345,14 @@ def _kept(chunks: Iterable[Chunk], recorder: Recorder) -> Iterator[Chunk]:
     """Every chunk, after it has been written."""
     for chunk in chunks:
         recorder.write(chunk)
+        recorder.settle(chunk)
+        _say(recorder.notices)
         yield chunk
+
+
+def _say(notices: deque[str]) -> None:
+    while notices:
+        console.print(notices.popleft())
 
 
 def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
@@ -274,8 +371,8 @@ def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: floa
     start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
     try:
         for chunk in ports.chunks():
-            while ports.notices:
-                console.print(ports.notices.popleft())
+            _say(ports.notices)
+            _say(recorder.notices)
             if chunk is not None:
                 recorder.write(chunk)
             start.follow(chunk)
@@ -294,12 +391,24 @@ def _finish(
     truth: Truth | None,
     title: str,
     elapsed_s: float | None = None,
+    guided: Guided | None = None,
 ) -> None:
-    """Write the track and say how it went."""
-    write_track(out / "track.csv", estimates)
+    """Write the track and say how it went; a disk that is full is said last."""
     off = errors(estimates, truth) if truth else None
     title = f"{title}: mean error {off.mean_m:.2f} m" if off else title
-    draw_track(out / "track.png", tracker.plan, estimates, truth, title)
+    trouble = None
+    try:
+        write_track(out / "track.csv", estimates)
+        places = (
+            tracker.filter.crumbs.places(tracker.filter.cloud, estimates[-1].t_s)
+            if tracker.filter and estimates
+            else []
+        )
+        draw_track(out / "track.png", tracker.plan, estimates, truth, title, guided.route if guided else None, places)
+        if guided:
+            guided.write(out / "cues.csv")
+    except OSError as error:
+        trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
         console.print("No estimate: the foot never stood still, or no MTx bytes came.")
         return
@@ -311,13 +420,17 @@ def _finish(
     if elapsed_s:
         span = estimates[-1].t_s - estimates[0].t_s
         console.print(f"{span:.0f} s of walk in {elapsed_s:.2f} s: {span / elapsed_s:.0f} x real time")
-    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}; track.csv and track.png are in {out}")
+    written = f"; track.csv and track.png are in {out}" if trouble is None else ""
+    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}{written}")
+    if trouble is not None:
+        raise trouble
 
 
 def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
     pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"
     return {
-        "version": _version(),
+        **_versions(),
+        "plan_name": plan.name,
         "plan_sha256": plan.digest,
         "start_x_y_rad": pose,
         "seed": str(seed),
@@ -333,8 +446,8 @@ def _recorded_start(about: dict[str, str], path: Path) -> Pose | None:
             return None
         x, y, heading, *level = (float(v) for v in text.split(","))
         return Pose(x, y, heading, int(level[0]) if level else 0)
-    except (ValueError, TypeError) as error:
-        raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
+    except (ValueError, TypeError, OverflowError) as error:
+        raise EchostepError(f"{path}: its recorded start is not known: give one with --start X,Y,DEG") from error
 
 
 def _recorded_seed(about: dict[str, str], path: Path, seed: int | None) -> int:
@@ -352,5 +465,18 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _version() -> str:
-    return importlib.metadata.version("echostep")
+def _versions() -> dict[str, str]:
+    """Of everything that an estimate depends on."""
+    named = {name: importlib.metadata.version(name) for name in ("numpy", "numba")}
+    return {
+        "version": importlib.metadata.version("echostep"),
+        "versions": ", ".join(
+            f"{name} {version}" for name, version in {"python": platform.python_version(), **named}.items()
+        ),
+        "protocol": f"0x{SCHEMA_HASH:08X}",
+    }
+
+
+def _now() -> dict[str, str]:
+    """What the clock on the wall says, and the clock of the arrivals at the same time."""
+    return {"started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"), "started_ns": str(time.monotonic_ns())}

@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from echostep.beacons import BeaconSettings
-from echostep.calibration import RangerSettings
+from echostep.calibration import GyroSettings, RangerSettings
 from echostep.climbing import ClimbSettings
 from echostep.errors import EchostepError
 from echostep.foot import FootSettings
 from echostep.gait import GaitSettings
+from echostep.heading import Iron
+from echostep.legpath import WearerSettings
 from echostep.likelihoods import EchoSettings
 from echostep.particles import CloudSettings
 from echostep.timeline import MtxTiming
@@ -29,12 +31,15 @@ class Settings:
 
     mtx: MtxTiming = field(default_factory=MtxTiming)
     ranger: RangerSettings = field(default_factory=RangerSettings)
+    gyro: GyroSettings = field(default_factory=GyroSettings)
+    compass: Iron = field(default_factory=Iron)
     foot: FootSettings = field(default_factory=FootSettings)
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
     beacons: BeaconSettings = field(default_factory=BeaconSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
+    wearer: WearerSettings = field(default_factory=WearerSettings)
 
 
 def read_settings(path: Path | str) -> str:

@@ -88,6 +88,11 @@ class Timeline:
         """How often the board's clock has begun anew."""
         return int(self._board["restarts"])
 
+    def arrival_ns(self, t_s: float) -> int:
+        """When undelayed bytes of that moment arrive, on the host's clock; 0 before anything has come."""
+        clock = self._board if self._board["started"] else self._mtx
+        return max(round(arrival.to_arrival_s(clock, t_s) * 1e9), 0)
+
     def times(self, board: Arrivals, mtx: Arrivals) -> Times:
         """Times of a portion's messages; a board message comes before a sample of the same row."""
         nb, nm = len(board.value), len(mtx.value)

@@ -12,6 +12,7 @@ from echostep.errors import EchostepError
 from echostep.estimate import Estimate, unwatched
 from echostep.gait import Leg
 from echostep.gateway import Gateway, Word
+from echostep.heading import Iron
 from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import systematic
@@ -37,7 +38,10 @@ class Tracker:
         self.settings = settings or Settings()
         self.plan = plan
         self.start = pose
-        self.intake = Intake(self.settings.mtx, self.settings.ranger, self.settings.foot, self.settings.gait)
+        s = self.settings
+        self.intake = Intake(
+            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == Iron() else s.compass
+        )
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self.gateway = Gateway()

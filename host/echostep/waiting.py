@@ -90,14 +90,17 @@ class Waiting:
         self._legs += legs
         self._leg_at += [at] * len(legs)
 
-    def release(self, board_newest_s: Floats, mtx_newest_s: Floats) -> list[Passage | Silence]:
-        """What is certain after these messages (n,), by how far either port has come with each of them; NaN: it has not spoken yet."""
+    def release(self, board_newest_s: Floats, mtx_newest_s: Floats, watched_s: Floats) -> list[Passage | Silence]:
+        """What is certain after these messages (n,), by how far either port has come with each of them; NaN: it has not spoken yet.
+
+        `watched_s`: up to when foot or legs watched him.
+        """
         legs, most = self._legs, len(self._legs) + len(board_newest_s)
         heard = np.empty((3, int(self._state["pings"][0]) + len(self._new)))
         leg, t_s, upto = np.empty(most, np.int64), np.empty(most), np.empty(most, np.int64)
         found = _release(
             self._state[0], self._pings, self._new_at, self._new, np.array(self._leg_at, np.int64),
-            np.array([leg.t1_s for leg in legs], np.float64), board_newest_s, mtx_newest_s, heard, leg, t_s, upto,
+            np.array([leg.t1_s for leg in legs], np.float64), board_newest_s, mtx_newest_s, watched_s, heard, leg, t_s, upto,
         )  # fmt: skip
         ping_s, ranger, range_m = heard[0], heard[1, : upto[found - 1] if found else 0].astype(np.int64), heard[2]
         pieces: list[Passage | Silence] = []
@@ -123,7 +126,7 @@ def _passage(leg: Leg, t_s: Floats, ranger: Ints, value_m: Floats) -> Passage:
 @njit(cache=True, error_model="numpy")
 def _release(
     s: _State, waiting: Floats, ping_at: Ints, pings: Floats, leg_at: Ints, leg_s: Floats, board_newest_s: Floats, mtx_newest_s: Floats,
-    heard: Floats, leg: Ints, t_s: Floats, upto: Ints,
+    watched_s: Floats, heard: Floats, leg: Ints, t_s: Floats, upto: Ints,
 ) -> int:  # fmt: skip
     """Message by message: take in its ping, send off every leg that is complete, tell a silence.
 
@@ -145,7 +148,7 @@ def _release(
             leg[found], t_s[found], upto[found] = next_leg, leg_s[next_leg], out
             next_leg += 1
             found += 1
-        if s.gone and board - max(mtx, s.told_s) >= BLIND_S:
+        if s.gone and board - max(watched_s[at], s.told_s) >= BLIND_S:
             s.told_s = board
             leg[found], t_s[found], upto[found] = -1, board, out
             found += 1

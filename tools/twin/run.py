@@ -80,6 +80,10 @@ class PtyBoard:
         """End the twin."""
         self._child.kill()
         self._child.wait()
+        for pipe in (self._in, self._out, self._child.stderr):
+            with contextlib.suppress(OSError):
+                if pipe:
+                    pipe.close()
 
 
 class PtyMtx:

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan
+from echostep.plan import Plan, load_plan
 from echostep.plan_writer import plan_json
 
 STOREY_M = 3.5  # from floor to floor, where a format does not say
+OTHERS = {".dxf", ".ifc", ".imdf", ".osm", ".xml", ".zip"}  # what is no plan.json, by its name
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,14 @@ def import_plan(path: Path, hints: Hints | None = None, above: Sequence[Path] = 
     return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
 
 
+def open_plan(path: Path | str) -> Plan:
+    """A plan.json as it is; anything else by import, where it says enough about itself. EchostepError names the file and the place in it."""
+    path = Path(path)
+    if path.is_dir() or path.suffix.casefold() in OTHERS or path.name in ("main.json", "core.txt"):
+        return import_plan(path)
+    return load_plan(path)
+
+
 def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
     if path.suffix.casefold() == ".dxf":
         from echostep.building.dxf import import_dxf
@@ -39,10 +48,24 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
         return import_dxf([path, *above], hints.storey_m, hints.layers, hints.units)
     if above:
         raise EchostepError(f"{above[0]}: only drawings (DXF) come in several files")
+    if path.suffix.casefold() in (".osm", ".xml") or (
+        path.suffix.casefold() == ".json" and _starts(path, '"elements"')
+    ):
+        from echostep.building.osm import import_osm
+
+        return import_osm(path, hints.storey_m)
     if path.name == "main.json" or (path / "main.json").exists():
         from echostep.building.wrld import import_wrld
 
         return import_wrld(path / "main.json" if path.is_dir() else path, hints.storey_m)
+    if path.suffix.casefold() == ".ifc":
+        from echostep.building.ifc import import_ifc
+
+        return import_ifc(path)
+    if path.suffix.casefold() in (".zip", ".imdf") or (path / "manifest.json").exists():
+        from echostep.building.imdf import import_imdf
+
+        return import_imdf(path, hints.storey_m)
     if path.name == "core.txt" or (path / "core.txt").exists():
         from echostep.building.nodelink import import_nodelink
 
@@ -50,3 +73,12 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
     if not path.exists():
         raise EchostepError(f"{path}: no such file")
     raise EchostepError(f"{path}: no format of plans that echostep knows")
+
+
+def _starts(path: Path, text: str) -> bool:
+    """Whether these letters stand near the beginning of a file."""
+    try:
+        with path.open("rb") as file:
+            return text.encode() in file.read(4096)
+    except OSError:
+        return False

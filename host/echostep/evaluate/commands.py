@@ -52,6 +52,20 @@ def echoes(
 
 
 @app.command()
+def lee2010(
+    runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/lee2010"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated)."""
+    from echostep.evaluate.lee2010 import evaluate_lee2010
+
+    evaluate_lee2010(runs, seed, json, out, scheduler)
+
+
+@app.command()
 def trails(
     runs: Annotated[int, typer.Option("--runs", help="Walks of each trail, each by another person.", min=1)] = 10,
     seed: Seed = 1,
@@ -63,6 +77,20 @@ def trails(
     from echostep.evaluate.trails import trails as study
 
     study(runs, seed, out, json, scheduler)
+
+
+@app.command("floors")
+def floors_command(
+    runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/floors"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
+    from echostep.evaluate.floors import evaluate_floors
+
+    evaluate_floors(runs, seed, json, out, scheduler)
 
 
 @app.command("feet")

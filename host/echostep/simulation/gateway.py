@@ -6,23 +6,28 @@ beacons within reach and without a wall between measure, with the errors of [Fis
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echostep.frames import encode
 from echostep.messages import Beacon
+from echostep.plan import Plan
 from echostep.polyline import along, way_m
 from echostep.simulation.returns import OUTLIER_M
+from echostep.simulation.scenario import START_NS, Scenario
 from echostep.sources import GATEWAY, Chunk
 
 Floats = NDArray[np.float64]
 PERIOD_S = 0.2
 ASIDE_M = 0.3
 LATENCY_S = 0.02
+SPACING_M = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +89,15 @@ def gateway_chunks(
             sequence += 1
         if said:
             yield Chunk(GATEWAY, int(np.interp(now + LATENCY_S, t_s, arrival_ns)), said)
+
+
+def with_beacons(scenario: Scenario, plan: Plan, seed: int) -> Iterator[Chunk]:
+    """A scenario's chunks with those of a gateway whose beacons lie along the walk, on a plan of one level."""
+    truth = scenario.truth
+    places = lay_beacons(truth[:, 1:3], SPACING_M, np.random.default_rng([seed, 8]))
+    arrival_ns = START_NS + np.rint(truth[:, 0] * 1e9).astype(np.int64)
+    gateway = gateway_chunks(BeaconWorld(places, plan.levels[0].walls), truth[:, 0], truth[:, 1:3], arrival_ns, seed)
+    return heapq.merge(scenario.chunks(), gateway, key=attrgetter("t_arrival_ns"))
 
 
 def _hidden(walls: Floats, ax: float, ay: float, bx: float, by: float) -> bool:

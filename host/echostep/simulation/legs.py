@@ -1,6 +1,6 @@
 """Thigh, calf and pelvis over the gait cycle.
 
-In: phase (0 at heel strike of the right foot) and effort (length of the stride against a usual one). Out: rates and sway. Owns the curves.
+In: phase (0 at heel strike of the right foot) and effort (length of the stride against a usual one). Out: angles and sway. Owns the curves.
 The angles are the normal ones for natural walking, read every 5 % of the cycle to a degree [Perry 1992; Winter 2009], as a Fourier series.
 """
 
@@ -37,6 +37,11 @@ THIGH_DEG = (
     23,
 )  # against the vertical, forward positive
 KNEE_DEG = (5, 10, 16, 18, 17, 14, 11, 8, 6, 7, 11, 21, 37, 52, 60, 58, 47, 30, 13, 4)  # flexion
+# Stairs, from a foot's contact on, against the vertical and flexion [Riener 2002; McFadyen and Winter 1988], read to a few degrees.
+UP_THIGH_DEG = (50, 49, 46, 41, 35, 28, 21, 15, 9, 4, 0, -3, -2, 6, 20, 35, 47, 54, 56, 53)
+UP_KNEE_DEG = (62, 61, 58, 52, 45, 38, 31, 25, 19, 14, 11, 12, 22, 42, 65, 83, 91, 88, 79, 69)
+DOWN_THIGH_DEG = (12, 11, 9, 8, 7, 6, 6, 6, 7, 9, 13, 19, 25, 29, 31, 29, 25, 20, 15, 12)
+DOWN_KNEE_DEG = (10, 17, 22, 23, 22, 21, 22, 25, 30, 38, 50, 65, 80, 88, 88, 78, 60, 38, 18, 9)
 TERMS = 5
 SWAY_M = 0.02  # of the trunk toward the foot that stands [Perry 1992]
 TWIST_RAD = math.radians(4.0)  # of the pelvis, forward with the leg that lands [Perry 1992]
@@ -55,11 +60,10 @@ class Leg:
     shank_m: float = 0.43
 
 
-def leg_rates(phase: Floats, effort: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Pitch rates (n,) of thigh and calf in rad/s by the normal curves, forward positive."""
-    thigh = effort * _series(THIGH_DEG, phase)
-    calf = thigh - effort * _series(KNEE_DEG, phase)
-    return np.gradient(thigh) * rate_hz, np.gradient(calf) * rate_hz
+def stair_angles(phase: Floats, up: bool) -> tuple[Floats, Floats]:
+    """Thigh and calf against the vertical (n,) on stairs of 17 x 29 cm, forward positive."""
+    thigh = series(UP_THIGH_DEG if up else DOWN_THIGH_DEG, phase)
+    return thigh, thigh - series(UP_KNEE_DEG if up else DOWN_KNEE_DEG, phase)
 
 
 def leg_angles(ankle_m: Floats, hip_m: Floats, leg: Leg) -> tuple[Floats, Floats]:
@@ -97,7 +101,7 @@ def sway(phase: Floats, effort: Floats) -> tuple[Floats, Floats]:
     return left_m, twist
 
 
-def _series(degrees: tuple[int, ...], phase: Floats) -> Floats:
+def series(degrees: tuple[int, ...], phase: Floats) -> Floats:
     """The curve in radians, by its first terms."""
     c = np.fft.rfft(np.radians(degrees)) / len(degrees)
     found = np.full(len(phase), c[0].real)

@@ -6,6 +6,7 @@ In: what is true, a seeded generator for each sensor. Out: counts as the device 
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,11 @@ GYRO_NOISE_RAD_S = math.radians(0.5)  # rms in its 40 Hz
 GYRO_BIAS_RAD_S = math.radians(1.0)
 
 PRESSURE_PA = 101_325.0  # at height 0
-PRESSURE_NOISE_PA = 3.0  # high speed, 15 bit [SCP1000 data sheet]
+Mode = Literal["high-speed", "high-resolution"]
+PRESSURE_NOISE_PA: dict[Mode, float] = {
+    "high-speed": 3.0,
+    "high-resolution": 1.5,
+}  # 15 bit, 17 bit [SCP1000 data sheet]
 PRESSURE_DRIFT_PA = 0.1  # random walk in a second: weather and doors
 TEMPERATURE_NOISE_C = 0.1
 
@@ -45,16 +50,23 @@ class Adis16100:
 class Scp1000:
     """A barometer."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, mode: Mode = "high-speed") -> None:
         self._rng = rng
+        self._noise_pa = PRESSURE_NOISE_PA[mode]
         self._drift_pa = 0.0
 
-    def counts(self, height_m: Floats, temperature_c: float, n: int) -> tuple[Counts, Counts]:
-        """Pressure (0.25 Pa) and temperature (0.05 degC) of n milliseconds at heights (n,) [ISO 2533, standard atmosphere]."""
+    def counts(
+        self, height_m: Floats | float, temperature_c: float, n: int, air_pa: Floats | None = None
+    ) -> tuple[Counts, Counts]:
+        """Pressure (0.25 Pa) and temperature (0.05 degC) of n milliseconds at one height or at n [ISO 2533, standard atmosphere].
+
+        `air_pa` (n,): the true pressures, in the place of heights and the barometer's own weather.
+        """
         drawn = self._rng.standard_normal((n, 3))
         drift = self._drift_pa + PRESSURE_DRIFT_PA * math.sqrt(1e-3) * np.cumsum(drawn[:, 0])
         self._drift_pa = float(drift[-1])
-        pressure = PRESSURE_PA * (1.0 - 2.25577e-5 * height_m) ** 5.25588 + drift + PRESSURE_NOISE_PA * drawn[:, 1]
+        true = PRESSURE_PA * (1.0 - 2.25577e-5 * height_m) ** 5.25588 + drift if air_pa is None else air_pa
+        pressure = true + self._noise_pa * drawn[:, 1]
         temperature = temperature_c + TEMPERATURE_NOISE_C * drawn[:, 2]
         return np.rint(4.0 * pressure).astype(np.int64), np.rint(20.0 * temperature).astype(np.int64)
 

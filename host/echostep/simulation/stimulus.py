@@ -35,9 +35,12 @@ class BoardSensors:
 
     def __init__(
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
-        magnetism: Magnetism | None = None,
+        magnetism: Magnetism | None = None, air_pa: Floats | None = None,
     ) -> None:  # fmt: skip
-        """`sync_t_s`: times of the MTx's SyncOut edges, ascending; without `magnetism` the earth's field alone. He hears the level nearest to him."""
+        """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone. He hears the level nearest to him.
+
+        `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), in the place of its heights.
+        """
         self._walk = walk
         self._walls = [level.solid for level in levels]
         self._level = np.abs(walk.height_m[:, None] - [level.height_m for level in levels]).argmin(1)
@@ -46,6 +49,7 @@ class BoardSensors:
         self._echo_rng, *rest = rng.spawn(6)
         self._range_bias_m = ranger_bias_m(self._echo_rng, self._acoustics)
         self._thigh, self._calf, self._belt = (Adis16100(r) for r in rest[:3])
+        self._air_pa = air_pa
         self._barometer = Scp1000(rest[3])
         self._compass = Compass(magnetism, rest[4])
 
@@ -66,7 +70,8 @@ class BoardSensors:
             rows["own_us"][one], rows["cross_us"][one] = heard.own_us, heard.cross_us
             begin = end
         rows["bearing"] = self._compass.bearings(trunk, heading)
-        rows["pressure"], rows["temperature"] = self._barometer.counts(w.height_m[at], TEMPERATURE_C, len(at))
+        air = None if self._air_pa is None else self._air_pa[at]
+        rows["pressure"], rows["temperature"] = self._barometer.counts(w.height_m[at], TEMPERATURE_C, len(at), air)
         rows["sync_us"] = self._edges(start, stop)
         return rows
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from echostep.simulation.attitude import rotations
 from echostep.simulation.footpath import Foot, Strides, foot_path
-from echostep.simulation.legs import STRAIGHT, Leg, hip_path, leg_angles, sway
+from echostep.simulation.legs import STRAIGHT, Leg, hip_path, leg_angles, stair_angles, sway
 
 Floats = NDArray[np.float64]
 Waypoint = (  # x, y, how long to pause there (s), height (m; 0 when not given)
@@ -33,6 +33,7 @@ STEEP = 0.1  # rise over run; less is a ramp, walked as the flat
 STAIR_STRIDE_M = 0.58  # of run: two treads of 29 cm
 LIFT_M_S, LIFT_M_S2 = 1.0, 0.8  # a passenger lift's speed and its change [ISO 8100-32, typical]
 DOORS_S = 3.0  # before and after a ride
+CLIMBING_M_S = 0.08  # faster than on any ramp
 STEADY, LOADED = 0.85, 0.1  # effort, phase: when the hip is so low that the knee is all but straight
 LEG_SMOOTH_MS = 41  # soft parts round off what a sensor on them feels
 ANKLE = np.array([-0.06, 0.0, 0.0])  # from the sensor on the instep, foot frame (m)
@@ -194,16 +195,16 @@ class _Schedule:
         foot_m, rpy, flat = foot_path(t, strides, self._person.foot, height)
         phase, effort = strides.phase(t), _smooth(strides.effort(t, self._person.stride_m))
         above_floor = foot_m - height[:, None] * np.array([0.0, 0.0, 1.0])
-        thigh, calf = self._leg(trunk, heading, above_floor, rpy, phase, effort)
+        thigh, calf = self._leg(trunk, heading, above_floor, rpy, phase, effort, np.gradient(height) * RATE_HZ)
         left_m, twist = sway(phase, effort)
         worn = heading + twist
         trunk = trunk + left_m[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
         return Walk(t, trunk, worn, foot_m, rpy, thigh, calf, np.gradient(worn) * RATE_HZ, flat, height)
 
     def _leg(
-        self, trunk: Floats, heading: Floats, foot_m: Floats, rpy: Floats, phase: Floats, effort: Floats
-    ) -> tuple[Floats, Floats]:
-        """Rates of thigh and calf, by the foot above the floor that carries the trunk: what joins the hip on its way to the ankle on its own."""
+        self, trunk: Floats, heading: Floats, foot_m: Floats, rpy: Floats, phase: Floats, effort: Floats, climb_m_s: Floats,
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """Rates of thigh and calf: what joins the hip on its way to the ankle on its own, and on stairs the curves that people have there."""
         person, along = self._person, np.column_stack([np.cos(heading), np.sin(heading)])
         lever = rotations(rpy) @ ANKLE
         ankle = np.column_stack(
@@ -216,6 +217,11 @@ class _Schedule:
         lower = float(np.max((upright - most)[(effort > STEADY) & (phase < LOADED)], initial=0.0))
         high = np.minimum(upright - lower * np.minimum(effort, 1.0) ** 2, most)
         thigh, calf = leg_angles(ankle, np.column_stack([ahead, _smooth(high, LEG_SMOOTH_MS)]), person.leg)
+        climbing = np.where(effort > 0.1, climb_m_s, 0.0)
+        for up, there in ((True, climbing > CLIMBING_M_S), (False, climbing < -CLIMBING_M_S)):
+            share = _smooth(there.astype(np.float64), SMOOTH_MS)
+            on_stairs = stair_angles(phase, up)
+            thigh, calf = (a + share * (b - a) for a, b in zip((thigh, calf), on_stairs, strict=True))
         return np.gradient(_smooth(thigh, LEG_SMOOTH_MS)) * RATE_HZ, np.gradient(_smooth(calf, LEG_SMOOTH_MS)) * RATE_HZ
 
     def _turn_to(self, at: Floats, course: float) -> None:

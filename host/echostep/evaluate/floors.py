@@ -1,0 +1,148 @@
+"""Floors by pressure, simulated: how often the right floor is named, and for how long a wrong one.
+
+In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.climbs`, `simulation.weather`).
+
+The true floor is the storey nearest to the wearer: on stairs and in a lift it changes when he passes the middle between two. Within a quarter of
+a metre of the middle both count as right (`floor_right`), because landings lie there; `strict_right` gives nothing away. Unless a scene is of a
+`whole` record, each sample is judged by what was known at it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep import vertical
+from echostep.altitude import BarometerSettings, Pressures
+from echostep.evaluate.study import Row, Study, print_table, write_json, write_parquet
+from echostep.floors import FloorFilter, Floors
+from echostep.simulation.climbs import Climb, climb
+from echostep.simulation.sensors import PRESSURE_NOISE_PA, Mode
+from echostep.simulation.weather import Weather, device_temperatures, pressures
+
+Floats = NDArray[np.float64]
+
+STOREYS_M = (0.0, 3.5, 7.0, 10.5, 14.0)
+RUN_S = 1200.0
+TIE_M = 0.25
+COUNTS_PA = 0.25
+MODE_HZ: dict[Mode, float] = {"high-speed": 9.0, "high-resolution": 1.8}
+
+
+STORM = Weather()
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """`known_start`: the first floor is told; `gait`: walking and standing are told, as legs or foot do.
+
+    `whole`: judged with the whole record, as `echostep floors` does.
+    """
+
+    ways: Literal["stairs", "lift", "both"] = "both"
+    weather: Weather = STORM
+    mode: Mode = "high-speed"
+    known_start: bool = True
+    gait: bool = True
+    whole: bool = False
+
+
+SCENES = {
+    "floors/stairs": Scene("stairs"),
+    "floors/lift": Scene("lift"),
+    "floors/both": Scene(),
+    "floors/pulses": Scene(weather=replace(STORM, doors_s=30.0, fan_s=90.0, fan_pa=15.0)),
+    "floors/high-resolution": Scene(mode="high-resolution"),
+    "floors/pressure-only": Scene(gait=False),
+    "floors/unknown-start": Scene(known_start=False, gait=False, whole=True),
+    "floors/record": Scene(gait=False, whole=True),
+}
+COLUMNS = {
+    "name": "", "runs": "runs", "floor_right": "right %", "strict_right": "strict %", "worst_right": "worst run %",
+    "longest_wrong_s": "longest wrong s",    "changes": "changes",
+}  # fmt: skip
+
+
+def evaluate_floors(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
+    """Run the study, print the table, write JSON, Parquet."""
+    each = Study("floors", runs, seed, one_run, out, scheduler).rows()
+    rows = [_summary(name, [row for row in each if row["name"] == name]) for name in SCENES]
+    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
+    print_table(f"Floors by pressure, {runs} simulated runs of 20 minutes, weather of 1 hPa/h", shown, COLUMNS)
+    write_parquet(out / "floors.parquet", each)
+    if json_path is not None:
+        write_json(json_path, "floors", runs, seed, rows)
+
+
+def one_run(seed: int) -> list[Row]:
+    """Every scene with the person and the weather of this seed."""
+    return [_row(name, scene, seed) for name, scene in SCENES.items()]
+
+
+def _row(name: str, scene: Scene, seed: int) -> Row:
+    rng = np.random.default_rng([seed, 50])
+    way = climb(STOREYS_M, RUN_S, rng, scene.ways)
+    sign = float(rng.choice((-1.0, 1.0)))
+    weather = replace(scene.weather, trend_pa_h=sign * scene.weather.trend_pa_h, air_c=float(rng.uniform(17.0, 26.0)))
+    at, samples = _measured(way, weather, scene, rng)
+    heights = np.array(STOREYS_M)
+    away = np.abs(way.height_m[at][:, None] - heights)
+    true = away.argmin(axis=1)
+    prior = np.eye(len(heights))[true[0]] if scene.known_start else None
+    filter_ = FloorFilter(heights, BarometerSettings(PRESSURE_NOISE_PA[scene.mode]), prior)
+    found = filter_.look_back(samples) if scene.whole else filter_.take(samples)
+    return {"name": name, "seed": seed, **judge(found, away)}
+
+
+def _measured(
+    way: Climb, weather: Weather, scene: Scene, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], Pressures]:
+    """What the SCP1000 reports of it, in counts and back, and which times of the walk these are."""
+    air = pressures(way.t_s, way.height_m, way.in_shaft, weather, rng)
+    device = device_temperatures(way.t_s, weather.air_c, rng)
+    rate = 1.0 / float(way.t_s[1] - way.t_s[0])
+    at = np.floor(np.arange(0.0, RUN_S, 1.0 / MODE_HZ[scene.mode]) * rate).astype(np.int64)
+    noisy = air[at] + PRESSURE_NOISE_PA[scene.mode] * rng.standard_normal(len(at))
+    gait = np.where(way.walking[at], vertical.WALKING, vertical.STILL).astype(np.int8) if scene.gait else None
+    return at, Pressures(way.t_s[at], COUNTS_PA * np.rint(noisy / COUNTS_PA), np.rint(20.0 * device[at]) / 20.0, gait)
+
+
+def judge(found: Floors, away_m: Floats) -> Row:
+    """Share of right floors with ties and strict, the longest time without one, changes of the true floor; `away_m`: (n, k) from each storey."""
+    n = np.arange(len(found.floor))
+    ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * TIE_M
+    wrong = ~ties[n, found.floor]
+    true = away_m.argmin(axis=1)
+    return {
+        "floor_right": float(1.0 - wrong.mean()),
+        "strict_right": float((found.floor == true).mean()),
+        "longest_wrong_s": longest_s(found.t_s, wrong),
+        "changes": int(np.count_nonzero(np.diff(true))),
+    }
+
+
+def longest_s(t_s: Floats, wrong: NDArray[np.bool_]) -> float:
+    """The longest time without a right sample, to the first right one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], wrong.astype(np.int8), [0]]))).reshape(-1, 2)
+    return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in edges.tolist()), default=0.0)
+
+
+def _summary(name: str, rows: Sequence[Row]) -> Row:
+    def over(key: str, how: Callable[[list[float]], float]) -> float:
+        return round(how([row[key] for row in rows]), 5)
+
+    return {
+        "name": name,
+        "runs": len(rows),
+        "floor_right": over("floor_right", lambda v: sum(v) / len(v)),
+        "strict_right": over("strict_right", lambda v: sum(v) / len(v)),
+        "worst_right": over("floor_right", min),
+        "longest_wrong_s": over("longest_wrong_s", max),
+        "late_runs": sum(row["longest_wrong_s"] > 10.0 for row in rows),
+        "changes": sum(row["changes"] for row in rows),
+    }

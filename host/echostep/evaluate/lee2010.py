@@ -1,0 +1,259 @@
+"""The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track; theirs and ours.
+
+In: seeds. Out: rows `lap/lee2010`, `lap/default`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8. Owns the routes.
+Everything is simulated, from the bytes of the simulated board on: frames, clock and counts are read as live. Each run is another person in another
+magnetic field. Both methods are given the place and the heading of the start, and the wearer's legs to within a centimetre.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep import lee2010
+from echostep import messages as m
+from echostep.calibration import ADIS16100_RAD_S
+from echostep.evaluate.study import Row, Study, console, print_table, write_json, write_parquet
+from echostep.frames import BoardReader, Frames, encode
+from echostep.leg_file import LegSamples, track_default
+from echostep.leg_kinematics import Segments
+from echostep.legs import LegsSettings
+from echostep.plan import Level
+from echostep.simulation.board import PythonBoard
+from echostep.simulation.legs import Leg
+from echostep.simulation.magnetism import Magnetism
+from echostep.simulation.stimulus import BoardSensors
+from echostep.simulation.walker import Person, Walk, Waypoint, walk
+from echostep.timeline import PLAIN, Arrivals, MtxTiming, Timeline
+
+Floats = NDArray[np.float64]
+
+LAP: tuple[Waypoint, ...] = ((0.0, 0.0), (40.0, 0.0), (40.0, 30.0), (0.0, 30.0), (0.0, 0.0))  # [Lee 2010, Figure 6]
+CORRIDOR_M, STOREY_M, STOREYS = 80.0, 3.5, 5  # [Lee 2010, Figure 7]; the storey's height is not printed
+PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
+BLOCK_MS = 50
+SENSORS = m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT | m.Sensors.COMPASS | m.Sensors.PRESSURE
+TAPE_SD_M = 0.01  # of a thigh or a shank that somebody measures
+KNOWN_S = 2.0  # of standing on the floor where the walk begins: its pressure is the reference
+COLUMNS = {
+    "name": "", "ending_m": "ending", "ending_max_m": "worst", "mean_m": "mean", "distance_error_percent": "way %", "floor_right": "floor right",
+}  # fmt: skip
+INVALID = -32768
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What the host has: the gyros' and the compass's `samples`, `pressure` (n, 2) t_s and Pa, the wearer's `segments` as measured."""
+
+    samples: LegSamples
+    pressure: Floats
+    segments: Segments
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A method's track (n, 3) t_s, x, y from the true start on, and how far it says that he walked."""
+
+    track: Floats
+    distance_m: float
+
+
+def evaluate_lee2010(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
+    """Run the study, print its table beside the paper's figure, and write JSON, Parquet and pictures."""
+    from echostep.evaluate.lee2010_pictures import draw
+
+    each = Study("lee2010", runs, seed, one_run, out, scheduler).rows()
+    rows = [
+        _summary([row for row in each if row["name"] == name]) for name in dict.fromkeys(row["name"] for row in each)
+    ]
+    print_table(
+        f"Lee and Lee 2010: {runs} simulated runs, metres; last, the paper's one real lap", [*rows, *PRINTED], COLUMNS
+    )
+    console.print(
+        "ending, mean: error of the place at the end and on the way; way: error of the distance walked. Simulated."
+    )
+    write_parquet(out / "lee2010.parquet", each)
+    draw(out, seed)
+    if json_path is not None:
+        write_json(json_path, "lee2010", runs, seed, rows)
+
+
+def one_run(seed: int) -> list[Row]:
+    """All rows of one person."""
+    lap = lap_of(seed)
+    measured = measure(lap, seed)
+    rows = [_row(f"lap/{name}", name, seed, lap, method(measured, start_of(lap))) for name, method in METHODS.items()]
+    descent = descent_of(seed)
+    measured = measure(descent, seed)
+    floors = floors_of(measured.pressure)
+    right = floor_right(floors, descent)
+    for name, method in METHODS.items():
+        row = _row(
+            "storeys" if name == "lee2010" else f"storeys/{name}",
+            name,
+            seed,
+            descent,
+            method(measured, start_of(descent)),
+        )
+        rows.append(row | {"floor_right": right})
+    rows.append(
+        {"name": "floors", "profile": "lee2010", "seed": seed, "floor_right": right, **_heights_off(floors, descent)}
+    )
+    return rows
+
+
+def person_of(seed: int) -> Person:
+    """Legs, stride and pace of a healthy adult [Winter 2009; Perry 1992]."""
+    rng = np.random.default_rng([seed, 30])
+    height = rng.uniform(1.55, 1.92)
+    leg = Leg(0.245 * height * rng.uniform(0.96, 1.04), 0.246 * height * rng.uniform(0.96, 1.04))
+    stride = 0.78 * height * rng.uniform(0.9, 1.08)
+    return Person(stride_m=stride, stride_s=1.1 * rng.uniform(0.93, 1.12), leg=leg)
+
+
+def lap_of(seed: int) -> Walk:
+    """Once round 40 x 30 m."""
+    return walk(LAP, person_of(seed), np.random.default_rng([seed, 31]))
+
+
+def descent_of(seed: int) -> Walk:
+    """From the 5th floor down to the 1st, along each corridor."""
+    return walk(descent_waypoints(), person_of(seed), np.random.default_rng([seed, 32]))
+
+
+def descent_waypoints() -> list[Waypoint]:
+    """Corridors of 80 m to and fro, a stairwell of two flights at the end of each."""
+    way: list[Waypoint] = [(0.0, 0.0, 0.0, (STOREYS - 1) * STOREY_M)]
+    for k in range(STOREYS):
+        z, y, on = (STOREYS - 1 - k) * STOREY_M, 1.6 * k, 1.0 if k % 2 == 0 else -1.0
+        end = CORRIDOR_M if on > 0.0 else 0.0
+        way.append((end, y, 0.0, z))
+        if k + 1 < STOREYS:
+            half, low = z - 0.5 * STOREY_M, z - STOREY_M
+            for x, dy, at in ((1.0, 0.0, z), (4.2, 0.0, half), (5.0, 0.8, half), (4.2, 1.6, half), (1.0, 1.6, low)):
+                way.append((end + on * x, y + dy, 0.0, at))
+    return way
+
+
+def measure(walked: Walk, seed: int) -> Measured:
+    """What reaches the host of a walk: bytes of the simulated board, read as live."""
+    rng = np.random.default_rng([seed, 33])
+    magnetism = Magnetism(np.random.default_rng([seed, 34]))
+    levels = [Level(str(k), k * STOREY_M, np.empty((0, 4))) for k in range(STOREYS)]
+    sensors = BoardSensors(walked, levels, np.empty(0), np.random.default_rng([seed, 35]), magnetism)
+    board = PythonBoard(seed=seed)
+    board.send(encode(m.Configure(SENSORS, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED), 0))
+    sent: list[bytes] = []
+    for start in range(0, len(walked.t_s), BLOCK_MS):
+        sent += [part for _, part in board.advance(sensors.rows(start, start + BLOCK_MS))]
+    leg = person_of(seed).leg
+    tape = TAPE_SD_M * rng.standard_normal(2)
+    return replace(_read(b"".join(sent)), segments=Segments(leg.thigh_m + tape[0], leg.shank_m + tape[1]))
+
+
+def _read(received: bytes) -> Measured:
+    """Frames, one clock, SI units."""
+    reader = BoardReader()
+    frames = reader.frames(received)
+    t_s, gyros = _timed(frames, m.Gyros)
+    at, compass = _timed(frames, m.Compass)
+    heading = np.full(len(t_s), np.nan)
+    good = compass["bearing"] < 3600
+    place = np.minimum(np.searchsorted(t_s, at[good]), len(t_s) - 1)
+    heading[place] = _wrapped(0.5 * math.pi - np.radians(0.1 * compass["bearing"][good]))
+    thigh, calf, belt = (
+        np.where(gyros[name] == INVALID, np.nan, gyros[name] * ADIS16100_RAD_S) for name in ("thigh", "calf", "belt")
+    )
+    pressure_s, pressure = _timed(frames, m.Pressure)
+    table = np.column_stack([pressure_s, 0.25 * pressure["pressure"]])[pressure["pressure"] > 0]
+    whole = np.isfinite(t_s) & np.isfinite(thigh) & np.isfinite(calf) & np.isfinite(belt)
+    samples = LegSamples(t_s[whole], thigh[whole], calf[whole], belt[whole], heading[whole])
+    return Measured(samples, table, Segments())
+
+
+def _timed(frames: Frames, kind: type[m.Message]) -> tuple[Floats, NDArray[np.void]]:
+    """The messages of a kind with their times."""
+    identifier = next(i for i, one in m.BY_ID.items() if one is kind)
+    _, rows = frames.rows(identifier)
+    ticks = rows["ticks"].astype(np.int64)
+    n, none = len(ticks), np.empty(0, np.int64)
+    arrived = ticks * 500 + 1_000_000_000
+    board = Arrivals(ticks, np.arange(n), arrived, np.full(n, PLAIN))
+    times = Timeline(MtxTiming()).times(board, Arrivals(none, none, none, none))
+    return times.board_s, rows
+
+
+def start_of(walked: Walk) -> tuple[float, float, float]:
+    """Place and heading at the beginning."""
+    x, y = walked.trunk_m[0].tolist()
+    return x, y, float(walked.heading_rad[0])
+
+
+def by_lee(measured: Measured, start: tuple[float, float, float]) -> Found:
+    """The paper's method: its equations at 10 Hz."""
+    s = measured.samples
+    settings = lee2010.LeeSettings(legs=lee2010.Legs(measured.segments.thigh_m, measured.segments.shank_m))
+    walker = lee2010.Walker(settings)
+    walker.heading = lee2010.Fused(start[2], 0.0)
+    rows = walker.feed(s.t_s, s.thigh, s.shank, s.belt, s.compass)
+    return Found(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
+
+
+def by_default(measured: Measured, start: tuple[float, float, float]) -> Found:
+    """Ours."""
+    rows = track_default(measured.samples, LegsSettings(measured.segments), start[2]).rows[::20]
+    return Found(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
+
+
+METHODS = {"lee2010": by_lee, "default": by_default}
+
+
+def floors_of(pressure: Floats) -> Floats:
+    """(n, 2) t_s and number of the floor from 0, by the paper's rule, when the first reading's floor is known: the highest."""
+    heights = [k * STOREY_M for k in range(STOREYS)]
+    reference = float(np.median(pressure[pressure[:, 0] < pressure[0, 0] + KNOWN_S, 1]))
+    floors = [lee2010.floor_of(p, heights, reference, STOREYS - 1) for p in pressure[:, 1].tolist()]
+    return np.column_stack([pressure[:, 0], floors])
+
+
+def floor_right(floors: Floats, walked: Walk) -> float:
+    """Share of the readings with the floor that is nearest in truth."""
+    return float((floors[:, 1] == np.rint(_height_at(floors[:, 0], walked) / STOREY_M)).mean())
+
+
+def _heights_off(floors: Floats, walked: Walk) -> Row:
+    """Error of the height that is put out, which is the floor's own, at the end and on the way."""
+    off = np.abs(floors[:, 1] * STOREY_M - _height_at(floors[:, 0], walked))
+    return {"ending_m": float(off[-1]), "mean_m": float(off.mean())}
+
+
+def _height_at(t_s: Floats, walked: Walk) -> Floats:
+    return np.interp(t_s, walked.t_s, walked.height_m)
+
+
+def _row(name: str, profile: str, seed: int, walked: Walk, found: Found) -> Row:
+    truth = np.column_stack([np.interp(found.track[:, 0], walked.t_s, walked.trunk_m[:, k]) for k in (0, 1)])
+    off = np.hypot(*(found.track[:, 1:] - truth).T)
+    way = float(np.hypot(*np.diff(walked.foot_m[::50, :2], axis=0).T).sum())
+    return {
+        "name": name, "profile": profile, "seed": seed, "ending_m": float(off[-1]), "mean_m": float(off.mean()),
+        "distance_error_percent": 100.0 * (found.distance_m / way - 1.0),
+    }  # fmt: skip
+
+
+def _summary(rows: list[Row]) -> Row:
+    """Means over the runs, and the worst ending."""
+    found: Row = {"name": rows[0]["name"], "profile": rows[0]["profile"], "runs": len(rows)}
+    for key in ("ending_m", "mean_m", "distance_error_percent", "floor_right"):
+        if key in rows[0]:
+            found[key] = round(sum(row[key] for row in rows) / len(rows), 4)
+    found["ending_max_m"] = round(max(row["ending_m"] for row in rows), 4)
+    return found
+
+
+def _wrapped(angle_rad: Floats) -> Floats:
+    return np.arctan2(np.sin(angle_rad), np.cos(angle_rad))

@@ -1,0 +1,1 @@
+"""Teams: several trackers' estimates meet at a commander."""

@@ -1,0 +1,222 @@
+"""The commander's view: a team on one plan, those in need first.
+
+In: a plan, a broker's URL. Out: a table on the terminal, a picture, or the roster as JSON. Owns nothing but the loop.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from echostep.errors import EchostepError
+from echostep.plan import Plan, load_plan
+from echostep.team.endpoint import parse_endpoint
+from echostep.team.inbox import Inbox, Reception
+from echostep.team.mqtt import Listener
+from echostep.team.report import checked_name
+from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, Need, Roster, nearest
+from echostep.team.team_picture import draw_team
+
+LOOK_S = 0.25
+WIDE = 110  # columns of a terminal that has room for all
+WIDEST = 24  # of one of them
+COLUMNS = {
+    "who": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "to start": "right",
+    "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
+}  # fmt: skip
+SPARED = ("looks", "nearest m", "walked m")  # in a narrow terminal
+STYLES = {
+    Need.LOST: "bold white on red", Need.STALE: "bold red", Need.UNCERTAIN: "yellow",
+    Need.WAITING: "cyan", Need.TRACKING: "green", Need.ENDED: "grey62",
+}  # fmt: skip
+
+
+def command(
+    plan_path: Path, url: str, team: str | None, seconds: float | None, picture: Path | None, *, as_json: bool
+) -> None:
+    """Follow a team until Ctrl-C, or for so long."""
+    plan = load_plan(plan_path)
+    endpoint = parse_endpoint(url, ("mqtt", "mqtts"))
+    if picture and picture.suffix not in (".png", ".svg"):
+        raise EchostepError(f"--picture {picture}: expected a name that ends in .png or .svg")
+    console = Console(soft_wrap=True, stderr=as_json)
+    inbox, roster = Inbox(), Roster()
+    topic = f"echostep/{checked_name('--team', team) if team else '+'}/+/+"
+    reception = Reception(
+        Listener(endpoint, topic, inbox.hear), lambda said: console.print(f"{endpoint}: {said}", markup=False)
+    )
+    end_s = math.inf if seconds is None else time.monotonic() + seconds
+    try:
+        with Live(console=console, auto_refresh=False, transient=False, redirect_stdout=False) as shown:
+            while time.monotonic() < end_s:
+                time.sleep(min(LOOK_S, max(end_s - time.monotonic(), 0.0)))
+                look(inbox, roster)
+                if not as_json:
+                    shown.update(
+                        table(roster, plan, time.monotonic(), connected=reception.connected, columns=console.width),
+                        refresh=True,
+                    )
+    except KeyboardInterrupt:
+        pass
+    finally:
+        reception.close()
+    look(inbox, roster)
+    now_s = time.monotonic()
+    if picture:
+        draw_team(picture, plan, roster.members(now_s), now_s)
+    if as_json:
+        json.dump(as_tree(roster, plan, now_s), sys.stdout, indent=2)
+        sys.stdout.write("\n")
+
+
+def look(inbox: Inbox, roster: Roster) -> None:
+    """Everything that has come goes into the roster."""
+    letters, refused = inbox.take()
+    for letter in letters:
+        roster.hear(letter.topic, letter.payload, letter.retained, letter.heard_s, letter.unix_s)
+    for why, count in refused.items():
+        roster.heard += count
+        roster.refuse(why, count)
+
+
+def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns: int = WIDE) -> Group:
+    """The roster for people, a line for each, in so many columns."""
+    members = roster.members(now_s)
+    made = Table(
+        title=f"{plan.name}: {summary(members, now_s)}", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
+    names = [name for name in COLUMNS if columns >= WIDE or name not in SPARED]
+    duplicates = roster.duplicates(now_s)
+    rows = [_cells(m, members, plan, now_s, duplicates) for m in members]
+    left = columns - 2
+    for name in names:
+        longest = max([len(name)] + [cell_len(row[name]) for row in rows])
+        width = max(left, 8) if name == "note" else min(longest, WIDEST)
+        left -= width + 2
+        made.add_column(name, justify=COLUMNS[name], no_wrap=True, width=width)  # type: ignore[arg-type]
+    for m, row in zip(members, rows, strict=True):
+        made.add_row(*(Text(row[name]) for name in names), style=STYLES[m.need(now_s)])
+    below = [] if connected else [Text("no connection to the broker", style="bold red")]
+    if roster.counts:
+        below.append(Text(f"not believed: {refused(roster)}", style="grey62"))
+    return Group(made, *below)
+
+
+def summary(members: Sequence[Member], now_s: float) -> str:
+    """How many of them are in which state."""
+    needs = [m.need(now_s) for m in members]
+    return f"{len(members)} tracker{'s' * (len(members) != 1)}" + "".join(
+        f", {needs.count(n)} {n}" for n in Need if n in needs
+    )
+
+
+def refused(roster: Roster) -> str:
+    """What was not believed, most frequent first."""
+    return ", ".join(f"{count} x {why}" for why, count in roster.counts.most_common(6))
+
+
+def _cells(
+    m: Member, members: Sequence[Member], plan: Plan, now_s: float, duplicates: set[tuple[str, str]]
+) -> dict[str, str]:
+    r, p, near = m.report, m.position(now_s), nearest(m, members)
+    from_start = _from_start(m, plan)
+    return {
+        "who": f"{r.team}/{r.name}",
+        "state": _state(m, now_s),
+        "x, y m": f"{p.x_m:.1f}, {p.y_m:.1f}" if p else "",
+        "±95% m": f"{p.radius95_m:.1f}" if p else "",
+        "floor": p.floor_name if p else "",
+        "to start": "" if from_start is None else f"{from_start:.0f} m",
+        "looks": "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
+        "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",
+        "walked m": f"{r.motion.walked_m:.0f}" if r.motion else "",
+        "note": "; ".join(notes(m, plan, duplicates)),
+    }
+
+
+def _state(m: Member, now_s: float) -> str:
+    """His state, and for how long nothing has been heard of him or of his sensors."""
+    need, silent_s, p = m.need(now_s), m.silent_s(now_s), m.report.position
+    quiet = need not in (Need.STALE, Need.ENDED) and silent_s <= m.patience_s
+    if quiet:
+        return f"{need}, no estimate {p.age_s:.0f} s" if p and p.age_s > 3.0 else need.value
+    return f"{need} {silent_s:.0f} s" if need is Need.STALE else f"{need}, silent {silent_s:.0f} s"
+
+
+def notes(m: Member, plan: Plan, duplicates: set[tuple[str, str]]) -> list[str]:
+    """What else the commander should know of him."""
+    said, r = [], m.report
+    if m.key[:2] in duplicates:
+        said.append(f"name used twice (run {r.run})")
+    if m.presence == "broken":
+        said.append("connection broke")
+    if r.motion and r.motion.still_s > STILL_S:
+        said.append(f"still for {r.motion.still_s:.0f} s")
+    if r.source != "live":
+        said.append(r.source)
+    if r.plan_sha256 != plan.digest:
+        said.append(f"tracked on another plan ({r.plan})")
+    if not m.retained and abs(m.clock_off_s) > CLOCK_OFF_S:
+        said.append(f"clock {'ahead' if m.clock_off_s > 0 else 'behind'} by {abs(m.clock_off_s):.0f} s")
+    if r.battery_percent is not None and r.battery_percent < 20:
+        said.append(f"battery {r.battery_percent} %")
+    said += r.streams.findings if r.streams else ()
+    if r.streams and r.streams.dropped + r.streams.lost + r.streams.bad:
+        said.append(f"{r.streams.bad} bad, {r.streams.lost} lost, {r.streams.dropped} dropped frames")
+    said += [f"{why} {count} x" for why, count in m.notes.items()]
+    return said
+
+
+def as_tree(roster: Roster, plan: Plan, now_s: float) -> dict[str, Any]:
+    """The roster for programs."""
+    members, duplicates = roster.members(now_s), roster.duplicates(now_s)
+    return {
+        "plan": plan.name,
+        "heard": roster.heard,
+        "not_believed": dict(roster.counts.most_common()),
+        "members": [_member(m, members, plan, now_s, duplicates) for m in members],
+    }
+
+
+def _member(
+    m: Member, members: Sequence[Member], plan: Plan, now_s: float, duplicates: set[tuple[str, str]]
+) -> dict[str, Any]:
+    import msgspec
+
+    near = nearest(m, members)
+    return {
+        "team": m.report.team,
+        "name": m.report.name,
+        "state": m.need(now_s).value,
+        "silent_s": round(m.silent_s(now_s), 3),
+        "stale": m.silent_s(now_s) > m.patience_s or m.presence == "broken",
+        "presence": m.presence,
+        "remembered": m.retained,
+        "radius95_m": p.radius95_m if (p := m.position(now_s)) else None,
+        "clock_ahead_s": round(m.clock_off_s, 3),
+        "missed": m.missed,
+        "from_start_m": _from_start(m, plan),
+        "nearest": {"name": near[1].report.name, "distance_m": near[0]} if near else None,
+        "notes": notes(m, plan, duplicates),
+        "report": msgspec.to_builtins(m.report),
+    }
+
+
+def _from_start(m: Member, plan: Plan) -> float | None:
+    """Straight distance from the plan's start, on its floor."""
+    p = m.report.position
+    if p is None or plan.start is None or p.floor != plan.start.level:
+        return None
+    return math.hypot(p.x_m - plan.start.x_m, p.y_m - plan.start.y_m)

@@ -1,0 +1,178 @@
+"""Cursor on Target: a report as an event for TAK, over UDP, TCP or TLS.
+
+In: reports with a place on Earth. Out: `event` elements [CoT Event 2.0 schema, MITRE], one a datagram, or one after the other on a stream. Owns one
+socket, used by one thread. XML by the standard library: pytak brings an asyncio client with queues of its own, where the newest position must win.
+
+`ce` and `le` are what the schema says: one standard deviation, `ce` along the worst direction, the plan's own uncertainty included. The remarks
+tell the 95 % radius.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import math
+import socket
+import ssl
+from uuid import NAMESPACE_URL, uuid5
+from xml.etree import ElementTree
+
+from echostep.team.endpoint import Endpoint, tls_context
+from echostep.team.report import Report
+
+FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
+UNKNOWN = "9999999.0"  # of the schema
+HOW = {"live": "m-f", "replay": "m-f", "simulated": "m-s"}  # machine: fused, simulated
+PATIENCE_S = 3.0
+GROUPS = {
+    "White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple",
+    "Dark Blue", "Blue", "Cyan", "Teal", "Green", "Dark Green", "Brown",
+}  # of TAK  # fmt: skip
+HOPS = 4  # of multicast
+
+
+def event(report: Report) -> bytes | None:
+    """The event, one line of XML in UTF-8; None without a place on Earth."""
+    place, position, motion = report.place, report.position, report.motion
+    if place is None or position is None:
+        return None
+    top = ElementTree.Element("event", version="2.0", uid=uid(report.team, report.name), type=FRIEND_ON_FOOT)
+    top.attrib |= {"time": report.time, "start": report.time, "stale": report.stale, "how": HOW[report.source]}
+    hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
+    point = {"lat": f"{place.lat_deg:.8f}", "lon": f"{place.lon_deg:.8f}", "hae": hae, "ce": _up(place.sd_m), "le": le}
+    ElementTree.SubElement(top, "point", point)
+    detail = ElementTree.SubElement(top, "detail")
+    ElementTree.SubElement(detail, "contact", callsign=report.name)
+    if motion is not None and place.course_deg is not None:
+        track = {"course": f"{place.course_deg:.1f}", "speed": f"{motion.speed_m_s:.2f}"}
+        ElementTree.SubElement(detail, "track", track)
+    if report.battery_percent is not None:
+        ElementTree.SubElement(detail, "status", battery=str(report.battery_percent))
+    if report.team.title() in GROUPS:
+        ElementTree.SubElement(detail, "__group", name=report.team.title(), role="Team Member")
+    ElementTree.SubElement(detail, "precisionlocation", geopointsrc="CALC", altsrc="CALC" if place.hae_m else "???")
+    ElementTree.SubElement(detail, "takv", platform="echostep", version=report.version, device="", os="")
+    ElementTree.SubElement(detail, "remarks").text = remarks(report)
+    return ElementTree.tostring(top, encoding="utf-8", xml_declaration=False)
+
+
+def uid(team: str, name: str) -> str:
+    """One for each wearer; where a hyphen in a name makes it ambiguous, with a part of a hash."""
+    plain = f"echostep-{team}-{name}"
+    return plain if plain.count("-") == 2 else f"{plain}-{uuid5(NAMESPACE_URL, f'{team}/{name}').hex[:8]}"
+
+
+def remarks(report: Report) -> str:
+    """What the event's fields cannot say, in words."""
+    p = report.position
+    words = [f"{report.status}, 95 % within {p.radius95_m:.1f} m" if p else report.status]
+    if p:
+        words.append(p.floor_name)
+        if p.age_s > 1.0:
+            words.append(f"no estimate for {p.age_s:.0f} s")
+    if report.motion:
+        words.append(f"still for {report.motion.still_s:.0f} s")
+    words.append(f"team {report.team}")
+    if report.source != "live":
+        words.append(report.source)
+    return "; ".join(words)
+
+
+def _up(metres: float) -> str:
+    """An error is never rounded to less than it is."""
+    return f"{math.ceil(metres * 100.0) / 100.0:.2f}"
+
+
+class UdpLine:
+    """A `Line` of datagrams, to a host or to a multicast group (TAK: 239.2.3.1:6969)."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._endpoint = endpoint
+        self._socket: socket.socket | None = None
+
+    def open(self) -> None:
+        """Look the host up and make a socket."""
+        family, kind, number, _, address = _address(self._endpoint, socket.SOCK_DGRAM)
+        self._socket = socket.socket(family, kind, number)
+        self._socket.setblocking(False)
+        if ipaddress.ip_address(address[0].partition("%")[0]).is_multicast:
+            level, option = (
+                (socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_HOPS)
+                if family == socket.AF_INET6
+                else (socket.IPPROTO_IP, socket.IP_MULTICAST_TTL)
+            )
+            self._socket.setsockopt(level, option, HOPS)
+        self._socket.connect(address)
+
+    def send(self, report: Report) -> None:
+        """One datagram; that nobody listens (port unreachable) is no fault of ours."""
+        made = event(report)
+        if made is None or self._socket is None:
+            return
+        try:
+            self._socket.send(made)
+        except (ConnectionRefusedError, BlockingIOError):
+            return
+
+    def close(self, *, ended: bool) -> None:  # noqa: ARG002
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+
+class StreamLine:
+    """A `Line` of events on TCP or TLS, as a TAK server takes them."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._endpoint = endpoint
+        self._tls = tls_context(endpoint) if endpoint.secure else None
+        self._socket: socket.socket | None = None
+
+    def open(self) -> None:
+        """Connect, and shake hands."""
+        plain = socket.create_connection((self._endpoint.host, self._endpoint.port), PATIENCE_S)
+        try:
+            plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384)  # what waits in there grows old
+            self._socket = self._tls.wrap_socket(plain, server_hostname=self._endpoint.host) if self._tls else plain
+        except OSError:
+            plain.close()
+            raise
+
+    def send(self, report: Report) -> None:
+        """Write the event; what the server sends is read and forgotten."""
+        made = event(report)
+        if self._socket is None:
+            raise ConnectionError("not connected")
+        self._drain(self._socket)
+        if made is not None:
+            self._socket.settimeout(PATIENCE_S)
+            self._socket.sendall(made + b"\n")
+
+    def _drain(self, sock: socket.socket) -> None:
+        sock.settimeout(0.0)
+        for _ in range(64):
+            try:
+                if not sock.recv(65_536):
+                    raise ConnectionResetError("the server closed the connection")
+            except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
+                return
+
+    def close(self, *, ended: bool) -> None:
+        """Close the connection."""
+        sock, self._socket = self._socket, None
+        if sock is None:
+            return
+        try:
+            if ended and isinstance(sock, ssl.SSLSocket):
+                sock.settimeout(0.5)
+                sock.unwrap()
+        except (OSError, ValueError):
+            pass
+        finally:
+            sock.close()
+
+
+def _address(endpoint: Endpoint, kind: int) -> tuple[int, int, int, str, tuple[str, int]]:
+    found = socket.getaddrinfo(endpoint.host, endpoint.port, type=kind)
+    return found[0]  # type: ignore[return-value]

@@ -1,0 +1,117 @@
+"""Where reports go: the URL of a broker or of a TAK listener -> `Endpoint`.
+
+In: a URL. Out: an `Endpoint`, its TLS context. Owns nothing; every error names the URL (without its password) and what to do.
+"""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from echostep.errors import EchostepError
+from echostep.team.report import checked_name
+
+PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089}
+FILES = ("ca", "cert", "key")
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A parsed URL; `files` are the PEM files of TLS: `ca` (else the system's), `cert` and `key` of the client."""
+
+    scheme: str
+    host: str
+    port: int
+    user: str | None
+    password: str | None
+    files: dict[str, str]
+
+    @property
+    def secure(self) -> bool:
+        return self.scheme in ("mqtts", "cot+tls")
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}"
+
+
+def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoint:
+    """A URL such as mqtts://user:password@host:8883?ca=ca.pem&cert=me.pem&key=me.key; raises EchostepError."""
+    shown = url.rpartition("@")[2]
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname, parts.port
+        asked = parse_qs(parts.query, strict_parsing=True) if parts.query else {}
+    except ValueError as error:
+        raise EchostepError(f"{shown}: not an address: {error}") from error
+    if parts.scheme not in schemes:
+        raise EchostepError(f"{shown}: expected one of {', '.join(f'{s}://' for s in schemes)}")
+    if not host or port == 0 or parts.path not in ("", "/") or parts.fragment:
+        raise EchostepError(f"{shown}: expected {parts.scheme}://HOST[:PORT]")
+    if not _lookable(host):
+        raise EchostepError(f"{shown}: the name of the host is damaged")
+    if unknown := set(asked) - set(FILES):
+        raise EchostepError(f"{shown}: {', '.join(sorted(unknown))}: unknown; there are {', '.join(FILES)}")
+    endpoint = Endpoint(
+        parts.scheme, host, port or PORTS[parts.scheme],
+        unquote(parts.username) if parts.username else None,
+        unquote(parts.password) if parts.password else None,
+        {name: values[-1] for name, values in asked.items()},
+    )  # fmt: skip
+    if endpoint.files and not endpoint.secure:
+        raise EchostepError(f"{shown}: ca, cert and key are for {'mqtts' if 'mqtt' in parts.scheme else 'cot+tls'}://")
+    if ("cert" in endpoint.files) != ("key" in endpoint.files):
+        raise EchostepError(f"{shown}: cert and key belong together")
+    if endpoint.user is not None and "mqtt" not in parts.scheme:
+        raise EchostepError(f"{shown}: user and password are for mqtt:// and mqtts://")
+    return endpoint
+
+
+def _lookable(host: str) -> bool:
+    """Whether the resolver would take the name."""
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        return False
+    return host.isprintable() and " " not in host
+
+
+@dataclass(frozen=True, slots=True)
+class Outlet:
+    """Where a tracker's estimates go, and under what name."""
+
+    endpoints: tuple[Endpoint, ...]
+    name: str
+    team: str
+
+
+def parse_outlet(urls: Sequence[str], name: str, team: str) -> Outlet:
+    """What `--publish`, `--name` and `--team` say; raises EchostepError."""
+    if not name:
+        raise EchostepError("--publish needs the wearer's name: --name NAME")
+    return Outlet(
+        tuple(parse_endpoint(url) for url in urls), checked_name("--name", name), checked_name("--team", team)
+    )
+
+
+def tls_context(endpoint: Endpoint) -> ssl.SSLContext:
+    """Verifies the server's certificate and name, always; raises EchostepError that names the file."""
+    for name, path in endpoint.files.items():
+        if not Path(path).is_file():
+            raise EchostepError(f"{endpoint}: {name}={path}: there is no such file")
+    try:
+        context = ssl.create_default_context(cafile=endpoint.files.get("ca"))
+        if "cert" in endpoint.files:
+            context.load_cert_chain(endpoint.files["cert"], endpoint.files["key"], password=_no_password)
+    except (OSError, ValueError) as error:
+        names = ", ".join(f"{k}={v}" for k, v in endpoint.files.items())
+        raise EchostepError(f"{endpoint}: cannot use {names}: {error}") from error
+    return context
+
+
+def _no_password() -> str:
+    """Never ask on the terminal."""
+    raise ValueError("the key is encrypted; give it without a passphrase")

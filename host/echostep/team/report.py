@@ -1,0 +1,250 @@
+"""The report: what a tracker tells its commander, as JSON.
+
+In: the facts, or the bytes of a payload from anybody. Out: `Report`, or the bytes. Owns nothing. Every field has its limits beside it; the JSON
+Schema is made of them (`schema`), and `decode` believes nothing outside them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import unicodedata
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from echostep.errors import EchostepError
+
+MAX_PAYLOAD = 8192  # bytes; ours have about 900
+LIMIT_M = 1e5
+
+Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="m, on the plan (x east, y north)")]
+Name = Annotated[
+    str, Meta(min_length=1, max_length=32, pattern="^[^/+#]*$", description="printable characters, no / + #")
+]
+Moment = Annotated[str, Meta(min_length=20, max_length=32, description="UTC, RFC 3339, by the tracker's clock")]
+Heading = Annotated[float, Meta(ge=-7.0, le=7.0, description="rad counter-clockwise from x")]
+
+
+class BadReportError(ValueError):
+    """A payload that is not a report; the text says in a few words why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where the wearer is on the plan."""
+
+    t_s: Annotated[float, Meta(ge=-1e9, le=1e12, description="the tracker's own clock at the estimate, s")]
+    age_s: Annotated[
+        float, Meta(ge=0.0, le=1e9, description="seconds since the estimate was made; it has been widened by as many")
+    ]
+    x_m: Metres
+    y_m: Metres
+    xx_m2: Annotated[float, Meta(ge=0.0, le=1e12, description="covariance of x and x, m2")]
+    xy_m2: Annotated[float, Meta(ge=-1e12, le=1e12, description="covariance of x and y, m2")]
+    yy_m2: Annotated[float, Meta(ge=0.0, le=1e12, description="covariance of y and y, m2")]
+    radius95_m: Annotated[float, Meta(ge=0.0, le=1e7, description="longer half axis of the 95 % ellipse, m")]
+    heading_rad: Heading | None
+    heading_sd_rad: Annotated[float, Meta(ge=0.0, le=100.0, description="standard deviation, rad")]
+    floor: Annotated[int, Meta(ge=-1000, le=1000, description="index of the level in the plan")]
+    floor_name: Annotated[str, Meta(max_length=64, description="its name")]
+    floor_probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that he is on this floor")]
+    z_m: Annotated[
+        float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor he stands on, in the plan's metres")
+    ]
+    z_sd_m: Annotated[float, Meta(ge=0.0, le=LIMIT_M, description="standard deviation of it, m")]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How the wearer moves."""
+
+    steps: Annotated[int, Meta(ge=0, le=2**53, description="of the foot that wears the MTx")]
+    walked_m: Annotated[float, Meta(ge=0.0, le=1e9, description="length of the track so far, m")]
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=100.0, description="over the last seconds, m/s")]
+    still_s: Annotated[float, Meta(ge=0.0, le=1e9, description="seconds since the last step")]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where that is on Earth, when the plan has a georeference."""
+
+    lat_deg: Annotated[float, Meta(ge=-90.0, le=90.0, description="WGS 84")]
+    lon_deg: Annotated[float, Meta(ge=-180.0, le=180.0, description="WGS 84")]
+    hae_m: Annotated[float, Meta(ge=-1e4, le=1e5, description="height over the ellipsoid, m")] | None
+    sd_m: Annotated[
+        float,
+        Meta(ge=0.0, le=1e7, description="standard deviation along the worst direction, georeference included, m"),
+    ]
+    hae_sd_m: Annotated[float, Meta(ge=0.0, le=1e7, description="of the height, m")] | None
+    course_deg: Annotated[float, Meta(ge=0.0, le=360.0, description="heading, clockwise from true north")] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Streams:
+    """Health of what the sensors send."""
+
+    mtx_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="samples of the MTx per second")]
+    board_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="messages of the sensor board per second")]
+    bad: Annotated[int, Meta(ge=0, le=2**53, description="frames that failed a check, both ports, since the start")]
+    lost: Annotated[int, Meta(ge=0, le=2**53, description="frames that never came, both ports, since the start")]
+    dropped: Annotated[int, Meta(ge=0, le=2**53, description="messages that the board had no room for")]
+    synchronised: Annotated[bool, Meta(description="the MTx is timed by its SyncOut wire")]
+    findings: Annotated[
+        tuple[Annotated[str, Meta(max_length=100)], ...],
+        Meta(max_length=4, description="what is wrong with the sensors, the worst first"),
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All of it; `position` is missing until the tracker has its first estimate."""
+
+    echostep_report: Annotated[Literal[1], Meta(description="version of this form")]
+    team: Name
+    name: Name
+    run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$", description="one run of one tracker; another run, another one")]
+    sequence: Annotated[int, Meta(ge=0, le=2**53, description="counts the reports made in this run")]
+    time: Annotated[Moment, Meta(description="when it was sent: UTC, RFC 3339, by the tracker's clock")]
+    stale: Annotated[Moment, Meta(description="until when it holds, by the same clock")]
+    source: Annotated[Literal["live", "replay", "simulated"], Meta(description="where the bytes come from")]
+    status: Annotated[
+        Literal["waiting", "tracking", "uncertain", "lost"],
+        Meta(
+            description="waiting: no estimate yet; uncertain: beyond 1 m of 95 % radius; lost: beyond 5 m, or the sensors are silent"
+        ),
+    ]
+    position: Annotated[Position | None, Meta(description="missing while waiting")]
+    motion: Annotated[Motion | None, Meta(description="missing while waiting")]
+    place: Annotated[Place | None, Meta(description="missing without a georeference")]
+    streams: Annotated[Streams | None, Meta(description="missing until something is heard")]
+    plan: Annotated[str, Meta(max_length=64, description="name of the plan that he is tracked on")]
+    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="of the plan's file")]
+    version: Annotated[str, Meta(max_length=32, description="of the tracker's echostep")]
+    battery_percent: Annotated[int, Meta(ge=0, le=100, description="charge of the tracker's computer")] | None
+    superseded: Annotated[
+        int, Meta(ge=0, le=2**53, description="reports that a newer one overtook before they could be sent")
+    ]
+
+    @property
+    def sent_s(self) -> float:
+        """Unix time of `time`."""
+        return _unix(self.time)
+
+    @property
+    def stale_after_s(self) -> float:
+        """How long the report holds."""
+        return _unix(self.stale) - _unix(self.time)
+
+
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """The retained word beside the reports: a tracker is online, has ended, or (the broker says so) its connection broke."""
+
+    echostep_presence: Literal[1]
+    run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
+    presence: Literal["online", "ended", "broken"]
+
+
+_REPORTS, _PRESENCES = msgspec.json.Decoder(Report), msgspec.json.Decoder(Presence)
+
+
+def encode(report: Report | Presence) -> bytes:
+    """The payload, JSON in UTF-8."""
+    return msgspec.json.encode(report)
+
+
+def decode(payload: bytes) -> Report:
+    """A payload as a report; raises BadReportError, and nothing else, whatever the bytes."""
+    report: Report = _decoded(payload, _REPORTS)
+    check_name(report.team)
+    check_name(report.name)
+    if not 0.0 <= report.stale_after_s <= 86_400.0:
+        raise BadReportError("stale is not within a day after time")
+    p = report.position
+    if p is not None and p.xy_m2**2 > p.xx_m2 * p.yy_m2 * (1.0 + 1e-9) + 1e-12:
+        raise BadReportError("position: not a covariance")
+    if (p is None) != (report.status == "waiting"):
+        raise BadReportError("status and position contradict each other")
+    findings = report.streams.findings if report.streams else ()
+    for text in (report.plan, report.version, p.floor_name if p else "", *findings):
+        if not _printable(text):
+            raise BadReportError("unprintable text")
+    return report
+
+
+def decode_presence(payload: bytes) -> Presence:
+    """As `decode`, for the word beside the reports."""
+    presence: Presence = _decoded(payload, _PRESENCES)
+    return presence
+
+
+def _decoded(payload: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
+    if len(payload) > MAX_PAYLOAD:
+        raise BadReportError("too long")
+    try:
+        return decoder.decode(payload)
+    except UnicodeDecodeError as error:
+        raise BadReportError("not UTF-8") from error
+    except msgspec.ValidationError as error:
+        raise BadReportError(_named(str(error))) from error
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise BadReportError("not JSON") from error
+
+
+def _named(error: str) -> str:
+    """What msgspec found, without the sender's own text, which may be made to harm a terminal."""
+    if "missing required field" in error:
+        return error.replace("Object missing required", "no")
+    at = error.rpartition(" - at `$.")[2].rstrip("`")
+    return f"wrong field {at}" if at.replace(".", "").replace("_", "").isalnum() and at.isascii() else "not a report"
+
+
+def check_name(text: str) -> None:
+    """Raises BadReportError when a name could confuse a topic, a terminal or a reader."""
+    if not 1 <= len(text) <= 32 or text != text.strip() or not _printable(text) or any(c in "/+#" for c in text):
+        raise BadReportError("a name has 1 to 32 printable characters, none of them / + #")
+
+
+def checked_name(option: str, text: str) -> str:
+    """A name that the user gave; raises EchostepError."""
+    try:
+        check_name(text)
+    except BadReportError as error:
+        raise EchostepError(f"{option} {text!r}: {error}") from error
+    return text
+
+
+def printable(text: str, most: int) -> str:
+    """A text of ours as a report may carry it."""
+    return "".join(c if _printable(c) else " " for c in text[:most])
+
+
+def _printable(text: str) -> bool:
+    """No control characters, nothing that turns the direction of writing, no lone surrogates."""
+    return all(unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp") for c in text)
+
+
+def moment(unix_s: float) -> str:
+    """Unix time as RFC 3339 in UTC, to the millisecond."""
+    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _unix(text: str) -> float:
+    try:
+        seconds = datetime.fromisoformat(text)
+        unix_s = seconds.timestamp() if seconds.tzinfo else math.nan
+    except (ValueError, OverflowError) as error:
+        raise BadReportError("not a time") from error
+    if not -1e10 < unix_s < 1e11:
+        raise BadReportError("not a time in UTC")
+    return unix_s
+
+
+def schema() -> str:
+    """JSON Schema (2020-12) of a report, as text."""
+    made = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "echostep report"}
+    return json.dumps(made | msgspec.json.schema(Report), indent=2) + "\n"

@@ -1,0 +1,102 @@
+"""A Mosquitto broker on a free loopback port, for the tests of the team."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+from typing import Self
+
+import pytest
+import trustme
+
+MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
+needs_broker = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not installed (apt install mosquitto)")
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+class Certificates:
+    """An authority, a server that it knows by 127.0.0.1, a client that it knows."""
+
+    def __init__(self, folder: Path) -> None:
+        authority = trustme.CA()
+        self.ca, self.server, self.client, self.stranger = (
+            folder / f"{n}.pem" for n in ("ca", "server", "client", "stranger")
+        )
+        authority.cert_pem.write_to_path(str(self.ca))
+        for path, issuer, name in (
+            (self.server, authority, "127.0.0.1"),
+            (self.client, authority, "anna@example.org"),
+            (self.stranger, trustme.CA(), "eve@example.org"),
+        ):
+            issuer.issue_cert(name).private_key_and_cert_chain_pem.write_to_path(str(path))
+
+    def query(self, client: Path | None = None) -> str:
+        """The part of a URL that names the files."""
+        return f"?ca={self.ca}" + ("" if client is None else f"&cert={client}&key={client}")
+
+
+class Broker:
+    """Started, stopped and started again on one port."""
+
+    def __init__(self, folder: Path, *more: str, port: int | None = None) -> None:
+        self.port = port or free_port()
+        self._configuration = folder / f"mosquitto-{self.port}.conf"
+        lines = (
+            "user root",
+            f"listener {self.port} 127.0.0.1",
+            "allow_anonymous true",
+            *more,
+        )  # root: it reads our folder
+        self._configuration.write_text("\n".join(lines) + "\n")
+        self._log = folder / f"mosquitto-{self.port}.log"
+        self._running: subprocess.Popen[bytes] | None = None
+
+    @property
+    def url(self) -> str:
+        return f"mqtt://127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        assert MOSQUITTO
+        with self._log.open("ab") as log:
+            self._running = subprocess.Popen([MOSQUITTO, "-c", self._configuration], stdout=log, stderr=log)
+        end_s = time.monotonic() + 10.0
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", self.port), 1.0).close()
+            except OSError:
+                assert time.monotonic() < end_s, self._log.read_text()
+                assert self._running.poll() is None, self._log.read_text()
+                time.sleep(0.02)
+            else:
+                return
+
+    def stop(self) -> None:
+        if self._running is not None:
+            self._running.send_signal(signal.SIGCONT)
+            self._running.terminate()
+            self._running.wait(10.0)
+            self._running = None
+
+    def freeze(self) -> None:
+        """It lives but does nothing."""
+        assert self._running
+        self._running.send_signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        assert self._running
+        self._running.send_signal(signal.SIGCONT)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()

@@ -1,0 +1,24 @@
+"""The first seconds of the simulated demo walk, once for all tests that need a recording with steps in it."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import takewhile
+
+from board_runs import ROOT
+from echostep.plan import load_plan
+from echostep.simulation.board import PythonBoard
+from echostep.simulation.scenario import demo_scenario
+from echostep.sources import Chunk
+
+DEMO = ROOT / "host/echostep/plans/demo.json"
+
+
+@cache
+def walk_chunks(seconds: float = 15.0) -> tuple[Chunk, ...]:
+    """Chunks of both ports, Python board, seed 3."""
+    scenario = demo_scenario(load_plan(DEMO), 3, PythonBoard(3))
+    chunks = scenario.chunks()
+    first = next(chunks)
+    rest = takewhile(lambda chunk: chunk.t_arrival_ns - first.t_arrival_ns < seconds * 1e9, chunks)
+    return (first, *rest)

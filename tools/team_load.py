@@ -1,0 +1,157 @@
+"""What it costs to follow a team: trackers that publish, a commander that follows them, the CPU share of both.
+
+In: how many trackers, how often, for how long. Out: figures on the terminal. Owns a Mosquitto broker of its own on a free loopback port. The trackers
+are threads that publish simulated reports through the code of `--publish`; the commander is the command, its table drawn on a pseudo terminal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import resource
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from dataclasses import replace
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from echostep.plan import Plan, load_plan
+from echostep.team.endpoint import parse_endpoint
+from echostep.team.mqtt import MqttLine
+from echostep.team.outbox import Outbox
+from echostep.team.publish import blank
+from echostep.team.report import Motion, Position, Report, Streams
+
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def report_at(base: Report, k: int, t_s: float) -> Report:
+    """Somebody who walks in a circle."""
+    x_m, y_m = 10.0 + 5.0 * math.cos(0.2 * t_s + k), 5.0 + 3.0 * math.sin(0.2 * t_s + k)
+    position = Position(t_s, 0.0, x_m, y_m, 0.04, 0.0, 0.04, 0.5, 0.0, 0.1, 0, "Ground floor", 1.0, 0.0, 0.1)
+    motion, streams = Motion(int(t_s), t_s, 1.0, 0.0), Streams(100.0, 360.0, 0, 0, 0, True, ())
+    return replace(base, status="tracking", position=position, motion=motion, streams=streams)
+
+
+def publish(url: str, plan: Plan, trackers: int, rate_hz: float, seconds: float) -> list[str]:
+    """Run all trackers in this process; returns their summaries."""
+    bases = [blank(plan, f"tracker {k:02d}", "load", f"{k:08x}", "simulated") for k in range(trackers)]
+    boxes = [Outbox(MqttLine(parse_endpoint(url), b.team, b.name, b.run), b.name, print) for b in bases]
+    began = time.monotonic()
+    for n in range(int(rate_hz * seconds)):
+        for k, (box, base) in enumerate(zip(boxes, bases, strict=True)):
+            box.offer(report_at(base, k, n / rate_hz))
+        time.sleep(max(began + (n + 1) / rate_hz - time.monotonic(), 0.0))
+    return [box.close() for box in boxes]
+
+
+def flood(port: int, rate_hz: float, ended: threading.Event) -> None:
+    """Somebody sends the same nonsense so many times a second, at QoS 0, past every queue of ours [MQTT 3.1.1, 3.1 and 3.3]."""
+    payload, topic = b'{"echostep_report":1,"team":"evil"}' + b" " * 700, b"echostep/evil/eve/estimate"
+    rest = struct.pack(">H", len(topic)) + topic + payload
+    packets = (b"\x30" + bytes([len(rest) & 127 | 128, len(rest) >> 7]) + rest) * 100
+    with socket.create_connection(("127.0.0.1", port)) as sock:
+        sock.sendall(b"\x10\x10\x00\x04MQTT\x04\x02\x00\x3c\x00\x04evil")
+        began, sent = time.monotonic(), 0
+        while not ended.is_set():
+            sock.sendall(packets)
+            sent += 100
+            time.sleep(max(began + sent / rate_hz - time.monotonic(), 0.0))
+
+
+def drain(descriptor: int) -> None:
+    """Read a pseudo terminal until it is closed."""
+    try:
+        while os.read(descriptor, 65_536):
+            pass
+    except OSError:
+        return
+
+
+def cpu_s(pid: int) -> float:
+    """Seconds of CPU that a running child has used [proc(5)]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+def follow(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.Popen[str]:
+    """Start a commander, on a pseudo terminal or with its output kept."""
+    command = [sys.executable, "-m", "echostep", "command", "--plan", str(plan_path), url, *more]
+    if not terminal:
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    ours, theirs = os.openpty()
+    threading.Thread(target=drain, args=(ours,), daemon=True).start()
+    running = subprocess.Popen(command, stdout=theirs, text=True, env=os.environ | {"COLUMNS": "140", "TERM": "xterm"})
+    os.close(theirs)
+    return running
+
+
+def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: float, flood_hz: float) -> None:
+    """Two commanders follow, one draws its table, one keeps the roster; print what they used and heard."""
+    drawing = follow(url, plan_path, terminal=True)
+    keeping = follow(url, plan_path, "--json", terminal=False)
+    time.sleep(5.0)
+    before_s, mine_s = (cpu_s(drawing.pid), cpu_s(keeping.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    began = time.monotonic()
+    ended = threading.Event()
+    if flood_hz:
+        port = int(url.rpartition(":")[2])
+        threading.Thread(target=flood, args=(port, flood_hz, ended), daemon=True).start()
+    summaries = publish(url, load_plan(plan_path), trackers, rate_hz, seconds)
+    ended.set()
+    span_s = time.monotonic() - began
+    after_s, ours_s = (cpu_s(drawing.pid), cpu_s(keeping.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    for commander in (drawing, keeping):
+        commander.send_signal(signal.SIGINT)
+    out, _ = keeping.communicate(timeout=30)
+    drawing.wait(30)
+    roster = json.loads(out)
+    late = sum("0 overtaken" not in s or "0 unsent" not in s for s in summaries)
+    print(f"{trackers} trackers x {rate_hz:g} estimates/s for {span_s:.0f} s on {os.cpu_count()} cores")
+    for name, a, b in zip(("with its table", "roster only"), after_s, before_s, strict=True):
+        print(f"commander, {name}: {100.0 * (a - b) / span_s:.1f} % of one core")
+    if not flood_hz:
+        print(f"publishing, each tracker: {100.0 * (ours_s - mine_s) / span_s / trackers:.2f} % of one core")
+    followed = [m for m in roster["members"] if m["team"] == "load"]
+    missed, refused = sum(m["missed"] for m in followed), sum(roster["not_believed"].values())
+    print(f"{roster['heard']} messages heard, {refused} not believed")
+    print(
+        f"{len(followed)} trackers followed, {missed} of their reports missed; {late} overtook some or left some unsent"
+    )
+
+
+def main() -> None:
+    """Parse, run the broker, measure."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--trackers", type=int, default=20)
+    parser.add_argument("--rate", type=float, default=10.0)
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--flood", type=float, default=0.0, help="hostile messages per second beside them")
+    asked = parser.parse_args()
+    mosquitto = shutil.which("mosquitto", path=os.environ["PATH"] + ":/usr/sbin")
+    if mosquitto is None:
+        sys.exit("mosquitto is not installed: apt install mosquitto")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with tempfile.TemporaryDirectory() as folder, as_file(files("echostep") / "plans" / "demo.json") as plan_path:
+        configuration = Path(folder) / "mosquitto.conf"
+        configuration.write_text(f"user root\nlistener {port} 127.0.0.1\nallow_anonymous true\n")
+        broker = subprocess.Popen([mosquitto, "-c", str(configuration)], stderr=subprocess.DEVNULL)
+        try:
+            measure(f"mqtt://127.0.0.1:{port}", plan_path, asked.trackers, asked.rate, asked.seconds, asked.flood)
+        finally:
+            broker.terminate()
+            broker.wait(10)
+
+
+if __name__ == "__main__":
+    main()
