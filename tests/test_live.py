@@ -35,7 +35,9 @@ def sha_of(text: str) -> str:
 
 
 @needs_twin
-def test_a_live_run_replays_to_identical_estimates(tmp_path: Path) -> None:
+@pytest.mark.parametrize("wears_mtx", [True, False])
+def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bool) -> None:
+    """With foot and board, and with the board alone."""
     twin = subprocess.Popen(
         [sys.executable, ROOT / "tools/twin/run.py", "--out", tmp_path], stdout=subprocess.PIPE, text=True
     )
@@ -48,13 +50,12 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path) -> None:
             PLAN,
             "--board",
             board,
-            "--mtx",
-            mtx,
+            *(("--mtx", mtx) if wears_mtx else ()),
             "--out",
             tmp_path / "live",
             "--headless",
             "--seconds",
-            14,
+            14 if wears_mtx else 18,
         )
     finally:
         twin.send_signal(signal.SIGINT)

@@ -72,6 +72,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"start": {"x": 1, "y": 2}}, "start.heading_deg|None"),
     ({"start": []}, "start"),
     ({"name": 4}, "name"),
+    ({"name": "\ud800"}, "name"),
     ({"levels": [{"walls": [], "doors": [{"line": [0, 0, 0, 0]}]}]}, r"levels\[0\].doors\[0\].line"),
     ({"levels": [{"walls": [], "doors": [{"line": [0, 0, 0, 1], "state": "ajar"}]}]}, r"doors\[0\].state"),
     ({"levels": [{"walls": [], "windows": [[0, 0, 0]]}]}, r"windows\[0\]"),

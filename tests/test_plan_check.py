@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import warnings
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -141,6 +143,31 @@ def test_levels_need_a_way() -> None:
     assert [f.level for f in check_plan(house([*levels, {"name": "roof", "walls": box()}], connectors=[STAIRS]))] == [2]
 
 
+def test_stairs_behind_walls() -> None:
+    levels = [{"name": name, "walls": box(), "doors": [door()], "rooms": [ROOM]} for name in "gh"]
+    shut = [[0.4, 0.4, 1.6, 0.4], [1.6, 0.4, 1.6, 1.6], [1.6, 1.6, 0.4, 1.6], [0.4, 1.6, 0.4, 0.4]]
+    levels[1] = levels[1] | {"walls": [*box(), *shut], "rooms": []}
+    (finding,) = check_plan(house(levels, connectors=[STAIRS]))
+    assert (finding.level, "no way out" in finding.text) == (1, True)
+    ajar = [
+        [0.4, 0.4, 1.6, 0.4],
+        [1.6, 0.4, 1.6, 1.6],
+        [1.6, 1.6, 1.4, 1.6],
+        [0.6, 1.6, 0.4, 1.6],
+        [0.4, 1.6, 0.4, 0.4],
+    ]
+    levels[1] = levels[1] | {"walls": [*box(), *ajar], "doors": [{"line": [0.6, 1.6, 1.4, 1.6]}, door()]}
+    assert kinds(house(levels, connectors=[STAIRS])) == []
+
+
+@pytest.mark.parametrize(
+    "outline", [[[0, 0], [1, 1], [1, 0], [0, 1]], [[0, 0], [1, 1], [2, 2]], [[-1e5, 0], [1e5, 1], [1e5, 0]]]
+)
+def test_odd_outlines_of_stairs(outline: list[list[float]]) -> None:
+    levels = [{"name": name, "walls": box(), "doors": [door()], "rooms": [ROOM]} for name in "gh"]
+    assert "way" in kinds(house(levels, connectors=[STAIRS | {"outline": outline}]))
+
+
 def test_upper_rooms_are_reached_by_stairs_alone() -> None:
     upper = {"name": "h", "walls": [*box(), [1, 0, 2, 0]], "rooms": [{"name": "up", "at": [3, 2]}]}
     ground = {"name": "g", "walls": box(), "doors": [door()], "rooms": [ROOM, {"name": "B", "at": [3, 1]}]}
@@ -191,6 +218,19 @@ def test_pictures(tmp_path: Path) -> None:
         draw_plan(plan, tmp_path / "plan.pdf", [0])
     with pytest.raises(EchostepError, match="cannot write"):
         draw_plan(plan, tmp_path / "none" / "plan.png", [0])
+
+
+@pytest.mark.parametrize("name", ["$x^$", "$\\frac{1}", "a\x00b\nc", "x" * 5000, "\U0001f600", "$$", "&<>"])
+def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
+    plan = house(
+        [{"name": name, "walls": box(), "rooms": [{"name": name, "at": [2, 1]}]}] * 2,
+        connectors=[STAIRS | {"name": name}],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # letters that the font lacks
+        draw_plan(plan, tmp_path / "plan.svg", [0, 1], None, check_plan(plan))
+        draw_plan(plan, tmp_path / "plan.png", [0])
+    ET.parse(tmp_path / "plan.svg")
 
 
 def test_many_walls_become_pixels(tmp_path: Path) -> None:

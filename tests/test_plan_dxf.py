@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from ezdxf.filemanagement import new
+from typer.testing import CliRunner
 
 from echostep.building import dxf_entities
-from echostep.building.formats import Hints, import_plan
+from echostep.building.formats import Hints, import_plan, open_plan
+from echostep.cli import app
 from echostep.errors import EchostepError
-from echostep.plan import Plan
+from echostep.plan import Plan, load_plan
 
 
 def drawing(insunits: int = 6) -> tuple[Any, Any]:
@@ -202,3 +204,33 @@ def test_no_drawing(tmp_path: Path, raw: bytes) -> None:
     with pytest.raises(EchostepError, match=r"a.dxf: ") as caught:
         import_plan(tmp_path / "a.dxf")
     assert "\n" not in str(caught.value)
+
+
+def test_room_numbers_of_blocks(tmp_path: Path) -> None:
+    """Room tags are often attributes of a block."""
+    doc, space = with_gap()
+    doc.blocks.new("TAG")
+    space.add_blockref("TAG", (2, 2), {"layer": "A-ROOM"}).add_attrib("NUMBER", "2.14", (2, 2), {"layer": "A-ROOM"})
+    assert [(room.name, room.at_m) for room in imported(doc, tmp_path).levels[0].rooms] == [("2.14", (2, 2))]
+
+
+def test_commands(tmp_path: Path) -> None:
+    doc, _ = with_gap()
+    doc.saveas(tmp_path / "ground.dxf")
+    command = ["plan", "import", str(tmp_path / "ground.dxf"), "-o", str(tmp_path / "plan.json")]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0
+    assert "ground, 0 m: 2 walls" in done.output
+    assert load_plan(tmp_path / "plan.json").digest == open_plan(tmp_path / "ground.dxf").digest
+    again = CliRunner().invoke(app, [*command, "--layer", "walls=A-DOOR", "--layer", "walls=A-W*", "--units", "mm"])
+    assert again.exit_code == 0
+    for wrong, named in (
+        (["--layer", "roofs=A"], "KIND=PATTERN"),
+        (["--layer", "walls"], "KIND"),
+        (["--units", "li"], "--units li"),
+    ):
+        failed = CliRunner().invoke(app, [*command, *wrong])
+        assert isinstance(failed.exception, EchostepError)
+        assert named in str(failed.exception)
+    both = ["plan", "import", str(tmp_path / "a.ifc"), str(tmp_path / "b.ifc"), "-o", str(tmp_path / "plan.json")]
+    assert "only drawings" in str(CliRunner().invoke(app, both).exception)

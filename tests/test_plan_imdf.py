@@ -121,6 +121,8 @@ def test_a_relationship_joins_stairs_apart(tmp_path: Path) -> None:
     tree["relationship.geojson"] = {"type": "FeatureCollection", "features": [relation]}
     plan = import_plan(folder(tmp_path / "b", tree))
     assert sorted(c.kind for c in plan.connectors) == ["lift", "stairs", "stairs"]
+    relation["properties"] |= {"intermediary": 3, "origin": [], "destination": {"id": {}}}
+    assert len(import_plan(folder(tmp_path / "c", tree)).connectors) == 1
 
 
 def changed(name: str, place: int, **about: Any) -> dict[str, Any]:

@@ -20,8 +20,10 @@ from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
     from echostep.plan import Pose
+    from echostep.runs import Views
     from echostep.team.endpoint import Outlet
 
+LOCAL = "127.0.0.1"
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
@@ -42,9 +44,24 @@ Start = Annotated[
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
-Headless = Annotated[bool, typer.Option("--headless", help="No live view.")]
+Headless = Annotated[bool, typer.Option("--headless", help="No view at all.")]
+Page = Annotated[
+    bool | None,
+    typer.Option(
+        "--page/--no-page",
+        help="Serve the live page (the default), also when a replay is over; or do not.",
+        show_default=False,
+    ),
+]
+Host = Annotated[
+    str, typer.Option("--host", metavar="ADDRESS", help="Serve the page to others too; its address then holds a token.")
+]
+Port = Annotated[int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
-MtxPort = Annotated[str, typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx.")]
+MtxPort = Annotated[
+    str | None,
+    typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the leg gyros of the board carry."),
+]
 Publish = Annotated[
     list[str] | None,
     typer.Option(
@@ -83,53 +100,47 @@ def demo(
         ),
     ] = None,
     guide: Annotated[bool, typer.Option("--guide", help="With beacons, and guidance to the end of the walk.")] = False,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, _outlet(publish, name, team), headless=headless, guide=guide)
+    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team), guide=guide)
 
 
 @app.command()
 def live(
     plan: Plan,
     board: BoardPort,
-    mtx: MtxPort,
+    mtx: MtxPort = None,
     out: Out = Path("out/live"),
     start: Start = None,
     settings: SettingsFile = None,
     seed: Seed = 0,
     headless: Headless = False,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
     beacons: BeaconsPort = None,
     guide: GuideTo = None,
 ) -> None:
-    """Track the wearer of a board and an MTx; everything is recorded."""
+    """Track the wearer of a board and an MTx, or of the board alone; everything is recorded."""
     from echostep import runs
 
-    runs.live(
-        plan,
-        board,
-        mtx,
-        out,
-        _pose(start),
-        settings,
-        seed,
-        seconds,
-        _outlet(publish, name, team),
-        headless=headless,
-        beacons=beacons,
-        guide=guide,
-    )
+    views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
+    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet, beacons=beacons, guide=guide)
 
 
 @app.command()
 def record(
     board: BoardPort,
-    mtx: MtxPort,
+    mtx: MtxPort = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
         "out/recording.mcap"
     ),
@@ -152,6 +163,9 @@ def replay(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
     headless: Headless = False,
+    page: Page = None,
+    host: Host = LOCAL,
+    port: Port = None,
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
@@ -160,18 +174,9 @@ def replay(
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
-    runs.replay(
-        recording,
-        plan,
-        out,
-        _pose(start),
-        settings,
-        seed,
-        truth,
-        _outlet(publish, name, team),
-        headless=headless,
-        guide=guide,
-    )
+    views = _views(headless, page, host, port, stays=sys.stdout.isatty())
+    outlet = _outlet(publish, name, team)
+    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, outlet, guide=guide)
 
 
 @app.command()
@@ -326,6 +331,16 @@ def _pose(text: str | None) -> Pose | None:
     from echostep.runs import parse_pose
 
     return None if text is None else parse_pose(text)
+
+
+def _views(headless: bool, page: bool | None, host: str, port: int | None, *, stays: bool = False) -> Views:
+    from echostep.page.server import Address
+    from echostep.runs import Views
+
+    if headless and page:
+        raise EchostepError("--headless shows nothing: leave it out, or leave out --page")
+    served = not headless and page is not False
+    return Views(not headless, Address(host, port) if served else None, stays=bool(page) or stays)
 
 
 def main() -> None:

@@ -24,7 +24,7 @@ def number(value: Any, where: str, limit: float = LIMIT_M, unit: str = "m") -> f
 
 def text(value: Any, where: str) -> str:
     """A text."""
-    if not isinstance(value, str):
+    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
         raise ValueError(f"{where}: {_short(value)} is not a text")
     return value
 

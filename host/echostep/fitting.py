@@ -156,6 +156,5 @@ def find_legs(heard: Heard, settings: GyroSettings, segments: Segments, walked_m
         raise EchostepError(f"{seen}: walk {walked_m:g} m straight on, stand still before and after, and do it again")
     scale = calibrated_scale(distance_m, walked_m)
     values: Values = {"thigh_m": segments.thigh_m, "shank_m": segments.shank_m, "leg_scale": round(scale, 4)}
-    return {
-        "wearer": values
-    }, f"The walk of {walked_m:g} m was seen as {distance_m:.2f} m in {len(strides)} strides: scale {scale:.3f}"
+    line = f"The walk of {walked_m:g} m was seen as {distance_m:.2f} m in {len(strides)} strides: scale {scale:.3f}"
+    return {"wearer": values}, line

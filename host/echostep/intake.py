@@ -81,6 +81,7 @@ class Intake:
         self.path = TrunkPath(gait)
         self.status: Status | None = None
         self.identity: Identity | None = None
+        self.pings = 0
         self.words = BoardWords()
         self._ranger = ranger
         self.journey = Journey(wearer or WearerSettings(), iron)
@@ -89,6 +90,11 @@ class Intake:
         self._unknown_ports = 0
         self._bad_times = 0
         self.newest_s = math.nan  # how far either port has come
+
+    @property
+    def ahead(self) -> tuple[Leg, ...]:
+        """Legs that the foot has told already, but whose pings are not all in."""
+        return self._waiting.legs
 
     @property
     def counts(self) -> IntakeCounts:
@@ -143,6 +149,7 @@ class Intake:
     def _hear(self, frames: Frames, times: Times) -> None:
         """Pings that say something about walls, and heights by pressure, wait for their leg."""
         place, pings = frames.rows(PING)
+        self.pings += len(place)
         t_s = times.board_s[place] + self._ranger.delay_s
         kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
         rows = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[kept]

@@ -67,13 +67,13 @@ def draw_track(
     inches = min(sum(_height(plan.levels[k]) for k in visited), MOST_INCHES)
     figure = Figure(figsize=(10, inches), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title)
+    figure.suptitle(title, parse_math=False)
     for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
         here = [e for e in estimates if e.level == k]
         _draw_level(axes, plan.levels[k], here, truth.between(here) if truth else None)
         _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
         if len(plan.levels) > 1:
-            axes.set_title(plan.levels[k].name, loc="left", fontsize=9)
+            axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
     figure.savefig(path)
 
 
@@ -84,7 +84,7 @@ def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m
     axes.set(aspect="equal", xlabel="x / m", ylabel="y / m")
     axes.add_collection(LineCollection(list(level.solid.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
     for room in level.rooms:
-        axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8)
+        axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8, parse_math=False)
     if truth_m is not None:
         axes.plot(*truth_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
     for e in _spread(estimates, 60):

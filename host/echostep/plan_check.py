@@ -11,13 +11,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from echostep.plan import Level, Plan
-from echostep.plan_faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead, longer
+from echostep.plan_faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead, longer, shared
 from echostep.plan_leaks import leak
 
 NEAR_M = 0.1  # walls that end so near to each other were meant to meet
 OVERLAP_M = 0.02
+ELBOW_M2 = 1.0  # less room than this beside stairs is no way out
+MOST_WAYS_OUT = 20  # are looked for in one plan
+NOT_ENCLOSED = "is not enclosed by walls and doors"
 PARALLEL = 0.02  # sine of the angle
 
 Lines = tuple[tuple[float, float, float, float], ...]
@@ -37,11 +41,15 @@ class Finding:
 
 def check_plan(plan: Plan) -> list[Finding]:
     """All findings."""
-    faces = [faces_of(level) for level in plan.levels]
+    asked = bool(plan.connectors) or any(level.rooms for level in plan.levels)  # does anything ask for enclosed spaces?
+    faces = [faces_of(level if asked else Level(level.name, level.height_m, level.walls[:0])) for level in plan.levels]
     found = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
     found += _unreachable(plan, faces)
     found += _ways(plan, faces)
     found.sort(key=lambda finding: finding.level)
+    opened = [k for k, finding in enumerate(found) if finding.text.endswith(NOT_ENCLOSED)]
+    for k in opened[:MOST_WAYS_OUT]:
+        found[k] = _way_out(found[k], plan.levels[found[k].level])
     return [replace(finding, number=number) for number, finding in enumerate(found, 1)]
 
 
@@ -125,17 +133,18 @@ def _open_rooms(level: Level, faces: Faces, i: int) -> Iterator[Finding]:
     at = faces.at(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
     for room, face in zip(level.rooms, at, strict=True):
         if face == OUTSIDE:
-            yield _opened("open room", level, i, room.at_m, f"room {room.name!r} is not enclosed by walls and doors")
+            yield Finding("open room", i, room.at_m, f"room {room.name!r} {NOT_ENCLOSED}")
 
 
-def _opened(kind: str, level: Level, i: int, at_m: tuple[float, float], text: str) -> Finding:
+def _way_out(finding: Finding, level: Level) -> Finding:
     """A finding about a place that should be enclosed, with its narrowest way out where that can be found."""
     doors = np.array([door.line for door in level.doors]).reshape(-1, 4)
-    gap = leak(np.concatenate((level.solid, longer(doors, JAMB_M))), at_m)
+    gap = leak(np.concatenate((level.solid, longer(doors, JAMB_M))), finding.at_m)
     if gap is None:
-        return Finding(kind, i, at_m, text)
+        return finding
     x, y, width = gap
-    return Finding(kind, i, (x, y), f"{text}; the narrowest way out is {width:g} m wide or less", ((*at_m, x, y),))
+    text = f"{finding.text}; the narrowest way out is {width:g} m wide or less"
+    return replace(finding, at_m=(x, y), text=text, lines_m=((*finding.at_m, x, y),))
 
 
 def _unreachable(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
@@ -171,12 +180,10 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
             )
         for i in connector.levels:
             if faces[i].at(np.array([at]))[0] == OUTSIDE:
-                yield _opened(
-                    "way",
-                    plan.levels[i],
-                    i,
-                    at,
-                    f"{connector.kind} {connector.name!r} is not enclosed by walls and doors",
+                yield Finding("way", i, at, f"{connector.kind} {connector.name!r} {NOT_ENCLOSED}")
+            elif _sealed(shapely.make_valid(area), plan.levels[i], faces[i]):
+                yield Finding(
+                    "way", i, at, f"{connector.kind} {connector.name!r} has no door and no way out to this level"
                 )
     joined = {i for connector in plan.connectors for i in connector.levels}
     if len(plan.levels) > 1:
@@ -184,6 +191,16 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[Finding]:
             ends = plan.levels[i].solid.reshape(-1, 2)
             x, y = ends.mean(axis=0) if len(ends) else (0.0, 0.0)
             yield Finding("way", i, (float(x), float(y)), "no stairs, lift or ramp leads to this level")
+
+
+def _sealed(area: BaseGeometry, level: Level, faces: Faces) -> bool:
+    """Whether walls close stairs or a lift off from all that is about them."""
+    held = shared(area, faces)
+    if OUTSIDE in held or held[1:]:
+        return False
+    room = faces.areas[held[0]]
+    near = [door for door in level.doors if shapely.LineString((door.line[:2], door.line[2:])).distance(room) < JAMB_M]
+    return not near and room.area - room.intersection(area).area < ELBOW_M2
 
 
 def _beside(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from echostep.plan import Door, Level, Plan
 
@@ -63,11 +64,11 @@ def groups(plan: Plan, faces: Sequence[Faces]) -> dict[Face, Face]:
     """For each face that a door or a way touches, the face that stands for all those that one can walk to from it."""
     leader: dict[Face, Face] = {}
     for i, level in enumerate(plan.levels):
-        for a, b in _both_sides(level.doors, faces[i]):
+        for a, b in both_sides(level.doors, faces[i]):
             _join(leader, (i, a), (i, b))
     for connector in plan.connectors:
-        area = shapely.Polygon(connector.outline_m)
-        touched = [(i, face) for i in connector.levels for face in _shared(area, faces[i])]
+        area = shapely.make_valid(shapely.Polygon(connector.outline_m))
+        touched = [(i, face) for i in connector.levels for face in shared(area, faces[i])]
         for face in touched[1:]:
             _join(leader, touched[0], face)
     return {face: lead(leader, face) for face in list(leader)}
@@ -88,7 +89,7 @@ def _join(leader: dict[Face, Face], one: Face, other: Face) -> None:
     leader[a] = b
 
 
-def _both_sides(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
+def both_sides(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
     """The faces in front of and behind each door."""
     sides = np.array([_beside(door) for door in doors]).reshape(-1, 2)
     found = faces.at(sides).reshape(-1, 2)
@@ -102,7 +103,7 @@ def _beside(door: Door) -> tuple[tuple[float, float], tuple[float, float]]:
     return (x + u, y + v), (x - u, y - v)
 
 
-def _shared(area: shapely.Polygon, faces: Faces) -> list[int]:
+def shared(area: BaseGeometry, faces: Faces) -> list[int]:
     """The faces that hold a tenth of a way's area or more; OUTSIDE when there is none."""
     near = faces.tree.query(area)
     held = [int(i) for i in near if faces.areas[i].intersection(area).area > 0.1 * area.area]

@@ -29,7 +29,7 @@ WALL, WINDOW, DOOR, ROOM, WAY, OBSTACLE, WRONG = (
     "#bbbbbb",
     "#d0021b",
 )
-WIDTH_PX = 1500
+WIDTH_PX = 1500  # of a picture; a level has 900 at least
 MANY = 20_000  # more lines than these are drawn as pixels
 MOST_NAMES = 500  # of rooms in one picture, after which none could be read
 
@@ -53,20 +53,21 @@ def draw_plan(
     if path.suffix.casefold() not in (".png", ".svg"):
         raise EchostepError(f"{path}: pictures are .png or .svg")
     columns = math.ceil(math.sqrt(len(levels)))
+    wide_px = max(WIDTH_PX, 900 * columns)
     rows = math.ceil(len(levels) / columns)
     x0, y0, x1, y1 = bounds or _about([plan.levels[i] for i in levels])
     shape = min(max((y1 - y0) / (x1 - x0), 0.3), 2.5)
     cell = 10.0 if columns == 1 else 6.0  # inches
     figure = Figure(figsize=(cell * columns, ((cell - 0.4) * shape + 0.5) * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    view = View((x0, y0, x1, y1), 72.0 * cell / (x1 - x0), 1.1 * max(x1 - x0, (y1 - y0) / shape) * columns / WIDTH_PX)
+    view = View((x0, y0, x1, y1), 72.0 * cell / (x1 - x0), 1.1 * max(x1 - x0, (y1 - y0) / shape) * columns / wide_px)
     for number, i in enumerate(levels):
         axes = figure.add_subplot(rows, columns, number + 1, aspect="equal")
         _draw_level(axes, plan, i, view, [f for f in findings if f.level == i])
     try:
         figure.savefig(
             path,
-            dpi=max(60, round(WIDTH_PX / figure.get_figwidth())),
+            dpi=max(60, round(wide_px / figure.get_figwidth())),
             metadata={"Date": None} if path.suffix == ".svg" else None,
         )
     except OSError as error:
@@ -102,7 +103,8 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Fi
     for way in ways:
         axes.text(
             *way.outline_m.mean(axis=0),
-            way.name,
+            shown(way.name),
+            parse_math=False,
             size=6,
             ha="center",
             va="center",
@@ -113,7 +115,17 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Fi
     named = [room for room in level.rooms if x0 <= room.at_m[0] <= x1 and y0 <= room.at_m[1] <= y1]
     for room in named if len(named) <= MOST_NAMES else ():
         size = _letter_pt(room, view.points_m)
-        axes.text(*room.at_m, room.name, size=size, ha="center", va="center", color="#555555", clip_on=True, zorder=5)
+        axes.text(
+            *room.at_m,
+            shown(room.name),
+            parse_math=False,
+            size=size,
+            ha="center",
+            va="center",
+            color="#555555",
+            clip_on=True,
+            zorder=5,
+        )
     if plan.start is not None and plan.start.level == i:
         axes.plot(
             plan.start.x_m,
@@ -127,10 +139,15 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Fi
         _mark(axes, finding)
     axes.set_xlim(x0, x1)
     axes.set_ylim(y0, y1)
-    axes.set_title(f"{level.name}, {level.height_m:g} m", size=9)
+    axes.set_title(shown(f"{level.name}, {level.height_m:g} m"), size=9, parse_math=False)
     axes.tick_params(labelsize=6, colors="#888888")
     for side in axes.spines.values():
         side.set_color("#dddddd")
+
+
+def shown(name: str) -> str:
+    """A name in a picture: one line, without what is not printed, not too long."""
+    return "".join(letter if letter.isprintable() else " " for letter in name)[:80]
 
 
 def _letter_pt(room: Room, points_m: float) -> float:

@@ -48,6 +48,11 @@ class Walls:
         """`slant_rad`: greatest angle of a ray to a wall's normal for which the tables must hold; 0 serves `echo_sources`."""
         self._index = build_index(walls, slant_rad)
 
+    @property
+    def index(self) -> WallIndex:
+        """The index as it is, with the tiles looked at so far."""
+        return self._index
+
     def near(self, x_m: Floats, y_m: Floats, reach_m: float = 0.0) -> WallIndex:
         """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most FARTHEST_M) of them."""
         reach_m = min(reach_m, FARTHEST_M)

@@ -15,6 +15,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from importlib.resources import as_file, files
@@ -29,6 +30,7 @@ from echostep import fischer2008, leg_file
 from echostep.alignment import aligned
 from echostep.building.formats import open_plan
 from echostep.capture import Decoder, as_json, read_capture
+from echostep.checkin import PERSON
 from echostep.derived import Derived
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
@@ -41,6 +43,8 @@ from echostep.legs import LegsSettings
 from echostep.messages import SCHEMA_HASH, Identify
 from echostep.mtx_start import MtxStart
 from echostep.onboard import orientations
+from echostep.page.live import LivePage
+from echostep.page.server import Address
 from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose
@@ -60,6 +64,7 @@ if TYPE_CHECKING:
 
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
+TAPPED = "tapped"  # where a recording says that its start is a check-in
 BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
@@ -67,14 +72,17 @@ console = Console(soft_wrap=True)  # one message, one line, however wide the ter
 Tell = Callable[[list[Estimate]], None]
 
 
+@dataclass(frozen=True, slots=True)
+class Views:
+    """Who looks at a run: the terminal, the page at an address; `stays`: the page is served until Ctrl-C when a replay is over."""
+
+    terminal: bool = True
+    page: Address | None = None
+    stays: bool = False
+
+
 def demo(
-    out: Path,
-    seed: int,
-    board_command: str | None,
-    outlet: Outlet | None = None,
-    *,
-    headless: bool,
-    guide: bool = False,
+    out: Path, seed: int, board_command: str | None, views: Views, outlet: Outlet | None = None, *, guide: bool = False
 ) -> None:
     """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
     from echostep.simulation.board import BoardProcess, PythonBoard
@@ -94,60 +102,61 @@ def demo(
         tracker = Tracker(plan, scenario.start, seed=seed)
         guided = Guided(tracker, Place(*scenario.truth[-1, 1:3].tolist())) if guide else None
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
-        with _published(outlet, tracker, "simulated") as tell, Recorder(out / "walk.mcap", about) as recorder:
-            walked = with_beacons(scenario, plan, seed) if guide else scenario.chunks()
-            chunks = walked if headless else _paced(walked)
-            estimates = _run(
-                tracker,
-                _portions(_kept(chunks, recorder), HEADLESS_CHUNKS if headless else 1),
-                "echostep demo (simulated)",
-                lambda: scenario.fraction,
-                headless,
-                tell,
-                recorder,
-                guided,
-            )
-        _say(recorder.notices)
+        title = "echostep demo (simulated)"
+        watched = views.terminal or views.page is not None
+        with _page(tracker, title, views) as page, _published(outlet, tracker, "simulated") as tell:
+            with Recorder(out / "walk.mcap", about) as recorder:
+                walked = with_beacons(scenario, plan, seed) if guide else scenario.chunks()
+                chunks = _with_check_ins(_paced(walked) if watched else walked, page)
+                portions = _portions(_kept(chunks, recorder), 1 if watched else HEADLESS_CHUNKS)
+                estimates = _run(
+                    tracker, portions, title, lambda: scenario.fraction, views, page, tell, recorder, guided
+                )
+            _say(recorder.notices)
+            _finish(out, tracker, estimates, truth, "simulated walk", guided=guided)
+            _linger(page, views)
     finally:
         scenario.close()
-    _finish(out, tracker, estimates, truth, "simulated walk", guided=guided)
 
 
 def live(
-    plan_path: Path, board: str, mtx: str, out: Path, start: Pose | None,
-    settings_path: Path | None, seed: int, seconds: float | None, outlet: Outlet | None = None, *, headless: bool,
-    beacons: str | None = None, guide: str | None = None,
+    plan_path: Path, board: str, mtx: str | None, out: Path, start: Pose | None,
+    settings_path: Path | None, seed: int, seconds: float | None, views: Views, outlet: Outlet | None = None,
+    *, beacons: str | None = None, guide: str | None = None,
 ) -> None:  # fmt: skip
-    """Track from two serial ports, and a beacon gateway's if there is one, until Ctrl-C."""
+    """Track from one or two serial ports until Ctrl-C."""
     plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
-    tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed)
+    tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed, waits=views.page is not None)
     guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
     out = _folder(out)
-    ports = SerialPorts(_urls(board, mtx, beacons), BAUD)
+    ports = _ports(board, mtx, beacons)
     try:
         ports.send(BOARD, encode(Identify(), 0))
         about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
-        with _published(outlet, tracker, "live") as tell, Recorder(out / "walk.mcap", about) as recorder:
-            chunks = _portions(_until(ports, recorder, tracker.settings.mtx.rate_hz, seconds), 1)
-            estimates = _run(tracker, chunks, "echostep live", None, headless, tell, recorder, guided)
+        with (
+            _page(tracker, "echostep live", views) as page,
+            _published(outlet, tracker, "live") as tell,
+            Recorder(out / "walk.mcap", about) as recorder,
+        ):
+            chunks = _until(ports, recorder, tracker.settings.mtx.rate_hz, seconds, page)
+            estimates = _run(tracker, _one_by_one(chunks), "echostep live", None, views, page, tell, recorder, guided)
         _say(recorder.notices)
     finally:
         ports.close()
     _finish(out, tracker, estimates, None, "live", guided=guided)
 
 
-def record(board: str, mtx: str, out: Path, seconds: float | None, beacons: str | None = None) -> None:
-    """Record from two serial ports, and a beacon gateway's if there is one, until Ctrl-C."""
+def record(board: str, mtx: str | None, out: Path, seconds: float | None, beacons: str | None = None) -> None:
+    """Record from one or two serial ports until Ctrl-C."""
     warm_up()
-    urls = _urls(board, mtx, beacons)
-    ports = SerialPorts(urls, BAUD)
-    count = dict.fromkeys(urls, 0)
+    ports = _ports(board, mtx, beacons)
+    count = {BOARD: 0, MTX: 0, GATEWAY: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out, {**_versions(), **_now(), "note": "recorded without tracking"}) as recorder:
-            for chunk in _until(ports, recorder, MtxTiming().rate_hz, seconds):
+            for chunk in filter(None, _until(ports, recorder, MtxTiming().rate_hz, seconds, None)):
                 count[chunk.port] += len(chunk.data)
         _say(recorder.notices)
     finally:
@@ -160,8 +169,8 @@ def record(board: str, mtx: str, out: Path, seconds: float | None, beacons: str 
 
 def replay(
     path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
-    seed: int | None, truth_path: Path | None, outlet: Outlet | None = None, *, headless: bool,
-    guide: str | None = None,
+    seed: int | None, truth_path: Path | None, views: Views, outlet: Outlet | None = None,
+    *, guide: str | None = None,
 ) -> None:  # fmt: skip
     """Track a recording again."""
     recording, plan = open_recording(path), open_plan(plan_path)
@@ -175,21 +184,17 @@ def replay(
         console.print(f"Recording: {note}")
     guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
-    began = time.perf_counter()
-    with _published(outlet, tracker, "replay") as tell:
+    title = f"echostep replay {path.name}"
+    with _page(tracker, title, views, replay=True) as page, _published(outlet, tracker, "replay") as tell:
+        began = time.perf_counter()
         estimates = _run(
-            tracker,
-            recording.portions(),
-            f"echostep replay {path.name}",
-            lambda: recording.fraction,
-            headless,
-            tell,
-            guided=guided,
+            tracker, recording.portions(), title, lambda: recording.fraction, views, page, tell, guided=guided
         )
-    elapsed_s = time.perf_counter() - began
-    if recording.truncated:
-        console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
-    _finish(out, tracker, estimates, truth, path.name, elapsed_s, guided)
+        elapsed_s = time.perf_counter() - began
+        if recording.truncated:
+            console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
+        _finish(out, tracker, estimates, truth, path.name, elapsed_s, guided)
+        _linger(page, views)
 
 
 def tracker_of(
@@ -199,7 +204,8 @@ def tracker_of(
     about, path = recording.about, recording.path
     text = read_settings(settings_path) if settings_path else about.get("settings_toml", "")
     settings = parse_settings(text, str(settings_path or path))
-    return Tracker(plan, start or _recorded_start(about, path), settings, _recorded_seed(about, path, seed))
+    first, seed = start or _recorded_start(about, path), _recorded_seed(about, path, seed)
+    return Tracker(plan, first, settings, seed, waits=about.get("start") == TAPPED)
 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
@@ -280,18 +286,22 @@ def parse_pose(text: str) -> Pose:
 
 
 def _run(
-    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None, headless: bool,
-    tell: Tell, recorder: Recorder | None = None, guided: Guided | None = None,
+    tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None,
+    views: Views, page: LivePage | None, tell: Tell, recorder: Recorder | None = None, guided: Guided | None = None,
 ) -> list[Estimate]:  # fmt: skip
     """Feed everything; Ctrl-C ends a run like its last chunk does. `recorder`: what is derived is recorded, once it has been shown."""
     derived = Derived(tracker)
-    view = None if headless else TerminalView(tracker, title, progress, console)
+    view = TerminalView(tracker, title, progress, console) if views.terminal else None
     estimates: list[Estimate] = []
     shown: AbstractContextManager[object] = view or nullcontext()
     with shown:
         try:
             for portion in portions:
+                if page:
+                    page.coming()
                 new = tracker.take(portion)
+                if page:
+                    page.shown(portion)
                 estimates += new
                 tell(new)
                 cues = guided.take(new) if guided else []
@@ -302,7 +312,8 @@ def _run(
                 if recorder:
                     recorder.notes(derived.take(portion, new))
         except KeyboardInterrupt:
-            pass
+            if page:
+                page.wanted = False
     return estimates
 
 
@@ -313,9 +324,38 @@ def _speak(cues: Sequence[Cue]) -> None:
             console.print(f"{cue.t_s:7.1f} s  {arrow_sign(cue.arrow_rad)}  {cue.spoken}")
 
 
-def _urls(board: str, mtx: str, beacons: str | None) -> dict[str, str]:
-    """Ports by name."""
-    return {BOARD: board, MTX: mtx} | ({GATEWAY: beacons} if beacons else {})
+@contextmanager
+def _page(tracker: Tracker, title: str, views: Views, *, replay: bool = False) -> Iterator[LivePage | None]:
+    """The live page while the run lasts, if anybody wants one; its address is said."""
+    if views.page is None:
+        yield None
+        return
+    with LivePage(tracker, title, views.page, replay=replay) as page:
+        console.print(f"The page: {page.url}", highlight=False)
+        yield page
+
+
+def _linger(page: LivePage | None, views: Views) -> None:
+    """Serve the page when the run is over: as long as somebody looks, or until Ctrl-C if asked."""
+    if page is None or not page.wanted or not (views.stays or page.pages):
+        return
+    console.print(
+        f"The page stays at {page.url} {'until' if views.stays else 'while it is open, or until'} Ctrl-C.",
+        highlight=False,
+    )
+    try:
+        while views.stays or page.pages:
+            time.sleep(0.2)
+    except KeyboardInterrupt:
+        pass
+
+
+def _with_check_ins(chunks: Iterable[Chunk], page: LivePage | None) -> Iterator[Chunk]:
+    """Every chunk, and before it what people said on the page since the last one."""
+    for chunk in chunks:
+        for said in page.said() if page else ():
+            yield Chunk(PERSON, chunk.t_arrival_ns, said)
+        yield chunk
 
 
 @contextmanager
@@ -362,22 +402,39 @@ def _portions(chunks: Iterable[Chunk], most: int) -> Iterator[Portion]:
         yield portion_of(taken)
 
 
-def _until(ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None) -> Iterator[Chunk]:
-    """Chunks of the ports, for so long or until Ctrl-C, each recorded before anything looks at it; the MTx is set up on the way.
+def _one_by_one(chunks: Iterable[Chunk | None]) -> Iterator[Portion]:
+    """Portions of one chunk; an empty one when nothing came, so that the views go on."""
+    for chunk in chunks:
+        yield portion_of([chunk] if chunk else [])
 
-    What happens to the ports and to the MTx is said.
+
+def _ports(board: str, mtx: str | None, beacons: str | None) -> SerialPorts:
+    urls = {BOARD: board, MTX: mtx, GATEWAY: beacons}
+    return SerialPorts({name: url for name, url in urls.items() if url is not None}, BAUD)
+
+
+def _until(
+    ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None, page: LivePage | None
+) -> Iterator[Chunk | None]:
+    """Chunks of the ports and check-ins, for so long or until Ctrl-C, each recorded before anything looks at it; None when nothing came for a while.
+
+    The MTx is set up on the way. What happens to the ports and to the MTx is said.
     """
     end = math.inf if seconds is None else time.monotonic() + seconds
-    start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print)
+    start = MtxStart(rate_hz, lambda sent: ports.send(MTX, sent), console.print) if MTX in ports.names else None
     try:
         for chunk in ports.chunks():
             _say(ports.notices)
             _say(recorder.notices)
             if chunk is not None:
                 recorder.write(chunk)
-            start.follow(chunk)
-            if chunk is not None:
-                yield chunk
+            if start is not None:
+                start.follow(chunk)
+            yield chunk
+            for said in page.said() if page else ():
+                check_in = Chunk(PERSON, time.monotonic_ns(), said)
+                recorder.write(check_in)
+                yield check_in
             if time.monotonic() >= end:
                 return
     except KeyboardInterrupt:
@@ -410,7 +467,7 @@ def _finish(
     except OSError as error:
         trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:
-        console.print("No estimate: the foot never stood still, or no MTx bytes came.")
+        console.print("No estimate: the foot never stood still, or no MTx bytes came; without an MTx, nobody walked.")
         return
     if off is not None:
         console.print(
@@ -426,13 +483,15 @@ def _finish(
         raise trouble
 
 
-def _about(plan: Plan, start: Pose, seed: int, settings_toml: str, note: str) -> dict[str, str]:
-    pose = f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"
+def _about(plan: Plan, start: Pose | None, seed: int, settings_toml: str, note: str) -> dict[str, str]:
+    first = {"start": TAPPED}
+    if start is not None:
+        first = {"start_x_y_rad": f"{start.x_m!r},{start.y_m!r},{start.heading_rad!r},{start.level}"}
     return {
         **_versions(),
         "plan_name": plan.name,
         "plan_sha256": plan.digest,
-        "start_x_y_rad": pose,
+        **first,
         "seed": str(seed),
         "settings_toml": settings_toml,
         "note": note,

@@ -80,14 +80,18 @@ class Portion:
         for port, t_arrival_ns, start, end in zip(*columns, strict=True):
             yield Chunk(self.ports[port], t_arrival_ns, self.received[start:end])
 
+    def rows(self, begin: int, end: int) -> Portion:
+        """The chunks from row `begin` up to row `end`."""
+        kept = slice(begin, end)
+        return Portion(
+            self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
+        )
+
     def cut_after(self, name: str) -> Iterator[Portion]:
         """The portion cut behind each chunk of the port of that name."""
         at = (self.port == self.ports.index(name)).nonzero()[0] + 1 if name in self.ports else np.empty(0, np.int64)
-        edges = [0, *at.tolist(), len(self.port)]
-        for a, b in pairwise(dict.fromkeys(edges)):
-            yield Portion(
-                self.ports, self.port[a:b], self.t_arrival_ns[a:b], self.start[a:b], self.end[a:b], self.received
-            )
+        for begin, end in pairwise(dict.fromkeys([0, *at.tolist(), len(self.port)])):
+            yield self.rows(begin, end)
 
     def of(self, name: str) -> PortBytes:
         """What the port of that name delivered."""
@@ -126,7 +130,7 @@ def _join(received: Octets, start: Ints, end: Ints, joined: Octets) -> None:
 
 
 class SerialPorts:
-    """Two serial ports (pyserial URLs) read by a thread each; a port that goes away is opened again.
+    """Serial ports (pyserial URLs) read by a thread each; a port that goes away is opened again.
 
     Raises EchostepError when a port cannot be opened at the start. `notices` says in words what happened to the ports.
     """
@@ -142,6 +146,11 @@ class SerialPorts:
         ]
         for thread in self._threads:
             thread.start()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the ports that are read."""
+        return tuple(self._ports)
 
     def chunks(self) -> Iterator[Chunk | None]:
         """Chunks in order of arrival until `close`; None when nothing came for `IDLE_S`."""

@@ -6,16 +6,21 @@ In: chunks in order of arrival. Out: estimates. Owns the intake, the cloud and t
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
+from echostep.checkin import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
 from echostep.errors import EchostepError
-from echostep.estimate import Estimate, unwatched
+from echostep.estimate import Estimate, estimate, unwatched
 from echostep.gait import Leg
 from echostep.gateway import Gateway, Word
 from echostep.heading import Iron
 from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
-from echostep.particles import systematic
+from echostep.particles import CloudSettings, Move, systematic
 from echostep.plan import Plan, Pose
 from echostep.settings import Settings
 from echostep.sources import GATEWAY, Chunk, Portion, portion_of
@@ -23,17 +28,33 @@ from echostep.storeys import building
 from echostep.waiting import Passage
 
 MOST_WORDS = 4096  # of beacons that wait for the foot; older ones are forgotten
+KNOWN_SD_RAD = 0.5  # of a heading; beyond it the cloud must look everywhere
+NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
+Watch = Callable[
+    [Passage | None, Estimate], None
+]  # is told of each estimate and of what it came from; None: of a silent foot
 
 
 class Tracker:
     """Feed it every chunk; it returns the estimates that the chunk completes."""
 
-    def __init__(self, plan: Plan, start: Pose | None = None, settings: Settings | None = None, seed: int = 0) -> None:
-        """`start`: where the trunk stands and looks at the beginning; the plan's own start when None."""
+    def __init__(
+        self,
+        plan: Plan,
+        start: Pose | None = None,
+        settings: Settings | None = None,
+        seed: int = 0,
+        *,
+        waits: bool = False,
+    ) -> None:
+        """`start`: where the trunk stands and looks at the beginning; the plan's own start when None.
+
+        `waits`: for a check-in, when there is neither.
+        """
         pose = start or plan.start
-        if pose is None:
+        if pose is None and not waits:
             raise EchostepError("the plan has no start: give one with --start X,Y,DEG")
-        if pose.level >= len(plan.levels):
+        if pose is not None and pose.level >= len(plan.levels):
             raise EchostepError(f"the start is on level {pose.level}, the plan has {len(plan.levels)}, counted from 0")
         self.settings = settings or Settings()
         self.plan = plan
@@ -46,8 +67,18 @@ class Tracker:
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self.gateway = Gateway()
         self._words: list[Word] = []  # that wait for their leg
+        self.watch: Watch | None = None
+        self.check_ins = 0
+        self.bad_check_ins = 0
         self._rng = np.random.default_rng(seed)
         self._last: Estimate | None = None
+        self.leg: Leg | None = None  # the last one
+        self._said: CheckIn | None = None
+
+    @property
+    def lost_at_start(self) -> bool:
+        """Whether nobody has said yet where the walk begins."""
+        return self.start is None and self._said is None
 
     def feed(self, chunk: Chunk) -> list[Estimate]:
         """Take one chunk; estimates come at the middle of each stance, and twice a second while standing."""
@@ -55,6 +86,36 @@ class Tracker:
 
     def take(self, portion: Portion) -> list[Estimate]:
         """Take many chunks; the estimates are those that the chunks would have given one by one."""
+        if PERSON not in portion.ports:
+            return self._cut(portion)
+        estimates: list[Estimate] = []
+        begin = 0
+        for row in np.flatnonzero(portion.port == portion.ports.index(PERSON)).tolist():
+            estimates += self._cut(portion.rows(begin, row))
+            said = parse_check_in(portion.received[portion.start[row] : portion.end[row]])
+            if said is None or said.level >= len(self.plan.levels):
+                self.bad_check_ins += 1
+            else:
+                estimates += self.check_in(said)
+            begin = row + 1
+        return estimates + self._cut(portion.rows(begin, len(portion.port)))
+
+    def check_in(self, said: CheckIn) -> list[Estimate]:
+        """Somebody says where he stands: the cloud is drawn anew about it, with what was known of the heading when he did not say it.
+
+        Before the first leg it is the start. Legs that are still on their way come on top: who checks in should stand.
+        """
+        self.check_ins += 1
+        self._said = said
+        if self.leg is None:
+            return []
+        self.filter = self._drawn(said, self.leg.heading1_rad)
+        t_s = max(self.leg.t1_s, self._last.t_s) if self._last else self.leg.t1_s
+        self._last = estimate(self.filter.cloud, t_s, self.leg.heading1_rad, self.leg.step)
+        self._tell(Passage(self.leg, *NO_PINGS), self._last)
+        return [self._last]
+
+    def _cut(self, portion: Portion) -> list[Estimate]:
         return [e for piece in portion.cut_after(GATEWAY) for e in self._take(piece)]
 
     def _take(self, portion: Portion) -> list[Estimate]:
@@ -62,11 +123,16 @@ class Tracker:
         estimates: list[Estimate] = []
         for piece in self.intake.take(portion):
             if isinstance(piece, Passage):
-                self.filter = self.filter or self._begin(piece.leg.heading0_rad, self._rng)
+                self.leg = piece.leg
+                self.filter = self.filter or self._first(piece.leg.heading0_rad)
+                if self.filter is None:
+                    continue
                 self._last = self.filter.follow(piece, self._words_until(piece.leg.t1_s))
                 estimates.append(self._last)
+                self._tell(piece, self._last)
             elif self._last is not None:
                 estimates.append(unwatched(self._last, piece.t_s))
+                self._tell(None, estimates[-1])
         if said := portion.of(GATEWAY).received:
             self._words += self.gateway.take(said, self.intake.newest_s)
         return estimates
@@ -77,14 +143,38 @@ class Tracker:
         self._words = [word for word in self._words if word.t_s > t_s][-MOST_WORDS:]
         return words
 
+    def _tell(self, passage: Passage | None, told: Estimate) -> None:
+        if self.watch:
+            self.watch(passage, told)
+
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
         self.intake.warm_up()
         leg = Leg(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         one = Passage(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
-        self._begin(0.0, np.random.default_rng(0)).follow(one)
+        self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0)).follow(one)
         systematic(np.ones(2), 0.5, 2)
 
-    def _begin(self, walk_heading_rad: float, rng: np.random.Generator) -> MapFilter:
+    def _first(self, walk_heading_rad: float) -> MapFilter | None:
+        """The filter at the first leg; None while nobody has said where that is."""
+        if self._said is not None:
+            return self._drawn(self._said, walk_heading_rad)
+        return None if self.start is None else self._begin(self.start, walk_heading_rad, self._rng)
+
+    def _drawn(self, said: CheckIn, walk_heading_rad: float) -> MapFilter:
+        """A filter about a check-in; with no heading at all its cloud is large and looks everywhere."""
+        heading_rad, sd_rad = said.heading_rad, HEADING_SD_RAD
+        if heading_rad is None:
+            heading_rad, sd_rad = (self._last.heading_rad, self._last.heading_sd_rad) if self._last else (0.0, math.pi)
+        turn_sd_deg = math.degrees(min(sd_rad, KNOWN_SD_RAD))
+        spread = replace(self.settings.cloud, start_sd_m=said.sd_m, start_turn_sd_deg=turn_sd_deg)
+        drawn = self._begin(Pose(said.x_m, said.y_m, heading_rad, said.level), walk_heading_rad, self._rng, spread)
+        if sd_rad > KNOWN_SD_RAD:
+            drawn.cloud.scatter(Move(0.0, 0.0, 0.0, sd_rad))
+        return drawn
+
+    def _begin(
+        self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
+    ) -> MapFilter:
         s, b = self.settings, self.building
-        return MapFilter(b.walls, self.start, walk_heading_rad, rng, s.cloud, s.echo, b.storeys, s.climb, s.beacons)
+        return MapFilter(b.walls, start, walk_heading_rad, rng, cloud or s.cloud, s.echo, b.storeys, s.climb, s.beacons)

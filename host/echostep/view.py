@@ -89,7 +89,8 @@ class TerminalView:
     ) -> None:
         self._tracker = tracker
         self._title = title
-        self._level = tracker.start.level if tracker.start.level in range(len(tracker.plan.levels)) else 0
+        at = tracker.start.level if tracker.start else 0
+        self._level = at if at in range(len(tracker.plan.levels)) else 0
         self._canvas = Canvas(tracker.plan.levels[self._level])
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()

@@ -81,6 +81,11 @@ class Waiting:
         """Pings given up because no leg came."""
         return int(self._state["dropped"][0])
 
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """Legs that wait for their pings, in order."""
+        return tuple(self._legs)
+
     def hear(self, at: Ints, pings: Floats) -> None:
         """Pings (n, 3) of t_s, ranger, range_m, or HEIGHT and a height, and the place of each message (n,)."""
         self._new_at, self._new = at, pings

@@ -108,7 +108,7 @@ def _storey(found: Mapping[str, list[Any]], frame: Frame, storey: Storey, file: 
 
 def _room(entity: Any, frame: Frame) -> Room | None:
     """A text as the name of a room."""
-    if entity.dxftype() not in ("TEXT", "MTEXT"):
+    if entity.dxftype() not in ("TEXT", "MTEXT", "ATTRIB"):
         return None
     words = " ".join((entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text).split())[:80]
     x, y = frame.metres(entity.dxf.insert)

@@ -6,6 +6,7 @@ In: a file. Out: entities with the layers that they really lie on; chains of str
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,6 +74,7 @@ def read_drawing(file: Path) -> Any:
     from ezdxf.lldxf.const import DXFError
 
     raw = read_bytes(file)
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # its words about single values; the audit counts them
     try:
         drawing, auditor = recover.read(io.BytesIO(raw))
     except Exception as error:  # a damaged drawing breaks ezdxf in many ways
@@ -94,6 +96,8 @@ def entities(space: Any, file: Path, whole: Callable[[str], bool]) -> Iterator[t
             raise EchostepError(f"{file}: its blocks have more than {MOST_PARTS} parts")
         layer = outer if entity.dxf.layer == "0" else str(entity.dxf.layer)
         yield entity, layer
+        if entity.dxftype() == "INSERT":
+            stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
         if entity.dxftype() == "INSERT" and depth < DEEPEST_BLOCK and not whole(layer):
             stack += [(part, layer, depth + 1) for part in parts(entity, file)]
 

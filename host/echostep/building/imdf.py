@@ -241,7 +241,8 @@ def _relationships(
     for one in _features(archive, "relationship", earth):
         if one.category not in WAYS:
             continue
-        ends = [one.about.get("origin"), one.about.get("destination"), *(one.about.get("intermediary") or [])]
+        between = one.about.get("intermediary")
+        ends = [one.about.get("origin"), one.about.get("destination"), *(between if isinstance(between, list) else [])]
         keys = [str(end.get("id")) for end in ends if isinstance(end, dict)]
         found = sorted({units[key][0] for key in keys if key in units})
         for key in keys:

@@ -146,7 +146,7 @@ def _solid(parts: list[BaseGeometry]) -> BaseGeometry:
 
 
 def _segments(lines: Iterable[BaseGeometry]) -> NDArray[np.float64]:
-    """Straight pieces, (n, 4), rounded to a millimetre, none shorter than a centimetre unless it holds others together."""
+    """Straight pieces, (n, 4), rounded to a millimetre, curves within 5 mm."""
     rows = [np.zeros((0, 4))]
     for line in pieces(lines):
         points = np.asarray(line.simplify(FLAT_M).coords)[:, :2].round(3)

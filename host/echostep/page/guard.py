@@ -1,0 +1,74 @@
+"""The guard: who may see the page.
+
+In: every request to the server. Out: the request, or a refusal. Owns the count of refusals. On the loopback a page of another site must not reach the
+socket: `Host` must name this machine and `Origin` must be the page's own. Elsewhere the address holds a random token, without which nothing answers.
+"""
+
+from __future__ import annotations
+
+import hmac
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+SAFE = {
+    "content-security-policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+}
+
+
+class Guard:
+    """ASGI middleware; `token` None: loopback only."""
+
+    def __init__(self, app: ASGIApp, token: str | None) -> None:
+        self.refused = 0
+        self._app = app
+        self._token = token
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        if not self._welcome(scope):
+            self.refused += 1
+            if scope["type"] == "http":
+                await PlainTextResponse("not here", 404)(scope, receive, send)
+            else:
+                await send({"type": "websocket.close", "code": 1008})
+            return
+
+        async def safe(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update(SAFE)
+            await send(message)
+
+        await self._app(scope, receive, safe)
+
+    def _welcome(self, scope: Scope) -> bool:
+        headers = Headers(scope=scope)
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if self._token is None:
+            if _name(host) not in LOOPBACK:
+                return False
+        elif not hmac.compare_digest(scope["path"].split("/")[1].encode(), self._token.encode()):
+            return False
+        if origin is None:
+            return bool(scope["type"] == "http")
+        return origin.lower() == f"http://{host.lower()}"
+
+
+def _name(host: str) -> str | None:
+    """The name in a Host header, without its port."""
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None

@@ -1,0 +1,67 @@
+"""The scene: everything that a page shows of one moment, immutable.
+
+In: a tracker, in the tracker's thread. Out: `Scene`s that any thread may read. Owns nothing; all arrays are copies.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.estimate import Estimate, Status
+from echostep.page.beams import Beam
+from echostep.page.streams import Streams
+from echostep.particles import Cloud
+
+KNOWN_HEADING_RAD = 1.0  # beyond this standard deviation the arrow is a circle
+MOST_SHOWN = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Specks:
+    """A cloud as it is drawn: `x_m`, `y_m` (n,) float32 in the map, `weight` (n,) uint8, 255 for the greatest, `level` (n,) uint8."""
+
+    x_m: NDArray[np.float32]
+    y_m: NDArray[np.float32]
+    weight: NDArray[np.uint8]
+    level: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One moment: `walked` points of the trail belong to it; `born_ns` is the host's monotonic clock when its bytes had come."""
+
+    born_ns: int
+    t_s: float
+    told: Estimate | None
+    specks: Specks | None
+    beams: tuple[Beam, ...]
+    streams: Streams | None
+    walked: int
+    words: str
+
+
+def specks(cloud: Cloud, most: int = MOST_SHOWN) -> Specks:
+    """A copy of a cloud; of a larger one every so many-th particle."""
+    every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
+    weight = np.exp(cloud.log_weight[every])
+    shown = (255.0 * weight / max(float(weight.max()), 1e-300)).astype(np.uint8)
+    x_m, y_m = cloud.map_x_m[every].astype(np.float32), cloud.y_m[every].astype(np.float32)
+    return Specks(x_m, y_m, shown, np.minimum(cloud.level[every], 255).astype(np.uint8))
+
+
+def words(told: Estimate | None, *, waits: bool = False, taps: bool = True) -> str:
+    """How far to trust a position, in words; `waits`: for somebody to say where he is; `taps`: one can say so on the page."""
+    if told is None:
+        return "tap where you stand to start" if waits else "waiting for the foot to stand still"
+    if told.status == Status.LOST:
+        return "lost: walk along a wall or tap where you are" if taps else "lost"
+    return f"{told.status.value}, {metres(told.ellipse95.major_m)}"
+
+
+def metres(distance_m: float) -> str:
+    """A length as people say it: 0.2 m, 3 m, 40 m."""
+    return f"{distance_m:.1f} m" if distance_m < 0.95 else f"{distance_m:.0f} m"

@@ -1,0 +1,157 @@
+// Paints what moves on a canvas: cloud, trail, echoes, position with its ellipse, heading, destination, a pose that is being tapped.
+
+const GRADES = 4;  // of weight
+const SPECK_PX = 2.5;
+
+export class Painter {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.pen = canvas.getContext('2d');
+    this.recolour();
+  }
+
+  recolour() {
+    const style = getComputedStyle(document.documentElement);
+    this.colour = Object.fromEntries(
+      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'ink'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  }
+
+  paint(view, scene) {
+    const sharp = window.devicePixelRatio || 1, { canvas, pen } = this;
+    const width = Math.round(view.width * sharp), height = Math.round(view.height * sharp);
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    pen.setTransform(sharp, 0, 0, sharp, 0, 0);
+    pen.clearRect(0, 0, view.width, view.height);
+    pen.lineJoin = pen.lineCap = 'round';
+    if (scene.cloud) this.specks(view, scene.cloud, scene.level);
+    this.trail(view, scene.trail, scene.level);
+    const { told } = scene.frame ?? {};
+    if (scene.frame?.guidance) this.way(view, scene.frame.guidance.path);
+    if (told && told.level === scene.level) {
+      for (const beam of scene.frame.beams) this.beam(view, beam);
+      this.ellipse(view, told);
+      this.wearer(view, told);
+    }
+    if (scene.tapped) this.pose(view, scene.tapped);
+  }
+
+  specks(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shown) {
+    const [a, b, c, d, e, f] = view.matrix(), { pen } = this, half = SPECK_PX / 2;
+    pen.fillStyle = this.colour.cloud;
+    const e0 = a * x0_m + c * y0_m + e - half, f0 = b * x0_m + d * y0_m + f - half;
+    const [as, bs, cs, ds] = [a * step_m, b * step_m, c * step_m, d * step_m];
+    for (let grade = 0; grade < GRADES; grade++) {
+      pen.globalAlpha = 0.12 + (0.5 * grade) / (GRADES - 1);
+      for (let k = 0; k < count; k++) {
+        if (weight[k] >> 6 !== grade || level[k] !== shown) continue;
+        const sx = as * x[k] + cs * y[k] + e0, sy = bs * x[k] + ds * y[k] + f0;
+        if (sx > -4 && sy > -4 && sx < view.width && sy < view.height) pen.fillRect(sx, sy, SPECK_PX, SPECK_PX);
+      }
+    }
+    pen.globalAlpha = 1;
+  }
+
+  line(points, colour, width, dash = []) {
+    const { pen } = this;
+    pen.beginPath();
+    points.forEach(([sx, sy], k) => (k ? pen.lineTo(sx, sy) : pen.moveTo(sx, sy)));
+    pen.setLineDash(dash);
+    pen.strokeStyle = colour;
+    pen.lineWidth = width;
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  // A point that is no number is a break: somebody checked in.
+  trail(view, { points, count }, shown) {
+    const [a, b, c, d, e, f] = view.matrix(), { pen } = this;
+    pen.beginPath();
+    let on = false;
+    for (let k = 0; k < 3 * count; k += 3) {
+      const x = points[k], y = points[k + 1], here = points[k + 2] === shown && x === x;
+      if (here) pen[on ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
+      on = here;
+    }
+    pen.strokeStyle = this.colour.trail;
+    pen.lineWidth = 2;
+    pen.stroke();
+  }
+
+  // Measured: a line with a bar across its end. Expected: a ring where the plan would send the echo from.
+  beam(view, { ranger, x_m, y_m, axis_rad, measured_m, expected_m }) {
+    const { pen } = this, at = (r) => view.toScreen(x_m + r * Math.cos(axis_rad), y_m + r * Math.sin(axis_rad));
+    const colour = ranger ? this.colour.right : this.colour.left, from = at(0);
+    if (expected_m !== null) {
+      const end = at(expected_m);
+      this.line([from, end], this.colour.expected, 1.5, [2, 5]);
+      pen.beginPath();
+      pen.arc(...end, 6, 0, 2 * Math.PI);
+      pen.strokeStyle = this.colour.expected;
+      pen.lineWidth = 1.5;
+      pen.stroke();
+    }
+    if (measured_m !== null) {
+      const end = at(measured_m), across = view.toScreen(x_m, y_m), ux = end[0] - across[0], uy = end[1] - across[1];
+      const length = Math.hypot(ux, uy) || 1, bx = (-uy / length) * 7, by = (ux / length) * 7;
+      this.line([from, end], colour, 2.5);
+      this.line([[end[0] - bx, end[1] - by], [end[0] + bx, end[1] + by]], colour, 3.5);
+    } else {
+      this.line([from, at(0.6)], colour, 2.5, [1, 6]);
+    }
+  }
+
+  ellipse(view, { x_m, y_m, major_m, minor_m, angle_rad }) {
+    const { pen } = this, [sx, sy] = view.toScreen(x_m, y_m);
+    pen.beginPath();
+    pen.ellipse(sx, sy, Math.max(major_m * view.scale, 1), Math.max(minor_m * view.scale, 1), -(angle_rad + view.turn), 0, 2 * Math.PI);
+    pen.fillStyle = pen.strokeStyle = this.colour.here;
+    pen.globalAlpha = 0.15;
+    pen.fill();
+    pen.globalAlpha = 1;
+    pen.lineWidth = 2;
+    pen.stroke();
+  }
+
+  // An arrow along the heading; a circle when nobody knows it.
+  wearer(view, { x_m, y_m, heading_rad, heading_known }) {
+    const { pen } = this;
+    pen.save();
+    pen.translate(...view.toScreen(x_m, y_m));
+    pen.rotate(-(heading_rad + view.turn));
+    pen.beginPath();
+    if (heading_known) { pen.moveTo(13, 0); pen.lineTo(-9, 8); pen.lineTo(-4, 0); pen.lineTo(-9, -8); pen.closePath(); }
+    else pen.arc(0, 0, 8, 0, 2 * Math.PI);
+    pen.lineWidth = 4;
+    pen.strokeStyle = this.colour.halo;
+    pen.stroke();
+    pen.fillStyle = this.colour.here;
+    pen.fill();
+    pen.restore();
+  }
+
+  way(view, path) {
+    const points = path.map(([x, y]) => view.toScreen(x, y)), { pen } = this;
+    if (points.length > 1) this.line(points, this.colour.goal, 3, [8, 7]);
+    const [sx, sy] = points[points.length - 1];
+    pen.beginPath();
+    pen.arc(sx, sy - 16, 8, Math.PI * 0.85, Math.PI * 0.15);
+    pen.lineTo(sx, sy);
+    pen.closePath();
+    pen.fillStyle = this.colour.goal;
+    pen.fill();
+  }
+
+  pose(view, { x_m, y_m, heading_rad }) {
+    const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this;
+    pen.beginPath();
+    pen.arc(sx, sy, 9, 0, 2 * Math.PI);
+    pen.strokeStyle = this.colour.goal;
+    pen.lineWidth = 3;
+    pen.stroke();
+    if (heading_rad === null) return;
+    const u = heading_rad + view.turn, tip = [sx + 44 * Math.cos(u), sy - 44 * Math.sin(u)];
+    const wing = (w) => [tip[0] - 14 * Math.cos(u + w), tip[1] + 14 * Math.sin(u + w)];
+    this.line([[sx + 9 * Math.cos(u), sy - 9 * Math.sin(u)], tip], this.colour.goal, 3);
+    this.line([wing(0.5), tip, wing(-0.5)], this.colour.goal, 3);
+  }
+}

@@ -1,0 +1,100 @@
+// Words and numbers around the map: status, place, health of the streams, guidance, floors, scale bar; and what a screen reader is told.
+
+const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕' };
+const COMPASS = ['east', 'north-east', 'north', 'north-west', 'west', 'south-west', 'south', 'south-east'];
+const SPOKEN_MS = 8000;  // a screen reader hears a new place no sooner
+const $ = (id) => document.getElementById(id);
+
+export class Panel {
+  constructor(onFloor) {
+    this.onFloor = onFloor;
+    this.spoken = { at: -Infinity, status: '', text: '' };
+  }
+
+  hello({ title, plan }) {
+    $('title').textContent = `${title}: ${plan.name}`;
+    document.title = title;
+    $('goal').replaceChildren(new Option('Go to…', ''), new Option('a place on the map', 'map'),
+      ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
+    $('floors').replaceChildren(...plan.levels.map((level, k) => {
+      const button = document.createElement('button'), share = document.createElement('span');
+      button.type = 'button';
+      button.textContent = level.name;
+      share.className = 'share';
+      button.append(share);
+      button.onclick = () => this.onFloor(k);
+      return button;
+    }));
+  }
+
+  frame({ told, words, streams, guidance, beams }, rooms, turn) {
+    const status = told?.status ?? 'waiting';
+    this.status(status, words);
+    $('place').textContent = told ? whereabouts(told, rooms) : '';
+    $('echoes').textContent = told ? echoes(beams) : '';
+    $('health').textContent = streams ? rates(streams) : 'no bytes yet';
+    $('wrong').textContent = streams?.wrong ?? '';
+    $('wrong').hidden = !streams?.wrong;
+    $('guidance').hidden = !guidance;
+    if (guidance) {
+      $('way').textContent = guidance.text;
+      $('turn').style.visibility = guidance.arrow_rad === null ? 'hidden' : 'visible';
+      $('turn').style.transform = `rotate(${Math.PI / 2 - (guidance.arrow_rad ?? 0) - turn}rad)`;
+    }
+    this.speak(`${status} ${streams?.wrong ?? ''}`, [words, told ? near(told, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
+  }
+
+  status(status, words) {
+    $('words').dataset.status = status;
+    $('mark').textContent = MARKS[status];
+    if ($('said').textContent !== words) $('said').textContent = words;
+  }
+
+  floors(shown, told) {
+    [...$('floors').children].forEach((button, k) => {
+      const share = told?.levels?.[k] ?? 0;
+      button.setAttribute('aria-pressed', String(k === shown));
+      button.setAttribute('aria-label', `${button.firstChild.textContent}, ${Math.round(100 * share)} % likely`);
+      button.lastChild.style.width = `${100 * share}%`;
+    });
+  }
+
+  scale(view) {
+    const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
+    $('bar').style.width = `${length * view.scale}px`;
+    $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+    $('needle').style.transform = `rotate(${-view.turn}rad)`;
+  }
+
+  speak(status, text) {
+    const now = performance.now(), { spoken } = this;
+    if (text === spoken.text || (status === spoken.status && now - spoken.at < SPOKEN_MS)) return;
+    this.spoken = { at: now, status, text };
+    $('live').textContent = text;
+  }
+}
+
+function near({ x_m, y_m }, rooms) {
+  const away = rooms.map(({ name, at_m: [x, y] }) => [Math.hypot(x - x_m, y - y_m), name]).sort((a, b) => a[0] - b[0]);
+  return away.length ? `near ${away[0][1]}` : '';
+}
+
+function whereabouts(told, rooms) {
+  const degrees = ((told.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((told.heading_sd_rad * 180) / Math.PI);
+  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ± ${spread}°` : 'heading unknown';
+  return [near(told, rooms), `x ${told.x_m.toFixed(1)} m, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
+}
+
+function echoes(beams) {
+  const one = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
+  const heard = beams.map((beam) => `${beam.ranger ? 'right' : 'left'} ${one(beam)}`);
+  return heard.length ? heard.join(' · ') : 'no echoes';
+}
+
+const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
+
+function rates({ mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
+  const rate = (value, unit) => (value === null ? '…' : `${Math.round(value)}${unit}`);
+  const late = late_pings ? ` · ${late_pings} late` : '';
+  return `MTx ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected} · ${synchronised ? 'SyncOut' : 'no SyncOut'}`;
+}

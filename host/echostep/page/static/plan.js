@@ -1,0 +1,76 @@
+// The plan of a floor in SVG: walls as paths, a tile each, of which only those on the screen are in the document; names of rooms, upright.
+
+const SVG = 'http://www.w3.org/2000/svg';
+const TILE_M = 30;
+
+export class PlanView {
+  constructor(wallsGroup, roomsGroup) {
+    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], box: [0, 0, 10, 10] });
+  }
+
+  show(walls, rooms) {
+    this.tiles = tilesOf(walls);
+    this.box = boxOf(walls, rooms);
+    this.wallsGroup.replaceChildren();
+    this.rooms = rooms.map(({ name, at_m: [x, y] }) => {
+      const text = document.createElementNS(SVG, 'text');
+      text.textContent = name;
+      return { x, y, text, half: 4 * name.length + 4 };
+    });
+    this.roomsGroup.replaceChildren(...this.rooms.map((room) => room.text));
+  }
+
+  draw(view) {
+    this.wallsGroup.setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
+    const [x, y] = [view.x, view.y], reach = Math.hypot(view.width, view.height) / 2 / view.scale;
+    for (const tile of this.tiles) {
+      const seen = tile.box[0] < x + reach && tile.box[2] > x - reach && tile.box[1] < y + reach && tile.box[3] > y - reach;
+      for (const part of tile.parts) place(part, seen && part.longest * view.scale > 1, this.wallsGroup);
+    }
+    const taken = [];
+    for (const room of this.rooms) {
+      const [sx, sy] = view.toScreen(room.x, room.y);
+      const free = taken.every(([tx, ty, half]) => Math.abs(tx - sx) > half + room.half || Math.abs(ty - sy) > 18);
+      const shown = free && sx > -room.half && sx < view.width + room.half && sy > -10 && sy < view.height + 10;
+      if (shown) taken.push([sx, sy, room.half]);
+      room.text.setAttribute('visibility', shown ? 'visible' : 'hidden');
+      if (shown) { room.text.setAttribute('x', sx.toFixed(1)); room.text.setAttribute('y', sy.toFixed(1)); }
+    }
+  }
+}
+
+// Put a part's path into the document, or take it out.
+function place(part, shown, group) {
+  if (shown === part.shown) return;
+  part.shown = shown;
+  if (!part.path) {
+    part.path = document.createElementNS(SVG, 'path');
+    part.path.setAttribute('d', part.d.join(''));
+    part.d = null;
+  }
+  if (shown) group.append(part.path);
+  else part.path.remove();
+}
+
+// Walls by tile and by length: short ones are not drawn where they would be less than a pixel.
+function tilesOf(walls) {
+  const tiles = new Map();
+  for (let k = 0; k < walls.length; k += 4) {
+    const [x0, y0, x1, y1] = walls.subarray(k, k + 4);
+    const key = `${Math.floor((x0 + x1) / 2 / TILE_M)} ${Math.floor((y0 + y1) / 2 / TILE_M)}`;
+    if (!tiles.has(key)) tiles.set(key, { box: [Infinity, Infinity, -Infinity, -Infinity], parts: new Map() });
+    const tile = tiles.get(key), length = Math.hypot(x1 - x0, y1 - y0), size = Math.ceil(Math.log2(Math.max(length, 0.01)));
+    tile.box = [Math.min(tile.box[0], x0, x1), Math.min(tile.box[1], y0, y1), Math.max(tile.box[2], x0, x1), Math.max(tile.box[3], y0, y1)];
+    if (!tile.parts.has(size)) tile.parts.set(size, { longest: 2 ** size, d: [], path: null, shown: false });
+    tile.parts.get(size).d.push(`M${x0} ${y0}L${x1} ${y1}`);
+  }
+  return [...tiles.values()].map(({ box, parts }) => ({ box, parts: [...parts.values()] }));
+}
+
+function boxOf(walls, rooms) {
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  const take = (x, y) => { box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y); };
+  for (let k = 0; k < walls.length; k += 2) take(walls[k], walls[k + 1]);
+  for (const room of rooms) take(...room.at_m);
+  return box[0] > box[2] ? [0, 0, 10, 10] : box;
+}
