@@ -73,7 +73,8 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
         "flash",
         "calibrate",
         "command",
-        *(f"evaluate {name}" for name in ("feet", "girard2011", "echoes", "trails")),
+        "beacons simulate",
+        *(f"evaluate {name}" for name in ("feet", "girard2011", "echoes", "trails", "fischer2008")),
     ],
 )
 def test_every_option_that_is_named_exists(command: str) -> None:

@@ -29,7 +29,8 @@ class BeaconSettings:
     `range_sd_m` is wider than the beacon's own 5 cm by what boot, body and cloud leave out; `bearing_sd_deg` [Fischer 2008, 4.1.1]. `range_outliers`,
     `bearing_outliers`: shares of measurements that may be anything within `span_m` and the circle. `hidden`: share of inliers through a wall.
     `drop_sd_m`: of the place of a beacon about him who drops it. `drift_m`: what a beacon's place grows by, per square root of a measurement.
-    `kick_per_m`, `kick_deg`: how often a heading jumps (iron, a slipping mount), and the standard deviation of such a jump.
+    `kick_per_m`, `kick_deg`: how often the heading jumps (a slipping mount; iron, where a compass leads), and the standard deviation of such a jump;
+    `tries_per_m`: how often particles try it. `step_sd`: of the length of a move on open ground, per square root of a metre.
     """
 
     range_sd_m: float = 0.4
@@ -40,8 +41,8 @@ class BeaconSettings:
     span_m: float = 15.0
     drop_sd_m: float = 0.5
     drift_m: float = 0.003
-    kick_per_m: float = 0.3
-    tries_per_m: float = 0.5
+    kick_per_m: float = 0.01
+    tries_per_m: float = 0.05
     kick_deg: float = 45.0
     step_sd: float = 0.05
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echostep.beacon_commands import app as beacon_app
 from echostep.errors import EchostepError
 from echostep.evaluate.commands import app as evaluate
 from echostep.logs_cli import app as logs
@@ -27,6 +28,7 @@ app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
 )
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(beacon_app, name="beacons")
 app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
@@ -72,6 +74,15 @@ Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publ
 Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
 
 
+BeaconsPort = Annotated[
+    str | None,
+    typer.Option("--beacons", metavar="PORT", help="Port of a beacon gateway: serial, or udp://127.0.0.1:9000."),
+]
+GuideTo = Annotated[
+    str | None, typer.Option("--guide", metavar="TO", help="Guide the wearer there: a room, X,Y[,LEVEL], or start.")
+]
+
+
 @app.command()
 def demo(
     out: Out = Path("out/demo"),
@@ -88,6 +99,7 @@ def demo(
             help="Program that plays the sensor board; without it the Python board does.",
         ),
     ] = None,
+    guide: Annotated[bool, typer.Option("--guide", help="With beacons, and guidance to the end of the walk.")] = False,
     page: Page = None,
     host: Host = LOCAL,
     port: Port = None,
@@ -95,7 +107,7 @@ def demo(
     """Track a simulated walk through a simulated building."""
     from echostep import runs
 
-    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team))
+    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team), guide=guide)
 
 
 @app.command()
@@ -115,12 +127,14 @@ def live(
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
+    beacons: BeaconsPort = None,
+    guide: GuideTo = None,
 ) -> None:
     """Track the wearer of a board and an MTx, or of the board alone; everything is recorded."""
     from echostep import runs
 
     views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet)
+    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet, beacons=beacons, guide=guide)
 
 
 @app.command()
@@ -131,11 +145,12 @@ def record(
         "out/recording.mcap"
     ),
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    beacons: BeaconsPort = None,
 ) -> None:
     """Record both ports without tracking."""
     from echostep import runs
 
-    runs.record(board, mtx, out, seconds)
+    runs.record(board, mtx, out, seconds, beacons)
 
 
 @app.command()
@@ -154,12 +169,14 @@ def replay(
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
+    guide: GuideTo = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep import runs
 
     views = _views(headless, page, host, port, stays=sys.stdout.isatty())
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, _outlet(publish, name, team))
+    outlet = _outlet(publish, name, team)
+    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, outlet, guide=guide)
 
 
 @app.command()

@@ -26,9 +26,9 @@ MAX_ENCODED = 65  # payloads are at most 64 bytes; COBS adds one
 SHORTEST = 7  # an empty body: id, sequence, checksum, one byte of COBS, the closing zero
 MAX_BODY = max(kind.itemsize for kind in ROWS.values())
 _HEAD = struct.Struct("<BH")
-_IDENTITY, _IDENTIFY = 0x01, 0x81
+_IDENTITY, _IDENTIFY, _BEACON = 0x01, 0x81, 0x20
 _FIXED_SEED = 0xFFFF  # never changes [protocol/README.md]
-_FIXED_SEED_IDS = (_IDENTITY, _IDENTIFY)
+_FIXED_SEED_IDS = (_IDENTITY, _IDENTIFY, _BEACON)
 _GOOD, _BAD_COBS, _BAD_LENGTH, _BAD_CRC, _BAD_MESSAGE, _LOST, _SEQUENCE, _TALLY = range(
     8
 )  # the first as in `FrameCounts`

@@ -1,8 +1,8 @@
 """Guidance for a person: where to go next, one cue at a time, in words, as an arrow, and as a sentence to speak.
 
 In: a way (a `Route`, or a trail of crumbs), estimates, and when a beacon was last heard. Out: `Cue`s. Owns how far he has come along the way, the
-arrow's present direction, and the last place that was sure. Whatever the estimate cannot carry is not guided: the cue is then "stop", or the way
-back to that place.
+arrow's present direction, and the last place that was sure. What the estimate cannot carry is not guided: the cue is then "stop", or the way back
+to that place.
 """
 
 from __future__ import annotations

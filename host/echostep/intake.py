@@ -9,6 +9,7 @@ that arrived together were cut. Every decision is taken message by message, at t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ from echostep.messages import (
     Status,
     Sync,
 )
-from echostep.sources import BOARD, MTX, Chunk, Portion, portion_of
+from echostep.sources import BOARD, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.waiting import HEIGHT, Passage, Silence, Waiting
 from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, pack_mtdata
@@ -88,6 +89,7 @@ class Intake:
         self._waiting = Waiting()
         self._unknown_ports = 0
         self._bad_times = 0
+        self.newest_s = math.nan  # how far either port has come
 
     @property
     def ahead(self) -> tuple[Leg, ...]:
@@ -109,6 +111,7 @@ class Intake:
         board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
         mtx = _mtx_arrivals(batch, from_mtx.rows_of(batch.end), portion.t_arrival_ns)
         times = self.timeline.times(board, mtx)
+        self._come(times)
         self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
         self._note(frames, times)
         self._hear(frames, times)
@@ -122,9 +125,15 @@ class Intake:
         said = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
         other.take(portion_of([said, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
 
+    def _come(self, times: Times) -> None:
+        """How far the time has come."""
+        newest = np.append(times.board_newest_s[-1:], times.mtx_newest_s[-1:])
+        if not np.isnan(newest).all():
+            self.newest_s = float(np.nanmax(newest))
+
     def _count_unknown(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX):
+            if port not in (BOARD, MTX, GATEWAY):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _note(self, frames: Frames, times: Times) -> None:

@@ -7,13 +7,17 @@ known beside it: how much news an echo brings, and how far the plan explains wha
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.beacons import BeaconSettings
 from echostep.climbing import ClimbSettings, Rise
+from echostep.crumbs import Crumbs
 from echostep.estimate import Estimate, estimate
 from echostep.gait import Leg, wrap
+from echostep.gateway import Word
 from echostep.likelihoods import EchoSettings, echo_model
 from echostep.particles import Cloud, CloudSettings, Heard, Move
 from echostep.plan import Pose
@@ -49,10 +53,11 @@ class MapFilter:
     def __init__(
         self, walls: Walls, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
         cloud: CloudSettings | None = None, echo: EchoSettings | None = None,
-        storeys: Storeys | None = None, climbing: ClimbSettings | None = None,
+        storeys: Storeys | None = None, climbing: ClimbSettings | None = None, beacons: BeaconSettings | None = None,
     ) -> None:  # fmt: skip
         """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; `storeys`: how levels lie on the walls' sheet."""
         self.cloud = Cloud(cloud or CloudSettings(), start, walk_heading_rad, rng, storeys, climbing)
+        self.crumbs = Crumbs(walls, beacons or BeaconSettings(), rng)
         self.explained = 1.0
         self._walls = walls
         self._echo = echo or EchoSettings()
@@ -61,8 +66,8 @@ class MapFilter:
         self._gone_m = 0.0
         self._last_m = [-math.inf, -math.inf]
 
-    def follow(self, passage: Passage) -> Estimate:
-        """Move along a leg and weigh by its pings."""
+    def follow(self, passage: Passage, words: Sequence[Word] = ()) -> Estimate:
+        """Move along a leg and weigh by its pings and by what beacons said on it."""
         leg = passage.leg
         move = Move(leg.dx_m, leg.dy_m, leg.sd_m, leg.turn_sd_rad, leg.scale_sd)
         rise = _rise(leg, passage.height_m)
@@ -75,6 +80,7 @@ class MapFilter:
             self._judge(self.cloud.follow(move, heard, self._model, self._walls), heard.power)
             self.cloud.climb(move, rise)
             self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) * self._trust() / REGAIN_M)
+        self.crumbs.hear(self.cloud, leg, words)
         doubt_m = math.hypot(self._doubt_m, leg.anchor_sd_m, PLAN_SD_M * (1.0 - self._trust()), EXACT_SD_M)
         return estimate(self.cloud, leg.t1_s, leg.heading1_rad, leg.step, doubt_m)
 

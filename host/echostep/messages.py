@@ -517,6 +517,35 @@ class CheckGyros(NamedTuple):
         return cls._make(_CHECK_GYROS.unpack(body))
 
 
+_BEACON = struct.Struct("<IIHHHh")
+
+
+class Beacon(NamedTuple):
+    """One measurement of one beacon to the boot, as a beacon gateway passes it on."""
+
+    gateway_ms: int  # ms
+    unit: int
+    number: int
+    age_ms: int  # ms
+    range_mm: int  # mm, 65535 = invalid
+    bearing: int  # 0.01 deg, -32768 = invalid
+
+    @property
+    def id(self) -> int:
+        return 0x20
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _BEACON.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Beacon:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 16:
+            raise ValueError(f"beacon: {len(body)} bytes, expected 16")
+        return cls._make(_BEACON.unpack(body))
+
+
 Message = (
     Identity
     | Ping
@@ -532,6 +561,7 @@ Message = (
     | ClockQuery
     | Configure
     | CheckGyros
+    | Beacon
 )
 
 BY_ID: dict[int, type[Message]] = {
@@ -549,6 +579,7 @@ BY_ID: dict[int, type[Message]] = {
     0x82: ClockQuery,
     0x83: Configure,
     0x84: CheckGyros,
+    0x20: Beacon,
 }
 
 ROWS: dict[int, np.dtype[np.void]] = {
@@ -664,6 +695,16 @@ ROWS: dict[int, np.dtype[np.void]] = {
         ]
     ),
     0x84: np.dtype([]),
+    0x20: np.dtype(
+        [
+            ("gateway_ms", "<u4"),
+            ("unit", "<u4"),
+            ("number", "<u2"),
+            ("age_ms", "<u2"),
+            ("range_mm", "<u2"),
+            ("bearing", "<i2"),
+        ]
+    ),
 }
 GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x02, 4, 1),  # ping.ranger

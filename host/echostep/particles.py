@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.beacons import Beliefs, no_beliefs
 from echostep.climbing import ClimbSettings, Rise, carry, climb, climb_model
 from echostep.likelihoods import EchoModel, echo_density
 from echostep.plan import Pose
@@ -115,6 +116,7 @@ class Cloud:
         self.z_m: Floats = np.zeros(n)
         self.lag_m: Floats = np.zeros(n)
         self.log_weight: Floats = np.zeros(n)
+        self.beliefs = no_beliefs(n, 0)
         if self.storeys:
             levels = len(self.storeys.height_m)
             level = np.arange(n) % levels if start.level == ANY_LEVEL else np.full(n, start.level)
@@ -133,6 +135,15 @@ class Cloud:
         """East of each particle in the map (n,), whichever its level."""
         return self.x_m - self.level * self.storeys.pitch_m if self.storeys else self.x_m
 
+    @property
+    def pitch_m(self) -> float:
+        """How far east of the level below it each level lies on the sheet."""
+        return self.storeys.pitch_m if self.storeys else 0.0
+
+    def level_at(self, x_m: float) -> int:
+        """Level of a place on the sheet."""
+        return int(level_of(np.array([x_m]), self.storeys)[0]) if self.storeys else 0
+
     def climb(self, move: Move, rise: Rise) -> None:
         """Heights and levels after a move, and what they say of each particle."""
         if self.storeys is None:
@@ -144,7 +155,7 @@ class Cloud:
             self.x_m, self.y_m, self.turn_rad, self.scale, self.z_m, self.lag_m, self.log_weight,
             move.dx_m, move.dy_m, noise, rise, self._lag_variance, self._climb, self.storeys,
         )  # fmt: skip
-        self._renew()
+        self.renew()
 
     def puzzle(self, times: float) -> None:
         """Keep at least so many times the usual number of particles from the next resampling on."""
@@ -167,7 +178,7 @@ class Cloud:
             )  # fmt: skip
             if top < -0.5 * settings.wall_cost:
                 self._widen()
-            self._renew()
+            self.renew()
         return explained
 
     def _noise(self, move: Move, share: float) -> Floats:
@@ -202,9 +213,10 @@ class Cloud:
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
         self.z_m, self.lag_m = self.z_m[chosen], self.lag_m[chosen]
+        self.beliefs = Beliefs(self.beliefs.mean[chosen], self.beliefs.cov[chosen])
         self.log_weight = np.zeros(len(chosen))
 
-    def _renew(self) -> None:
+    def renew(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight."""
         if effective_size(self.log_weight) >= self._settings.resample_below * len(self.x_m):
             return

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.crumbs import BeaconPlace, BeaconState
 from echostep.estimate import Estimate
 from echostep.foot import Track
 from echostep.plan import Level, Plan
+from echostep.routes import Route
 from echostep.truth import Truth
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ COLUMNS = (
 )
 MOST_INCHES = 40.0
 ELSEWHERE_S = 5.0
+WAY_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
 TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # told apart by the colour-blind [Okabe and Ito 2008]
 
 
@@ -52,8 +55,11 @@ def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
         writer.writerows([getattr(e, name) for name in COLUMNS] for e in estimates)
 
 
-def draw_track(path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str) -> None:
-    """Plan, truth, estimate and 95 % ellipses as a PNG, the levels that he was on one above the other."""
+def draw_track(
+    path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
+    route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
+) -> None:  # fmt: skip
+    """Plan, truth, way, beacons, estimate and 95 % ellipses as a PNG, the levels that he was on one above the other."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -65,6 +71,7 @@ def draw_track(path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Tru
     for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
         here = [e for e in estimates if e.level == k]
         _draw_level(axes, plan.levels[k], here, truth.between(here) if truth else None)
+        _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
         if len(plan.levels) > 1:
             axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
     figure.savefig(path)
@@ -95,6 +102,23 @@ def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m
     axes.plot(*track.T, color=TRACK_COLOUR, linewidth=1, marker=".", markersize=4, label="estimate, 95 % ellipses")
     axes.autoscale_view()
     axes.legend(loc="upper right", fontsize=8)
+
+
+def _draw_guidance(axes: Axes, level: int, route: Route | None, beacons: Sequence[BeaconPlace]) -> None:
+    """The way, and each beacon with its standard deviation; those that were moved or are silent are hollow."""
+    from matplotlib.patches import Circle
+
+    for stretch in route.stretches if route else ():
+        if stretch.level == level:
+            axes.plot(*stretch.line_m.T, color=WAY_COLOUR, linewidth=2, linestyle="--", label="way")
+    for b in beacons:
+        full = b.state is BeaconState.WELL
+        axes.plot(b.x_m, b.y_m, "^", color=BEACON_COLOUR, mfc=BEACON_COLOUR if full else "none", markersize=6)
+        axes.add_patch(Circle((b.x_m, b.y_m), 2.0 * b.sd_m, color=BEACON_COLOUR, alpha=0.15, lw=0))
+    if beacons:
+        axes.plot([], [], "^", color=BEACON_COLOUR, label="beacons (hollow: moved or silent)")
+    if beacons or route:
+        axes.legend(loc="upper right", fontsize=8)
 
 
 def _with_gaps(rows: Sequence[tuple[float, float, float]]) -> Floats:

@@ -13,7 +13,7 @@ import shlex
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -36,6 +36,8 @@ from echostep.errors import EchostepError
 from echostep.estimate import Estimate, digest
 from echostep.foot import Track, walk_track
 from echostep.frames import encode
+from echostep.guidance import Cue, arrow_sign, describe_cue
+from echostep.guided import Guided, destination
 from echostep.imu import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.legs import LegsSettings
 from echostep.messages import SCHEMA_HASH, Identify
@@ -47,8 +49,9 @@ from echostep.particles import ANY_LEVEL
 from echostep.picture import draw_foot, draw_track, write_track
 from echostep.plan import Plan, Pose
 from echostep.recording import Recorder, Recording, open_recording
+from echostep.routes import Place
 from echostep.settings import parse_settings, read_settings
-from echostep.sources import BOARD, MTX, Chunk, Portion, SerialPorts, portion_of
+from echostep.sources import BOARD, GATEWAY, MTX, Chunk, Portion, SerialPorts, portion_of
 from echostep.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.truth import Truth, errors, load_truth
@@ -62,7 +65,7 @@ if TYPE_CHECKING:
 DEMO_PACE = 8.0
 HEADLESS_CHUNKS = 1000
 TAPPED = "tapped"  # where a recording says that its start is a check-in
-BAUD = {BOARD: 115200, MTX: 115200}
+BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
 console = Console(soft_wrap=True)  # one message, one line, however wide the terminal
 
 
@@ -78,9 +81,12 @@ class Views:
     stays: bool = False
 
 
-def demo(out: Path, seed: int, board_command: str | None, views: Views, outlet: Outlet | None = None) -> None:
+def demo(
+    out: Path, seed: int, board_command: str | None, views: Views, outlet: Outlet | None = None, *, guide: bool = False
+) -> None:
     """Track a simulated walk; the sensor board is a program that speaks the bench protocol, or the Python board."""
     from echostep.simulation.board import BoardProcess, PythonBoard
+    from echostep.simulation.gateway import with_beacons
     from echostep.simulation.scenario import demo_scenario
 
     board = BoardProcess(shlex.split(board_command)) if board_command else PythonBoard(seed=seed)
@@ -94,16 +100,20 @@ def demo(out: Path, seed: int, board_command: str | None, views: Views, outlet: 
         scenario.write_truth(out / "truth.csv")
         truth = load_truth(out / "truth.csv")
         tracker = Tracker(plan, scenario.start, seed=seed)
+        guided = Guided(tracker, Place(*scenario.truth[-1, 1:3].tolist())) if guide else None
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
         title = "echostep demo (simulated)"
         watched = views.terminal or views.page is not None
         with _page(tracker, title, views) as page, _published(outlet, tracker, "simulated") as tell:
             with Recorder(out / "walk.mcap", about) as recorder:
-                chunks = _with_check_ins(_paced(scenario.chunks()) if watched else scenario.chunks(), page)
+                walked = with_beacons(scenario, plan, seed) if guide else scenario.chunks()
+                chunks = _with_check_ins(_paced(walked) if watched else walked, page)
                 portions = _portions(_kept(chunks, recorder), 1 if watched else HEADLESS_CHUNKS)
-                estimates = _run(tracker, portions, title, lambda: scenario.fraction, views, page, tell, recorder)
+                estimates = _run(
+                    tracker, portions, title, lambda: scenario.fraction, views, page, tell, recorder, guided
+                )
             _say(recorder.notices)
-            _finish(out, tracker, estimates, truth, "simulated walk")
+            _finish(out, tracker, estimates, truth, "simulated walk", guided=guided)
             _linger(page, views)
     finally:
         scenario.close()
@@ -112,14 +122,16 @@ def demo(out: Path, seed: int, board_command: str | None, views: Views, outlet: 
 def live(
     plan_path: Path, board: str, mtx: str | None, out: Path, start: Pose | None,
     settings_path: Path | None, seed: int, seconds: float | None, views: Views, outlet: Outlet | None = None,
+    *, beacons: str | None = None, guide: str | None = None,
 ) -> None:  # fmt: skip
     """Track from one or two serial ports until Ctrl-C."""
     plan = open_plan(plan_path)
     text = read_settings(settings_path) if settings_path else ""
     tracker = Tracker(plan, start, parse_settings(text, str(settings_path)), seed, waits=views.page is not None)
+    guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
     out = _folder(out)
-    ports = _ports(board, mtx)
+    ports = _ports(board, mtx, beacons)
     try:
         ports.send(BOARD, encode(Identify(), 0))
         about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
@@ -129,18 +141,18 @@ def live(
             Recorder(out / "walk.mcap", about) as recorder,
         ):
             chunks = _until(ports, recorder, tracker.settings.mtx.rate_hz, seconds, page)
-            estimates = _run(tracker, _one_by_one(chunks), "echostep live", None, views, page, tell, recorder)
+            estimates = _run(tracker, _one_by_one(chunks), "echostep live", None, views, page, tell, recorder, guided)
         _say(recorder.notices)
     finally:
         ports.close()
-    _finish(out, tracker, estimates, None, "live")
+    _finish(out, tracker, estimates, None, "live", guided=guided)
 
 
-def record(board: str, mtx: str | None, out: Path, seconds: float | None) -> None:
+def record(board: str, mtx: str | None, out: Path, seconds: float | None, beacons: str | None = None) -> None:
     """Record from one or two serial ports until Ctrl-C."""
     warm_up()
-    ports = _ports(board, mtx)
-    count = {BOARD: 0, MTX: 0}
+    ports = _ports(board, mtx, beacons)
+    count = {BOARD: 0, MTX: 0, GATEWAY: 0}
     try:
         ports.send(BOARD, encode(Identify(), 0))
         with Recorder(out, {**_versions(), **_now(), "note": "recorded without tracking"}) as recorder:
@@ -149,12 +161,16 @@ def record(board: str, mtx: str | None, out: Path, seconds: float | None) -> Non
         _say(recorder.notices)
     finally:
         ports.close()
-    console.print(f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx")
+    console.print(
+        f"{out}: {count[BOARD]} bytes from the board, {count[MTX]} from the MTx"
+        + (f", {count[GATEWAY]} from the gateway" if beacons else "")
+    )
 
 
 def replay(
     path: Path, plan_path: Path, out: Path, start: Pose | None, settings_path: Path | None,
     seed: int | None, truth_path: Path | None, views: Views, outlet: Outlet | None = None,
+    *, guide: str | None = None,
 ) -> None:  # fmt: skip
     """Track a recording again."""
     recording, plan = open_recording(path), open_plan(plan_path)
@@ -166,15 +182,18 @@ def replay(
     out = _folder(out)
     if note := about.get("note"):
         console.print(f"Recording: {note}")
+    guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
     title = f"echostep replay {path.name}"
     with _page(tracker, title, views, replay=True) as page, _published(outlet, tracker, "replay") as tell:
         began = time.perf_counter()
-        estimates = _run(tracker, recording.portions(), title, lambda: recording.fraction, views, page, tell)
+        estimates = _run(
+            tracker, recording.portions(), title, lambda: recording.fraction, views, page, tell, guided=guided
+        )
         elapsed_s = time.perf_counter() - began
         if recording.truncated:
             console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
-        _finish(out, tracker, estimates, truth, path.name, elapsed_s)
+        _finish(out, tracker, estimates, truth, path.name, elapsed_s, guided)
         _linger(page, views)
 
 
@@ -268,7 +287,7 @@ def parse_pose(text: str) -> Pose:
 
 def _run(
     tracker: Tracker, portions: Iterable[Portion], title: str, progress: Callable[[], float] | None,
-    views: Views, page: LivePage | None, tell: Tell, recorder: Recorder | None = None,
+    views: Views, page: LivePage | None, tell: Tell, recorder: Recorder | None = None, guided: Guided | None = None,
 ) -> list[Estimate]:  # fmt: skip
     """Feed everything; Ctrl-C ends a run like its last chunk does. `recorder`: what is derived is recorded, once it has been shown."""
     derived = Derived(tracker)
@@ -285,14 +304,24 @@ def _run(
                     page.shown(portion)
                 estimates += new
                 tell(new)
+                cues = guided.take(new) if guided else []
                 if view:
-                    view.show(new)
+                    view.show(new, describe_cue(guided.cue) if guided and guided.cue else "")
+                else:
+                    _speak(cues)
                 if recorder:
                     recorder.notes(derived.take(portion, new))
         except KeyboardInterrupt:
             if page:
                 page.wanted = False
     return estimates
+
+
+def _speak(cues: Sequence[Cue]) -> None:
+    """Sentences as they would be spoken, for a run without a view."""
+    for cue in cues:
+        if cue.spoken:
+            console.print(f"{cue.t_s:7.1f} s  {arrow_sign(cue.arrow_rad)}  {cue.spoken}")
 
 
 @contextmanager
@@ -379,8 +408,9 @@ def _one_by_one(chunks: Iterable[Chunk | None]) -> Iterator[Portion]:
         yield portion_of([chunk] if chunk else [])
 
 
-def _ports(board: str, mtx: str | None) -> SerialPorts:
-    return SerialPorts({BOARD: board} if mtx is None else {BOARD: board, MTX: mtx}, BAUD)
+def _ports(board: str, mtx: str | None, beacons: str | None) -> SerialPorts:
+    urls = {BOARD: board, MTX: mtx, GATEWAY: beacons}
+    return SerialPorts({name: url for name, url in urls.items() if url is not None}, BAUD)
 
 
 def _until(
@@ -418,6 +448,7 @@ def _finish(
     truth: Truth | None,
     title: str,
     elapsed_s: float | None = None,
+    guided: Guided | None = None,
 ) -> None:
     """Write the track and say how it went; a disk that is full is said last."""
     off = errors(estimates, truth) if truth else None
@@ -425,7 +456,14 @@ def _finish(
     trouble = None
     try:
         write_track(out / "track.csv", estimates)
-        draw_track(out / "track.png", tracker.plan, estimates, truth, title)
+        places = (
+            tracker.filter.crumbs.places(tracker.filter.cloud, estimates[-1].t_s)
+            if tracker.filter and estimates
+            else []
+        )
+        draw_track(out / "track.png", tracker.plan, estimates, truth, title, guided.route if guided else None, places)
+        if guided:
+            guided.write(out / "cues.csv")
     except OSError as error:
         trouble = EchostepError(f"{out}: cannot write the track: {error.strerror}")
     if not estimates:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from echostep.beacons import BeaconSettings
 from echostep.calibration import GyroSettings, RangerSettings
 from echostep.climbing import ClimbSettings
 from echostep.errors import EchostepError
@@ -36,6 +37,7 @@ class Settings:
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
+    beacons: BeaconSettings = field(default_factory=BeaconSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     wearer: WearerSettings = field(default_factory=WearerSettings)
 

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 import serial
@@ -20,6 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
+from echostep.udp import UdpPort
 
 IDLE_S = 0.05  # no longer, so that the MTx is asked again in time
 READ_TIMEOUT_S = 0.1
@@ -27,6 +28,7 @@ WRITE_TIMEOUT_S = 0.5
 REOPEN_S = 0.5
 BOARD = "board"
 MTX = "mtx"
+GATEWAY = "gateway"
 LATEST_NS = 1 << 62  # later arrivals (damage in a recording) count as this one
 
 Ints = NDArray[np.int64]
@@ -84,6 +86,12 @@ class Portion:
         return Portion(
             self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
         )
+
+    def cut_after(self, name: str) -> Iterator[Portion]:
+        """The portion cut behind each chunk of the port of that name."""
+        at = (self.port == self.ports.index(name)).nonzero()[0] + 1 if name in self.ports else np.empty(0, np.int64)
+        for begin, end in pairwise(dict.fromkeys([0, *at.tolist(), len(self.port)])):
+            yield self.rows(begin, end)
 
     def of(self, name: str) -> PortBytes:
         """What the port of that name delivered."""
@@ -192,8 +200,10 @@ class SerialPorts:
             return
 
 
-def _open(url: str, baud: int) -> serial.SerialBase:
+def _open(url: str, baud: int) -> serial.SerialBase | UdpPort:
     try:
+        if url.startswith("udp://"):
+            return UdpPort(url)
         return serial.serial_for_url(url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S)
     except (serial.SerialException, OSError, ValueError) as error:
         raise EchostepError(

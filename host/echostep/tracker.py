@@ -16,16 +16,18 @@ from echostep.checkin import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
 from echostep.errors import EchostepError
 from echostep.estimate import Estimate, estimate, unwatched
 from echostep.gait import Leg
+from echostep.gateway import Gateway, Word
 from echostep.heading import Iron
 from echostep.intake import Intake
 from echostep.mapfilter import MapFilter
 from echostep.particles import CloudSettings, Move, systematic
 from echostep.plan import Plan, Pose
 from echostep.settings import Settings
-from echostep.sources import Chunk, Portion, portion_of
+from echostep.sources import GATEWAY, Chunk, Portion, portion_of
 from echostep.storeys import building
 from echostep.waiting import Passage
 
+MOST_WORDS = 4096  # of beacons that wait for the foot; older ones are forgotten
 KNOWN_SD_RAD = 0.5  # of a heading; beyond it the cloud must look everywhere
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[
@@ -63,6 +65,8 @@ class Tracker:
         )
         self.building = building(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
+        self.gateway = Gateway()
+        self._words: list[Word] = []  # that wait for their leg
         self.watch: Watch | None = None
         self.check_ins = 0
         self.bad_check_ins = 0
@@ -83,18 +87,18 @@ class Tracker:
     def take(self, portion: Portion) -> list[Estimate]:
         """Take many chunks; the estimates are those that the chunks would have given one by one."""
         if PERSON not in portion.ports:
-            return self._take(portion)
+            return self._cut(portion)
         estimates: list[Estimate] = []
         begin = 0
         for row in np.flatnonzero(portion.port == portion.ports.index(PERSON)).tolist():
-            estimates += self._take(portion.rows(begin, row))
+            estimates += self._cut(portion.rows(begin, row))
             said = parse_check_in(portion.received[portion.start[row] : portion.end[row]])
             if said is None or said.level >= len(self.plan.levels):
                 self.bad_check_ins += 1
             else:
                 estimates += self.check_in(said)
             begin = row + 1
-        return estimates + self._take(portion.rows(begin, len(portion.port)))
+        return estimates + self._cut(portion.rows(begin, len(portion.port)))
 
     def check_in(self, said: CheckIn) -> list[Estimate]:
         """Somebody says where he stands: the cloud is drawn anew about it, with what was known of the heading when he did not say it.
@@ -111,7 +115,11 @@ class Tracker:
         self._tell(Passage(self.leg, *NO_PINGS), self._last)
         return [self._last]
 
+    def _cut(self, portion: Portion) -> list[Estimate]:
+        return [e for piece in portion.cut_after(GATEWAY) for e in self._take(piece)]
+
     def _take(self, portion: Portion) -> list[Estimate]:
+        """Take chunks of which the last alone may be the gateway's: what beacons said is known from then on."""
         estimates: list[Estimate] = []
         for piece in self.intake.take(portion):
             if isinstance(piece, Passage):
@@ -119,13 +127,21 @@ class Tracker:
                 self.filter = self.filter or self._first(piece.leg.heading0_rad)
                 if self.filter is None:
                     continue
-                self._last = self.filter.follow(piece)
+                self._last = self.filter.follow(piece, self._words_until(piece.leg.t1_s))
                 estimates.append(self._last)
                 self._tell(piece, self._last)
             elif self._last is not None:
                 estimates.append(unwatched(self._last, piece.t_s))
                 self._tell(None, estimates[-1])
+        if said := portion.of(GATEWAY).received:
+            self._words += self.gateway.take(said, self.intake.newest_s)
         return estimates
+
+    def _words_until(self, t_s: float) -> list[Word]:
+        """What beacons have said up to then and nobody has heard yet."""
+        words = [word for word in self._words if word.t_s <= t_s]
+        self._words = [word for word in self._words if word.t_s > t_s][-MOST_WORDS:]
+        return words
 
     def _tell(self, passage: Passage | None, told: Estimate) -> None:
         if self.watch:
@@ -161,4 +177,4 @@ class Tracker:
         self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
     ) -> MapFilter:
         s, b = self.settings, self.building
-        return MapFilter(b.walls, start, walk_heading_rad, rng, cloud or s.cloud, s.echo, b.storeys, s.climb)
+        return MapFilter(b.walls, start, walk_heading_rad, rng, cloud or s.cloud, s.echo, b.storeys, s.climb, s.beacons)

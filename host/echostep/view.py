@@ -155,7 +155,10 @@ def health(tracker: Tracker) -> str:
     board, status = tracker.intake.board.counts, tracker.intake.status
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
-    return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}"
+    heard = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
+    return (
+        f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}{heard}"
+    )
 
 
 def findings(tracker: Tracker) -> list[Finding]:

@@ -61,6 +61,7 @@ def cases() -> Iterator[Case]:
     for name, system in SYSTEMS.items():
         yield Case(name, system)
     for name, system in list(SYSTEMS.items())[1:]:
+        yield Case(f"{name}/known-to-1m", system, replace(UNCERTAIN, axis_sd_deg=0.0), every=CLOSER)
         yield Case(f"{name}/uncertain", system, UNCERTAIN, every=CLOSER)
         yield Case(f"{name}/people", system, person=PEOPLE, every=CLOSER)
         yield Case(f"{name}/moved", system, replace(NOMINAL, moved=0.1), every=SAMPLE)

@@ -61,6 +61,7 @@ class Person:
 
 
 OBEDIENT = Person()
+IRON = BeaconSettings(kick_per_m=0.3, tries_per_m=0.5)  # for a heading that a compass leads, as the paper's
 
 
 class Return(NamedTuple):
@@ -129,7 +130,7 @@ def guided_return(
     `period_s`: between ultrasound measurements. `deployed`: nothing is known of the beacons but what was heard on the way in, which is simulated too;
     else `world.believed` is known within `place_sd_m` and `axis_sd_rad`.
     """
-    settings = settings or BeaconSettings()
+    settings = settings or IRON
     rules = _Rules(
         system, max(round(period_s / TICK_S), 1), threshold_m, round(person.delay_s / TICK_S), math.radians(person.heading_sd_deg),
         person.wrong_turns, deployed, settings.drop_sd_m**2, settings.step_sd,

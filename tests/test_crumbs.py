@@ -1,0 +1,130 @@
+"""Beacons in the tracker: a simulated walk with a gateway is tracked, live and replayed alike, and floods of nonsense change nothing."""
+
+from __future__ import annotations
+
+import heapq
+import random
+import subprocess
+import sys
+from importlib.resources import files
+from operator import attrgetter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from echostep.errors import EchostepError
+from echostep.estimate import digest
+from echostep.guided import Guided, destination
+from echostep.plan import Plan, load_plan
+from echostep.routes import Place
+from echostep.simulation.board import PythonBoard
+from echostep.simulation.gateway import BeaconWorld, gateway_chunks, lay_beacons
+from echostep.simulation.scenario import START_NS, Scenario
+from echostep.sources import GATEWAY, Chunk, portion_of
+from echostep.tracker import Tracker
+
+SEED = 5
+
+
+def demo() -> Plan:
+    return load_plan(Path(str(files("echostep") / "plans" / "demo.json")))
+
+
+class Walk:
+    def __init__(self) -> None:
+        self.plan = demo()
+        scenario = Scenario(self.plan, ((2.0, 7.5), (22.0, 7.5)), SEED, PythonBoard(seed=SEED))
+        self.start, self.truth = scenario.start, scenario.truth
+        self.alone = list(scenario.chunks())
+        scenario.close()
+        self.places = lay_beacons(self.truth[:, 1:3], 5.0, np.random.default_rng(SEED))
+        arrival_ns = START_NS + np.rint(1e9 * self.truth[:, 0]).astype(np.int64)
+        world = BeaconWorld(self.places, self.plan.levels[0].walls)
+        said = gateway_chunks(world, self.truth[:, 0], self.truth[:, 1:3], arrival_ns, SEED)
+        self.chunks = list(heapq.merge(self.alone, said, key=attrgetter("t_arrival_ns")))
+
+    def tracker(self) -> Tracker:
+        return Tracker(self.plan, self.start, seed=SEED)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Walk:
+    return Walk()
+
+
+def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> None:
+    live, replayed = walk.tracker(), walk.tracker()
+    one = [e for chunk in walk.chunks for e in live.feed(chunk)]
+    rng, two, rest = random.Random(SEED), [], walk.chunks
+    while rest:
+        cut = rng.randrange(1, 900)
+        two += replayed.take(portion_of(rest[:cut]))
+        rest = rest[cut:]
+    assert digest(one) == digest(two)
+    assert live.gateway.counts.words > 100
+    assert live.filter is not None
+    places = live.filter.crumbs.places(live.filter.cloud, one[-1].t_s)
+    assert len(places) >= 3
+    for p in places:
+        x, y, _ = walk.places[live.gateway.numbers[p.slot] - 1]
+        assert np.hypot(p.x_m - x, p.y_m - y) < 0.8
+    end = walk.truth[-1, 1:3]
+    assert np.hypot(one[-1].x_m - end[0], one[-1].y_m - end[1]) < 0.3
+
+
+def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
+    rng = random.Random(SEED)
+    noise = [Chunk(GATEWAY, c.t_arrival_ns, rng.randbytes(200) + b"\0") for c in walk.alone[::200]]
+    noisy = list(heapq.merge(walk.alone, noise, key=attrgetter("t_arrival_ns")))
+    quiet, disturbed = walk.tracker(), walk.tracker()
+    assert digest(quiet.take(portion_of(walk.alone))) == digest(disturbed.take(portion_of(noisy)))
+    assert disturbed.gateway.counts.broken >= len(noise)
+
+
+def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> None:
+    tracker = walk.tracker()
+    guided = Guided(tracker, Place(*walk.truth[-1, 1:3].tolist()))
+    guided.take(tracker.take(portion_of(walk.chunks)))
+    assert [c.kind.value for c in guided.cues[-1:]] == ["arrived"]
+    assert "ahead" in {c.kind.value for c in guided.cues}
+    guided.write(tmp_path / "cues.csv")
+    assert len((tmp_path / "cues.csv").read_text().splitlines()) == len(guided.cues) + 1
+
+
+def test_destinations_are_rooms_or_places() -> None:
+    plan = demo()
+    assert destination("office 2", plan) == Place(9.4, 12.2)
+    assert destination("3,2", plan) == Place(3.0, 2.0)
+    assert destination("start", plan) == Place(2.0, 7.5)
+    for wrong in ("kitchen", "1,2,9", "nan,1", "1,2,3,4"):
+        with pytest.raises(EchostepError, match="Office 1"):
+            destination(wrong, plan)
+
+
+def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "truth.csv", walk.truth[:200], delimiter=",", header="t_s,x,y,heading_rad,z", comments="")
+    plan = Path(str(files("echostep") / "plans" / "demo.json"))
+    command = [
+        sys.executable,
+        "-m",
+        "echostep",
+        "beacons",
+        "simulate",
+        "--plan",
+        str(plan),
+        "--truth",
+        "truth.csv",
+        "--pace",
+        "100",
+    ]
+    run = subprocess.run(
+        [*command, "--to", "udp://127.0.0.1:9"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert "bytes sent" in run.stdout
+    run = subprocess.run(
+        [*command, "--to", "/dev/nowhere"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert run.returncode == 2
+    assert run.stderr.startswith("echostep: /dev/nowhere")
