@@ -24,6 +24,7 @@ from echostep.legs import Flag, Legs, LegsSettings, Stride
 Floats = NDArray[np.float64]
 
 TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes away again
+SETTING_OFF_S = 1.0  # the first step
 SCALE_SD = 0.008  # by which the scale of strides wanders from one to the next
 REMEMBERED_S = 12.0  # of headings: longer than any stride waits to be told
 RECENT_S = 0.3  # who stands is told of so much later
@@ -95,7 +96,8 @@ class LegPath:
         self._told_s = t1
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
-        direction, length = self._direction(t0, t1), share * stride.length_m
+        begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0  # who turns on the spot goes nowhere before
+        direction, length = self._direction(max(t0, begun), t1), share * stride.length_m
         scale_sd = 0.0 if standing else SCALE_SD if self._begun else stride.scale_sd
         self._begun = self._begun or not standing
         return Leg(
