@@ -6,6 +6,7 @@ import heapq
 import random
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.resources import files
 from operator import attrgetter
 from pathlib import Path
@@ -85,11 +86,39 @@ def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
 def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> None:
     tracker = walk.tracker()
     guided = Guided(tracker, Place(*walk.truth[-1, 1:3].tolist()))
-    guided.take(tracker.take(portion_of(walk.chunks)))
+    tracker.take(portion_of(walk.chunks))
     assert [c.kind.value for c in guided.cues[-1:]] == ["arrived"]
     assert "ahead" in {c.kind.value for c in guided.cues}
     guided.write(tmp_path / "cues.csv")
     assert len((tmp_path / "cues.csv").read_text().splitlines()) == len(guided.cues) + 1
+    assert guided.news() == guided.cues
+    assert not guided.news()
+
+
+def test_cues_of_a_run_and_of_its_replay_are_the_same(walk: Walk) -> None:
+    """The gateway is silent in the middle: who waits for the end of a portion does not see that."""
+    first_ns = walk.chunks[0].t_arrival_ns
+    quiet = [c for c in walk.chunks if c.port != GATEWAY or not 6e9 < c.t_arrival_ns - first_ns < 14e9]
+    told = []
+    for size in (1, 700, len(quiet)):
+        tracker = walk.tracker()
+        guided = Guided(tracker, Place(*walk.truth[-1, 1:3].tolist()))
+        for begin in range(0, len(quiet), size):
+            tracker.take(portion_of(quiet[begin : begin + size]))
+        told.append([(c.t_s, c.kind.value, c.text, c.arrow_rad, c.spoken) for c in guided.cues])
+    assert told[0] == told[1] == told[2]
+    assert {"return", "ahead", "arrived"} <= {kind for _, kind, *_ in told[0]}
+
+
+def test_a_place_that_no_way_leads_to_is_told(walk: Walk) -> None:
+    room = np.array([[4.0, 14.0, 6.0, 14.0], [6.0, 14.0, 6.0, 18.0], [6.0, 18.0, 4.0, 18.0], [4.0, 18.0, 4.0, 14.0]])
+    level = walk.plan.levels[0]
+    closed = replace(walk.plan, levels=(replace(level, walls=np.concatenate([level.walls, room])),))
+    tracker = Tracker(closed, walk.start, seed=SEED)
+    guided = Guided(tracker, Place(5.0, 16.0))
+    tracker.take(portion_of(walk.chunks[: len(walk.chunks) // 3]))
+    assert {(c.kind.value, c.arrow_rad) for c in guided.cues} == {("stop", None)}
+    assert [c.spoken for c in guided.cues if c.spoken] == ["Stop. No way leads there from here."]
 
 
 def test_destinations_are_rooms_or_places() -> None:

@@ -67,7 +67,7 @@ class Tracker:
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self.gateway = Gateway()
         self._words: list[Word] = []  # that wait for their leg
-        self.watch: Watch | None = None
+        self.watchers: list[Watch] = []  # are told in this order
         self.check_ins = 0
         self.bad_check_ins = 0
         self._rng = np.random.default_rng(seed)
@@ -144,8 +144,8 @@ class Tracker:
         return words
 
     def _tell(self, passage: Passage | None, told: Estimate) -> None:
-        if self.watch:
-            self.watch(passage, told)
+        for watch in self.watchers:
+            watch(passage, told)
 
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
