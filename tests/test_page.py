@@ -504,3 +504,7 @@ def test_guidance_points_and_arrives() -> None:
     assert way.arrow_rad == pytest.approx(math.pi / 2)
     assert straight(told(), Place(2.3, 7.5, 0)).text == "You have arrived"
     assert "1 level up" in straight(told(), Place(2.3, 7.5, 1)).text
+    looks_north = replace(told(), heading_rad=math.pi / 2)
+    assert straight(looks_north, Place(2.0, 17.5, 0)).arrow_rad == pytest.approx(0.0)
+    unknown = straight(replace(told(), heading_sd_rad=2.0), Place(2.0, 17.5, 0))
+    assert (unknown.kind, unknown.arrow_rad) == ("stop", None)

@@ -17,7 +17,7 @@ from websockets.sync.client import ClientConnection
 from echostep.estimate import Estimate
 from echostep.guidance import Cue, CueKind
 from echostep.guided import Guided
-from echostep.page.guide import guidance
+from echostep.page.guide import guidance, rest
 from echostep.page.live import LivePage
 from echostep.page.marks import Mark
 from echostep.page.scene import Scene
@@ -32,7 +32,7 @@ from test_page import LOCAL, PLAN, next_frame, opened, opened_url, scene, served
 SEED = 5
 TO = Place(9.5, 10.8)
 WAY = Route((Stretch(0, np.array([[2.0, 7.5], [9.5, 7.5]])), Stretch(1, np.array([[9.5, 7.5], [9.5, 10.8]]))))
-AHEAD = Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "Straight ahead.", 7.5)
+AHEAD = Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "Straight ahead.", 10.8)
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,16 @@ def test_a_sentence_stands_until_there_is_a_new_one() -> None:
     assert silent.path == ((9.5, 7.5), (9.5, 10.8))
     left = guidance(replace(AHEAD, t_s=3.0, kind=CueKind.STOP, spoken="Stop."), None, 0, silent)
     assert (left.spoken, left.spoken_s, left.left_m, left.path) == ("Stop.", 3.0, None, ())
+
+
+def test_what_is_left_of_a_way() -> None:
+    there_and_back = Route((*WAY.stretches, Stretch(0, np.array([[9.5, 10.8], [9.5, 5.8], [2.0, 5.8]]))))
+    assert rest(there_and_back, 0, 99.0) == ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
+    assert rest(there_and_back, 0, 12.5 + 3.3 + 4.5) == ((5.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
+    assert rest(there_and_back, 1, 12.5 + 1.3) == ((9.5, 9.5), (9.5, 10.8))
+    assert rest(there_and_back, 0, 12.5 + 1.3) == ((9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
+    assert np.allclose(rest(there_and_back, 0, 7.0), ((9.0, 5.8), (2.0, 5.8)))
+    assert rest(there_and_back, 1, 7.0) == rest(there_and_back, 0, 0.0) == ()
 
 
 def test_who_turns_and_who_falls_silent() -> None:

@@ -30,6 +30,9 @@ class CueKind(StrEnum):
     AHEAD = "ahead"
 
 
+NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
+
+
 @dataclass(frozen=True, slots=True)
 class Cue:
     """What a person is told now. `arrow_rad`: where to walk, from where he looks, counter-clockwise; None: no arrow is shown.
@@ -97,7 +100,7 @@ class Guide:
         if e.status is not Status.LOST and silent_s < self._settings.deaf_s:
             self._sure = Place(e.x_m, e.y_m, e.level)
         if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
-            return self._told(e, CueKind.STOP, "Stop. Your direction is not known: turn once around, slowly", None)
+            return self._told(e, CueKind.STOP, NO_HEADING, None)
         if e.status is Status.LOST or silent_s >= self._settings.return_s:
             return self._back(e, silent_s)
         self._find(e)

@@ -10,14 +10,17 @@ import math
 import threading
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from echostep.estimate import Estimate
-from echostep.guidance import Cue, CueKind, Guide
+from echostep.guidance import NO_HEADING, Cue, CueKind, GuidanceSettings, Guide
 from echostep.plan import Plan
+from echostep.polyline import along, way_m
 from echostep.routes import Place, Route, Routes
 
 ARRIVED_M = 1.0
 AGAIN_S = 5.0  # a new way is looked for no sooner, in data time
-UNKNOWN_RAD = 1.0  # beyond this standard deviation of the heading no arrow is shown
+UNKNOWN_RAD = math.radians(GuidanceSettings().heading_sd_deg)
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
 NO_WAY = "No way was found. The arrow shows the straight line."
 STRAIGHT = "straight"  # the kind of a guidance that knows no way
@@ -25,7 +28,8 @@ STRAIGHT = "straight"  # the kind of a guidance that knows no way
 
 @dataclass(frozen=True, slots=True)
 class Guidance:
-    """What to do, in words; `arrow_rad`: where to walk, from where he looks, counter-clockwise; `path`: the way on his level as points.
+    """What to do, in words; `arrow_rad`: where to walk, from where he looks, counter-clockwise; `path`: what is left of the way on his
+    level, as points.
 
     `kind` is a `CueKind` or `STRAIGHT`, `left_m` the way that is left, None where that helps nobody. `spoken` is the last sentence and `spoken_s`
     when it was said. `own`: the page's own destination, not the run's.
@@ -55,10 +59,26 @@ class Guidance:
 def guidance(cue: Cue, route: Route | None, level: int, before: Guidance | None) -> Guidance:
     """A cue as it is shown on a level; `before`: what was shown until now, whose sentence stands as long as there is no new one."""
     said = (cue.spoken, cue.t_s) if cue.spoken else (before.spoken, before.spoken_s) if before else ("", cue.t_s)
-    lines = [stretch.line_m for stretch in route.stretches if stretch.level == level] if route else []
-    path = tuple((x, y) for line in lines for x, y in line.tolist())
+    path = () if route is None or math.isnan(cue.left_m) else rest(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
     return Guidance(cue.kind.value, cue.text, cue.arrow_rad, left_m, path, *said)
+
+
+def rest(route: Route, level: int, left_m: float) -> tuple[tuple[float, float], ...]:
+    """The last `left_m` of a way, what of it is on a level, as points."""
+    points: list[tuple[float, float]] = []
+    for stretch in reversed(route.stretches):
+        if left_m <= 0.0:
+            break
+        line, length_m = stretch.line_m, way_m(stretch.line_m)
+        if stretch.level == level:
+            if left_m < length_m:
+                x, y, _ = along(line, length_m - left_m)
+                come_m = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
+                line = np.vstack([(x, y), line[come_m > length_m - left_m]])
+            points[:0] = [(x, y) for x, y in line.tolist()]
+        left_m -= length_m
+    return tuple(points)
 
 
 class Ways:
@@ -123,7 +143,8 @@ def straight(told: Estimate, goal: Place, why: str = "") -> Guidance:
     if distance_m <= ARRIVED_M and not levels:
         return Guidance(CueKind.ARRIVED.value, "You have arrived", None, None, path, "You have arrived.")
     climb = f", {abs(levels)} level{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
+    if told.heading_sd_rad > UNKNOWN_RAD:
+        return Guidance(CueKind.STOP.value, NO_HEADING, None, None, path, f"{NO_HEADING}.")
     arrow = math.remainder(math.atan2(dy, dx) - told.heading_rad, 2.0 * math.pi)
-    known = told.heading_sd_rad <= UNKNOWN_RAD
     text = f"In a straight line{climb}{': ' if why else ''}{why}"
-    return Guidance(STRAIGHT, text, arrow if known else None, distance_m, path, NO_WAY if why else "")
+    return Guidance(STRAIGHT, text, arrow, distance_m, path, NO_WAY if why else "")
