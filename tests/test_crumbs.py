@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 import random
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from echostep.beacons import Beliefs, moments
 from echostep.errors import EchostepError
 from echostep.estimate import digest
 from echostep.guided import Guided, destination
@@ -72,6 +74,19 @@ def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> 
         assert np.hypot(p.x_m - x, p.y_m - y) < 0.8
     end = walk.truth[-1, 1:3]
     assert np.hypot(one[-1].x_m - end[0], one[-1].y_m - end[1]) < 0.3
+
+
+def test_moments_are_those_of_the_mixture() -> None:
+    rng = np.random.default_rng(SEED)
+    n, b = 500, 3
+    beliefs = Beliefs(rng.normal(40.0, 2.0, (n, b, 3)), rng.uniform(0.1, 1.0, (n, b, 6)))
+    weight = rng.uniform(size=n)
+    weight /= weight.sum()
+    for k, (x, y, sd, axis) in enumerate(moments(beliefs, weight)):
+        m, c = beliefs.mean[:, k], beliefs.cov[:, k]
+        assert (x, y) == pytest.approx((weight @ m[:, 0], weight @ m[:, 1]))
+        assert 2.0 * sd**2 == pytest.approx(weight @ ((m[:, 0] - x) ** 2 + (m[:, 1] - y) ** 2 + c[:, 0] + c[:, 3]))
+        assert axis == pytest.approx(math.atan2(weight @ np.sin(m[:, 2]), weight @ np.cos(m[:, 2])))
 
 
 def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:

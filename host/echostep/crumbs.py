@@ -25,6 +25,7 @@ from echostep.beacons import (
     beacon_model,
     hear,
     kick,
+    moments,
     place,
     unheard,
 )
@@ -99,22 +100,19 @@ class Crumbs:
         weight = np.exp(cloud.log_weight)
         weight /= weight.sum()
         here = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
-        return [self._place(cloud, weight, slot, here, t_s) for slot in np.flatnonzero(self._health.known).tolist()]
+        found = moments(cloud.beliefs, weight)
+        known = np.flatnonzero(self._health.known).tolist()
+        return [self._place(cloud, slot, found[slot].tolist(), here, t_s) for slot in known]
 
-    def _place(self, cloud: Cloud, weight: Floats, slot: int, here: tuple[float, float], t_s: float) -> BeaconPlace:
-        mean, cov = cloud.beliefs.mean[:, slot], cloud.beliefs.cov[:, slot]
-        x, y = float(weight @ mean[:, 0]), float(weight @ mean[:, 1])
-        spread = weight @ ((mean[:, 0] - x) ** 2 + (mean[:, 1] - y) ** 2 + cov[:, 0] + cov[:, 3])
-        axis = math.atan2(float(weight @ np.sin(mean[:, 2])), float(weight @ np.cos(mean[:, 2])))
+    def _place(self, cloud: Cloud, slot: int, found: list[float], here: tuple[float, float], t_s: float) -> BeaconPlace:
+        x, y, sd, axis = found
         state = BeaconState.MOVED if self._health.each[slot, UNFIT_RUNS] else BeaconState.WELL
         others = self.heard_s is not None and t_s - self.heard_s < SILENT_S
         near = math.hypot(x - here[0], y - here[1]) < NEAR_SHARE * self._reach_m[slot]
         if near and others and t_s - self._heard_s[slot] > SILENT_S:
             state = BeaconState.SILENT
         level = cloud.level_at(x)
-        return BeaconPlace(
-            slot, x - level * cloud.pitch_m, y, math.sqrt(0.5 * float(spread)), axis, level, state, self._heard_s[slot]
-        )
+        return BeaconPlace(slot, x - level * cloud.pitch_m, y, sd, axis, level, state, self._heard_s[slot])
 
     def _at_word(self, cloud: Cloud, leg: Leg, word: Word) -> tuple[Floats, Floats]:
         """Where the particles were (n,), (n,) when a word of the last leg was said."""

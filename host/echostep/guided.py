@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.estimate import Estimate
+from echostep.estimate import Estimate, Status
 from echostep.guidance import Cue, CueKind, Guide
 from echostep.plan import Plan
 from echostep.routes import Place, Route, Routes
@@ -50,7 +50,10 @@ class Guided:
         self._tracker = tracker
         self._to = to
         self._routes = Routes(tracker.plan)
-        self._routes.way(to, to)
+        first = Guide(self._routes.way(to, to))
+        first.cue(
+            Estimate(0.0, to.x_m, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, Status.TRACKING, to.level)
+        )  # compiled now, not on the way
         self._guide: Guide | None = None
         self._asked = 0
         self.cues: list[Cue] = []

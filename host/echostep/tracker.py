@@ -152,7 +152,9 @@ class Tracker:
         self.intake.warm_up()
         leg = Leg(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         one = Passage(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
-        self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0)).follow(one)
+        first = self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
+        first.follow(one, [Word(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+        first.crumbs.places(first.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
 
     def _first(self, walk_heading_rad: float) -> MapFilter | None:
