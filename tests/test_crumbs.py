@@ -24,6 +24,7 @@ from echostep.routes import Place
 from echostep.simulation.board import PythonBoard
 from echostep.simulation.gateway import BeaconWorld, gateway_chunks, lay_beacons
 from echostep.simulation.scenario import START_NS, Scenario
+from echostep.simulation.walker import Waypoint
 from echostep.sources import GATEWAY, Chunk, portion_of
 from echostep.tracker import Tracker
 
@@ -74,6 +75,33 @@ def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> 
         assert np.hypot(p.x_m - x, p.y_m - y) < 0.8
     end = walk.truth[-1, 1:3]
     assert np.hypot(one[-1].x_m - end[0], one[-1].y_m - end[1]) < 0.3
+
+
+def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, str]:
+    """The states of the beacons about a walk in the corridor, of which number 2 dies."""
+    plan = demo()
+    scenario = Scenario(plan, path, SEED, PythonBoard(seed=SEED))
+    t_s, xy_m = scenario.truth[:, 0], scenario.truth[:, 1:3]
+    places = np.array([(3.0, 7.4, 0.0), (8.5, 7.6, 1.0), (9.5, 10.8, 2.0)])
+    after = np.where(np.arange(3)[:, None] == 1, 500.0, places)
+    arrival_ns = START_NS + np.rint(1e9 * t_s).astype(np.int64)
+    walls, early = plan.levels[0].walls, t_s < min(dies_s, t_s[-2])
+    said = [
+        *gateway_chunks(BeaconWorld(places, walls), t_s[early], xy_m[early], arrival_ns[early], SEED),
+        *gateway_chunks(BeaconWorld(after, walls), t_s[~early], xy_m[~early], arrival_ns[~early], SEED),
+    ]
+    tracker = Tracker(plan, scenario.start, seed=SEED)
+    tracker.take(portion_of(list(heapq.merge(scenario.chunks(), said, key=attrgetter("t_arrival_ns")))))
+    assert tracker.filter
+    found = tracker.filter.crumbs.places(tracker.filter.cloud, t_s[-1])
+    return {tracker.gateway.numbers[p.slot]: p.state.value for p in found}
+
+
+def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> None:
+    there_and_back = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.6), (9.5, 7.5), (4.0, 7.5), (9.0, 7.5), (4.0, 7.5), (6.0, 7.5))
+    assert states_at_the_end(there_and_back, 19.0) == {1: "well", 2: "silent", 3: "well"}
+    into_the_corner = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.6), (11.6, 9.4, 12.0), (11.7, 9.5))
+    assert states_at_the_end(into_the_corner, math.inf) == {1: "well", 2: "well", 3: "well"}
 
 
 def test_moments_are_those_of_the_mixture() -> None:

@@ -351,7 +351,8 @@ def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp
         page.wait_for_timeout(700)
         colours = [ink_near(page, *place) for place in path[1:]]
         found = Axe().run(page)
-        picture(page, {"bright": "guide", "dark": "guide-dark", "contrast": "guide-contrast"}[look], tmp_path)
+        if look != "contrast":
+            picture(page, "guide" if look == "bright" else "guide-wide", tmp_path)
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
         outside = page.evaluate(
             "[...document.querySelectorAll('#guidance > *')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
@@ -393,7 +394,7 @@ def ink_near(page: Any, x_m: float, y_m: float) -> bool:
 
 def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
     stage = Stage(PLAN, "test", replay=False)
-    told = [guidance(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0), None, 0, None) for t, text in SENTENCES]
+    told = [guidance(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES]
     with PageServer(stage, LOCAL) as server:
         page = browser.new_context(**LOOKS["bright"]).new_page()
         page.add_init_script(SPEECH)
@@ -428,7 +429,7 @@ def test_the_arrow_turns_the_short_way_and_is_gone_when_nobody_knows(browser: An
     stage = Stage(PLAN, "test", replay=False)
     turn = "document.querySelector('#arrow').style.transform"
     with PageServer(stage, LOCAL) as server:
-        shown = replace(guidance(Cue(1.0, CueKind.TURN, "Turn left", 3.0, "", 9.0), None, 0, None))
+        shown = replace(guidance(Cue(1.0, CueKind.TURN, "Turn left", 2.0, "", 9.0, 3.0), None, 0, None))
         stage.publish(replace(scene(), guidance=shown))
         page = looking(browser, server.url, "bright")
         wait_for(page, f"{turn} === 'rotate(-3rad)'")

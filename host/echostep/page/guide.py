@@ -61,7 +61,7 @@ def guidance(cue: Cue, route: Route | None, level: int, before: Guidance | None)
     said = (cue.spoken, cue.t_s) if cue.spoken else (before.spoken, before.spoken_s) if before else ("", cue.t_s)
     path = () if route is None or math.isnan(cue.left_m) else rest(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
-    return Guidance(cue.kind.value, cue.text, cue.arrow_rad, left_m, path, *said)
+    return Guidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *said)
 
 
 def rest(route: Route, level: int, left_m: float) -> tuple[tuple[float, float], ...]:

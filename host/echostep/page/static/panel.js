@@ -3,6 +3,7 @@
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕' };
 const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
 const SPOKEN_MS = 8000;  // a screen reader hears a new place no sooner
+const FASTEST_RAD_S = Math.PI;  // as the arrow of the guide turns
 const $ = (id) => document.getElementById(id);
 
 export class Panel {
@@ -49,8 +50,12 @@ export class Panel {
     const { kind, text, arrow_rad, left_m, own } = guidance;
     $('guidance').dataset.kind = kind;
     $('turn').dataset.sign = arrow_rad !== null ? 'arrow' : kind === 'arrived' ? 'there' : 'halt';
-    if (arrow_rad !== null) this.turn += Math.atan2(Math.sin(-arrow_rad - this.turn), Math.cos(-arrow_rad - this.turn));
-    $('arrow').style.transform = `rotate(${this.turn}rad)`;
+    const by = arrow_rad === null ? 0 : Math.atan2(Math.sin(-arrow_rad - this.turn), Math.cos(-arrow_rad - this.turn));
+    if (by) {
+      this.turn += by;
+      $('arrow').style.transition = `transform ${0.2 + Math.abs(by) / FASTEST_RAD_S}s ease-out`;
+      $('arrow').style.transform = `rotate(${this.turn}rad)`;
+    }
     $('cue').textContent = text;
     $('left').textContent = left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`;
     $('nowhere').hidden = !own;
