@@ -304,10 +304,11 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
 def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
     start, chunks = demo_walk(beacons=False)
     tracker = Tracker(PLAN, start, seed=1)
-    portion = portion_of(chunks)
     with LivePage(tracker, "A replay", LOCAL, replay=True) as film:
-        tracker.take(portion)
-        film.shown(portion)
+        for begin in range(0, len(chunks), 2000):
+            portion = portion_of(chunks[begin : begin + 2000])
+            tracker.take(portion)
+            film.shown(portion)
         page = looking(browser, film.url, "bright")
         assert page.is_hidden("#here")
         page.select_option("#times", "16")

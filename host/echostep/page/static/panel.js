@@ -98,8 +98,8 @@ function near({ x_m, y_m }, rooms) {
 
 function whereabouts(told, rooms) {
   const degrees = ((told.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((told.heading_sd_rad * 180) / Math.PI);
-  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ± ${spread}°` : 'heading unknown';
-  return [near(told, rooms), `x ${told.x_m.toFixed(1)} m, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
+  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
+  return [near(told, rooms), `x ${told.x_m.toFixed(1)}, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
 }
 
 function echoes(beams) {
