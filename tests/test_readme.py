@@ -74,7 +74,10 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
         "calibrate",
         "command",
         "beacons simulate",
-        *(f"evaluate {name}" for name in ("feet", "girard2011", "echoes", "trails", "fischer2008")),
+        *(
+            f"evaluate {name}"
+            for name in ("feet", "girard2011", "echoes", "trails", "fischer2008", "lee2010", "floors", "storeys")
+        ),
     ],
 )
 def test_every_option_that_is_named_exists(command: str) -> None:

@@ -824,6 +824,6 @@ def test_the_truth_file_is_the_trunk_at_fifty_hertz(plan: Plan, tmp_path: Any) -
     scenario = Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1))
     scenario.write_truth(tmp_path / "truth.csv", 2.0)
     table = np.loadtxt(tmp_path / "truth.csv", delimiter=",", skiprows=1)
-    assert (tmp_path / "truth.csv").read_text().startswith("t_s,x,y,heading_rad\n")
+    assert (tmp_path / "truth.csv").read_text().startswith("t_s,x,y,heading_rad,z\n")
     assert np.allclose(np.diff(table[:, 0]), 0.02)
-    assert table[0] == pytest.approx([2.0, *scenario.walk.trunk_m[0], scenario.walk.heading_rad[0]], abs=1e-5)
+    assert table[0] == pytest.approx([2.0, *scenario.walk.trunk_m[0], scenario.walk.heading_rad[0], 0.0], abs=1e-5)

@@ -13,8 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from shapely import Point, Polygon
 
+from echostep import messages as m
+from echostep.building.formats import open_plan
 from echostep.climbing import ClimbSettings, Rise, climb, climb_model
 from echostep.estimate import Estimate, Status
+from echostep.evaluate.storeys import judge, through
 from echostep.particles import ANY_LEVEL, Cloud, CloudSettings, Move
 from echostep.plan import Connector, Level, Plan, Pose
 from echostep.simulation.board import PythonBoard
@@ -24,6 +27,7 @@ from echostep.simulation.walker import Person, Waypoint, walk
 from echostep.sources import MTX, Chunk, portion_of
 from echostep.storeys import LIFT, STAIRS, Storeys, building, connector_at, level_of, nearest_level, storeys_of
 from echostep.tracker import Tracker
+from foot_walks import data_folder
 
 Floats = NDArray[np.float64]
 FLAT = Rise(0.0, 0.02, 0.0, math.inf, 1.0)
@@ -227,10 +231,14 @@ def test_a_walk_by_stairs_and_lift_is_followed() -> None:
     assert all(sum(e.levels) == pytest.approx(1.0) for e in estimates)
 
 
-def test_without_the_foot_the_pressure_still_tells_the_level() -> None:
-    """The MTx falls silent before the stairs: the position is lost, the level comes back with him."""
+@pytest.mark.parametrize("wears_gyros", [False, True])
+def test_without_the_foot_the_pressure_still_tells_the_level(wears_gyros: bool) -> None:
+    """The MTx falls silent before the stairs: leg gyros carry the track on; without them it is lost, and the level comes back with the foot."""
     plan = tower(2)
-    scenario = Scenario(plan, tour(2), 2, PythonBoard(2))
+    gyros = m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT
+    worn = m.Sensors(0xFF) if wears_gyros else m.Sensors(0xFF) & ~gyros
+    configure = m.Configure(worn, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
+    scenario = Scenario(plan, tour(2), 2, PythonBoard(2), configure=configure)
     t_up = scenario.walk.t_s[np.argmax(scenario.walk.height_m > 0.1)] - 2.0
     t_top = scenario.walk.t_s[np.argmax(scenario.walk.height_m > STOREY_M - 0.01)] + 1.0
     silent = (1_000_000_000 + int(t_up * 1e9), 1_000_000_000 + int(t_top * 1e9))
@@ -242,10 +250,40 @@ def test_without_the_foot_the_pressure_still_tells_the_level() -> None:
     tracker = Tracker(plan, scenario.start, seed=2)
     estimates = [e for k in range(0, len(chunks), 1000) for e in tracker.take(portion_of(chunks[k : k + 1000]))]
     later = [e for e in estimates if t_top + 5.0 < e.t_s < t_top + 8.0]
-    assert any(e.status is Status.LOST for e in estimates)
+    assert any(e.status is Status.LOST for e in estimates) != wears_gyros
     assert later
     assert all(e.level == 1 for e in later)
 
 
 def test_kinds_have_the_kernels_numbers() -> None:
     assert storeys_of(tower(2)).kind.tolist() == [STAIRS, LIFT]
+
+
+# A real building's plan
+
+
+@pytest.mark.skipif(not (data_folder() / "maps").is_dir(), reason="skipped: no maps (../shared/data or $ECHOSTEP_DATA)")
+def test_all_seven_floors_of_a_real_plan_are_walked() -> None:
+    """By stairs and lift; the walk is simulated."""
+    plan = open_plan(data_folder() / "maps" / "westport-house")
+    assert len(plan.levels) == 7
+    way = through(plan, 3)
+    scenario, estimates = tracked(plan, way, 3)
+    found = judge(plan, scenario.truth, estimates)
+    assert found["floors"] == 7
+    assert found["floor_right"] == 1.0
+    assert found["mean_m"] < 0.5
+
+
+def test_floors_are_judged_by_what_is_nearest() -> None:
+    plan = tower(3)
+    truth = np.array([[0.0, 5.0, 1.5, 0.0, 0.0], [10.0, 5.0, 1.5, 0.0, 0.0], [20.0, 5.0, 1.5, 0.0, 7.0]])
+
+    def at(t_s: float, level: int) -> Estimate:
+        return Estimate(t_s, 5.0, 1.5, 0.01, 0.0, 0.01, 0.0, 0.1, 1, Status.TRACKING, level)
+
+    found = judge(plan, truth, [at(1.0, 0), at(2.0, 1), at(3.0, 1), at(5.0, 0), at(12.6, 0), at(20.0, 2)])
+    assert found["floor_right"] == pytest.approx(4 / 6), "at 12.6 s he is 1.82 m high: both floors are as good"
+    assert found["strict_right"] == pytest.approx(3 / 6)
+    assert found["longest_wrong_s"] == pytest.approx(1.0)
+    assert found["floors"] == 3

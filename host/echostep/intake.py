@@ -173,8 +173,8 @@ class Intake:
             while k < len(foot_at) and (foot_at[k] < at or block is None):
                 self._waiting.go(foot_at[k], self.journey.foot(by_foot[k][1]))
                 k += 1
-            if block is not None:
-                self._waiting.go(at, self.journey.legs(block, float(times.mtx_newest_s[at])))
+            if block is not None and (legs := self.journey.legs(block, float(times.mtx_newest_s[at]))):
+                self._waiting.go(at, legs)
             watched_s[since:at] = np.fmax(watched_s[since:at], by_legs_s)
             by_legs_s, since = self.journey.watched_s, at
         return watched_s

@@ -14,7 +14,7 @@ import math
 from collections import deque
 from dataclasses import replace
 
-from echostep.gait import Leg, wrap
+from echostep.gait import UNWATCHED_SD_M, Leg, wrap
 from echostep.heading import Iron
 from echostep.legpath import Block, LegPath, WearerSettings, rest_of, turned
 
@@ -24,7 +24,7 @@ LIKE = 0.35  # the legs' way against the foot's may be off by this share: else n
 LEAST_M = 3.0  # of a way that tells whether
 USUAL_M = 10.0  # a way as telling as what is known of all people
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over
-BRIDGE_M_S, BRIDGE_M = 0.4, 0.7
+BRIDGE_M_S, BRIDGE_M, BRIEF_S = 0.4, 1.5, 1.0
 STRAIGHT_M, STRAIGHT_RAD = 0.5, math.radians(20.0)
 PATIENCE_S = 4.0  # a foot that is back waits for the legs to catch up
 
@@ -136,7 +136,10 @@ class Journey:
         if not -math.inf < self._covered_s < first.t0_s:
             return []
         assert self._path is not None
-        sd = min(BRIDGE_M_S * (first.t0_s - self._covered_s), BRIDGE_M)
+        span_s = first.t0_s - self._covered_s
+        sd = min(BRIDGE_M_S * span_s, BRIDGE_M)
+        if span_s > BRIEF_S:
+            sd = max(sd, 1.01 * UNWATCHED_SD_M)  # the cloud is to look everywhere about
         heading = self._path.heading_rad(self._covered_s) + self._leg_turn - self._foot_turn
         return [Leg(self._covered_s, first.t0_s, 0.0, 0.0, heading, first.heading0_rad, sd, 0.0, first.step)]
 

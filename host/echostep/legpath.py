@@ -26,17 +26,23 @@ Floats = NDArray[np.float64]
 TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes away again
 SETTING_OFF_S = 1.0  # the first step
 SCALE_SD = 0.008  # by which the scale of strides wanders from one to the next
+CURVE_SD = 0.5  # of what a curve takes from a stride's length: he does not turn evenly
+TWIST_RAD = math.radians(12.0)  # so far the pelvis turns to and fro in a straight stride, which costs no way
 REMEMBERED_S = 12.0  # of headings: longer than any stride waits to be told
 RECENT_S = 0.3  # who stands is told of so much later
 
 
 @dataclass(frozen=True, slots=True)
 class WearerSettings:
-    """Hip to knee and knee to ankle of the wearer; `leg_scale`: how much longer his strides are than these tell, from a walk of known length."""
+    """Hip to knee and knee to ankle of the wearer; `leg_scale`: how much longer his strides are than these tell, from a walk of known length.
+
+    `leg_left_m`: where the leg with the gyros swings, to the left of the trunk (negative: the right leg); in a curve the outer leg goes farther.
+    """
 
     thigh_m: float = 0.43
     shank_m: float = 0.43
     leg_scale: float = 1.0
+    leg_left_m: float = -0.09
 
 
 class Block(NamedTuple):
@@ -56,6 +62,7 @@ class LegPath:
         """`iron`: the compass', when it was calibrated."""
         segments = Segments(settings.thigh_m, settings.shank_m, settings.leg_scale)
         self._legs = Legs(LegsSettings(segments, calibrated=settings.leg_scale != 1.0))
+        self._left_m = settings.leg_left_m
         self._heading = Heading(HeadingSettings(iron=iron))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
         self._told_s = -math.inf  # up to where legs were told
@@ -97,12 +104,16 @@ class LegPath:
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
         begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0  # who turns on the spot goes nowhere before
-        direction, length = self._direction(max(t0, begun), t1), share * stride.length_m
+        ahead, aside = self._direction(max(t0, begun), t1)
+        length = share * stride.length_m
+        if Flag.EDGE not in stride.flags and length > 0.0:
+            length = max(length + self._left_m * (self.heading_rad(t1) - self.heading_rad(t0)), 0.0)
         scale_sd = 0.0 if standing else SCALE_SD if self._begun else stride.scale_sd
         self._begun = self._begun or not standing
+        sd = math.hypot(stride.length_sd_m, CURVE_SD * length * (1.0 - math.hypot(ahead, aside)))
         return Leg(
-            t0, t1, length * math.cos(direction), length * math.sin(direction),
-            self.heading_rad(t0), self.heading_rad(t1), stride.length_sd_m, 0.0 if standing else TURN_SD_RAD, self.steps,
+            t0, t1, length * ahead, length * aside,
+            self.heading_rad(t0), self.heading_rad(t1), sd, 0.0 if standing else TURN_SD_RAD, self.steps,
             scale_sd=scale_sd,
         )  # fmt: skip
 
@@ -110,11 +121,14 @@ class LegPath:
         self._told_s = t1
         return Leg(t0, t1, 0.0, 0.0, self.heading_rad(t0), self.heading_rad(t1), 0.0, 0.0, self.steps)
 
-    def _direction(self, t0: float, t1: float) -> float:
-        """Mean heading over a stride: the pelvis twists to and fro in it."""
+    def _direction(self, t0: float, t1: float) -> tuple[float, float]:
+        """Where an even pace along the headings of a stride leads, per metre: less far in a curve; the pelvis twists to and fro in it."""
         times, headings = (np.array(column) for column in zip(*self._headings, strict=True))
         within = headings[(times >= t0) & (times <= t1)]
-        return float(within.mean()) if len(within) else self.heading_rad(0.5 * (t0 + t1))
+        if not len(within):
+            within = np.array([self.heading_rad(0.5 * (t0 + t1))])
+        twist = np.cos(within - within.mean()).mean() if np.ptp(within) < TWIST_RAD else 1.0
+        return float(np.cos(within).mean() / twist), float(np.sin(within).mean() / twist)
 
 
 def rest_of(leg: Leg, from_s: float) -> Leg:
