@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,8 +22,12 @@ from echostep.plan_edit import EditServer
 from echostep.plan_writer import plan_json, save_plan
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
+PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="300"><rect x="50" y="50" width="300" height="200" fill="none" stroke="#888" stroke-width="8"/></svg>'
+PICTURE = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="300">'
+    '<rect x="50" y="50" width="300" height="200" fill="none" stroke="#888" stroke-width="8"/></svg>'
+)
 
 
 @pytest.fixture
@@ -39,8 +44,11 @@ def asked(
     line = http.client.HTTPConnection("127.0.0.1", at.port or 0, timeout=10)
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     line.request("GET" if body is None else "POST", place if place.startswith("/") else at.path + place, body, named)
-    answer = line.getresponse()
-    return answer.status, answer.read(), answer.headers
+    try:
+        answer = line.getresponse()
+        return answer.status, answer.read(), answer.headers
+    finally:
+        line.close()
 
 
 def test_the_page_the_plan_and_nothing_else(served: EditServer) -> None:
@@ -123,7 +131,7 @@ def test_a_save_that_fails_leaves_the_file_whole(served: EditServer, monkeypatch
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(plan_edit.os, "fsync", full)
+    monkeypatch.setattr("os.fsync", full)
     status, raw, _ = asked(served, "plan", b'{"echostep_plan": 1, "levels": [{"walls": []}]}')
     assert (status, b"No space left" in raw) == (500, True)
     assert served.file.path.read_bytes() == before
@@ -190,7 +198,7 @@ def saved(page: Any, server: EditServer) -> Any:
     return load_plan(server.file.path).levels[0]
 
 
-def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None:
+def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer, tmp_path: Path) -> None:
     page = opened(browser, drawn)
     page.click('[data-tool="scale"]')  # 400 px are 20 m at first; the rectangle's upper side is 15 m
     click(page, 2.5, 12.5)
@@ -223,6 +231,11 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None
     level = saved(page, drawn)
     assert level.doors[0].line == (6.05, 7.0, 6.95, 7.0)
     assert sorted(level.walls.tolist()) == [[3.0, 7.0, 6.05, 7.0], [6.95, 7.0, 8.0, 7.0], [8.0, 7.0, 8.0, 9.5]]
+    page.click('[data-tool="wall"]')
+    click(page, 3.0, 7.0)
+    page.mouse.move(*spot(page, 3.0, 10.0))
+    page.screenshot(path=(PICTURES or tmp_path) / "plan-edit.png")
+    page.keyboard.press("Escape")
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
     page.click('[data-tool="erase"]')
@@ -275,7 +288,8 @@ def test_geometry(browser: Any, drawn: EditServer) -> None:
         t = rng.random()
         p, width = [x0 + t * (x1 - x0), y0 + t * (y1 - y0)], 0.9
         level, filled = page.evaluate(
-            f"async ([wall, p, w]) => {{ const g = await {geometry}, cut = g.cutDoor({{ walls: [wall] }}, 0, p, w); return [cut, g.fillDoor(cut, 0)]; }}",
+            f"""async ([wall, p, w]) => {{ const g = await {geometry}, cut = g.cutDoor({{ walls: [wall] }}, 0, p, w);
+            return [cut, g.fillDoor(cut, 0)]; }}""",
             [wall, p, width],
         )
         x2, y2, x3, y3 = level["doors"][0]["line"]
@@ -289,7 +303,8 @@ def test_geometry(browser: Any, drawn: EditServer) -> None:
         f"""async () => {{ const g = await {geometry}, walls = [[0, 0, 4, 0], [4, 0, 4, 3]];
         return [g.cutDoor({{ walls }}, 0, [1, 0], 5), [
           g.snap([3.9, 0.1], {{ walls }}), g.snap([1.02, 1.53], {{ walls }}), g.snap([2.04, 0.1], {{ walls }}),
-          g.snap([2.13, 2.12], {{ from: [1, 1], before: [0, 0] }}), g.snap([1.07, 3.02], {{ from: [1, 1] }}), g.snap([3.93, 2.02], {{ walls, from: [1, 2] }})],
+          g.snap([2.13, 2.12], {{ from: [1, 1], before: [0, 0] }}), g.snap([1.07, 3.02], {{ from: [1, 1] }}),
+          g.snap([3.93, 2.02], {{ walls, from: [1, 2] }})],
           g.moveWall({{ walls: [[0, 0, 1, 0], [2, 0, 4, 0], [4, 0, 4, 3]], doors: [{{ line: [1, 0, 2, 0] }}] }}, 0, [0, 0.5])]; }}"""
     )
     assert short is None

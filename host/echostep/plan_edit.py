@@ -32,7 +32,7 @@ from echostep.plan_writer import plan_json
 
 PAGE = Path(__file__).parent / "page" / "edit"
 SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # of the live page
-MOST_BODY = 8_000_000
+MOST_BODY = 8_000_000  # a browser draws so much without stumbling
 MOST_PICTURE = 32_000_000
 POST_S = 20.0
 NO_FILE = "none"
@@ -45,7 +45,7 @@ class PlanFile:
         self.path = path.resolve()
         if self.path.exists():
             if self.path.is_file() and self.path.stat().st_size > MOST_BODY:
-                raise EchostepError(f"{path}: larger than {MOST_BODY // 1_000_000} MB: too large to edit on a page")
+                raise EchostepError(f"{path}: larger than {MOST_BODY // 1_000_000} MB: draw it in the program it came from and import it again")
             load_plan(path)
         elif not self.path.parent.is_dir():
             raise EchostepError(f"{path}: there is no folder {self.path.parent}")
