@@ -198,7 +198,7 @@ def saved(page: Any, server: EditServer) -> Any:
     return load_plan(server.file.path).levels[0]
 
 
-def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer, tmp_path: Path) -> None:
+def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None:
     page = opened(browser, drawn)
     page.click('[data-tool="scale"]')  # 400 px are 20 m at first; the rectangle's upper side is 15 m
     click(page, 2.5, 12.5)
@@ -231,11 +231,6 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer, tmp_pat
     level = saved(page, drawn)
     assert level.doors[0].line == (6.05, 7.0, 6.95, 7.0)
     assert sorted(level.walls.tolist()) == [[3.0, 7.0, 6.05, 7.0], [6.95, 7.0, 8.0, 7.0], [8.0, 7.0, 8.0, 9.5]]
-    page.click('[data-tool="wall"]')
-    click(page, 3.0, 7.0)
-    page.mouse.move(*spot(page, 3.0, 10.0))
-    page.screenshot(path=(PICTURES or tmp_path) / "plan-edit.png")
-    page.keyboard.press("Escape")
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
     page.click('[data-tool="erase"]')
@@ -245,6 +240,51 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer, tmp_pat
     assert sorted(level.walls.tolist()) == [[3.0, 7.0, 8.0, 7.0], [8.0, 7.0, 8.0, 11.0]]
     assert not page.wrong
     page.context.close()
+
+
+def test_a_plan_is_traced_from_a_picture(browser: Any, tmp_path: Path) -> None:
+    walls = load_plan(DEMO).levels[0].walls  # 1 to 25 m, 1 to 13 m
+    lines = "".join(f"M{20 * x0} {280 - 20 * y0}L{20 * x1} {280 - 20 * y1}" for x0, y0, x1, y1 in walls)
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="520" height="280">'
+    (tmp_path / "picture.svg").write_text(f'{head}<path d="{lines}" fill="none" stroke="#999" stroke-width="6"/></svg>')
+    with EditServer(tmp_path / "new.json", tmp_path / "picture.svg", 0) as server:
+        page = opened(browser, server, viewport={"width": 1000, "height": 560})
+        page.click('[data-tool="scale"]')  # 20 m wide at first, in truth 26 m
+        click(page, 20 / 26, 20 / 26)
+        click(page, 25 * 20 / 26, 20 / 26)
+        page.fill("#answer", "24")
+        page.keyboard.press("Enter")
+        page.click('[data-tool="origin"]')
+        page.mouse.move(*spot(page, 3, 3))
+        page.mouse.down()
+        page.mouse.move(*spot(page, 3 + 3 / 13, 3 + 3 / 13), steps=4)  # the first point stayed where it was
+        page.mouse.up()
+        page.click("#whole")
+        page.wait_for_timeout(50)
+        page.click('[data-tool="wall"]')
+        for place in ((1, 1), (25, 1), (25, 13), (1, 13), (1, 1), (1, 8.5), (25, 8.5)):
+            click(page, *place)
+        page.keyboard.press("Escape")
+        page.click('[data-tool="door"]')
+        for x in (3.5, 9.5):
+            click(page, x, 8.5)
+        page.click('[data-tool="room"]')
+        click(page, 3.6, 11.3)
+        page.fill("#answer", "Office 1")
+        page.keyboard.press("Enter")
+        page.click('[data-tool="wall"]')
+        click(page, 6.2, 8.5)
+        page.mouse.move(*spot(page, 6.2, 12.0))
+        page.screenshot(path=(PICTURES or tmp_path) / "plan-edit.png")
+        page.keyboard.press("Escape")
+        level = saved(page, server)
+        picture = page.evaluate("echostep.sheet.picture")
+        assert not page.wrong
+        page.context.close()
+    assert picture["perPx"] == pytest.approx(0.05, abs=1e-3)
+    assert (picture["x"], picture["y"]) == (pytest.approx(0.0, abs=0.1), pytest.approx(0.0, abs=0.1))
+    assert level.walls[:4].tolist() == [[1, 1, 25, 1], [25, 1, 25, 13], [25, 13, 1, 13], [1, 13, 1, 1]]
+    assert (len(level.walls), len(level.doors), [room.name for room in level.rooms]) == (7, 2, ["Office 1"])
 
 
 def test_keys_alone_draw_a_wall_a_door_and_a_room(browser: Any, drawn: EditServer) -> None:

@@ -45,7 +45,9 @@ class PlanFile:
         self.path = path.resolve()
         if self.path.exists():
             if self.path.is_file() and self.path.stat().st_size > MOST_BODY:
-                raise EchostepError(f"{path}: larger than {MOST_BODY // 1_000_000} MB: draw it in the program it came from and import it again")
+                raise EchostepError(
+                    f"{path}: larger than {MOST_BODY // 1_000_000} MB: draw it in the program it came from and import it again"
+                )
             load_plan(path)
         elif not self.path.parent.is_dir():
             raise EchostepError(f"{path}: there is no folder {self.path.parent}")
