@@ -133,7 +133,7 @@ def looking(browser: Any, url: str, look: str) -> Any:
     return page
 
 
-def until(holds: Callable[[], bool], timeout_s: float = 15.0) -> bool:
+def until(holds: Callable[[], bool], timeout_s: float = 60.0) -> bool:
     deadline = time.monotonic() + timeout_s
     while not holds():
         if time.monotonic() > deadline:

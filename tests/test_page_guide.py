@@ -48,13 +48,13 @@ def guided_tracker() -> tuple[Tracker, Guided]:
 
 def until(page: ClientConnection, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     """The first frame for which something holds; each is drawn."""
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:
         frame = next_frame(page)
         page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
         if holds(frame):
             return frame
-    raise AssertionError("no such frame in 10 s")
+    raise AssertionError("no such frame in 30 s")
 
 
 def at(t_s: float) -> Callable[[dict[str, Any]], bool]:

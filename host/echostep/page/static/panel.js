@@ -4,7 +4,9 @@ const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕' }
 const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
 const SPOKEN_MS = 8000;  // a screen reader hears a new place no sooner
 const FASTEST_RAD_S = Math.PI;  // as the arrow of the guide turns
+const LEAST_RAD = 0.01;
 const $ = (id) => document.getElementById(id);
+const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // what stays is not laid out again
 
 export class Panel {
   constructor(onFloor) {
@@ -32,12 +34,12 @@ export class Panel {
   frame({ told, words, streams, guidance, beams, beacons }, rooms) {
     const status = told?.status ?? 'waiting';
     this.status(status, words);
-    $('place').textContent = told ? whereabouts(told, rooms) : '';
-    $('echoes').textContent = told ? echoes(beams) : '';
-    $('health').textContent = streams ? rates(streams) : 'no bytes yet';
-    $('wrong').textContent = streams?.wrong ?? '';
+    put('place', told ? whereabouts(told, rooms) : '');
+    put('echoes', told ? echoes(beams) : '');
+    put('health', streams ? rates(streams) : 'no bytes yet');
+    put('wrong', streams?.wrong ?? '');
     $('wrong').hidden = !streams?.wrong;
-    $('beacons').textContent = census(beacons);
+    put('beacons', census(beacons));
     $('beacons').hidden = !beacons.length;
     this.guide(guidance);
     this.speak(`${status} ${streams?.wrong ?? ''}`, [words, told ? near(told, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
@@ -51,20 +53,20 @@ export class Panel {
     $('guidance').dataset.kind = kind;
     $('turn').dataset.sign = arrow_rad !== null ? 'arrow' : kind === 'arrived' ? 'there' : 'halt';
     const by = arrow_rad === null ? 0 : Math.atan2(Math.sin(-arrow_rad - this.turn), Math.cos(-arrow_rad - this.turn));
-    if (by) {
+    if (Math.abs(by) > LEAST_RAD) {
       this.turn += by;
       $('arrow').style.transition = `transform ${0.2 + Math.abs(by) / FASTEST_RAD_S}s ease-out`;
       $('arrow').style.transform = `rotate(${this.turn}rad)`;
     }
-    $('cue').textContent = text;
-    $('left').textContent = left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`;
+    put('cue', text);
+    put('left', left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`);
     $('nowhere').hidden = !own;
   }
 
   status(status, words) {
     $('words').dataset.status = status;
     $('mark').textContent = MARKS[status];
-    if ($('said').textContent !== words) $('said').textContent = words;
+    put('said', words);
   }
 
   floors(shown, told) {

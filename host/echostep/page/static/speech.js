@@ -29,9 +29,9 @@ export class Speech {
   say(text) {
     window.speechSynthesis.cancel();
     if (!text) return;
-    const sentence = new SpeechSynthesisUtterance(text);
-    sentence.lang = 'en';
-    window.speechSynthesis.speak(sentence);
+    this.sentence = new SpeechSynthesisUtterance(text);  // held: browsers forget one that nobody holds
+    this.sentence.lang = 'en';
+    window.speechSynthesis.speak(this.sentence);
   }
 }
 
