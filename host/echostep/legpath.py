@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.clipping import Unclipped
 from echostep.gait import STANDING_PIECE_S, Leg
 from echostep.heading import Heading, HeadingSettings, Iron
 from echostep.leg_kinematics import Segments
@@ -27,6 +28,7 @@ TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes aw
 FRAME_SD_RAD = math.radians(
     1.0
 )  # of the walk frame, which is where the compass pointed at first: what it says later tells the gyro's bias
+RANGE_RAD_S = math.radians(300.0)  # [ADIS16100 datasheet]
 SLOW_RAD_S = math.radians(10.0)  # of a leg that stands, with its gyro's bias
 SETTING_OFF_S = 1.0  # the first step
 SCALE_SD = 0.004  # by which the scale of strides wanders from one to the next
@@ -66,6 +68,7 @@ class LegPath:
         """`iron`: the compass', when it was calibrated."""
         segments = Segments(settings.thigh_m, settings.shank_m, settings.leg_scale)
         self._legs = Legs(LegsSettings(segments, calibrated=settings.leg_scale != 1.0))
+        self._unclipped = Unclipped(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
         self._left_m = settings.leg_left_m
         self._heading = Heading(HeadingSettings(iron=iron, first_sd_rad=FRAME_SD_RAD))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
@@ -80,7 +83,8 @@ class LegPath:
         self._headings.extend(zip(block.t_s.tolist(), found[:, 0].tolist(), strict=True))
         while self._headings and self._headings[0][0] < block.t_s[-1] - REMEMBERED_S:
             self._headings.popleft()
-        told = [self._leg(stride) for stride in self._legs.feed(block.t_s, block.thigh, block.calf)]
+        t_s, rates = self._unclipped.feed(block.t_s, np.column_stack([block.thigh, block.calf]))
+        told = [self._leg(stride) for stride in self._legs.feed(t_s, rates[:, 0], rates[:, 1])]
         legs = [leg for leg in told if leg is not None]
         since_s = self._legs.standing_since_s
         until_s = float(block.t_s[-1]) - RECENT_S
