@@ -22,6 +22,8 @@ Way = tuple[int, int, float]  # from one storey to another, and metres up
 MOVING_P = 0.5
 SHORTEST_STAY_S, SHORTEST_END_S, SETTLES_S, LEVEL_S = 4.0, 1.0, 3.0, 8.0
 MOST_ROUNDS, SETTLED_M = 4, 0.02
+PASSED_S = 2.0  # at a known storey this is a stay
+DRIFTS_S = 120.0  # of stays that show the drift
 NOISE_TIMES_S, SMOOTH_PA = (0.5, 1.0), 0.02
 SAME_STOREY_M, LOWEST_STOREY_M = 1.2, 2.0
 FEWEST_HZ = 10.0
@@ -78,7 +80,7 @@ def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
     claimed, used = Column(settings).rows(samples)
     for _ in range(MOST_ROUNDS if len(heights) > 1 else 0):
         before = heights
-        visited = stays(FloorFilter(heights, settings).look_back(samples))
+        visited = stays(FloorFilter(heights, settings).look_back(samples), PASSED_S)
         heights = _fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]))
         if len(heights) < 2 or (len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M):
             break
@@ -103,13 +105,20 @@ def _first_ways(rises: list[float]) -> list[Way]:
 
 
 def _ways(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Way]:
-    """Ways between stays, with the rise that pressure claims between the seconds before one and after the other."""
-    found = []
-    for a, b in zip(visited, visited[1:], strict=False):
-        leaves = claimed_m[(t_s >= max(a.from_s, a.to_s - LEVEL_S)) & (t_s <= a.to_s)]
-        arrives = claimed_m[(t_s >= b.from_s) & (t_s <= min(b.to_s, b.from_s + LEVEL_S))]
-        found.append((a.floor, b.floor, float(np.median(arrives) - np.median(leaves))))
-    return found
+    """Ways between stays, with the rise that pressure claims between the seconds before one and after the other, less the weather's drift."""
+
+    def level(from_s: float, to_s: float) -> tuple[float, float]:
+        seconds = (t_s >= from_s) & (t_s <= to_s)
+        return float(t_s[seconds].mean()), float(np.median(claimed_m[seconds]))
+
+    begins = [level(stay.from_s, min(stay.to_s, stay.from_s + LEVEL_S)) for stay in visited]
+    ends = [level(max(stay.from_s, stay.to_s - LEVEL_S), stay.to_s) for stay in visited]
+    drift = np.sum(np.subtract(ends, begins), axis=0) if visited else np.zeros(2)
+    rate = drift[1] / drift[0] if drift[0] > DRIFTS_S else 0.0
+    return [
+        (a.floor, b.floor, after - before - rate * (later - sooner))
+        for a, b, (sooner, before), (later, after) in zip(visited, visited[1:], ends, begins[1:], strict=False)
+    ]
 
 
 def _fitted(ways: list[Way]) -> Floats:
@@ -141,7 +150,7 @@ def _rises(heights: Heights) -> list[float]:
     return [rise for rise in found if abs(rise) > SAME_STOREY_M]
 
 
-def stays(floors: Floors) -> list[Stay]:
+def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S) -> list[Stay]:
     """Times on each floor in their order; a floor that is only passed on the way does not count, the same floor again goes on."""
     still = floors.up + floors.down < MOVING_P
     found: list[Stay] = []
@@ -149,7 +158,7 @@ def stays(floors: Floors) -> list[Stay]:
     edges = np.flatnonzero(np.diff(at, prepend=-2, append=-2))
     for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         floor, t0, t1 = int(at[a]), float(floors.t_s[a]), float(floors.t_s[b - 1])
-        if floor < 0 or (t1 - t0 < SHORTEST_STAY_S and a > 0 and b < len(at)):
+        if floor < 0 or (t1 - t0 < shortest_s and a > 0 and b < len(at)):
             continue
         if found and found[-1].floor == floor:
             t0 = found.pop().from_s

@@ -53,7 +53,7 @@ TREND_M_S = 0.0023  # 1 hPa/h, for times that nobody saw
 GUST_M = 1.5  # sd of doors and fans: 18 Pa
 HELD_WANDERS_M, FADING_WANDERS_M, FADING_WANDERS = 0.2, 0.4, 0.2  # in a second; the last one times the gust
 FADES_S = 1.5
-SHIFT_M = 1.2
+SHIFT_M = 0.8  # fans and stack effect: 10 Pa
 # All that was known of the weather is wrong: an air lock, a first sample that was a spike. How often, 1/s; sd; only for what is far off
 SEALED, SEALED_M, SEALED_OFF_M = 1e-6, 100.0, 15.0
 FREE_RATES = 0.5  # without storeys each metre is a place to stop at, so setting off is the rarer
