@@ -148,8 +148,11 @@ def _fuse(compass: Compass, nav: Nav, h: Floats, c: float, s: float) -> float:
 def _update(compass: Compass, row: Floats, error: float, noise: float, trusted: bool) -> float:
     """One row: corrects north and iron; returns the yaw's correction. Without trust the yaw's error is only considered [Schmidt 1966]."""
     P = compass.P
-    towards = P @ row
-    total = row @ towards + noise
+    towards, total = np.zeros(SIZE), noise
+    for i in range(SIZE):
+        for j in range(SIZE):
+            towards[i] += P[i, j] * row[j]
+        total += row[i] * towards[i]
     gain = towards / total
     if not trusted:
         gain[DELTA] = 0.0

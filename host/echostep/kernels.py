@@ -5,7 +5,12 @@ numba counts references to every array that a kernel hands to another, atomicall
 longer than their work, so those do without: they return numbers or tuples of them, and make no arrays.
 """
 
+from __future__ import annotations
+
+import sys
 from typing import Any
+
+from numba.np import linalg
 
 LEAN: dict[str, Any] = {
     "cache": True,
@@ -13,3 +18,16 @@ LEAN: dict[str, Any] = {
     "_nrt": False,
 }  # counts no references, so it must not allocate
 ALLOCATES: dict[str, Any] = {**LEAN, "_nrt": True}  # called by a kernel that must not
+
+
+def _put_off_blas() -> None:
+    """Load the part of numba that looks for BLAS by loading scipy's, 0.15 s, and let it look when a kernel asks for it; none of ours does."""
+    if "numba.np.arraymath" not in sys.modules:
+        look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+        try:
+            from numba.np import arraymath  # noqa: F401
+        finally:
+            linalg.ensure_blas = look
+
+
+_put_off_blas()
