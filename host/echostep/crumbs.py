@@ -179,10 +179,11 @@ class Crumbs:
         if slot < known:
             return
         n, more = len(cloud.x_m), slot + 1 - known
-        mean, cov = cloud.beliefs
+        mean, cov, doubt = cloud.beliefs
         cloud.beliefs = Beliefs(
             np.concatenate([mean, np.zeros((n, more, 3))], axis=1),
             np.concatenate([cov, np.zeros((n, more, 6))], axis=1),
+            np.concatenate([doubt, np.zeros((n, more))], axis=1),
         )
         fresh, health = unheard(more), self._health
         self._health = Health(
