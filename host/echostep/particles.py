@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from echostep.beacons import Beliefs, no_beliefs
 from echostep.climbing import ClimbSettings, Rise, carry, climb, climb_model
+from echostep.kernels import LEAN
 from echostep.likelihoods import EchoModel, echo_density
 from echostep.plan import Pose
 from echostep.reflectors import MOST_SOURCES, Walls, echo_sources
@@ -213,7 +214,7 @@ class Cloud:
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
         self.z_m, self.lag_m = self.z_m[chosen], self.lag_m[chosen]
-        self.beliefs = Beliefs(self.beliefs.mean[chosen], self.beliefs.cov[chosen])
+        self.beliefs = Beliefs(*(part[chosen] for part in self.beliefs))
         self.log_weight = np.zeros(len(chosen))
 
     def renew(self) -> None:
@@ -280,7 +281,7 @@ def _follow(
     return k, done, least
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _propagate(
     x: Floats, y: Floats, turn: Floats, scale: Floats, log_weight: Floats,
     dx: float, dy: float, share: float, noise: Floats, wall_cost: float, walls: WallIndex,
@@ -334,7 +335,7 @@ def _reweight(
     return math.log(explained / weight), total * total / squares
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def effective_size(log_weight: Floats) -> float:
     """Effective number of particles, (sum w)^2 / sum w^2."""
     total, squares = 0.0, 0.0
