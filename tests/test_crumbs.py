@@ -107,7 +107,7 @@ def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> 
 def test_moments_are_those_of_the_mixture() -> None:
     rng = np.random.default_rng(SEED)
     n, b = 500, 3
-    beliefs = Beliefs(rng.normal(40.0, 2.0, (n, b, 3)), rng.uniform(0.1, 1.0, (n, b, 6)))
+    beliefs = Beliefs(rng.normal(40.0, 2.0, (n, b, 3)), rng.uniform(0.1, 1.0, (n, b, 6)), np.zeros((n, b)))
     weight = rng.uniform(size=n)
     weight /= weight.sum()
     for k, (x, y, sd, axis) in enumerate(moments(beliefs, weight)):

@@ -243,7 +243,7 @@ def moments(beliefs: Beliefs, weight: Floats) -> Floats:
 
     `weight` (n,) sums to 1. One pass over the particles as they lie in memory; squares are of offsets from the first particle's belief.
     """
-    mean, cov = beliefs
+    mean, cov, _ = beliefs
     sums = np.zeros((mean.shape[1], 5))
     for i in range(len(mean)):
         w = weight[i]
