@@ -23,6 +23,7 @@ from rich.table import Table
 from echostep.errors import EchostepError
 
 Row = dict[str, Any]
+TOLD = 10  # times in a study, where no terminal shows a bar
 NARROWEST = 110  # columns of a table, also where nobody says how wide the terminal is
 console = Console(soft_wrap=True)
 
@@ -55,8 +56,11 @@ class Study:
             console.print(f"{self.runs - len(missing)} of {self.runs} runs are taken from {journal.path}")
         found = _on_cluster(self.one, missing, self.scheduler) if self.scheduler else _on_cores(self.one, missing)
         try:
-            for seed, rows in track(found, self.name, total=len(missing), console=console, disable=not missing):
+            shown = track(found, self.name, total=len(missing), console=console, disable=not missing)
+            for k, (seed, rows) in enumerate(shown, start=1):
                 journal.add(seed, rows)
+                if not console.is_terminal and k % max(len(missing) // TOLD, 1) == 0:
+                    console.print(f"{self.name}: {k} of {len(missing)} runs")
         finally:
             found.close()
         return [row for seed in seeds for row in journal.runs[seed]]
