@@ -125,6 +125,36 @@ def test_unequal_storeys_are_found(rate_hz: float, noise_pa: float) -> None:
     assert found == pytest.approx([0.0, 5.0, 8.3, 14.9], abs=0.5)
 
 
+def test_short_stays_are_storeys_too() -> None:
+    legs = [
+        (0.0, 10.0),
+        (3.5, 9.0),
+        (3.5, 6.0),
+        (7.0, 9.0),
+        (7.0, 6.0),
+        (10.5, 9.0),
+        (10.5, 6.0),
+        (0.0, 9.0),
+        (0.0, 10.0),
+    ]
+    found = find_storeys(record(walk(legs, 5.0), 5.0), BarometerSettings(2.0))
+    assert found == pytest.approx([0.0, 3.5, 7.0, 10.5], abs=0.4)
+
+
+def test_weather_lifts_no_storey() -> None:
+    """Half an hour on each floor while the pressure falls by 2 hPa an hour."""
+    legs = [(0.0, 1800.0), (3.5, 14.0), (3.5, 1800.0), (0.0, 12.0), (0.0, 900.0)]
+    found = find_storeys(record(walk(legs, 1.0), 1.0, drift_pa_h=-200.0), BarometerSettings(2.0))
+    assert found == pytest.approx([0.0, 3.5], abs=0.25)
+
+
+def test_a_building_under_pressure_is_no_storey() -> None:
+    samples = record(np.zeros(600), 1.0, 3.0, drift_pa_h=0.0)
+    samples.pressure_pa[100:400] -= 25.0
+    with pytest.raises(EchostepError, match="one storey only"):
+        find_storeys(samples, BarometerSettings(3.0))
+
+
 def test_a_storey_that_vanishes_is_told() -> None:
     with pytest.raises(EchostepError, match="one storey only"):
         find_storeys(record(walk([(0.0, 90.0), (1.5, 9.0), (1.5, 90.0)], 5.0), 5.0), BarometerSettings(2.0))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from echostep.altitude import Altitude, BarometerSettings, Column, Heights, Pressures, noise_of
 from echostep.errors import EchostepError
-from echostep.floors import FloorFilter, Floors
+from echostep.floors import CLOSEST_M, FloorFilter, Floors
 from echostep.vertical import CLAIMED
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,8 @@ Way = tuple[int, int, float]  # from one storey to another, and metres up
 MOVING_P = 0.5
 SHORTEST_STAY_S, SHORTEST_END_S, SETTLES_S, LEVEL_S = 4.0, 1.0, 3.0, 8.0
 MOST_ROUNDS, SETTLED_M = 4, 0.02
-PASSED_S = 2.0  # at a known storey this is a stay
+PASSED_S, PASSED_P = 2.0, 0.8  # so short, or so probably on the way, is a stay on a storey that is known
+EDGE_S = 1.5  # of a stay, which may be part of the way
 DRIFTS_S = 120.0  # of stays that show the drift
 NOISE_TIMES_S, SMOOTH_PA = (0.5, 1.0), 0.02
 SAME_STOREY_M, LOWEST_STOREY_M = 1.2, 2.0
@@ -76,13 +77,13 @@ def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
     With these storeys the stays are found anew, and the heights by what pressure says at both ends of each way, until nothing changes.
     """
     ways = _first_ways(_rises(Altitude(settings).look_back(samples)))
-    heights = _fitted(ways)
+    heights = _apart(_fitted(ways, np.zeros(len({name for way in ways for name in way[:2]}) or 1)))
     claimed, used = Column(settings).rows(samples)
     for _ in range(MOST_ROUNDS if len(heights) > 1 else 0):
         before = heights
-        visited = stays(FloorFilter(heights, settings).look_back(samples), PASSED_S)
-        heights = _fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]))
-        if len(heights) < 2 or (len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M):
+        visited = stays(FloorFilter(heights, settings).look_back(samples), PASSED_S, PASSED_P)
+        heights = _apart(_fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]), before))
+        if len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M:
             break
     if len(heights) < 2:
         raise EchostepError("heights: the record shows one storey only: give the heights as --heights 0,3.5,7")
@@ -109,10 +110,15 @@ def _ways(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Way]:
 
     def level(from_s: float, to_s: float) -> tuple[float, float]:
         seconds = (t_s >= from_s) & (t_s <= to_s)
+        seconds[np.abs(t_s - 0.5 * (from_s + to_s)).argmin()] = True
         return float(t_s[seconds].mean()), float(np.median(claimed_m[seconds]))
 
-    begins = [level(stay.from_s, min(stay.to_s, stay.from_s + LEVEL_S)) for stay in visited]
-    ends = [level(max(stay.from_s, stay.to_s - LEVEL_S), stay.to_s) for stay in visited]
+    def inner(stay: Stay) -> tuple[float, float]:
+        edge = min(EDGE_S, 0.25 * (stay.to_s - stay.from_s))
+        return stay.from_s + edge, stay.to_s - edge
+
+    begins = [level(a, min(b, a + LEVEL_S)) for a, b in map(inner, visited)]
+    ends = [level(max(a, b - LEVEL_S), b) for a, b in map(inner, visited)]
     drift = np.sum(np.subtract(ends, begins), axis=0) if visited else np.zeros(2)
     rate = drift[1] / drift[0] if drift[0] > DRIFTS_S else 0.0
     return [
@@ -121,16 +127,31 @@ def _ways(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Way]:
     ]
 
 
-def _fitted(ways: list[Way]) -> Floats:
-    """Heights above the lowest, ascending and apart, of the storeys of all ways, by least squares."""
+def _fitted(ways: list[Way], before_m: Floats) -> Floats:
+    """Heights of the storeys of all ways, by least squares, above the lowest; one far from them that no way leads to moves with its neighbours."""
     names = sorted({name for a, b, _ in ways for name in (a, b)})
-    table, wanted = np.zeros((len(ways) + 1, max(1, len(names)))), np.zeros(len(ways) + 1)
+    if not names:
+        return np.zeros(1)
+    table, wanted = np.zeros((len(ways) + 1, len(names))), np.zeros(len(ways) + 1)
     for row, (a, b, rise) in enumerate(ways):
         table[row, names.index(a)], table[row, names.index(b)], wanted[row] = -1.0, 1.0, rise
     table[-1, 0] = 1.0
-    found = np.sort(np.linalg.lstsq(table, wanted, rcond=None)[0])
-    apart = np.concatenate([[True], np.diff(found) >= LOWEST_STOREY_M])
-    return np.asarray(found[apart] - found[0])
+    found = np.linalg.lstsq(table, wanted, rcond=None)[0] + before_m[names[0]]
+    order = np.argsort(before_m[names])
+    moved = before_m + np.interp(before_m, before_m[names][order], (found - before_m[names])[order])
+    passed = np.abs(moved[:, None] - found).min(axis=1) >= LOWEST_STOREY_M
+    passed[names] = False
+    heights = np.sort(np.concatenate([found, moved[passed]]))
+    return np.asarray(heights - heights[0])
+
+
+def _apart(heights_m: Floats) -> Floats:
+    """Those that are a storey above the one below, the lowest at 0."""
+    kept = [0.0]
+    for height in heights_m.tolist():
+        if height - kept[-1] >= CLOSEST_M:
+            kept.append(height)
+    return np.array(kept)
 
 
 def _rises(heights: Heights) -> list[float]:
@@ -150,9 +171,9 @@ def _rises(heights: Heights) -> list[float]:
     return [rise for rise in found if abs(rise) > SAME_STOREY_M]
 
 
-def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S) -> list[Stay]:
+def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S, moving_p: float = MOVING_P) -> list[Stay]:
     """Times on each floor in their order; a floor that is only passed on the way does not count, the same floor again goes on."""
-    still = floors.up + floors.down < MOVING_P
+    still = floors.up + floors.down < moving_p
     found: list[Stay] = []
     at = np.where(still, floors.floor, -1)
     edges = np.flatnonzero(np.diff(at, prepend=-2, append=-2))
