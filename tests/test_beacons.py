@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.beacons import (
-    FIT,
     UNFIT_RUNS,
     BeaconSettings,
     Beliefs,
@@ -66,7 +65,7 @@ def test_outlier_costs_no_particle_its_life() -> None:
     weight, beliefs = np.zeros(10), no_beliefs(10, 1)
     place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
     fit, size = weigh(x, y, weight, beliefs, 0, 9.0, math.nan, MODEL, OPEN)
-    assert fit < 1e-6
+    assert 0.8 < fit < 0.9  # it may also have been moved
     assert size > 9.9
 
 
@@ -76,7 +75,7 @@ def test_wall_on_the_line_of_sight_makes_a_fitting_range_less_likely() -> None:
         weight, beliefs = np.zeros(1), no_beliefs(1, 1)
         place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
         seen.append(weigh(np.full(1, 2.0), np.zeros(1), weight, beliefs, 0, 2.0, math.nan, MODEL, index)[0])
-    assert seen[1] < seen[0] - 0.2
+    assert seen[1] < seen[0] - 0.005
 
 
 def test_place_and_axis_are_learnt_from_a_walk_around() -> None:
@@ -114,9 +113,10 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
         inherit(beliefs, chosen)
     assert health.each[:2, UNFIT_RUNS].tolist() == [0.0, 0.0]
     assert health.each[2, UNFIT_RUNS] >= 1.0
-    assert health.each[2, FIT] > 0.5
-    off = np.hypot(beliefs.mean[:, 2, 0] - x, beliefs.mean[:, 2, 1] - y)
-    assert abs(off.mean() - 7.0) < 0.3
+    assert health.all[0] > 0.5
+    assert beliefs.doubt[:, 2].min() > 3.0
+    assert np.abs(beliefs.mean[:, 2, 0] + 4.0).max() < 0.1  # nobody learns from it
+    assert np.hypot(x.mean(), y.mean()) < 0.1
 
 
 def test_kick_prices_what_it_tries() -> None:
@@ -145,7 +145,35 @@ def test_no_measurement_makes_a_belief_infinite(
 
 def test_inherit_copies_what_the_chosen_believed() -> None:
     mean, cov = np.arange(12.0).reshape(2, 2, 3), np.arange(24.0).reshape(2, 2, 6)
-    beliefs = Beliefs(mean.copy(), cov.copy())
+    beliefs = Beliefs(mean.copy(), cov.copy(), np.arange(4.0).reshape(2, 2))
     inherit(beliefs, np.array([1, 1]))
     assert (beliefs.mean == mean[[1, 1]]).all()
     assert (beliefs.cov == cov[[1, 1]]).all()
+    assert beliefs.doubt.tolist() == [[2.0, 3.0], [2.0, 3.0]]
+
+
+def test_beacon_that_was_moved_costs_no_more_than_a_moved_one_and_is_trusted_again() -> None:
+    """A particle that one beacon contradicts for long is left with the others' word; when it fits again it counts again."""
+    beliefs, weight = no_beliefs(1, 1), np.zeros(1)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    at = np.full(1, 4.0), np.zeros(1)
+    trust = [weigh(*at, weight, beliefs, 0, 8.0, math.nan, MODEL, OPEN)[0] for _ in range(20)]
+    assert trust[0] > 0.8
+    assert trust[-1] < 0.05
+    assert beliefs.doubt[0, 0] < 8.0
+    trust = [weigh(*at, weight, beliefs, 0, 4.0, math.nan, MODEL, OPEN)[0] for _ in range(10)]
+    assert trust[-1] > 0.95
+
+
+def test_first_bearing_ties_the_axis_to_the_place() -> None:
+    """The place is uncertain across the line of sight: whoever then learns that the beacon lies to the left learns that its axis is another."""
+    beliefs, weight = no_beliefs(1, 1), np.zeros(1)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
+    weigh(np.full(1, 5.0), np.zeros(1), weight, beliefs, 0, 5.0, 0.3, MODEL, OPEN)
+    axis = beliefs.mean[0, 0, 2]
+    assert abs(axis + 0.3) < 0.1
+    for _ in range(20):
+        weigh(np.zeros(1), np.full(1, -5.0), weight, beliefs, 0, 6.0, math.nan, MODEL, OPEN)
+    assert abs(beliefs.mean[0, 0, 1] - 0.9) < 0.2
+    seen = math.atan2(-beliefs.mean[0, 0, 1], 5.0)
+    assert abs(beliefs.mean[0, 0, 2] - (seen - 0.3)) < 0.06

@@ -20,6 +20,7 @@ from echostep.walls import WallIndex, crosses_wall
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 TWO_PI = 2.0 * math.pi
+SURE = 3.0  # log-odds that one doubt, or one trust, can gain
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,8 @@ class BeaconSettings:
     `bearing_outliers`: shares of measurements that may be anything within `span_m` and the circle. `hidden`: share of inliers through a wall.
     `drop_sd_m`: of the place of a beacon about him who drops it. `drift_m`: what a beacon's place grows by, per square root of a measurement.
     `kick_per_m`, `kick_deg`: how often the heading jumps (a slipping mount; iron, where a compass leads), and the standard deviation of such a jump;
-    `tries_per_m`: how often particles try it. `step_sd`: of the length of a move on open ground, per square root of a metre.
+    `tries_per_m`: how often particles try it. `step_sd`: of the length of a move on open ground, per square root of a metre. `moved`: share of
+    beacons that are not where they are believed to be.
     """
 
     range_sd_m: float = 0.4
@@ -45,6 +47,7 @@ class BeaconSettings:
     tries_per_m: float = 0.05
     kick_deg: float = 45.0
     step_sd: float = 0.05
+    moved: float = 0.03
 
 
 class BeaconModel(NamedTuple):
@@ -60,6 +63,7 @@ class BeaconModel(NamedTuple):
     kick_per_m: float
     tries_per_m: float
     kick_rad: float
+    moved: float
 
 
 def beacon_model(settings: BeaconSettings) -> BeaconModel:
@@ -67,20 +71,24 @@ def beacon_model(settings: BeaconSettings) -> BeaconModel:
     return BeaconModel(
         settings.range_sd_m, math.radians(settings.bearing_sd_deg), settings.range_outliers, settings.bearing_outliers,
         settings.hidden, settings.span_m, settings.drift_m,
-        settings.kick_per_m, settings.tries_per_m, math.radians(settings.kick_deg),
+        settings.kick_per_m, settings.tries_per_m, math.radians(settings.kick_deg), settings.moved,
     )  # fmt: skip
 
 
 class Beliefs(NamedTuple):
-    """Of n particles about b beacons: `mean` (n, b, 3): x, y (m), axis (rad); `cov` (n, b, 6): xx, xy, xa, yy, ya, aa."""
+    """Of n particles about b beacons: `mean` (n, b, 3): x, y (m), axis (rad); `cov` (n, b, 6): xx, xy, xa, yy, ya, aa; `doubt` (n, b): log-odds that
+
+    the beacon is not there any more, above those of one that has just been placed.
+    """
 
     mean: Floats
     cov: Floats
+    doubt: Floats
 
 
 def no_beliefs(particles: int, beacons: int) -> Beliefs:
     """Room for beacons of which nothing is known yet."""
-    return Beliefs(np.zeros((particles, beacons, 3)), np.zeros((particles, beacons, 6)))
+    return Beliefs(np.zeros((particles, beacons, 3)), np.zeros((particles, beacons, 6)), np.zeros((particles, beacons)))
 
 
 @njit(cache=True, error_model="numpy")
@@ -89,6 +97,7 @@ def place(beliefs: Beliefs, k: int, x: float, y: float, axis: float, place_var: 
     for i in range(len(beliefs.mean)):
         beliefs.mean[i, k] = x, y, axis
         beliefs.cov[i, k] = place_var, 0.0, 0.0, place_var, 0.0, axis_var
+        beliefs.doubt[i, k] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -102,6 +111,7 @@ def drop(
     """
     near = range_m * range_m < 4.0 * drop_var
     for i in range(len(beliefs.mean)):
+        beliefs.doubt[i, k] = 0.0
         if near or rng.random() < dropped:
             beliefs.mean[i, k] = x[i], y[i], 0.0
             beliefs.cov[i, k] = drop_var, 0.0, 0.0, drop_var, 0.0, math.pi * math.pi
@@ -129,10 +139,13 @@ def weigh(
 
     A range is normal about its distance, or anything; a bearing likewise. NaN for a bearing that was not measured. Expected range and its
     variance come from the moments of the belief: of a near beacon the sideways variance makes the mean range longer than the distance of the
-    means. A wall on the line of sight leaves few inliers. Returns the cloud's mean share of belief that the range was an inlier, and the
-    effective size after.
+    means. A wall on the line of sight leaves few inliers. Who doubts that the beacon is
+    still there neither learns of it nor loses weight. Returns the cloud's mean belief that it is, and the effective size after.
     """
-    top, share, total = -np.inf, 0.0, 0.0
+    top, trust, total = -np.inf, 0.0, 0.0
+    prior = math.log(model.moved / (1.0 - model.moved))
+    told = not math.isnan(bearing)
+    strange = 1.0 / (model.span_m * (TWO_PI if told else 1.0))  # density of what a beacon says that lies anywhere
     for i in range(len(x)):
         w = math.exp(log_weight[i])
         m, c = beliefs.mean[i, k], beliefs.cov[i, k]
@@ -152,24 +165,18 @@ def weigh(
         inlier = (1.0 - bad) * fits
         density = inlier + bad / model.span_m
         inlier /= density
-        if not math.isnan(bearing):
-            # sideways place error turns the bearing: variance over the squared distance
-            turn_var = aside / (square + aside + c[0] + c[3]) + c[5] + model.bearing_sd_rad**2
-            gap = wrapped(bearing - math.atan2(dy, dx) + m[2])
-            near = 0.0
-            if turn_var < 3.0:  # else the circle is full: any bearing is as good
-                near = math.exp(-0.5 * gap * gap / turn_var) / math.sqrt(TWO_PI * turn_var)
-                density *= (1.0 - model.bearing_outliers) * near + model.bearing_outliers / TWO_PI
-            else:
-                density /= TWO_PI
-        log_weight[i] += math.log(density)
-        top = max(top, log_weight[i])
-        share += w * inlier
-        total += w
-        if inlier > 0.5:
+        elsewhere = 1.0 / (1.0 + math.exp(-prior - beliefs.doubt[i, k]))
+        if (1.0 - elsewhere) * inlier > 0.5:
             _correct(m, c, -ux, -uy, 0.0, off, model.range_sd_m**2 + 0.5 * aside * aside / (square + aside))
-        if not math.isnan(bearing):
-            _learn_axis(m, c, x[i], y[i], bearing, model)
+        if told:
+            density *= _bearing_density(m, c, x[i], y[i], bearing, model, elsewhere < 0.5)
+        there = (1.0 - elsewhere) * density
+        either = there + elsewhere * strange
+        log_weight[i] += math.log(either)
+        beliefs.doubt[i, k] = min(max(beliefs.doubt[i, k] + math.log(strange / density), -SURE), SURE - prior)
+        top = max(top, log_weight[i])
+        trust += w * there / either
+        total += w
         c[0] += model.drift_m**2
         c[3] += model.drift_m**2
     weights, squares = 0.0, 0.0
@@ -178,28 +185,37 @@ def weigh(
         w = math.exp(log_weight[i])
         weights += w
         squares += w * w
-    return share / total, weights * weights / squares
+    return trust / total, weights * weights / squares
 
 
 @njit(cache=True, error_model="numpy")
-def _learn_axis(m: Floats, c: Floats, x: float, y: float, bearing: float, model: BeaconModel) -> None:
-    """Correct a belief by the bearing, unless it is an outlier; the first one of an unknown axis sets it."""
+def _bearing_density(
+    m: Floats, c: Floats, x: float, y: float, bearing: float, model: BeaconModel, learn: bool
+) -> float:
+    """Density of a bearing (1/rad), and correct the belief by it unless it is an outlier; the first one of an unknown axis sets it.
+
+    The first one ties the axis to the place: whoever believes the beacon more to the left believes another axis.
+    """
     dx, dy = x - m[0], y - m[1]
     square = dx * dx + dy * dy
     if square < 0.25 or square < c[0] + c[3]:
-        return  # a bearing from where the beacon may be itself says nothing
+        return 1.0 / TWO_PI  # a bearing from where the beacon may be itself says nothing
     direction = math.atan2(dy, dx)
-    if c[5] > 3.0:
-        m[2] = wrapped(direction - bearing)
-        c[2] = c[4] = 0.0
-        c[5] = model.bearing_sd_rad**2 + (c[0] + c[3]) / square
-        return
-    gap = wrapped(bearing - direction + m[2])
     hx, hy = dy / square, -dx / square
+    if c[5] > 3.0:
+        if not learn:
+            return 1.0 / TWO_PI
+        m[2] = wrapped(direction - bearing)
+        c[2], c[4] = hx * c[0] + hy * c[1], hx * c[1] + hy * c[3]
+        c[5] = model.bearing_sd_rad**2 + hx * c[2] + hy * c[4]
+        return 1.0 / TWO_PI
+    gap = wrapped(bearing - direction + m[2])
     spread = hx * hx * c[0] + 2.0 * hx * hy * c[1] + hy * hy * c[3] - 2.0 * (hx * c[2] + hy * c[4]) + c[5]
-    if gap * gap > 9.0 * (spread + model.bearing_sd_rad**2):
-        return
-    _correct(m, c, hx, hy, -1.0, gap, model.bearing_sd_rad**2)
+    spread += model.bearing_sd_rad**2
+    near = math.exp(-0.5 * gap * gap / spread) / math.sqrt(TWO_PI * spread)
+    if learn and gap * gap <= 9.0 * spread:
+        _correct(m, c, hx, hy, -1.0, gap, model.bearing_sd_rad**2)
+    return (1.0 - model.bearing_outliers) * near + model.bearing_outliers / TWO_PI
 
 
 @njit(cache=True, error_model="numpy")
@@ -222,6 +238,34 @@ def _correct(m: Floats, c: Floats, hx: float, hy: float, ha: float, off: float, 
 
 
 @njit(cache=True, error_model="numpy")
+def moments(beliefs: Beliefs, weight: Floats) -> Floats:
+    """What all particles together believe of each beacon (b, 4): x, y (m), standard deviation per axis (m), axis (rad).
+
+    `weight` (n,) sums to 1. One pass over the particles as they lie in memory; squares are of offsets from the first particle's belief.
+    """
+    mean, cov, _ = beliefs
+    sums = np.zeros((mean.shape[1], 5))
+    for i in range(len(mean)):
+        w = weight[i]
+        for k in range(mean.shape[1]):
+            m, c, s = mean[i, k], cov[i, k], sums[k]
+            dx, dy = m[0] - mean[0, k, 0], m[1] - mean[0, k, 1]
+            s[0] += w * dx
+            s[1] += w * dy
+            s[2] += w * (dx * dx + dy * dy + c[0] + c[3])
+            s[3] += w * math.sin(m[2])
+            s[4] += w * math.cos(m[2])
+    found = np.empty((mean.shape[1], 4))
+    for k in range(mean.shape[1]):
+        s = sums[k]
+        found[k, 0] = mean[0, k, 0] + s[0]
+        found[k, 1] = mean[0, k, 1] + s[1]
+        found[k, 2] = math.sqrt(0.5 * max(s[2] - s[0] * s[0] - s[1] * s[1], 0.0))
+        found[k, 3] = math.atan2(s[3], s[4])
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def kick(turn: Floats, log_weight: Floats, way_m: float, model: BeaconModel, rng: np.random.Generator) -> None:
     """Let some particles try a heading that has just jumped, at the price of how seldom that happens: only they can follow it."""
     tried, price = model.tries_per_m * way_m, math.log(model.kick_per_m / model.tries_per_m)
@@ -237,6 +281,7 @@ def inherit(beliefs: Beliefs, chosen: Ints) -> None:
     mean, cov = beliefs.mean[chosen], beliefs.cov[chosen]
     beliefs.mean[:] = mean
     beliefs.cov[:] = cov
+    beliefs.doubt[:] = beliefs.doubt[chosen]
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,16 +300,16 @@ def stride(
 DROPPED = 0.7  # share of beacons that are heard for the first time because they have just been dropped, whatever range is heard
 FIT, HEARD, UNFIT_RUNS = 0, 1, 2  # columns of `Health.each`
 FIT_SHARE = 0.12  # of the newest measurement in a running mean
-MISFIT = 0.25  # inliers' share below which a beacon is not where it was
-LOST_FIT = 0.4  # inliers' share of all beacons below which it is the cloud that is wrong
+MISFIT = 0.25  # belief below which a beacon is not where it was
+LOST_FIT = 0.4  # belief in all beacons below which it is the cloud that is wrong
 REGAINED = 0.25  # share of a lost cloud that is put where the newest measurement allows
 
 
 class Health(NamedTuple):
     """How well beacons are explained.
 
-    `each` (b, 3): running share of inliers, measurements, how often it was found moved. `all` (2,): running share of inliers of the last
-    measurements by any beacon, times regained. `known` (b,): whether it has been heard.
+    `each` (b, 3): running belief that it is where it was, measurements, how often it was found moved. `all` (2,): the same belief of whatever
+    beacons were heard last, times regained. `known` (b,): whether it has been heard.
     """
 
     each: Floats
@@ -300,7 +345,6 @@ def hear(
     if each[FIT] < MISFIT and everything[0] > LOST_FIT:
         each[UNFIT_RUNS] += 1.0
         each[FIT] = 1.0
-        drop(beliefs, k, x, y, range_m, bearing, model, 0.0, 0.0, rng)
     everything[0] += 0.5 * FIT_SHARE * (fit - everything[0])
     if everything[0] < LOST_FIT:
         everything[0] = 0.7
@@ -326,3 +370,4 @@ def _regain(
         y[i] = m[1] + range_m * math.sin(direction)
         turn[i] = TWO_PI * rng.random()
         log_weight[i] = 0.0
+        beliefs.doubt[i] = 0.0

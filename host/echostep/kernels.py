@@ -22,12 +22,14 @@ ALLOCATES: dict[str, Any] = {**LEAN, "_nrt": True}  # called by a kernel that mu
 
 def _put_off_blas() -> None:
     """Load the part of numba that looks for BLAS by loading scipy's, 0.15 s, and let it look when a kernel asks for it; none of ours does."""
-    if "numba.np.arraymath" not in sys.modules:
-        look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-        try:
-            from numba.np import arraymath  # noqa: F401
-        finally:
-            linalg.ensure_blas = look
+    look = getattr(linalg, "ensure_blas", None)
+    if look is None or "numba.np.arraymath" in sys.modules:
+        return
+    linalg.ensure_blas = lambda: None
+    try:
+        from numba.np import arraymath  # noqa: F401
+    finally:
+        linalg.ensure_blas = look
 
 
 _put_off_blas()

@@ -214,7 +214,7 @@ class Cloud:
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
         self.z_m, self.lag_m = self.z_m[chosen], self.lag_m[chosen]
-        self.beliefs = Beliefs(self.beliefs.mean[chosen], self.beliefs.cov[chosen])
+        self.beliefs = Beliefs(*(part[chosen] for part in self.beliefs))
         self.log_weight = np.zeros(len(chosen))
 
     def renew(self) -> None:

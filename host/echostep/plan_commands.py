@@ -1,4 +1,4 @@
-"""`echostep plan import | check | show`.
+"""`echostep plan import | check | show | edit`.
 
 In: what the user typed. Out: plans, pictures, findings. Heavy imports wait until a command runs.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MOST_LINES, MOST_MARKS = 200, 300  # in a terminal, in a picture
 
-app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show.")
+app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show, edit.")
 
 
 Files = Annotated[
@@ -127,6 +127,23 @@ def show(
 
     plan = open_plan(file)
     draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
+
+
+@app.command()
+def edit(
+    file: Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON); one that does not exist begins empty.")],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="IMAGE", help="Draw over this picture (PNG, JPEG, SVG).")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)
+    ] = None,
+    headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
+) -> None:
+    """Draw and drag walls and doors on a page in the browser, until Ctrl-C."""
+    from echostep.plan_edit import edit_plan
+
+    edit_plan(file, picture, port, browser=not headless)
 
 
 def _level(plan: Plan, name: str) -> int:

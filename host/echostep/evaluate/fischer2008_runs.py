@@ -46,7 +46,8 @@ NEAR_END_M = 3.0  # "within a short distance of the end"
 ARRIVED_M = 1.0  # who believes to be so near the end stops
 TIME_FACTOR = 2.5  # "under a certain delay": times the trail's length at walking speed
 THRESHOLD_M = 1.0
-DEAF_S = 3.0  # who has not been heard for so long goes back to where he was
+DEAF_S = 3.0  # who has not been heard for so long goes back to where he was; twice as long when he is there again
+SAFE_S = 15.0  # who has been heard for so long is sent back early again
 PARTICLES = 100
 DROPPED_BEFORE_M = 0.3  # a beacon lies when he has come so near to its place
 
@@ -83,6 +84,7 @@ class _Rules(NamedTuple):
     deployed: bool
     drop_var: float
     step_sd: float
+    deaf_s: float
 
 
 class _Cloud(NamedTuple):
@@ -107,6 +109,9 @@ class _Walker(Protocol):
     heard_x: float  # on that way, where he was last heard
     heard_y: float
     heard_tick: float
+    silent_tick: float  # when he was last out of range, or the walk began
+    leash_s: float  # how long he may now be out of range before he is sent back
+    back: float  # 1: he has been sent back since he was last heard
     believed_x: float
     believed_y: float
     offset: float  # that the paper's fusion adds to the measured heading
@@ -133,7 +138,7 @@ def guided_return(
     settings = settings or IRON
     rules = _Rules(
         system, max(round(period_s / TICK_S), 1), threshold_m, round(person.delay_s / TICK_S), math.radians(person.heading_sd_deg),
-        person.wrong_turns, deployed, settings.drop_sd_m**2, settings.step_sd,
+        person.wrong_turns, deployed, settings.drop_sd_m**2, settings.step_sd, max(DEAF_S, 1.5 * period_s),
     )  # fmt: skip
     rng = np.random.default_rng(seed)
     count = len(world.beacons)
@@ -175,6 +180,7 @@ def _return(
     trail = world.trail
     w.x, w.y, w.heading = along(trail, 0.0)
     w.believed_x, w.believed_y, w.reliable_x, w.reliable_y = w.x, w.y, w.x, w.y
+    w.leash_s = rules.deaf_s
     if not rules.deployed:
         _start(cloud, w.x, w.y, rng)
     inside = np.zeros(len(world.sources), np.bool_)
@@ -221,11 +227,20 @@ def _listen(
     """One ultrasound event for our cloud."""
     _advance(cloud, rules, model, w.piece_x, w.piece_y, rng)
     w.piece_x, w.piece_y = 0.0, 0.0
+    heard = False
     for k in range(len(world.beacons)):
         if hears(world, k, w.x, w.y):
-            w.heard_tick, w.heard_x, w.heard_y = tick, w.walk_x, w.walk_y
+            heard = True
             range_m, bearing = measured(world, k, w.x, w.y, rng)
             _hear(cloud, k, range_m, bearing, rules, model, walls, rng)
+    if not heard:
+        w.silent_tick = tick
+        return
+    w.heard_tick, w.heard_x, w.heard_y = tick, w.walk_x, w.walk_y
+    if w.back:
+        w.leash_s, w.back = 2.0 * w.leash_s, 0.0
+    elif (tick - w.silent_tick) * TICK_S > SAFE_S:
+        w.leash_s = rules.deaf_s
 
 
 @njit(cache=True, error_model="numpy")
@@ -244,23 +259,48 @@ def _correct(world: Ground, rules: _Rules, rng: np.random.Generator, w: _Walker)
 @njit(cache=True, error_model="numpy")
 def _guide(world: Ground, rules: _Rules, cloud: _Cloud, rng: np.random.Generator, w: _Walker, tick: int) -> bool:
     """One guidance event [Fischer 2008, Figure 8]; whether the system believes that he has arrived."""
-    path, turned = world.trail, w.offset
     if rules.system == OURS:
-        w.believed_x, w.believed_y, turned = _mean(cloud)
-        if rules.deployed:
-            path = _crumbs(cloud, path[-1, 0], path[-1, 1])
-    if w.confirmed:
-        w.reliable_x, w.reliable_y, w.confirmed = w.believed_x, w.believed_y, 0.0
-    s, _ = nearest(path, w.believed_x, w.believed_y, 0.0, np.inf)
-    x, y, _ = along(path, s + AHEAD_M)
-    w.wanted = math.atan2(y - w.believed_y, x - w.believed_x) - (w.heading + w.error + turned)
-    if rules.system == OURS and (tick - w.heard_tick) * TICK_S > DEAF_S:
-        w.wanted = math.atan2(w.heard_y - w.walk_y, w.heard_x - w.walk_x) - (w.heading + w.error)
+        w.believed_x, w.believed_y, _ = _mean(cloud)
+        w.wanted, rest_m = _homeward(cloud, world.trail, rules.deployed, w.heading + w.error)
+        if (tick - w.heard_tick) * TICK_S > w.leash_s:
+            w.wanted = math.atan2(w.heard_y - w.walk_y, w.heard_x - w.walk_x) - (w.heading + w.error)
+            w.back = 1.0
+    else:
+        if w.confirmed:
+            w.reliable_x, w.reliable_y, w.confirmed = w.believed_x, w.believed_y, 0.0
+        way, rest_m = _ahead(world.trail, w.believed_x, w.believed_y)
+        w.wanted = way - (w.heading + w.error + w.offset)
     w.wanted += rules.heading_sd_rad * rng.standard_normal()
     if rng.random() < rules.wrong_turns:
         w.wanted += 0.5 * math.pi if rng.random() < 0.5 else -0.5 * math.pi
     w.wanted_tick = tick + rules.delay_ticks
-    return math.hypot(w.believed_x - path[-1, 0], w.believed_y - path[-1, 1]) < ARRIVED_M
+    return rest_m < ARRIVED_M
+
+
+@njit(cache=True, error_model="numpy")
+def _ahead(path: Floats, x: float, y: float) -> tuple[float, float]:
+    """Direction of the target on a path, and the distance of its end, from (x, y) [Fischer 2008, Figure 8]."""
+    s, _ = nearest(path, x, y, 0.0, np.inf)
+    to_x, to_y, _ = along(path, s + AHEAD_M)
+    return math.atan2(to_y - y, to_x - x), math.hypot(x - path[-1, 0], y - path[-1, 1])
+
+
+@njit(cache=True, error_model="numpy")
+def _homeward(cloud: _Cloud, trail: Floats, deployed: bool, heading: float) -> tuple[float, float]:
+    """The turn to be made, and the distance of the exit: the cloud's means of what each particle says, whose maps may differ by more than places."""
+    total, east, north, rest = 0.0, 0.0, 0.0, 0.0
+    path = trail
+    for i in range(len(cloud.x)):
+        w = math.exp(cloud.log_weight[i])
+        if deployed:
+            path = _crumbs(cloud, i, trail[-1, 0], trail[-1, 1])
+        way, rest_m = _ahead(path, cloud.x[i], cloud.y[i])
+        way -= heading + cloud.turn[i]
+        total += w
+        east += w * math.cos(way)
+        north += w * math.sin(way)
+        rest += w * rest_m
+    return math.atan2(north, east), rest / total
 
 
 @njit(cache=True, error_model="numpy")
@@ -346,18 +386,11 @@ def _way_in(
 
 
 @njit(cache=True, error_model="numpy")
-def _crumbs(cloud: _Cloud, exit_x: float, exit_y: float) -> Floats:
-    """The way back as the cloud believes it: from beacon to beacon, to the exit."""
+def _crumbs(cloud: _Cloud, i: int, exit_x: float, exit_y: float) -> Floats:
+    """The way back as a particle believes it: from beacon to beacon, to the exit."""
     count = cloud.beliefs.mean.shape[1]
-    path = np.zeros((count + 1, 2))
-    total = 0.0
-    for i in range(len(cloud.x)):
-        w = math.exp(cloud.log_weight[i])
-        total += w
-        for k in range(count):
-            path[k, 0] += w * cloud.beliefs.mean[i, k, 0]
-            path[k, 1] += w * cloud.beliefs.mean[i, k, 1]
-    path /= total
+    path = np.empty((count + 1, 2))
+    path[:count] = cloud.beliefs.mean[i, :, :2]
     path[count] = exit_x, exit_y
     keep = np.ones(count + 1, np.bool_)
     keep[:count] = cloud.health.known

@@ -56,7 +56,7 @@ class PageServer:
         self.sessions: set[Session] = set()
         self._stage = stage
         self._ways = Ways(stage.plan)
-        self._listening = _listen(address)
+        self._listening = listen(address)
         token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
         host, port = self._listening.getsockname()[:2]
         shown = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
@@ -142,7 +142,7 @@ class PageServer:
             self.sessions.discard(session)
 
 
-def _listen(address: Address) -> socket.socket:
+def listen(address: Address) -> socket.socket:
     """A socket that listens at an address."""
     try:
         return _bound(address.host, PORT if address.port is None else address.port)

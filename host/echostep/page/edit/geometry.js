@@ -1,0 +1,156 @@
+// Geometry of the plan's page: pure functions on a level of plan.json {walls, doors, windows, rooms, ...} that give a new level. Metres, x east, y north.
+
+export const GRID_M = 0.05;
+export const JOINT_M = 1e-3; // ends that are nearer are one joint
+const IN_LINE = 1e-3; // sine of the angle between two that are in line
+
+export const round = (v) => Math.round(v * 1e4) / 1e4;
+export const onGrid = (v) => round(Math.round(v / GRID_M) * GRID_M);
+export const distance = ([ax, ay], [bx, by]) => Math.hypot(bx - ax, by - ay);
+export const same = (a, b) => distance(a, b) < JOINT_M;
+export const ends = ([x0, y0, x1, y1]) => [[x0, y0], [x1, y1]];
+export const length = (s) => distance(...ends(s));
+const unit = ([ax, ay], [bx, by]) => { const l = Math.hypot(bx - ax, by - ay); return [(bx - ax) / l, (by - ay) / l]; };
+const spot = ([x, y]) => [round(x), round(y)];
+
+// Nearest point of a segment, and how far along it lies (0 to 1).
+export function foot(p, [x0, y0, x1, y1]) {
+  const dx = x1 - x0, dy = y1 - y0, t = Math.min(Math.max(((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy), 0), 1);
+  const at = [x0 + t * dx, y0 + t * dy];
+  return { at, t, away: distance(p, at) };
+}
+
+function nearest(p, rows, reach) {
+  let found = null;
+  rows.forEach((row, k) => {
+    const here = foot(p, row);
+    if (here.away <= reach && (!found || here.away < found.away)) found = { ...here, k };
+  });
+  return found;
+}
+
+// What lies at a place: {kind: 'end' | 'door' | 'room' | 'wall', ...} or null. Small things win.
+export function hit(level, p, reach) {
+  const doors = level.doors ?? [], lines = doors.map((door) => door.line);
+  const room = (level.rooms ?? []).findIndex((r) => distance(r.at, p) <= reach);
+  const door = nearest(p, lines, reach), wall = nearest(p, level.walls, reach);
+  if (door && (!wall || door.away <= wall.away) && door.t > 0.15 && door.t < 0.85) return { kind: 'door', k: door.k };
+  const joint = level.walls.flatMap(ends).filter((e) => distance(e, p) <= reach).sort((a, b) => distance(a, p) - distance(b, p))[0];
+  if (joint) return { kind: 'end', at: joint, k: wall.k };
+  if (room >= 0) return { kind: 'room', k: room };
+  if (door && (!wall || door.away <= wall.away)) return { kind: 'door', k: door.k };
+  return wall && { kind: 'wall', k: wall.k };
+}
+
+// Where a point goes: to the end of a wall, at a right angle to the last stretch (or along x or y), onto a wall, or to the grid.
+export function snap(p, { walls = [], from = null, before = null, reach = 0.2 } = {}) {
+  const near = walls.flatMap(ends).filter((e) => distance(e, p) <= reach && !(from && same(e, from))).sort((a, b) => distance(a, p) - distance(b, p))[0];
+  if (near) return { at: near, kind: 'end' };
+  if (from && distance(from, p) > 0) {
+    const u = before && !same(before, from) ? unit(before, from) : [1, 0];
+    for (const [ux, uy] of [u, [-u[1], u[0]], [1, 0], [0, 1]]) {
+      const along = (p[0] - from[0]) * ux + (p[1] - from[1]) * uy, off = Math.abs((p[1] - from[1]) * ux - (p[0] - from[0]) * uy);
+      if (off > reach || Math.abs(along) <= off) continue;
+      const wall = walls.map((w) => crossing(from, [ux, uy], w)).filter((c) => c && distance(c, p) <= reach && !same(c, from)).sort((a, b) => distance(a, p) - distance(b, p))[0];
+      if (wall) return { at: spot(wall), kind: 'wall' };
+      const far = Math.round(along / GRID_M) * GRID_M;
+      if (far) return { at: spot([from[0] + far * ux, from[1] + far * uy]), kind: 'right angle' };
+    }
+  }
+  const wall = nearest(p, walls, reach);
+  if (wall) return { at: spot(wall.at), kind: 'wall' };
+  return { at: [onGrid(p[0]), onGrid(p[1])], kind: 'grid' };
+}
+
+// Where a line through a point meets a segment, or null.
+export function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
+  const vx = x1 - x0, vy = y1 - y0, d = ux * vy - uy * vx;
+  if (Math.abs(d) < IN_LINE * Math.hypot(vx, vy)) return null;
+  const t = ((x0 - px) * uy - (y0 - py) * ux) / d;
+  return t < 0 || t > 1 ? null : [x0 + t * vx, y0 + t * vy];
+}
+
+// Wall k with a gap of a width about the point nearest to p; null where the wall is too short. What would be left shorter than a joint is no wall.
+export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
+  const wall = level.walls[k], [a, b] = ends(wall), long = length(wall);
+  if (!(width > JOINT_M) || long < width - JOINT_M) return null;
+  const u = unit(a, b), w = Math.min(width, long);
+  let s = Math.min(Math.max(foot(p, wall).t * long - w / 2, 0), long - w);
+  s = Math.min(Math.round(s / GRID_M) * GRID_M, long - w);
+  const at = (d) => (d <= JOINT_M ? a : d >= long - JOINT_M ? b : spot([a[0] + d * u[0], a[1] + d * u[1]]));
+  const jambs = [at(s), at(s + w)];
+  const parts = [[...a, ...jambs[0]], [...jambs[1], ...b]].filter((part) => length(part) > JOINT_M);
+  return { ...level, walls: level.walls.toSpliced(k, 1, ...parts), doors: [...(level.doors ?? []), { ...kept, line: jambs.flat() }] };
+}
+
+// Whether two segments lie in one line and share an end.
+function follows(a, b) {
+  const [[p, q], [r, s]] = [ends(a), ends(b)];
+  const [ux, uy] = unit(p, q), [vx, vy] = unit(r, s);
+  return Math.abs(ux * vy - uy * vx) < IN_LINE && [p, q].some((e) => same(e, r) || same(e, s));
+}
+
+// The level without door k, its gap closed: the walls on both sides and the gap become one wall. {level, wall: index or -1 when no wall was beside it}.
+export function fillDoor(level, k) {
+  const door = level.doors[k].line, doors = level.doors.toSpliced(k, 1), sides = [];
+  for (const end of ends(door)) {
+    const i = level.walls.findIndex((w, j) => !sides.includes(j) && follows(door, w) && ends(w).some((e) => same(e, end)));
+    if (i >= 0) sides.push(i);
+  }
+  if (!sides.length) return { level: { ...level, doors }, wall: -1 };
+  const points = [...ends(door), ...sides.flatMap((i) => ends(level.walls[i]))], u = unit(...ends(door));
+  const along = (e) => e[0] * u[0] + e[1] * u[1];
+  points.sort((a, b) => along(a) - along(b));
+  const walls = [...level.walls.filter((_, i) => !sides.includes(i)), [...points[0], ...points.at(-1)]];
+  return { level: { ...level, walls, doors }, wall: walls.length - 1 };
+}
+
+// Door k with its middle at p: along its wall, or freely where it has none. Null where it does not fit.
+export function moveDoor(level, k, p) {
+  const { line, ...kept } = level.doors[k], filled = fillDoor(level, k);
+  if (filled.wall >= 0) return cutDoor(filled.level, filled.wall, p, length(line), kept);
+  const [mx, my] = [(line[0] + line[2]) / 2, (line[1] + line[3]) / 2], dx = onGrid(p[0] - mx), dy = onGrid(p[1] - my);
+  return { ...filled.level, doors: [...filled.level.doors, { ...kept, line: [line[0] + dx, line[1] + dy, line[2] + dx, line[3] + dy].map(round) }] };
+}
+
+// All ends of walls, windows and doors at some joints, moved to other places ([from, to] pairs); what has no length left is gone.
+export function moveJoints(level, moves) {
+  const to = (e) => moves.find(([from]) => same(from, e))?.[1] ?? e;
+  const moved = (row) => { const [a, b] = ends(row).map(to); return [...a, ...b]; };
+  const left = (row) => length(row) > JOINT_M;
+  return {
+    ...level, walls: level.walls.map(moved).filter(left),
+    ...(level.windows && { windows: level.windows.map(moved).filter(left) }),
+    ...(level.doors && { doors: level.doors.map((d) => ({ ...d, line: moved(d.line) })).filter((d) => left(d.line)) }),
+  };
+}
+
+// The joints of wall k and of all doors and walls that go on in its line: they move together.
+export function runOf(level, k) {
+  const doors = (level.doors ?? []).map((d) => d.line), rows = [level.walls[k]], tried = new Set([level.walls[k]]);
+  for (let i = 0; i < rows.length; i++) {
+    const others = doors.includes(rows[i]) ? level.walls : doors; // a wall goes on through a door only
+    for (const row of others) if (!tried.has(row) && follows(rows[i], row)) { tried.add(row); rows.push(row); }
+  }
+  const joints = [];
+  for (const e of rows.flatMap(ends)) if (!joints.some((j) => same(j, e))) joints.push(e);
+  return joints;
+}
+
+export function moveWall(level, k, [dx, dy]) {
+  return moveJoints(level, runOf(level, k).map(([x, y]) => [[x, y], [round(x + dx), round(y + dy)]]));
+}
+
+// A picture {x, y, perPx} (lower left corner in metres, metres a pixel) so that two places on it are so far apart; the first stays where it is.
+export function scaled(picture, a, b, metres) {
+  const factor = metres / distance(a, b);
+  return { x: a[0] + (picture.x - a[0]) * factor, y: a[1] + (picture.y - a[1]) * factor, perPx: picture.perPx * factor };
+}
+
+export function box(level, picture) {
+  const xs = [], ys = [];
+  for (const row of [...level.walls, ...(level.windows ?? []), ...(level.doors ?? []).map((d) => d.line)]) { xs.push(row[0], row[2]); ys.push(row[1], row[3]); }
+  if (picture) { xs.push(picture.x, picture.x + picture.width * picture.perPx); ys.push(picture.y, picture.y + picture.height * picture.perPx); }
+  const least = (v) => v.reduce((a, b) => Math.min(a, b)), most = (v) => v.reduce((a, b) => Math.max(a, b));
+  return xs.length ? [least(xs), least(ys), most(xs), most(ys)] : [0, 0, 10, 8];
+}

@@ -1,0 +1,186 @@
+// The plan's page: loads the plan and the picture, joins sheet, tools, view and buttons, saves.
+
+import { box } from './geometry.js';
+import { paint } from './paint.js';
+import { Pointer } from './pointer.js';
+import { Sheet } from './sheet.js';
+import { startTheme } from './theme.js';
+import { Tools } from './tools.js';
+import { View } from './view.js';
+
+const byId = (id) => document.getElementById(id);
+const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin' };
+const FIRST_WIDTH_M = 20; // of a picture whose scale nobody has set
+const view = new View(), map = byId('map');
+let sheet, tools, stamp, waiting = false;
+
+const say = (text) => { byId('status').textContent = text; };
+const wrong = (text) => { byId('wrong').textContent = text; };
+
+function ask(question, answer) {
+  byId('question').textContent = question;
+  byId('answer').value = answer;
+  byId('ask').showModal();
+  byId('answer').select();
+  return new Promise((told) => {
+    const end = (value) => { byId('ask').onclose = null; byId('ask').close(); map.focus(); told(value); };
+    byId('ask').querySelector('form').onsubmit = (e) => { e.preventDefault(); end(byId('answer').value); };
+    byId('no').onclick = () => end(null);
+    byId('ask').onclose = () => end(null);
+  });
+}
+
+function doorWidth() {
+  const width = byId('width').valueAsNumber;
+  return width >= 0.3 && width <= 20 ? width : 0.9;
+}
+
+function changed() {
+  if (waiting) return;
+  waiting = true;
+  requestAnimationFrame(draw);
+}
+
+function draw() {
+  waiting = false;
+  paint({ level: tools.level, picture: tools.picture, view, chosen: tools.chosen, draft: tools.draft, measure: Boolean(tools.live), cross: tools.cross, points: tools.points });
+  for (const button of document.querySelectorAll('[data-tool]')) button.setAttribute('aria-pressed', String(button.dataset.tool === tools.name));
+  byId('undo').disabled = !sheet.past.length;
+  byId('redo').disabled = !sheet.future.length;
+  byId('save').toggleAttribute('data-unsaved', sheet.unsaved);
+  byId('title').textContent = `${sheet.tree.name}${sheet.unsaved ? ' (not saved)' : ''}`;
+  const names = sheet.tree.levels.map((level) => level.name), options = byId('level');
+  if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
+  options.value = sheet.k;
+  if (sheet.picture) try { localStorage.setItem(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture)); } catch { /* private browsing */ }
+}
+
+function show() {
+  view.fit(box(sheet.level, sheet.picture));
+  changed();
+}
+
+function goLevel(k) {
+  if (k < 0 || k >= sheet.tree.levels.length) return;
+  tools.choose(tools.name);
+  sheet.k = k;
+  say(`Level ${sheet.level.name}, ${sheet.level.height_m} m`);
+  changed();
+}
+
+async function addLevel() {
+  const { levels } = sheet.tree, name = (await ask('Name of the new level', ''))?.trim();
+  if (!name) return;
+  if (levels.some((level) => level.name === name)) { say(`There is a level ${name}`); return; }
+  const height = Number((await ask('Its height in metres above the ground', String(levels.at(-1).height_m + 3.5)))?.replace(',', '.') ?? NaN);
+  if (!(Math.abs(height) < 1e5)) { say('No level: its height is a number of metres'); return; }
+  sheet.change({ ...sheet.tree, levels: [...levels, { name, height_m: height, walls: [], rooms: [] }] });
+  goLevel(levels.length);
+}
+
+async function save(over = false) {
+  const { tree } = sheet;
+  try {
+    const headers = { 'content-type': 'application/json', ...(over ? {} : { 'if-match': stamp }) };
+    const answer = await fetch('plan', { method: 'POST', headers, body: JSON.stringify(tree), signal: AbortSignal.timeout(30000) });
+    const told = await answer.json().catch(() => ({}));
+    if (answer.status === 409 && confirm(`${told.error}. Write over it? It stays as .bak.`)) { await save(true); return; }
+    if (!answer.ok) { wrong(`Not saved: ${told.error ?? answer.status}`); return; }
+    stamp = answer.headers.get('etag');
+    sheet.saved = tree;
+    wrong('');
+    say(`Saved ${told.saved}`);
+  } catch { wrong('Not saved: echostep does not answer. Is it still running?'); }
+  changed();
+}
+
+function turn(way) {
+  tools.choose(tools.name);
+  sheet[way]();
+  changed();
+}
+
+function step(e, [dx, dy]) {
+  const wide = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 25].find((m) => m * view.scale >= 8) ?? 50, by = e.shiftKey ? 0.05 : wide, [x, y] = tools.cross;
+  tools.move([Math.round((x + dx * by) / 0.05) * 0.05, Math.round((y + dy * by) / 0.05) * 0.05]);
+  view.keep(...tools.cross);
+  if (!tools.draft && !tools.live) say(`x ${tools.cross[0].toFixed(2)}, y ${tools.cross[1].toFixed(2)} m`);
+}
+
+function enter() {
+  if (!tools.drags) tools.up(tools.cross, true);
+  else if (tools.held) tools.up(tools.cross, false);
+  else say(tools.down(tools.cross) ? 'Picked up: arrows carry it, Enter puts it down' : 'Nothing here');
+}
+
+function key(e) {
+  const ctrl = e.ctrlKey || e.metaKey, name = e.key.length === 1 ? e.key.toLowerCase() : e.key;
+  if (byId('ask').open) return;
+  const always = ctrl && { s: save, z: () => turn(e.shiftKey ? 'redo' : 'undo'), y: () => turn('redo') }[name];
+  if (always) { e.preventDefault(); always(); return; }
+  if (ctrl || e.altKey || document.activeElement !== map) return;
+  const done = {
+    ArrowLeft: () => step(e, [-1, 0]), ArrowRight: () => step(e, [1, 0]), ArrowUp: () => step(e, [0, 1]), ArrowDown: () => step(e, [0, -1]),
+    Enter: enter, ' ': enter, Escape: () => { tools.stop(); say('Ended'); }, Delete: () => tools.chosen && tools.remove(tools.chosen), Backspace: () => tools.chosen && tools.remove(tools.chosen),
+    '+': () => view.zoom(1.25), '=': () => view.zoom(1.25), '-': () => view.zoom(0.8), 0: show, PageUp: () => goLevel(sheet.k + 1), PageDown: () => goLevel(sheet.k - 1),
+  }[name] ?? (KEYS[name] && (() => pick(KEYS[name])));
+  if (!done) return;
+  e.preventDefault();
+  done();
+  changed();
+}
+
+const HINTS = {
+  select: 'Drag walls, ends of walls, doors and names', wall: 'Click from corner to corner; Escape or End ends a wall', door: 'Click on a wall', erase: 'Click on what shall go',
+  room: 'Click into a room', scale: 'Click two points whose distance you know', origin: 'Drag the picture',
+};
+
+function pick(name) {
+  tools.choose(name);
+  say(HINTS[name]);
+  changed();
+}
+
+async function loadPicture(name) {
+  const answer = await fetch('picture');
+  if (answer.status !== 200) return;
+  const image = new Image();
+  image.src = URL.createObjectURL(await answer.blob());
+  try { await image.decode(); } catch { wrong('The browser cannot show this picture'); return; }
+  const [width, height] = [image.naturalWidth || 1000, image.naturalHeight || 1000];
+  byId('image').setAttribute('href', image.src);
+  byId('image').setAttribute('width', width);
+  byId('image').setAttribute('height', height);
+  let kept = null;
+  try { kept = JSON.parse(localStorage.getItem(`picture of ${name}`)); } catch { /* private browsing */ }
+  const fits = kept?.width === width && kept.height === height && kept.perPx > 0;
+  sheet.picture = fits ? kept : { x: 0, y: 0, perPx: FIRST_WIDTH_M / width, width, height, set: false };
+}
+
+async function start() {
+  const answer = await fetch('plan'), tree = await answer.json();
+  if (!answer.ok) { wrong(tree.error); return; }
+  stamp = answer.headers.get('etag');
+  sheet = new Sheet(tree);
+  await loadPicture(tree.name);
+  tools = new Tools(sheet, view, { ask, say, changed, doorWidth });
+  new Pointer(map, view, { down: (p) => tools.down(p), move: (p) => tools.move(p), up: (p, click) => tools.up(p, click), cancel: () => { tools.stop(); changed(); }, moved: changed });
+  new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
+  view.resize(map.clientWidth, map.clientHeight);
+  show();
+  tools.cross = [view.x, view.y];
+  document.addEventListener('keydown', key);
+  for (const button of document.querySelectorAll('[data-tool]')) button.onclick = () => pick(button.dataset.tool);
+  const clicks = {
+    end: () => { tools.stop(); changed(); }, add: addLevel, undo: () => turn('undo'), redo: () => turn('redo'), whole: show, save: () => save(),
+    closer: () => { view.zoom(1.25); changed(); }, farther: () => { view.zoom(0.8); changed(); },
+  };
+  for (const [id, done] of Object.entries(clicks)) byId(id).onclick = done;
+  byId('level').onchange = () => goLevel(Number(byId('level').value));
+  startTheme(byId('look'), changed);
+  addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
+  say(sheet.picture && !sheet.picture.set ? 'Set the scale first: Scale, then two points whose distance you know' : HINTS.select);
+  window.echostep = { view, sheet, tools };
+}
+
+start().catch((error) => wrong(`Cannot start: ${error.message}`));

@@ -1,0 +1,43 @@
+// The sheet in SVG. In: a level, the picture's place, the view, what is chosen and drafted. Owns nothing but the elements.
+
+import { ends, length } from './geometry.js';
+
+const SVG = 'http://www.w3.org/2000/svg';
+const byId = (id) => document.getElementById(id);
+const path = (rows) => rows.map(([a, b, c, d]) => `M${a} ${b}L${c} ${d}`).join('');
+
+function mark(kind, [x, y], text, chosen) {
+  const made = document.createElementNS(SVG, kind);
+  made.setAttribute(kind === 'text' ? 'x' : 'cx', x);
+  made.setAttribute(kind === 'text' ? 'y' : 'cy', y);
+  if (kind === 'text') made.textContent = text;
+  else made.setAttribute('r', 5);
+  if (chosen) made.dataset.chosen = '';
+  return made;
+}
+
+export function paint({ level, picture, view, chosen, draft, measure, cross, points }) {
+  byId('world').setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
+  const image = byId('image');
+  image.toggleAttribute('hidden', !picture);
+  if (picture) image.setAttribute('transform', `matrix(${picture.perPx} 0 0 ${-picture.perPx} ${picture.x} ${picture.y + picture.height * picture.perPx})`);
+  const doors = level.doors ?? [];
+  byId('walls').setAttribute('d', path(level.walls));
+  byId('windows').setAttribute('d', path(level.windows ?? []));
+  byId('obstacles').setAttribute('d', (level.obstacles ?? []).map((o) => `M${o.map((p) => p.join(' ')).join('L')}Z`).join(''));
+  byId('doors').setAttribute('d', path(doors.map((door) => door.line)));
+  const row = chosen && { wall: level.walls[chosen.k], end: level.walls[chosen.k], door: doors[chosen.k]?.line }[chosen.kind];
+  byId('chosen').setAttribute('d', row ? path([row]) : '');
+  byId('draft').setAttribute('d', draft ? path([draft]) : '');
+  const marks = (level.rooms ?? []).map((room, k) => mark('text', view.toScreen(...room.at), room.name, chosen?.kind === 'room' && chosen.k === k));
+  for (const p of [...(row ? ends(row) : []), ...points]) marks.push(mark('circle', view.toScreen(...p)));
+  byId('marks').replaceChildren(...marks);
+  byId('cross').setAttribute('transform', `translate(${view.toScreen(...cross).join(' ')})`);
+  const told = draft ?? (measure ? row : null), text = byId('measure');
+  text.textContent = told && length(told) > 0 ? `${length(told).toFixed(2)} m` : '';
+  if (told) {
+    const [x, y] = view.toScreen((told[0] + told[2]) / 2, (told[1] + told[3]) / 2);
+    text.setAttribute('x', x);
+    text.setAttribute('y', y - 12);
+  }
+}

@@ -1,0 +1,28 @@
+// The sheet: the plan and the picture's place as they are, were and will be again. Owns the history; every change is a new tree.
+
+const MOST_KEPT = 300;
+
+export class Sheet {
+  constructor(tree) { Object.assign(this, { tree, picture: null, k: 0, past: [], future: [], saved: tree }); }
+
+  get level() { return this.tree.levels[this.k]; }
+  get unsaved() { return this.tree !== this.saved; }
+
+  change(tree, picture = this.picture) {
+    this.past.push([this.tree, this.picture]);
+    if (this.past.length > MOST_KEPT) this.past.shift();
+    [this.tree, this.picture, this.future] = [tree, picture, []];
+  }
+
+  setLevel(level) { this.change({ ...this.tree, levels: this.tree.levels.with(this.k, level) }); }
+
+  undo() { this.go(this.past, this.future); }
+  redo() { this.go(this.future, this.past); }
+
+  go(from, to) {
+    if (!from.length) return;
+    to.push([this.tree, this.picture]);
+    [this.tree, this.picture] = from.pop();
+    this.k = Math.min(this.k, this.tree.levels.length - 1);
+  }
+}

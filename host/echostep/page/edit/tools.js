@@ -1,0 +1,138 @@
+// The tools: what a press, a move and a click on the sheet do. In: places in metres. Out: changes of the sheet. Owns what is held, drafted and chosen.
+
+import { cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
+
+const REACH_PX = 14;
+
+export class Tools {
+  // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), doorWidth()
+  constructor(sheet, view, desk) {
+    Object.assign(this, { sheet, view, desk, name: 'select', held: null, live: null, chosen: null, draft: null, chain: null, points: [], cross: [0, 0] });
+  }
+
+  get reach() { return REACH_PX / this.view.scale; }
+  get level() { return this.live?.level ?? this.sheet.level; }
+  get picture() { return this.live?.picture ?? this.sheet.picture; }
+  get drags() { return this.name === 'select' || this.name === 'origin'; }
+
+  choose(name) {
+    this.stop();
+    this.name = name;
+    this.chosen = null;
+  }
+
+  // End a chain of walls, let go of what is held.
+  stop() { Object.assign(this, { held: null, live: null, draft: null, chain: null, points: [] }); }
+
+  down(p) {
+    this.cross = p;
+    if (this.name === 'origin' && this.sheet.picture) this.held = { from: p };
+    if (this.name === 'select') {
+      const found = hit(this.level, p, this.reach);
+      this.chosen = found;
+      if (found) this.held = { found, from: p };
+    }
+    this.desk.changed();
+    return Boolean(this.held);
+  }
+
+  move(p) {
+    this.cross = p;
+    const { held, sheet } = this;
+    if (held?.found) {
+      const level = this.dragged(held.found, held.from, p);
+      if (level) this.live = { level };
+    } else if (held) this.live = { picture: { ...sheet.picture, x: sheet.picture.x + p[0] - held.from[0], y: sheet.picture.y + p[1] - held.from[1] } };
+    else if (this.chain) this.draft = [...this.chain.at, ...this.snapped(p).at];
+    else if (this.name === 'scale' && this.points.length) this.draft = [...this.points[0], ...p];
+    this.desk.changed();
+  }
+
+  dragged({ kind, k, at }, from, p) {
+    const base = this.sheet.level;
+    if (kind === 'door') return moveDoor(base, k, p);
+    if (kind === 'wall') return moveWall(base, k, [onGrid(p[0] - from[0]), onGrid(p[1] - from[1])]);
+    if (kind === 'room') return { ...base, rooms: base.rooms.with(k, { ...base.rooms[k], at: [onGrid(p[0]), onGrid(p[1])] }) };
+    const other = ends(base.walls[k]).find((e) => !same(e, at)), walls = base.walls.filter((w) => !ends(w).some((e) => same(e, at)));
+    return moveJoints(base, [[at, snap(p, { walls, from: other, reach: this.reach }).at]]);
+  }
+
+  snapped(p) { return snap(p, { walls: this.sheet.level.walls, from: this.chain?.at, before: this.chain?.before, reach: this.reach }); }
+
+  up(p, click) {
+    const { live, held } = this;
+    if (held && (live || this.drags)) {
+      [this.held, this.live] = [null, null];
+      if (live?.level) { this.sheet.setLevel(live.level); this.rechoose(); this.desk.say('Moved'); }
+      if (live?.picture) { this.sheet.change(this.sheet.tree, live.picture); this.desk.say('Picture moved'); }
+    } else if (click && !this.drags) this[this.name](p);
+    this.desk.changed();
+  }
+
+  rechoose() {
+    if (this.chosen?.kind === 'door') this.chosen = { kind: 'door', k: this.sheet.level.doors.length - 1 };
+    else if (this.chosen?.kind === 'end') this.chosen = { kind: 'wall', k: this.chosen.k };
+  }
+
+  wall(p) {
+    const { at, kind } = this.snapped(p), { chain, sheet } = this;
+    if (!chain) {
+      this.chain = { at, first: at };
+      this.points = [at];
+    } else if (same(at, chain.at)) {
+      this.stop();
+      this.desk.say('Wall ended');
+      return;
+    } else {
+      sheet.setLevel({ ...sheet.level, walls: [...sheet.level.walls, [...chain.at, ...at]] });
+      this.desk.say(`Wall ${distance(chain.at, at).toFixed(2)} m, to ${kind}`);
+      if (same(at, chain.first)) this.stop();
+      else Object.assign(this, { chain: { at, before: chain.at, first: chain.first }, points: [at], draft: null });
+      return;
+    }
+    this.desk.say(`Wall from x ${at[0].toFixed(2)}, y ${at[1].toFixed(2)} m, ${kind}`);
+  }
+
+  door(p) {
+    const { sheet } = this, width = this.desk.doorWidth();
+    const near = sheet.level.walls.map((w, k) => ({ k, ...foot(p, w) })).sort((a, b) => a.away - b.away)[0];
+    if (!near || near.away > 1.5 * this.reach) { this.desk.say('No wall here: a door is cut into a wall'); return; }
+    const cut = cutDoor(sheet.level, near.k, p, width);
+    if (cut) sheet.setLevel(cut);
+    this.desk.say(cut ? `Door ${width.toFixed(2)} m` : `This wall is shorter than ${width.toFixed(2)} m`);
+  }
+
+  erase(p) { this.remove(hit(this.sheet.level, p, this.reach)); }
+
+  remove(found) {
+    const { level } = this.sheet;
+    if (!found) { this.desk.say('Nothing here'); return; }
+    if (found.kind === 'door') this.sheet.setLevel(fillDoor(level, found.k).level);
+    else if (found.kind === 'room') this.sheet.setLevel({ ...level, rooms: level.rooms.toSpliced(found.k, 1) });
+    else this.sheet.setLevel({ ...level, walls: level.walls.toSpliced(found.k, 1) });
+    this.chosen = null;
+    this.desk.say(`Deleted a ${found.kind === 'end' ? 'wall' : found.kind}`);
+  }
+
+  async room(p) {
+    const { level, k: storey } = this.sheet, rooms = level.rooms ?? [], found = hit({ ...level, walls: [], doors: [] }, p, this.reach);
+    const name = (await this.desk.ask('Name of the room', found ? rooms[found.k].name : ''))?.trim();
+    if (!name || this.sheet.k !== storey) return;
+    const at = [onGrid(p[0]), onGrid(p[1])];
+    this.sheet.setLevel({ ...level, rooms: found ? rooms.with(found.k, { ...rooms[found.k], name }) : [...rooms, { name, at }] });
+    this.desk.say(`Room ${name}`);
+    this.desk.changed();
+  }
+
+  async scale(p) {
+    if (!this.sheet.picture) { this.desk.say('There is no picture to scale: start with --picture IMAGE'); return; }
+    if (!this.points.length) { this.points = [p]; this.desk.say('Now the second point'); return; }
+    const [a] = this.points, metres = Number((await this.desk.ask('Distance of the two points in metres', ''))?.replace(',', '.') ?? 0);
+    this.stop();
+    if (metres > 0 && metres < 1e5 && distance(a, p) > 0) {
+      this.sheet.change(this.sheet.tree, { ...this.sheet.picture, ...scaled(this.sheet.picture, a, p, metres), set: true });
+      this.desk.say(`Scale: ${round(this.sheet.picture.perPx)} m a pixel`);
+    } else this.desk.say('Scale unchanged: the distance is a number of metres');
+    this.desk.changed();
+  }
+}
