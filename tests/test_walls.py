@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import naive
+from echostep.cones import POSES
 from echostep.errors import EchostepError
 from echostep.reflectors import CORNER, EDGE, MOST_SOURCES, WALL, Walls, echo_sources, lambda_ray_ranges
 from echostep.walls import WallIndex, build_index, crosses_wall
@@ -90,6 +91,22 @@ def test_cone_readings_agree_with_plain_rays(
         for axis, reading in zip((math.pi / 2, -math.pi / 2), row, strict=True):
             expected = naive.cone_reading(x[i], y[i], heading[i] + axis, walls, rays, aperture, 6.0)
             assert reading == pytest.approx(expected, abs=1e-9)
+
+
+def test_many_poses_read_what_each_would_alone() -> None:
+    """More in a tile than are taken at a time, in no order, some nowhere; a few go another way."""
+    rng = np.random.default_rng(5)
+    walls = rng.uniform(0.0, 6.0, (20, 4))
+    owner = Walls(walls, 0.5 * math.radians(55.0) / 7)
+    x, y, heading = rng.uniform(2.0, 4.0, 3 * POSES), rng.uniform(2.0, 3.0, 3 * POSES), rng.uniform(-4, 4, 3 * POSES)
+    x[::50], heading[7::50] = np.nan, np.inf
+    index = owner.near(x, y)
+    found = lambda_ray_ranges(x, y, heading, index)
+    alone = [lambda_ray_ranges(x[i : i + 1], y[i : i + 1], heading[i : i + 1], index)[0] for i in range(len(x))]
+    assert found == pytest.approx(np.array(alone), abs=1e-9)
+    assert (found[::50] == 6.0).all()
+    assert (found[7::50] == 6.0).all()
+    assert len(np.unique(found)) > POSES
 
 
 def test_a_wall_end_is_an_edge() -> None:

@@ -1,7 +1,8 @@
 """Speed, as ratios against a peer that does the same work in the same run on the same poses and walls.
 
 In: nothing. Out: a table, and in the folder given by --out bench.json (`{name, ratio, median_s, peer_s}` a row) and bench.png. Rounds of ours and the
-peer's are interleaved, so that a busy machine slows both; medians are reported.
+peer's are interleaved and timed by the CPU time of the thread, so that a busy machine slows both alike and a switch to another program counts for
+neither (threads that a peer starts are not charged to it); medians are reported.
 """
 
 from __future__ import annotations
@@ -121,14 +122,14 @@ def our_weights(readings: Floats) -> Floats:
 
 
 def interleaved(ours: Work, peer: Work, rounds: int) -> tuple[float, float]:
-    """Median seconds of ours and of the peer's, taken in turn, after one round that is not counted."""
+    """Median CPU seconds of ours and of the peer's, taken in turn, after one round that is not counted."""
     times: tuple[list[float], list[float]] = ([], [])
     for k in range(rounds + 1):
         for side, work in enumerate((ours, peer)):
-            began = time.perf_counter()
+            began = time.thread_time()
             work()
             if k:
-                times[side].append(time.perf_counter() - began)
+                times[side].append(time.thread_time() - began)
     return median(times[0]), median(times[1])
 
 

@@ -1,4 +1,4 @@
-"""Where the time of a replay goes: seconds of each stage, the least of some rounds.
+"""Where the time of a replay goes: CPU seconds of each stage, the least of some rounds.
 
 In: a recording and its plan. Out: a table on the terminal. Kernels are compiled and loaded before the clock starts.
 """
@@ -25,9 +25,9 @@ def clocked(stage: str, work: Callable[..., Any], spent: Spent) -> Callable[...,
     """The same work, its time added to a stage."""
 
     def run(*arguments: Any) -> Any:
-        began = time.perf_counter()
+        began = time.thread_time()
         found = work(*arguments)
-        spent[stage] = spent.get(stage, 0.0) + time.perf_counter() - began
+        spent[stage] = spent.get(stage, 0.0) + time.thread_time() - began
         return found
 
     return run
@@ -46,18 +46,18 @@ def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
         ("all of the intake", intake, "take"),
     ):
         setattr(owner, name, clocked(stage, getattr(owner, name), spent))
-    began = time.perf_counter()
+    began = time.thread_time()
     estimates = [e for portion in recording.portions() for e in tracker.take(portion)]
-    spent["replay"] = time.perf_counter() - began
+    spent["replay"] = time.thread_time() - began
     return spent, estimates[-1].t_s - estimates[0].t_s
 
 
 def reading(path: Path) -> float:
     """Seconds to read the recording."""
-    recording, began = open_recording(path), time.perf_counter()
+    recording, began = open_recording(path), time.thread_time()
     for _ in recording.portions():
         pass
-    return time.perf_counter() - began
+    return time.thread_time() - began
 
 
 def main() -> None:

@@ -78,9 +78,9 @@ class Ellipse(NamedTuple):
 
 def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     """The ellipse that holds 95 % of a normal distribution with this covariance."""
-    values, vectors = np.linalg.eigh(np.array([[xx_m2, xy_m2], [xy_m2, yy_m2]]))
-    minor, major = (math.sqrt(max(float(v), 0.0) * CHI2_95) for v in values)
-    return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]))
+    mean, half = 0.5 * (xx_m2 + yy_m2), math.hypot(0.5 * (xx_m2 - yy_m2), xy_m2)
+    major, minor = (math.sqrt(max(v, 0.0) * CHI2_95) for v in (mean + half, mean - half))
+    return Ellipse(major, minor, 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2))
 
 
 def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, doubt_m: float = 0.0) -> Estimate:

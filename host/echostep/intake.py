@@ -166,18 +166,17 @@ class Intake:
 
         Returns up to when somebody watched him, after each message (n,).
         """
-        watched_s = times.mtx_newest_s.copy()
-        foot_at, k = [at for at, _ in by_foot], 0
-        by_legs_s, since = self.journey.watched_s, 0
-        for at, block in [*by_leg, (len(watched_s), None)]:
+        count, foot_at, k = len(times.mtx_newest_s), [at for at, _ in by_foot], 0
+        legs_at, legs_s = [0], [self.journey.watched_s]
+        for at, block in [*by_leg, (count, None)]:
             while k < len(foot_at) and (foot_at[k] < at or block is None):
                 self._waiting.go(foot_at[k], self.journey.foot(by_foot[k][1]))
                 k += 1
             if block is not None and (legs := self.journey.legs(block, float(times.mtx_newest_s[at]))):
                 self._waiting.go(at, legs)
-            watched_s[since:at] = np.fmax(watched_s[since:at], by_legs_s)
-            by_legs_s, since = self.journey.watched_s, at
-        return watched_s
+            legs_at.append(at)
+            legs_s.append(self.journey.watched_s)
+        return np.fmax(times.mtx_newest_s, np.repeat(legs_s[:-1], np.diff(legs_at)))
 
     def _follow(self, batch: MtBatch, times: Times) -> list[tuple[int, list[Leg]]]:
         """Samples go through the foot to its path: the legs, and the place of the message that tells them."""
@@ -227,11 +226,9 @@ class GyroBlocks:
         count = len(rows) // BLOCK
         self._rows = rows[count * BLOCK :].copy()
         self._rows[:, 5] = -1.0
-        found = []
-        for k in range(count):
-            t_s, thigh, calf, belt, shown, at = rows[k * BLOCK : (k + 1) * BLOCK].T
-            found.append((int(at[-1]), Block(t_s, thigh, calf, belt, shown)))
-        return found
+        *columns, at = rows[: count * BLOCK].reshape(count, BLOCK, 6).transpose(2, 0, 1)
+        blocks = (Block(*block) for block in zip(*columns, strict=True))
+        return list(zip(at[:, -1].astype(np.int64).tolist(), blocks, strict=True))
 
 
 def _board_arrivals(frames: Frames, row: Ints, t_arrival_ns: Ints) -> Arrivals:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,9 +109,11 @@ class MapFilter:
         for which in (0, 1):
             mine = np.flatnonzero(ranger == which)
             if len(mine):
-                travel = np.diff(at_m[mine], prepend=self._last_m[which])
+                travel = at_m[mine]
+                last_m, self._last_m[which] = self._last_m[which], float(travel[-1])
+                travel[1:] -= travel[:-1].copy()
+                travel[0] -= last_m
                 power[mine] = np.minimum(travel / self._echo.correlation_m, 1.0)
-                self._last_m[which] = float(at_m[mine[-1]])
         return power * self._trust()
 
     def _trust(self) -> float:
@@ -127,8 +130,8 @@ class MapFilter:
 
 def _rise(leg: Leg, height_m: Floats) -> Rise:
     """What foot and pressure say of the height at the end of a leg; the middle one of the last samples resists a slammed door."""
-    late = height_m[-LATE_SAMPLES:]
-    if not len(late):
+    late = height_m[-LATE_SAMPLES:].tolist()
+    if not late:
         return Rise(leg.rise_m, leg.rise_sd_m, 0.0, math.inf, leg.t1_s - leg.t0_s)
-    height, sd = float(np.median(late)), math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(late)))
+    height, sd = median(late), math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(late)))
     return Rise(leg.rise_m, leg.rise_sd_m, height, sd, leg.t1_s - leg.t0_s)

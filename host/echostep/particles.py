@@ -236,10 +236,11 @@ class Cloud:
     def _wanted(self) -> int:
         """Size for the present spread, from the number of cells that hold particles [Fox 2003, eq. 7 with z of 99 %]."""
         s = self._settings
-        cells = np.floor(
-            np.column_stack([self.x_m / s.cell_m, self.y_m / s.cell_m, self.turn_rad / math.radians(s.cell_deg)])
-        )
-        k = len(np.unique(cells @ np.array([1.0, 1e6, 1e12]))) - 1
+        cells = np.floor(self.x_m / s.cell_m)
+        cells += 1e6 * np.floor(self.y_m / s.cell_m)
+        cells += 1e12 * np.floor(self.turn_rad / math.radians(s.cell_deg))
+        cells.sort()
+        k = np.count_nonzero(cells[1:] != cells[:-1])
         if k < 1:
             return self._least
         part = 2.0 / (9.0 * k)

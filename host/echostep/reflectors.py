@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.cones import COLUMNS, MOST_RAYS, POSES, SAME_M, Eight, Fan, read_cones, sort_by_tile
 from echostep.kernels import ALLOCATES, LEAN
 from echostep.sightlines import CORNER, EDGE, in_sector, tile_sources
 from echostep.walls import (
@@ -257,9 +258,6 @@ def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_a
     return min(n + 1, MOST_SOURCES)
 
 
-SAME_M = 1e-9  # a ray meets walls so close together at once
-
-
 @njit(cache=True, error_model="numpy")
 def lambda_ray_ranges(
     x: Floats, y: Floats, heading_rad: Floats, index: WallIndex,
@@ -275,20 +273,39 @@ def lambda_ray_ranges(
     spacing = aperture_rad / rays
     angle = (np.arange(rays + 1) + 0.5 - 0.5 * rays) * spacing
     bound = np.sin(np.minimum(np.maximum(angle - 0.5 * spacing, -0.5 * math.pi), 0.5 * math.pi))
-    fan = np.vstack((np.cos(angle), np.sin(angle), bound))
+    cosine, sine = np.cos(angle), np.sin(angle)
     slant = math.tan(0.5 * spacing) * (1.0 + 1e-12)
     tables_hold = slant <= index.slant * (1.0 + 1e-11) and 0.5 * aperture_rad <= CONE_RAD
-    _cone_ranges(x, y, heading_rad, index, fan, slant, tables_hold, maximum_m, ranges)
+    order, others = np.arange(len(x)).astype(np.int32), 0
+    if tables_hold and rays <= MOST_RAYS:
+        begin = np.zeros(index.looked + 2, np.int32)
+        others = sort_by_tile(x, y, heading_rad, index, np.empty(len(x), np.int32), begin, order)
+        eight = Fan(_eight(cosine, rays, 0.0), _eight(sine, rays, 0.0), _eight(bound, rays, np.inf), bound[rays])
+        columns = np.empty((COLUMNS, POSES))
+        read_cones(x, y, heading_rad, index, order, begin, eight, maximum_m, columns, ranges)
+    fan = np.vstack((cosine, sine, bound))
+    _cone_ranges(order[others:], x, y, heading_rad, index, fan, slant, tables_hold, maximum_m, ranges)
     return ranges
+
+
+@njit(cache=True, error_model="numpy")
+def _eight(values: Floats, count: int, beyond: float) -> Eight:
+    """The first ones of `values`, at most MOST_RAYS, and the rest of them `beyond`."""
+    row = np.full(MOST_RAYS, beyond)
+    row[:count] = values[:count]
+    return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
 
 
 @njit(**LEAN)
 def _cone_ranges(
-    x: Floats, y: Floats, heading: Floats, index: WallIndex,
+    chosen: Ints, x: Floats, y: Floats, heading: Floats, index: WallIndex,
     fan: Floats, slant: float, tables_hold: bool, maximum_m: float, ranges: Floats,
 ) -> None:  # fmt: skip
-    """Fill `ranges`. `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of its width."""
-    for i in range(len(x)):
+    """Fill `ranges` of the chosen poses, one by one.
+
+    `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of its width.
+    """
+    for i in chosen:
         tile = tile_at(x[i], y[i], index)
         if tile < 0 or not math.isfinite(heading[i]):
             ranges[i, 0] = ranges[i, 1] = maximum_m
