@@ -49,7 +49,7 @@ THRESHOLD_M = 1.0
 DEAF_S = 3.0  # who has not been heard for so long goes back to where he was; twice as long when he is there again
 SAFE_S = 15.0  # who has been heard for so long is sent back early again
 PARTICLES = 100
-MORE_PARTICLES = 300  # where the map is learnt as well, or somebody is seldom heard
+MORE_PARTICLES = 300  # where the map is learnt or known badly, or somebody is seldom heard
 SELDOM_S = 2.0
 DROPPED_BEFORE_M = 0.3  # a beacon lies when he has come so near to its place
 
@@ -139,7 +139,7 @@ def guided_return(
     else `world.believed` is known within `place_sd_m` and `axis_sd_rad`.
     """
     settings = settings or (MAPPING if deployed else IRON)
-    particles = particles or (MORE_PARTICLES if deployed or period_s >= SELDOM_S else PARTICLES)
+    particles = particles or (MORE_PARTICLES if deployed or place_sd_m > 0.0 or period_s >= SELDOM_S else PARTICLES)
     rules = _Rules(
         system, max(round(period_s / TICK_S), 1), threshold_m, round(person.delay_s / TICK_S), math.radians(person.heading_sd_deg),
         person.wrong_turns, deployed, settings.drop_sd_m**2, settings.step_sd, max(DEAF_S, 1.5 * period_s),
