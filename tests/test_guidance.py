@@ -118,6 +118,10 @@ def test_arrow_comes_to_rest_where_it_should() -> None:
     for k in range(40):
         cue = g.cue(at(0.2 * k, 3.0, 0.0, -90))
     assert cue.arrow_rad == pytest.approx(math.pi / 2, abs=0.01)
+    assert cue.aim_rad == pytest.approx(math.pi / 2)
+    turned = g.cue(at(8.0, 3.0, 0.0, 90))  # a moment later: the aim is there at once, the arrow is not
+    assert turned.aim_rad == pytest.approx(-math.pi / 2)
+    assert (turned.arrow_rad or 0.0) > 0.5
     assert arrow_sign(cue.arrow_rad) == "←"
     assert describe_cue(cue).startswith("←  Turn left   17 m")
 

@@ -372,7 +372,7 @@ def test_noise_is_counted_and_the_page_goes_on() -> None:
             page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
             while frame["guidance"] is None and time.monotonic() < deadline:
                 frame = next_frame(page)
-        assert frame["guidance"]["distance_m"] == pytest.approx(3.0)
+        assert frame["guidance"]["left_m"] == pytest.approx(3.0)
         assert server.counts.unknown == len(noise)
 
 
@@ -469,7 +469,7 @@ def test_an_errand_finds_its_way_around_walls() -> None:
     errand.found(Ways(PLAN).way(here, goal), "", here)
     way = errand.guidance(here)
     assert not errand.lacks_way(here)
-    assert way.distance_m > 5.5  # through the door at (13, 6.5)
+    assert (way.left_m or 0.0) > 5.5  # through the door at (13, 6.5)
     assert way.path[-1] == (13.0, 4.5)
     assert abs(way.arrow_rad or 0.0) < 0.3
     with pytest.raises(EchostepError) as outside:
@@ -500,7 +500,11 @@ def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
 
 def test_guidance_points_and_arrives() -> None:
     way = straight(told(), Place(2.0, 17.5, 0))
-    assert way.distance_m == 10.0
+    assert (way.left_m or 0.0) == 10.0
     assert way.arrow_rad == pytest.approx(math.pi / 2)
     assert straight(told(), Place(2.3, 7.5, 0)).text == "You have arrived"
     assert "1 level up" in straight(told(), Place(2.3, 7.5, 1)).text
+    looks_north = replace(told(), heading_rad=math.pi / 2)
+    assert straight(looks_north, Place(2.0, 17.5, 0)).arrow_rad == pytest.approx(0.0)
+    unknown = straight(replace(told(), heading_sd_rad=2.0), Place(2.0, 17.5, 0))
+    assert (unknown.kind, unknown.arrow_rad) == ("stop", None)

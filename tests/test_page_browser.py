@@ -6,11 +6,13 @@ With ECHOSTEP_PICTURES=1 the pictures of the README are made anew.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +22,17 @@ import pytest
 from board_runs import ROOT
 from echostep.foot import Step
 from echostep.gait import Leg
+from echostep.guidance import Cue, CueKind
+from echostep.guided import Guided
+from echostep.page.guide import Guidance, guidance
 from echostep.page.live import LivePage
 from echostep.page.scene import Specks
 from echostep.page.server import Address, PageServer
 from echostep.page.stage import Stage
-from echostep.plan import load_plan
+from echostep.plan import Pose, load_plan
+from echostep.routes import Place
 from echostep.simulation.board import PythonBoard
+from echostep.simulation.gateway import with_beacons
 from echostep.simulation.scenario import START_NS, demo_scenario
 from echostep.sources import Chunk, portion_of
 from echostep.tracker import Tracker
@@ -55,17 +62,24 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-class Walk:
-    """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it."""
+@cache
+def demo_walk(*, beacons: bool) -> tuple[Pose, list[Chunk]]:
+    """Where the demo's walk begins, and its chunks."""
+    scenario = demo_scenario(PLAN, 1, PythonBoard(seed=1))
+    return scenario.start, list(with_beacons(scenario, PLAN, 1) if beacons else scenario.chunks())
 
-    def __init__(self, begin_s: float, pace: float) -> None:
-        scenario = demo_scenario(PLAN, 1, PythonBoard(seed=1))
-        self._chunks = list(scenario.chunks())
+
+class Walk:
+    """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it; `guide`: with beacons, to a place."""
+
+    def __init__(self, begin_s: float, pace: float, guide: Place | None = None) -> None:
+        start, self._chunks = demo_walk(beacons=guide is not None)
         self._first_ns = self._chunks[0].t_arrival_ns
-        self._tracker = Tracker(PLAN, scenario.start, seed=1)
+        self._tracker = Tracker(PLAN, start, seed=1)
         self._pace = pace
         self._stop = threading.Event()
-        self.page = LivePage(self._tracker, "A simulated walk", LOCAL)
+        guided = Guided(self._tracker, guide) if guide else None
+        self.page = LivePage(self._tracker, "A simulated walk", LOCAL, guided)
         self._begin = sum(chunk.t_arrival_ns - self._first_ns < begin_s * 1e9 for chunk in self._chunks)
         self._thread = threading.Thread(target=self._run, daemon=True)
         self.taken = 0
@@ -208,7 +222,7 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
         wait_for(page, "echostep.scene.frame.guidance")
         if look == "dark":
             page.evaluate("echostep.view.zoom(4)")
-        wait_for(page, "echostep.scene.frame.guidance.text.includes('to go')")
+        wait_for(page, "document.querySelector('#left').textContent.includes('to go')")
         page.wait_for_timeout(700)
         found = Axe().run(
             page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]}
@@ -288,12 +302,13 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
 
 
 def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
-    scenario = demo_scenario(PLAN, 1, PythonBoard(seed=1))
-    tracker = Tracker(PLAN, scenario.start, seed=1)
-    portion = portion_of(list(scenario.chunks()))
+    start, chunks = demo_walk(beacons=False)
+    tracker = Tracker(PLAN, start, seed=1)
     with LivePage(tracker, "A replay", LOCAL, replay=True) as film:
-        tracker.take(portion)
-        film.shown(portion)
+        for begin in range(0, len(chunks), 2000):
+            portion = portion_of(chunks[begin : begin + 2000])
+            tracker.take(portion)
+            film.shown(portion)
         page = looking(browser, film.url, "bright")
         assert page.is_hidden("#here")
         page.select_option("#times", "16")
@@ -312,6 +327,122 @@ def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
         wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 20) < 0.1")
         assert page.evaluate("echostep.scene.trail.count") < 30
         assert not page.wrong
+        page.context.close()
+
+
+GUIDED = """({
+    cue: document.querySelector('#cue').textContent, left: document.querySelector('#left').textContent,
+    sign: document.querySelector('#turn').dataset.sign, end: document.querySelector('#nowhere').offsetParent !== null,
+    sentence: document.querySelector('#sentence').textContent, beacons: document.querySelector('#beacons').textContent })"""
+SPEECH = """
+    window.said = [];
+    speechSynthesis.speak = (sentence) => window.said.push(sentence.text);
+    speechSynthesis.cancel = () => window.said.push(null);"""
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp_path: Path) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    with Walk(25.0, 0.1, Place(19.6, 5.4)) as walk:  # so slow that nothing is over before it was looked at
+        page = looking(browser, walk.page.url, look)
+        wait_for(page, "echostep.scene.frame.beacons.length > 5")
+        seen = page.evaluate(GUIDED)
+        path = page.evaluate("echostep.scene.frame.guidance.path")
+        page.wait_for_timeout(700)
+        colours = [ink_near(page, *place) for place in path[1:]]
+        found = Axe().run(page)
+        if look != "contrast":
+            picture(page, "guide" if look == "bright" else "guide-wide", tmp_path)
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        outside = page.evaluate(
+            "[...document.querySelectorAll('#guidance > *')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
+        )
+        page.select_option("#goal", label="Store")
+        wait_for(page, "echostep.scene.frame.guidance.own")
+        wait_for(page, f"{GUIDED}.end")
+        page.click("#nowhere")
+        wait_for(page, "!echostep.scene.frame.guidance.own")
+        assert not page.wrong
+        page.context.close()
+    assert seen["cue"] in ("Straight ahead", "Turn right", "Turn left", "Turn around")
+    assert seen["sign"] == "arrow"
+    assert seen["left"].endswith(" m to go")
+    assert seen["sentence"]
+    assert not seen["end"]
+    assert re.fullmatch(r"beacons: \d+ of \d+ heard", seen["beacons"])
+    assert all(colours)
+    assert found.violations_count == 0, found.generate_report()
+    assert (wide, outside) == (0, 0)
+
+
+def ink_near(page: Any, x_m: float, y_m: float) -> bool:
+    """Whether the canvas shows anything of the way's colour within a few pixels of a place."""
+    return bool(
+        page.evaluate(
+            """([x, y]) => {
+                const canvas = document.querySelector('#canvas'), [sx, sy] = echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio);
+                const hex = getComputedStyle(document.documentElement).getPropertyValue('--goal').trim();
+                const want = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+                const { data } = canvas.getContext('2d').getImageData(sx - 40, sy - 40, 80, 80);
+                for (let k = 0; k < data.length; k += 4) if (want.every((v, c) => Math.abs(data[k + c] - v) < 6) && data[k + 3] > 250) return true;
+                return false;
+            }""",
+            [x_m, y_m],
+        )
+    )
+
+
+def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
+    stage = Stage(PLAN, "test", replay=False)
+    told = [guidance(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES]
+    with PageServer(stage, LOCAL) as server:
+        page = browser.new_context(**LOOKS["bright"]).new_page()
+        page.add_init_script(SPEECH)
+        page.goto(server.url)
+
+        def hears(shown: Guidance) -> None:
+            stage.publish(replace(scene(), guidance=shown))
+            wait_for(page, f"document.querySelector('#sentence').textContent === '{shown.spoken}'")
+
+        hears(told[0])
+        assert page.evaluate("said") == []  # off at first
+        assert page.get_attribute("#speech", "aria-pressed") == "false"
+        page.click("#speech")
+        assert page.evaluate("said") == [None, "Turn left."]
+        hears(told[1])
+        hears(replace(told[1], arrow_rad=0.2))
+        hears(told[2])
+        assert page.evaluate("said") == [None, "Turn left.", None, "Turn right.", None, "Turn left."]
+        page.reload()
+        wait_for(page, "window.said?.length")
+        assert page.get_attribute("#speech", "aria-pressed") == "true"  # remembered
+        page.click("#speech")
+        hears(told[1])
+        assert page.evaluate("said") == [None, "Turn left.", None]
+        page.context.close()
+
+
+SENTENCES = ((1.0, "Turn left"), (2.0, "Turn right"), (3.0, "Turn left"))
+
+
+def test_the_arrow_turns_the_short_way_and_is_gone_when_nobody_knows(browser: Any) -> None:
+    stage = Stage(PLAN, "test", replay=False)
+    turn = "document.querySelector('#arrow').style.transform"
+    with PageServer(stage, LOCAL) as server:
+        shown = replace(guidance(Cue(1.0, CueKind.TURN, "Turn left", 2.0, "", 9.0, 3.0), None, 0, None))
+        stage.publish(replace(scene(), guidance=shown))
+        page = looking(browser, server.url, "bright")
+        wait_for(page, f"{turn} === 'rotate(-3rad)'")
+        stage.publish(replace(scene(), guidance=replace(shown, arrow_rad=-3.0)))
+        wait_for(page, f"Math.abs(parseFloat({turn}.slice(7)) + 2 * Math.PI - 3) < 1e-4")
+        stage.publish(replace(scene(), guidance=shown.stopped("There is nothing from the foot", 2.0)))
+        wait_for(page, f"{GUIDED}.sign === 'halt'")
+        assert page.is_hidden("#arrow")
+        assert page.evaluate(f"{GUIDED}.cue") == "Stop. There is nothing from the foot"
+        stage.publish(replace(scene(), guidance=None))
+        wait_for(page, "document.querySelector('#guidance').hidden")
+        assert page.evaluate(f"{GUIDED}.sentence") == ""
         page.context.close()
 
 

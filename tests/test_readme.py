@@ -76,7 +76,17 @@ def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
         "beacons simulate",
         *(
             f"evaluate {name}"
-            for name in ("feet", "girard2011", "echoes", "trails", "fischer2008", "lee2010", "floors", "storeys")
+            for name in (
+                "feet",
+                "girard2011",
+                "echoes",
+                "trails",
+                "fischer2008",
+                "lee2010",
+                "legs",
+                "floors",
+                "storeys",
+            )
         ),
     ],
 )

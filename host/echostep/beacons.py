@@ -238,6 +238,34 @@ def _correct(m: Floats, c: Floats, hx: float, hy: float, ha: float, off: float, 
 
 
 @njit(cache=True, error_model="numpy")
+def moments(beliefs: Beliefs, weight: Floats) -> Floats:
+    """What all particles together believe of each beacon (b, 4): x, y (m), standard deviation per axis (m), axis (rad).
+
+    `weight` (n,) sums to 1. One pass over the particles as they lie in memory; squares are of offsets from the first particle's belief.
+    """
+    mean, cov, _ = beliefs
+    sums = np.zeros((mean.shape[1], 5))
+    for i in range(len(mean)):
+        w = weight[i]
+        for k in range(mean.shape[1]):
+            m, c, s = mean[i, k], cov[i, k], sums[k]
+            dx, dy = m[0] - mean[0, k, 0], m[1] - mean[0, k, 1]
+            s[0] += w * dx
+            s[1] += w * dy
+            s[2] += w * (dx * dx + dy * dy + c[0] + c[3])
+            s[3] += w * math.sin(m[2])
+            s[4] += w * math.cos(m[2])
+    found = np.empty((mean.shape[1], 4))
+    for k in range(mean.shape[1]):
+        s = sums[k]
+        found[k, 0] = mean[0, k, 0] + s[0]
+        found[k, 1] = mean[0, k, 1] + s[1]
+        found[k, 2] = math.sqrt(0.5 * max(s[2] - s[0] * s[0] - s[1] * s[1], 0.0))
+        found[k, 3] = math.atan2(s[3], s[4])
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def kick(turn: Floats, log_weight: Floats, way_m: float, model: BeaconModel, rng: np.random.Generator) -> None:
     """Let some particles try a heading that has just jumped, at the price of how seldom that happens: only they can follow it."""
     tried, price = model.tries_per_m * way_m, math.log(model.kick_per_m / model.tries_per_m)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from echostep import ins
 from echostep.ins import YAW, Nav
+from echostep.kernels import ALLOCATES, LEAN
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def new_compass() -> Compass:
     )
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def gather(compass: Compass, nav: Nav, mag: Floats) -> None:
     """Take the field (3,) at a sample of rest, body frame."""
     if not (math.isfinite(mag[0]) and math.isfinite(mag[1]) and math.isfinite(mag[2])):
@@ -68,7 +69,7 @@ def gather(compass: Compass, nav: Nav, mag: Floats) -> None:
     compass.taken[0] += 1.0
 
 
-@njit(cache=True)
+@njit(**ALLOCATES)
 def correction(compass: Compass, nav: Nav, yaw: float) -> float:
     """The rest is over, at this yaw: by how much the navigation's yaw is to be turned (rad), 0 without trust; its gyro bias has been corrected."""
     taken = compass.taken[0]
@@ -91,7 +92,7 @@ def correction(compass: Compass, nav: Nav, yaw: float) -> float:
     return _fuse(compass, nav, h, c, s)
 
 
-@njit(cache=True)
+@njit(**ALLOCATES)
 def _start(compass: Compass, nav: Nav, h: Floats, strength: float, c: float, s: float) -> None:
     compass.field[:] = 0.0
     compass.field[0], compass.field[1] = c * h[0] - s * h[1], s * h[0] + c * h[1]
@@ -102,7 +103,7 @@ def _start(compass: Compass, nav: Nav, h: Floats, strength: float, c: float, s: 
     compass.yaw_variance[0] = nav.P[YAW, YAW]
 
 
-@njit(cache=True)
+@njit(**ALLOCATES)
 def _strange(compass: Compass, h: Floats, strength: float) -> bool:
     """Whether strength or height of this field is not the usual one; the usual follows slowly."""
     usual = compass.usual[0]
@@ -113,7 +114,7 @@ def _strange(compass: Compass, h: Floats, strength: float) -> bool:
     return off > STRANGE
 
 
-@njit(cache=True)
+@njit(**ALLOCATES)
 def _fuse(compass: Compass, nav: Nav, h: Floats, c: float, s: float) -> float:
     """Two Kalman updates of north and iron, and of the yaw when trusted."""
     x, unit2 = compass.field, compass.usual[0] ** 2
@@ -143,12 +144,15 @@ def _fuse(compass: Compass, nav: Nav, h: Floats, c: float, s: float) -> float:
     return turned
 
 
-@njit(cache=True)
+@njit(**ALLOCATES)
 def _update(compass: Compass, row: Floats, error: float, noise: float, trusted: bool) -> float:
     """One row: corrects north and iron; returns the yaw's correction. Without trust the yaw's error is only considered [Schmidt 1966]."""
     P = compass.P
-    towards = P @ row
-    total = row @ towards + noise
+    towards, total = np.zeros(SIZE), noise
+    for i in range(SIZE):
+        for j in range(SIZE):
+            towards[i] += P[i, j] * row[j]
+        total += row[i] * towards[i]
     gain = towards / total
     if not trusted:
         gain[DELTA] = 0.0

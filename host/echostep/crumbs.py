@@ -25,6 +25,7 @@ from echostep.beacons import (
     beacon_model,
     hear,
     kick,
+    moments,
     place,
     unheard,
 )
@@ -33,14 +34,15 @@ from echostep.gateway import Word
 from echostep.particles import Cloud
 from echostep.placing import found_place
 from echostep.reflectors import Walls
+from echostep.walls import crosses_wall
 
 Floats = NDArray[np.float64]
 
 MOST_STRANGE = 60  # words that are kept of a beacon without a place
 TRY_EVERY = 4  # words: then it is tried to find it
 PLACED_SD_M = 0.4
-SILENT_S = 8.0  # a beacon that should be heard, and others are, is silent after so long
-NEAR_SHARE = 0.6  # of the greatest range at which it was heard: so near it should be heard
+SILENT_S = 8.0  # a beacon that should be heard all the time, and others are, is silent after so long
+NEAR_SHARE = 0.6  # of the greatest range at which it was heard: so near, and without a wall between, it should be heard
 
 
 class BeaconState(StrEnum):
@@ -77,6 +79,7 @@ class Crumbs:
         self._strange: dict[int, deque[tuple[float, float, float, float]]] = {}  # words of beacons without a place
         self._heard_s: list[float] = []
         self._reach_m: list[float] = []
+        self._hindered_s: list[float] = []  # when it was last too far or behind a wall
         self.heard_s: float | None = None  # when any beacon was last heard
 
     def hear(self, cloud: Cloud, leg: Leg, words: Sequence[Word]) -> None:
@@ -93,28 +96,39 @@ class Crumbs:
             if self._has_place(cloud, x, y, word):
                 self._weigh(cloud, x, y, word)
                 cloud.renew()
+        if self._health.known.any():
+            self._expect(cloud, leg.t1_s)
 
     def places(self, cloud: Cloud, t_s: float) -> list[BeaconPlace]:
         """Every beacon that was heard, by slot."""
+        _, found = self._moments(cloud)
+        known = np.flatnonzero(self._health.known).tolist()
+        return [self._place(cloud, slot, found[slot].tolist(), t_s) for slot in known]
+
+    def _moments(self, cloud: Cloud) -> tuple[tuple[float, float], Floats]:
+        """Where he is on the sheet, and what `moments` says of the beacons."""
         weight = np.exp(cloud.log_weight)
         weight /= weight.sum()
-        here = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
-        return [self._place(cloud, weight, slot, here, t_s) for slot in np.flatnonzero(self._health.known).tolist()]
+        return (float(weight @ cloud.x_m), float(weight @ cloud.y_m)), moments(cloud.beliefs, weight)
 
-    def _place(self, cloud: Cloud, weight: Floats, slot: int, here: tuple[float, float], t_s: float) -> BeaconPlace:
-        mean, cov = cloud.beliefs.mean[:, slot], cloud.beliefs.cov[:, slot]
-        x, y = float(weight @ mean[:, 0]), float(weight @ mean[:, 1])
-        spread = weight @ ((mean[:, 0] - x) ** 2 + (mean[:, 1] - y) ** 2 + cov[:, 0] + cov[:, 3])
-        axis = math.atan2(float(weight @ np.sin(mean[:, 2])), float(weight @ np.cos(mean[:, 2])))
+    def _expect(self, cloud: Cloud, t_s: float) -> None:
+        """Note which beacons cannot be expected to be heard now."""
+        (x, y), found = self._moments(cloud)
+        index = self._walls.index
+        for slot in np.flatnonzero(self._health.known).tolist():
+            bx, by = float(found[slot, 0]), float(found[slot, 1])
+            far = math.hypot(bx - x, by - y) > NEAR_SHARE * self._reach_m[slot]
+            if far or (len(index.walls) and crosses_wall(bx, by, x, y, index)):
+                self._hindered_s[slot] = t_s
+
+    def _place(self, cloud: Cloud, slot: int, found: list[float], t_s: float) -> BeaconPlace:
+        x, y, sd, axis = found
         state = BeaconState.MOVED if self._health.each[slot, UNFIT_RUNS] else BeaconState.WELL
         others = self.heard_s is not None and t_s - self.heard_s < SILENT_S
-        near = math.hypot(x - here[0], y - here[1]) < NEAR_SHARE * self._reach_m[slot]
-        if near and others and t_s - self._heard_s[slot] > SILENT_S:
+        if others and t_s - max(self._heard_s[slot], self._hindered_s[slot]) > SILENT_S:
             state = BeaconState.SILENT
         level = cloud.level_at(x)
-        return BeaconPlace(
-            slot, x - level * cloud.pitch_m, y, math.sqrt(0.5 * float(spread)), axis, level, state, self._heard_s[slot]
-        )
+        return BeaconPlace(slot, x - level * cloud.pitch_m, y, sd, axis, level, state, self._heard_s[slot])
 
     def _at_word(self, cloud: Cloud, leg: Leg, word: Word) -> tuple[Floats, Floats]:
         """Where the particles were (n,), (n,) when a word of the last leg was said."""
@@ -177,6 +191,7 @@ class Crumbs:
         )
         self._heard_s += [-math.inf] * more
         self._reach_m += [0.0] * more
+        self._hindered_s += [-math.inf] * more
 
     def heard_times(self, slot: int) -> int:
         """Measurements of a beacon that were weighed."""

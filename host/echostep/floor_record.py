@@ -5,19 +5,26 @@ In: `Pressures`, `Floors`. Out: heights of storeys, `Stay`s, the sums. Owns noth
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.altitude import Altitude, BarometerSettings, Heights, Pressures
+from echostep.altitude import Altitude, BarometerSettings, Column, Heights, Pressures, noise_of
 from echostep.errors import EchostepError
-from echostep.floors import Floors
+from echostep.floors import FloorFilter, Floors
+from echostep.vertical import CLAIMED
 
 Floats = NDArray[np.float64]
+Way = tuple[int, int, float]  # from one storey to another, and metres up
 
 MOVING_P = 0.5
-SHORTEST_STAY_S, LEVEL_S = 4.0, 3.0
+SHORTEST_STAY_S, SHORTEST_END_S, SETTLES_S, LEVEL_S = 4.0, 1.0, 3.0, 8.0
+MOST_ROUNDS, SETTLED_M = 4, 0.02
+PASSED_S = 2.0  # at a known storey this is a stay
+DRIFTS_S = 120.0  # of stays that show the drift
+NOISE_TIMES_S, SMOOTH_PA = (0.5, 1.0), 0.02
 SAME_STOREY_M, LOWEST_STOREY_M = 1.2, 2.0
 FEWEST_HZ = 10.0
 
@@ -45,13 +52,45 @@ def thinned(samples: Pressures) -> tuple[Pressures, NDArray[np.int64]]:
     return Pressures(mean(samples.t_s), mean(samples.pressure_pa), temperature), group
 
 
+def noise_of_record(samples: Pressures, few: Pressures) -> float:
+    """Noise (Pa, 1 sd) of the thinned samples `few`, as large as it must be were each one's its own.
+
+    Errors that last, as those of coarse steps and of a filter in the sensor, are seen in means over longer times.
+    """
+    steps = np.diff(np.unique(samples.pressure_pa))
+    steps = steps[steps > SMOOTH_PA]
+    found = max(noise_of(few.pressure_pa), 0.5 * float(np.median(steps)) if len(steps) else 0.0)
+    rate = 1.0 / float(np.median(np.diff(few.t_s)))
+    for seconds in NOISE_TIMES_S:
+        many = round(seconds * rate)
+        whole = len(few.t_s) // many * many if many > 1 else 0
+        if whole >= 5 * many > 0:
+            found = max(found, math.sqrt(many) * noise_of(few.pressure_pa[:whole].reshape(-1, many).mean(axis=1)))
+    return found
+
+
 def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
     """Heights (k,) above the lowest storey of all those where the wearer stayed; raises EchostepError when he stayed on one only.
 
     Each way between two stays leads to a storey that is known by its height, or to a new one; the heights are then those that fit all ways best.
+    With these storeys the stays are found anew, and the heights by what pressure says at both ends of each way, until nothing changes.
     """
-    heights = Altitude(settings).look_back(samples)
-    rises = _rises(heights)
+    ways = _first_ways(_rises(Altitude(settings).look_back(samples)))
+    heights = _fitted(ways)
+    claimed, used = Column(settings).rows(samples)
+    for _ in range(MOST_ROUNDS if len(heights) > 1 else 0):
+        before = heights
+        visited = stays(FloorFilter(heights, settings).look_back(samples), PASSED_S)
+        heights = _fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]))
+        if len(heights) < 2 or (len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M):
+            break
+    if len(heights) < 2:
+        raise EchostepError("heights: the record shows one storey only: give the heights as --heights 0,3.5,7")
+    return np.round(heights, 2)
+
+
+def _first_ways(rises: list[float]) -> list[Way]:
+    """Ways between storeys, numbered as they are met, out of rises between stays."""
     known, ways, here = [0.0], [], 0
     for rise in rises:
         at = known[here] + rise
@@ -62,31 +101,56 @@ def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
         if there != here:
             ways.append((here, there, rise))
         here = there
-    if len(known) < 2:
-        raise EchostepError("heights: the record shows one storey only: give the heights as --heights 0,3.5,7")
-    table, wanted = np.zeros((len(ways) + 1, len(known))), np.zeros(len(ways) + 1)
+    return ways
+
+
+def _ways(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Way]:
+    """Ways between stays, with the rise that pressure claims between the seconds before one and after the other, less the weather's drift."""
+
+    def level(from_s: float, to_s: float) -> tuple[float, float]:
+        seconds = (t_s >= from_s) & (t_s <= to_s)
+        return float(t_s[seconds].mean()), float(np.median(claimed_m[seconds]))
+
+    begins = [level(stay.from_s, min(stay.to_s, stay.from_s + LEVEL_S)) for stay in visited]
+    ends = [level(max(stay.from_s, stay.to_s - LEVEL_S), stay.to_s) for stay in visited]
+    drift = np.sum(np.subtract(ends, begins), axis=0) if visited else np.zeros(2)
+    rate = drift[1] / drift[0] if drift[0] > DRIFTS_S else 0.0
+    return [
+        (a.floor, b.floor, after - before - rate * (later - sooner))
+        for a, b, (sooner, before), (later, after) in zip(visited, visited[1:], ends, begins[1:], strict=False)
+    ]
+
+
+def _fitted(ways: list[Way]) -> Floats:
+    """Heights above the lowest, ascending and apart, of the storeys of all ways, by least squares."""
+    names = sorted({name for a, b, _ in ways for name in (a, b)})
+    table, wanted = np.zeros((len(ways) + 1, max(1, len(names)))), np.zeros(len(ways) + 1)
     for row, (a, b, rise) in enumerate(ways):
-        table[row, a], table[row, b], wanted[row] = -1.0, 1.0, rise
+        table[row, names.index(a)], table[row, names.index(b)], wanted[row] = -1.0, 1.0, rise
     table[-1, 0] = 1.0
     found = np.sort(np.linalg.lstsq(table, wanted, rcond=None)[0])
     apart = np.concatenate([[True], np.diff(found) >= LOWEST_STOREY_M])
-    return np.round(found[apart] - found[0], 2)
+    return np.asarray(found[apart] - found[0])
 
 
 def _rises(heights: Heights) -> list[float]:
-    """Metres between each two neighbouring stays: what moved between level stretches."""
+    """Metres between each two neighbouring stays: what moved between level stretches. At the ends of a record a second is a stay."""
     level = heights.moving < MOVING_P
     edges = np.flatnonzero(np.diff(np.concatenate([[0], level.astype(np.int8), [0]])))
-    stays = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if heights.t_s[b - 1] - heights.t_s[a] >= SHORTEST_STAY_S]
+    stays = [
+        (a, b)
+        for a, b in edges.reshape(-1, 2).tolist()
+        if heights.t_s[b - 1] - heights.t_s[a] >= (SHORTEST_END_S if a == 0 or b == len(level) else SHORTEST_STAY_S)
+    ]
     found = []
     for (_, leaves), (arrives, ends) in zip(stays, stays[1:], strict=False):
         before = heights.height_m[leaves - 1]
-        settled = np.searchsorted(heights.t_s[:ends], heights.t_s[arrives] + LEVEL_S)
+        settled = np.searchsorted(heights.t_s[:ends], heights.t_s[arrives] + SETTLES_S)
         found.append(float(np.median(heights.height_m[arrives : max(settled, arrives + 1)]) - before))
     return [rise for rise in found if abs(rise) > SAME_STOREY_M]
 
 
-def stays(floors: Floors) -> list[Stay]:
+def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S) -> list[Stay]:
     """Times on each floor in their order; a floor that is only passed on the way does not count, the same floor again goes on."""
     still = floors.up + floors.down < MOVING_P
     found: list[Stay] = []
@@ -94,7 +158,7 @@ def stays(floors: Floors) -> list[Stay]:
     edges = np.flatnonzero(np.diff(at, prepend=-2, append=-2))
     for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         floor, t0, t1 = int(at[a]), float(floors.t_s[a]), float(floors.t_s[b - 1])
-        if floor < 0 or (t1 - t0 < SHORTEST_STAY_S and a > 0 and b < len(at)):
+        if floor < 0 or (t1 - t0 < shortest_s and a > 0 and b < len(at)):
             continue
         if found and found[-1].floor == floor:
             t0 = found.pop().from_s

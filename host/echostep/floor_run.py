@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from echostep.altitude import BarometerSettings, Pressures, noise_of
+from echostep.altitude import BarometerSettings, Pressures
 from echostep.errors import EchostepError
-from echostep.floor_record import describe, find_storeys, thinned
+from echostep.floor_record import describe, find_storeys, noise_of_record, thinned
 from echostep.floors import FloorFilter, Floors, checked_heights
 from echostep.pressure_csv import load_pressures, write_floors
 
@@ -47,7 +47,7 @@ def record_floors(samples: Pressures, heights_m: Floats, start: int | None = Non
     """Floors at all samples of a record, each by all of it; its own noise is measured, ten samples a second are looked at."""
     few, group = thinned(samples)
     prior = np.ones(len(heights_m)) if start is None else np.eye(len(heights_m))[start]
-    found = FloorFilter(heights_m, BarometerSettings(noise_of(few.pressure_pa)), prior).look_back(few)
+    found = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).look_back(few)
     return Floors(
         samples.t_s, found.heights_m, found.floor[group], found.probability[group], found.height_m[group], found.up[group], found.down[group]
     )  # fmt: skip
@@ -57,7 +57,7 @@ def _named(path: Path, samples: Pressures, heights_m: Floats | None, start: int 
     try:
         if heights_m is None:
             few, _ = thinned(samples)
-            heights_m = find_storeys(few, BarometerSettings(noise_of(few.pressure_pa)))
+            heights_m = find_storeys(few, BarometerSettings(noise_of_record(samples, few)))
         return record_floors(samples, heights_m, start)
     except EchostepError as error:
         raise EchostepError(f"{path}: {error}") from error

@@ -19,6 +19,7 @@ from echostep import compass as magnetic
 from echostep import ins, mounting, stance
 from echostep.compass import Compass
 from echostep.ins import POS, TILT, VEL, YAW, Nav
+from echostep.kernels import LEAN
 from echostep.stance import Rest, Window
 
 Floats = NDArray[np.float64]
@@ -91,7 +92,7 @@ _NUMPY = {"float": ("f8",), "int": ("i8",), "Floats": ("f8", 3)}
 FOOTING = np.dtype([(name, *_NUMPY[kind]) for name, kind in Footing.__annotations__.items()])
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def walk(
     s: Footing, nav: Nav, window: Window, rest: Rest, compass: Compass, height_m: float,
     t_s: Floats, accel: Floats, gyro: Floats, mag: Floats, events: Floats, rows: Floats,
@@ -116,17 +117,17 @@ def walk(
             else:
                 found = _find_level(s, nav, window, dt, t_s[k], events, found)
             s.t_s = t_s[k]
-            s.force[:] = accel[k]
-            s.rate[:] = gyro[k]
+            for i in range(3):
+                s.force[i], s.rate[i] = accel[k, i], gyro[k, i]
         if len(rows):
-            rows[k, 0:3] = nav.position
+            rows[k, 0], rows[k, 1], rows[k, 2] = nav.position[0], nav.position[1], nav.position[2]
             rows[k, 3] = ins.heading(nav)
             rows[k, 4] = s.in_stance
             rows[k, 5] = found
     return found
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _usable(s: Footing, t_s: float, accel: Floats, gyro: Floats) -> bool:
     """Whether this is a sample: finite, possible, later than the last one; counts those that are not."""
     possible = math.isfinite(t_s)
@@ -145,7 +146,7 @@ def _usable(s: Footing, t_s: float, accel: Floats, gyro: Floats) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _time(s: Footing, dt: float) -> None:
     """The period of the samples: a running median, so that missing ones do not count."""
     if s.period_s == 0.0:
@@ -154,7 +155,7 @@ def _time(s: Footing, dt: float) -> None:
         s.period_s *= 1.0 + PERIOD_GAIN if dt > s.period_s else 1.0 - PERIOD_GAIN
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _lose(s: Footing, nav: Nav, rest: Rest, compass: Compass, dt: float, events: Floats, found: int) -> int:
     """Samples are missing, or the clock or the level is wrong: the stance is over, and what the foot does until the next level unknown."""
     s.gaps += 1
@@ -171,29 +172,31 @@ def _lose(s: Footing, nav: Nav, rest: Rest, compass: Compass, dt: float, events:
     return found
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _find_level(s: Footing, nav: Nav, window: Window, dt: float, t_s: float, events: Floats, found: int) -> int:
     """Wait for a still moment to take the level from; after a while, start without."""
     unrest = stance.unrest(*stance.activity(window, nav.gyro_bias))
     s.waited_s += dt
     s.still_s = s.still_s + dt if unrest < stance.STILL else 0.0
+    force = stance.mean_force(window)
     if s.still_s == 0.0:
-        s.force_sum[:] = 0.0
         s.force_count = 0
-    s.force_sum += stance.mean_force(window)
+    for i in range(3):
+        s.force_sum[i] = s.force_sum[i] + force[i] if s.force_count else force[i]
     s.force_count += 1
     if s.still_s >= LEVEL_S - 1e-6:
-        ins.set_level(nav, s.force_sum / s.force_count, s.yaw_rad, True)
+        n, total = s.force_count, s.force_sum
+        ins.set_level(nav, (total[0] / n, total[1] / n, total[2] / n), s.yaw_rad, True)
         _begin(s, nav, t_s, STILL_TILT_RAD, 0.02)
         found = _land(s, nav, t_s - s.still_s, events, found)
     elif s.waited_s >= IMPATIENT_S and unrest < 1.0:
-        ins.set_level(nav, stance.mean_force(window), s.yaw_rad, False)
+        ins.set_level(nav, force, s.yaw_rad, False)
         _begin(s, nav, t_s, UNSURE_TILT_RAD, WALK_M_S)
         found = _land(s, nav, t_s, events, found)
     return found
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _begin(s: Footing, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
     """Navigate from here on; whatever the foot did while nobody watched goes into the position's covariance."""
     ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, GYRO_BIAS_RAD_S, ACCEL_BIAS_M_S2)
@@ -205,7 +208,7 @@ def _begin(s: Footing, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s
     s.rest_end_s = t_s
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _navigate(
     s: Footing, nav: Nav, window: Window, rest: Rest, compass: Compass, height_m: float, dt: float, t_s: float, accel: Floats, gyro: Floats,
     events: Floats, found: int,
@@ -217,7 +220,7 @@ def _navigate(
         stance.end_rest(rest)
         s.rest_s = 0.0
         if not s.in_stance:
-            mounting.watch(s.tilt_square, s.tilt_cube, mounting.tilt(nav) - s.stood, dt)
+            mounting.watch(s.tilt_square, s.tilt_cube, ins.difference(mounting.tilt(nav), s.stood), dt)
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
             found = _leave(s, nav, compass, events, found)
         return found
@@ -236,7 +239,7 @@ def _navigate(
     return found
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s: float, gyro: Floats) -> bool:
     """Whether the foot rests now; if so, the velocity has been corrected."""
     rate2, force2 = stance.activity(window, nav.gyro_bias)
@@ -260,7 +263,7 @@ def _rests(s: Footing, nav: Nav, window: Window, height_m: float, dt: float, t_s
     return True
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _doubt_limits(s: Footing, nav: Nav, dt: float, accel: Floats, gyro: Floats) -> None:
     """A sensor at the end of its range reads the same again and again: how far beyond the truth lies stays unknown all that time."""
     for i in range(3):
@@ -270,7 +273,8 @@ def _doubt_limits(s: Footing, nav: Nav, dt: float, accel: Floats, gyro: Floats) 
         rate = _limit_variance(gyro[i], s.rate_limit_s[i], dt)
         if force + rate > 0.0:
             s.saturated += 1
-            axis = ins.rotation(nav.attitude)[:, i]
+            r = ins.rotation(nav.attitude)
+            axis = (r[0][i], r[1][i], r[2][i])
             for j in range(3):
                 for k in range(3):
                     nav.P[VEL + j, VEL + k] += force * axis[j] * axis[k]
@@ -278,30 +282,30 @@ def _doubt_limits(s: Footing, nav: Nav, dt: float, accel: Floats, gyro: Floats) 
             nav.P[YAW, YAW] += rate * axis[2] ** 2
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _limit_variance(value: float, span_s: float, dt: float) -> float:
     """Growth over `dt` of the variance of the integral of a reading at its limit since `span_s`, its error being the same all the time."""
     return (LOST_SHARE * value) ** 2 * (2.0 * span_s - dt) * dt if span_s > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _land(s: Footing, nav: Nav, began_s: float, events: Floats, found: int) -> int:
     """A stance begins; the step that led to it is told, unless there was no stance before."""
     s.in_stance = 1
     s.settled = 0
     s.began_s = max(began_s, s.left_s) if s.under_way else began_s
     s.rest_yaw_rad = ins.heading(nav)
-    s.stood[:] = mounting.tilt(nav)
+    s.stood[0], s.stood[1], s.stood[2] = mounting.tilt(nav)
     if s.under_way:
         _write_step(s, nav, events[found])
         found += 1
     s.under_way = 1
-    s.origin[:] = nav.position
+    s.origin[0], s.origin[1], s.origin[2] = nav.position[0], nav.position[1], nav.position[2]
     s.yaw_variance = nav.P[YAW, YAW]
     return found
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _write_step(s: Footing, nav: Nav, row: Floats) -> None:
     row[0], row[1], row[2] = STEP, s.left_s, s.began_s
     for i in range(3):
@@ -311,18 +315,19 @@ def _write_step(s: Footing, nav: Nav, row: Floats) -> None:
     row[15] = s.rest_yaw_rad
     row[16] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
     row[17] = mounting.toe(s.tilt_square, s.tilt_cube)
-    s.tilt_square *= mounting.MEMORY
-    s.tilt_cube *= mounting.MEMORY
+    for i in range(3):
+        s.tilt_square[i] *= mounting.MEMORY
+        s.tilt_cube[i] *= mounting.MEMORY
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _settle(s: Footing, nav: Nav) -> None:
     """The errors of the next step count from here."""
     s.settled = 1
     ins.forget_start(nav)
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _leave(s: Footing, nav: Nav, compass: Compass, events: Floats, found: int) -> int:
     """The stance ended with its last rest."""
     row = events[found]

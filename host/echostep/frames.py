@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
+from echostep.kernels import LEAN
 from echostep.messages import BY_ID, GREATEST, ROWS, SCHEMA_HASH, SCHEMA_SEED, Message
 
 Ints = NDArray[np.int64]
@@ -183,7 +184,7 @@ def _read(
     return found, start, -1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _open(stream: Octets, start: int, end: int, payload: Octets, schema: _Schema, tally: Ints) -> bool:
     """Whether stream[start:end] is a frame with a right checksum; then `payload` holds its id, sequence, body and checksum."""
     if not SHORTEST - 1 <= end - start <= MAX_ENCODED:
@@ -202,7 +203,7 @@ def _open(stream: Octets, start: int, end: int, payload: Octets, schema: _Schema
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _unstuff(stream: Octets, at: int, end: int, payload: Octets) -> bool:
     """Undo COBS for one frame of at most MAX_ENCODED bytes; false when a block reaches beyond its end [Cheshire, Baker 1999]."""
     n = 0
@@ -219,7 +220,7 @@ def _unstuff(stream: Octets, at: int, end: int, payload: Octets) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _known(payload: Octets, size: int, schema: _Schema) -> bool:
     """Whether there is such a message, of this size, without unknown enumeration values, and from our own schema if it names one."""
     identifier = payload[0]
@@ -231,7 +232,7 @@ def _known(payload: Octets, size: int, schema: _Schema) -> bool:
     return identifier != _IDENTITY or _schema_hash(payload, schema) == schema.hash
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _schema_hash(payload: Octets, schema: _Schema) -> int:
     value = 0
     for k in range(4):
@@ -239,7 +240,7 @@ def _schema_hash(payload: Octets, schema: _Schema) -> int:
     return value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _count_sequence(sequence: int, identifier: int, tally: Ints) -> None:
     tally[_GOOD] += 1
     if tally[_SEQUENCE] >= 0 and identifier != _IDENTIFY:

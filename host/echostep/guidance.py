@@ -30,11 +30,15 @@ class CueKind(StrEnum):
     AHEAD = "ahead"
 
 
+NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
+
+
 @dataclass(frozen=True, slots=True)
 class Cue:
     """What a person is told now. `arrow_rad`: where to walk, from where he looks, counter-clockwise; None: no arrow is shown.
 
-    `spoken` is empty when there is nothing new to say. `left_m`: way that is left.
+    `spoken` is empty when there is nothing new to say. `left_m`: way that is left. `aim_rad`: where the arrow is turning to, for who draws
+    it more often than estimates come, and turns it smoothly himself.
     """
 
     t_s: float
@@ -43,6 +47,7 @@ class Cue:
     arrow_rad: float | None
     spoken: str = ""
     left_m: float = math.nan
+    aim_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +108,7 @@ class Guide:
         if e.status is not Status.LOST and silent_s < self._settings.deaf_s:
             self._sure = Place(e.x_m, e.y_m, e.level)
         if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
-            return self._told(e, CueKind.STOP, "Stop. Your direction is not known: turn once around, slowly", None)
+            return self._told(e, CueKind.STOP, NO_HEADING, None)
         if e.status is Status.LOST or silent_s >= self._leash_s:
             return self._back(e, silent_s)
         self._find(e)
@@ -215,7 +220,8 @@ class Guide:
         spoken = ""
         if new and not (kind is CueKind.AHEAD and text == self._said):
             spoken, self._said, self._said_s = text + ".", text, e.t_s
-        return Cue(e.t_s, kind, text, arrow, spoken, self.left_m)
+        aim = None if arrow_rad is None else _wrap(arrow_rad)
+        return Cue(e.t_s, kind, text, arrow, spoken, self.left_m, aim)
 
     def _smooth(self, wanted: float | None, t_s: float) -> float | None:
         """The arrow follows with a time constant and a greatest speed; after it was hidden it starts where it should be."""

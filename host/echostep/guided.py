@@ -1,22 +1,24 @@
 """A run that is guided: the tracker's estimates in, cues out, to show, to speak and to keep.
 
-In: a plan, where to go, estimates as they come. Out: the newest `Cue`, sentences, cues.csv. Owns the guide.
+In: a tracker, where to go. Out: a `Cue` for each estimate, at the moment when it is told; cues.csv. Owns the guide. What beacons have said is
+asked at that moment, so a replay gives the cues of the run, in whatever portions its chunks come.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.estimate import Estimate
-from echostep.guidance import Cue, Guide
+from echostep.estimate import Estimate, Status
+from echostep.guidance import Cue, CueKind, Guide
 from echostep.plan import Plan
 from echostep.routes import Place, Route, Routes
 from echostep.tracker import Tracker
+from echostep.waiting import Passage
 
+NO_WAY = "Stop. No way leads there from here"
 CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
 
 
@@ -48,9 +50,14 @@ class Guided:
         self._tracker = tracker
         self._to = to
         self._routes = Routes(tracker.plan)
-        self._routes.way(to, to)
+        first = Guide(self._routes.way(to, to))
+        first.cue(
+            Estimate(0.0, to.x_m, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, Status.TRACKING, to.level)
+        )  # compiled now, not on the way
         self._guide: Guide | None = None
+        self._asked = 0
         self.cues: list[Cue] = []
+        tracker.watchers.append(self._watch)
 
     @property
     def cue(self) -> Cue | None:
@@ -62,17 +69,10 @@ class Guided:
         """The way as it is now."""
         return self._guide.route if self._guide else None
 
-    def take(self, estimates: Sequence[Estimate]) -> list[Cue]:
-        """Cues for new estimates."""
-        new: list[Cue] = []
-        for e in estimates:
-            if self._guide is None and not self._lay(e):
-                continue
-            assert self._guide is not None
-            crumbs = self._tracker.filter.crumbs if self._tracker.filter else None
-            new.append(self._guide.cue(e, crumbs.heard_s if crumbs else None))
-        self.cues += new
-        return new
+    def news(self) -> list[Cue]:
+        """The cues since it was last asked."""
+        begin, self._asked = self._asked, len(self.cues)
+        return self.cues[begin:]
 
     def write(self, path: Path) -> None:
         """All cues as CSV."""
@@ -81,11 +81,20 @@ class Guided:
             writer.writerow(CUE_COLUMNS)
             writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)
 
-    def _lay(self, e: Estimate) -> bool:
+    def _watch(self, _: Passage | None, e: Estimate) -> None:
+        """The tracker told an estimate."""
+        if self._guide is None:
+            self._lay(e)
+        if self._guide is None:
+            self.cues.append(Cue(e.t_s, CueKind.STOP, NO_WAY, None, "" if self.cues else f"{NO_WAY}."))
+            return
+        crumbs = self._tracker.filter.crumbs if self._tracker.filter else None
+        self.cues.append(self._guide.cue(e, crumbs.heard_s if crumbs else None))
+
+    def _lay(self, e: Estimate) -> None:
         """Lay the way from a first estimate; a place from which no way leads is asked again at the next."""
         try:
             route = self._routes.way(Place(e.x_m, e.y_m, e.level), self._to)
         except EchostepError:
-            return False
+            return
         self._guide = Guide(route, planner=self._routes)
-        return True

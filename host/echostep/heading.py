@@ -12,6 +12,7 @@ that turn while the gyro does not count for nothing. The foot's magnetometer (`c
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,9 @@ FULL_TURN_RAD = math.radians(330.0)
 LARGEST_IRON_RAD = math.radians(60.0)
 FAR_OFF_SD = 3.0
 FITS = 6
+BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose means differ by less than CALM_RAD_S
+CALM_BINS = 7
+CALM_RAD_S = math.radians(1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +50,8 @@ class Iron:
 class HeadingSettings:
     """How wrong gyro and compass are: the building's `disturbance_rad` stays the same for about `same_s`; `steady_rad` is how far gyro and compass
     may part in a second. `drift_rad_s2` is the random walk of the bias in a root second, `walk_rad` that of the heading. `iron_sd_rad` of what is not
-    calibrated.
+    calibrated. `rest_sd_rad_s`: how somebody who stands still turns nevertheless, in a tenth of a second. `first_sd_rad`: of the first reading of the
+    compass; small where only turns against it count.
     """
 
     disturbance_rad: float = math.radians(8.0)
@@ -55,7 +60,8 @@ class HeadingSettings:
     walk_rad: float = math.radians(0.06)
     drift_rad_s2: float = math.radians(0.002)
     bias_sd_rad_s: float = math.radians(1.5)
-    rest_sd_rad_s: float = math.radians(0.5)
+    rest_sd_rad_s: float = math.radians(0.4)
+    first_sd_rad: float = math.radians(8.0)
     iron_sd_rad: float = math.radians(4.0)
     iron: Iron | None = None
 
@@ -75,7 +81,8 @@ class Heading:
         )
         if s.iron:
             self.state[IRON:] = s.iron.sin1, s.iron.cos1, s.iron.sin2, s.iron.cos2
-        self.known = heading_rad is not None
+        self.known = self._given = heading_rad is not None
+        self._spun = False
         if heading_rad is not None:
             self.state[HEADING] = heading_rad
         self.read = self.refused = 0
@@ -85,6 +92,8 @@ class Heading:
         self._last: tuple[float, float] | None = None  # time and compass of the reading before
         self._parted = 0.0
         self._period_s = 0.1
+        self._bin = (-1, 0.0, 0, True)  # its number, sum and count of rates, whether the legs stand in all of it
+        self._bins: deque[float] = deque(maxlen=CALM_BINS)  # means of the last ones in which they did
 
     def feed(
         self, t_s: Floats, rate_rad_s: Floats, compass_rad: Floats, still: NDArray[np.bool_] | None = None
@@ -95,12 +104,16 @@ class Heading:
         samples = zip(t_s.tolist(), rate_rad_s.tolist(), compass_rad.tolist(), rests.tolist(), strict=True)
         for k, (t, rate, compass, rest) in enumerate(samples):
             self._turn(t, rate)
-            if rest:
-                self._rest(rate)
+            self._watch(t, rate, rest)
             if not math.isnan(compass):
                 self._see(t, compass)
             found[k] = self.state[HEADING], math.sqrt(self.P[HEADING, HEADING])
         return found
+
+    @property
+    def bias_sd_rad_s(self) -> float:
+        """How well the gyro's bias is known."""
+        return math.sqrt(self.P[BIAS, BIAS])
 
     @property
     def iron(self) -> Iron:
@@ -118,9 +131,18 @@ class Heading:
         self._turned += turned
         if math.isnan(rate):
             self.P[HEADING, HEADING] += (math.radians(30.0)) ** 2 * dt
+        elif not self._spun:
+            self._begin()
         self._since_s += dt
         if self._since_s >= 0.1:
             self._grow()
+
+    def _begin(self) -> None:
+        """The gyro speaks for the first time: until then only the compass told, and tells no more exactly than it does."""
+        self._spun = True
+        if self.known and not self._given:
+            self.P[HEADING] = self.P[:, HEADING] = 0.0
+            self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
 
     def _grow(self) -> None:
         """Move the covariance on."""
@@ -131,14 +153,27 @@ class Heading:
         self.P[HEADING, HEADING] += self.settings.walk_rad**2 * dt
         self.P[BIAS, BIAS] += self.settings.drift_rad_s2**2 * dt
 
+    def _watch(self, t_s: float, rate: float, still: bool) -> None:
+        """Whose legs stand may turn on the spot or begin to walk: only in the middle of a calm stretch does the gyro show its bias."""
+        number, total, count, all_still = self._bin
+        if number == int(t_s / BIN_S):
+            self._bin = (number, total + rate, count + 1, all_still and still)
+            return
+        self._bin = (int(t_s / BIN_S), rate, 1, still)
+        if not count or not all_still or math.isnan(total):
+            self._bins.clear()
+            return
+        self._bins.append(total / count)
+        if len(self._bins) == CALM_BINS and max(self._bins) - min(self._bins) < CALM_RAD_S:
+            self._rest(self._bins[CALM_BINS // 2])
+
     def _rest(self, rate: float) -> None:
         """Who stands does not turn: the gyro shows its bias."""
-        if not math.isnan(rate) and abs(rate - self.state[BIAS]) < FAR_OFF_SD * (
-            self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s
-        ):
+        off = rate - float(self.state[BIAS])
+        if abs(off) < FAR_OFF_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
             row = np.zeros(SIZE)
             row[BIAS] = 1.0
-            self._update(row, rate - float(self.state[BIAS]), 1.5 * self.settings.rest_sd_rad_s**2)
+            self._update(row, off, self.settings.rest_sd_rad_s**2)
 
     def _see(self, t_s: float, compass: float) -> None:
         """One reading of the compass."""
@@ -149,7 +184,7 @@ class Heading:
             self.known = True
             self.state[HEADING] = heading = compass
             self.P[HEADING] = self.P[:, HEADING] = 0.0
-            self.P[HEADING, HEADING] = self.settings.disturbance_rad**2
+            self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
             self._last, self._turned = (t_s, compass), 0.0
             return
         harmonics = _harmonics(heading)

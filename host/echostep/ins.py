@@ -16,7 +16,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.kernels import LEAN
+
 Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Matrix = tuple[Vector, Vector, Vector]  # of rows
 
 GRAVITY_M_S2 = 9.81
 POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
@@ -63,54 +68,62 @@ def new_nav(noise: Noise) -> Nav:
     return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)), noise)
 
 
-@njit(cache=True)
-def rotation(q: Floats) -> Floats:
-    """Rotation matrix (3, 3) of a unit quaternion (4,)."""
+@njit(**LEAN)
+def rotation(q: Floats | Quaternion) -> Matrix:
+    """Rotation matrix of a unit quaternion."""
     w, x, y, z = q[0], q[1], q[2], q[3]
-    r = np.empty((3, 3))
-    r[0, 0], r[0, 1], r[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    r[1, 0], r[1, 1], r[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-    r[2, 0], r[2, 1], r[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-    return r
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
 
 
-@njit(cache=True)
-def multiply(a: Floats, b: Floats) -> Floats:
+@njit(**LEAN)
+def multiply(a: Floats | Quaternion, b: Floats | Quaternion) -> Quaternion:
     """Quaternion product a b, of unit length again."""
-    c = np.empty(4)
-    c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
-    c[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
-    c[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
-    c[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
-    c /= math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3])
-    return c
+    w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+    x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
+    y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
+    z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    return w / size, x / size, y / size, z / size
 
 
-@njit(cache=True)
-def turning(x: float, y: float, z: float) -> Floats:
+@njit(**LEAN)
+def turning(x: float, y: float, z: float) -> Quaternion:
     """Quaternion of a rotation vector (rad)."""
     angle = math.sqrt(x * x + y * y + z * z)
     k = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
-    q = np.empty(4)
-    q[0], q[1], q[2], q[3] = math.cos(0.5 * angle), k * x, k * y, k * z
-    return q
+    return math.cos(0.5 * angle), k * x, k * y, k * z
 
 
-@njit(cache=True)
-def apply(r: Floats, v: Floats) -> Floats:
+@njit(**LEAN)
+def dot(a: Floats | Vector, b: Floats | Vector) -> float:
+    """Scalar product of two (3,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(**LEAN)
+def apply(r: Matrix, v: Floats | Vector) -> Vector:
     """The product r v of a (3, 3) and a (3,)."""
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = r[i, 0] * v[0] + r[i, 1] * v[1] + r[i, 2] * v[2]
-    return out
+    return dot(r[0], v), dot(r[1], v), dot(r[2], v)
 
 
-@njit(cache=True)
-def _norm(v: Floats) -> float:
-    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+@njit(**LEAN)
+def difference(a: Floats | Vector, b: Floats | Vector) -> Vector:
+    """A - b, of two (3,)."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(cache=True)
+@njit(**LEAN)
+def _distance(a: Floats, b: Floats) -> float:
+    """Of two (3,)."""
+    d = difference(a, b)
+    return math.sqrt(dot(d, d))
+
+
+@njit(**LEAN)
 def heading(nav: Nav) -> float:
     """How far the foot has turned about the vertical since it was levelled with yaw zero (rad), whatever the mounting.
 
@@ -119,25 +132,34 @@ def heading(nav: Nav) -> float:
     r = rotation(nav.attitude)
     cosine, sine = 0.0, 0.0
     for k in range(3):
-        cosine += r[0, k] * nav.level[0, k] + r[1, k] * nav.level[1, k]
-        sine += r[1, k] * nav.level[0, k] - r[0, k] * nav.level[1, k]
+        cosine += r[0][k] * nav.level[0, k] + r[1][k] * nav.level[1, k]
+        sine += r[1][k] * nav.level[0, k] - r[0][k] * nav.level[1, k]
     return math.atan2(sine, cosine)
 
 
-@njit(cache=True)
-def set_level(nav: Nav, force: Floats, yaw: float, at_rest: bool) -> None:
+@njit(**LEAN)
+def set_level(nav: Nav, force: Vector, yaw: float, at_rest: bool) -> None:
     """Attitude from gravity: roll and pitch from the direction of the mean specific force (3,), yaw as given; at rest, bias from its size."""
-    size = max(_norm(force), 1e-9)
+    size = max(math.sqrt(dot(force, force)), 1e-9)
     if at_rest:
-        nav.accel_bias[:] = force * (1.0 - GRAVITY_M_S2 / size)
+        for i in range(3):
+            nav.accel_bias[i] = force[i] * (1.0 - GRAVITY_M_S2 / size)
     roll = turning(math.atan2(force[1], force[2]), 0.0, 0.0)
     pitch = turning(0.0, math.asin(min(max(-force[0] / size, -1.0), 1.0)), 0.0)
     flat = multiply(pitch, roll)
-    nav.level[:] = rotation(flat)
-    nav.attitude[:] = multiply(turning(0.0, 0.0, yaw), flat)
+    level = rotation(flat)
+    for i in range(3):
+        nav.level[i, 0], nav.level[i, 1], nav.level[i, 2] = level[i]
+    _face(nav, multiply(turning(0.0, 0.0, yaw), flat))
 
 
-@njit(cache=True)
+@njit(**LEAN)
+def _face(nav: Nav, q: Quaternion) -> None:
+    """Take an attitude."""
+    nav.attitude[0], nav.attitude[1], nav.attitude[2], nav.attitude[3] = q
+
+
+@njit(**LEAN)
 def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: float, accel_bias_sd: float) -> None:
     """At rest after levelling, with these standard deviations: what the accelerometer's bias has tilted, the filter knows to be tilted."""
     nav.velocity[:] = 0.0
@@ -151,13 +173,13 @@ def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: f
         P[VEL + i, VEL + i] = velocity_sd**2
         P[GYRO_BIAS + i, GYRO_BIAS + i] = gyro_bias_sd**2
         P[ACCEL_BIAS + i, ACCEL_BIAS + i] = accel_bias_sd**2
-        P[TILT, ACCEL_BIAS + i] = P[ACCEL_BIAS + i, TILT] = -r[1, i] * lean
-        P[TILT + 1, ACCEL_BIAS + i] = P[ACCEL_BIAS + i, TILT + 1] = r[0, i] * lean
+        P[TILT, ACCEL_BIAS + i] = P[ACCEL_BIAS + i, TILT] = -r[1][i] * lean
+        P[TILT + 1, ACCEL_BIAS + i] = P[ACCEL_BIAS + i, TILT + 1] = r[0][i] * lean
     for i in range(2):
         P[TILT + i, TILT + i] = tilt_sd**2 + lean / GRAVITY_M_S2
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
     """Strapdown step over `dt` with the samples of specific force and rate (3,) at its beginning and its end.
 
@@ -165,8 +187,8 @@ def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, 
     from one sample to the next turns the axis (coning) and the force (sculling) within the step [Savage 1998, part 1 eq. 47, part 2 eq. 56].
     """
     seen = min(0.5 + 0.5 * period / dt, 1.0) if dt > 0.0 else 1.0
-    rate = seen * rate1 + (1.0 - seen) * rate0 - nav.gyro_bias
-    force = seen * force1 + (1.0 - seen) * force0 - nav.accel_bias
+    rate = _mean(seen, rate0, rate1, nav.gyro_bias)
+    force = _mean(seen, force0, force1, nav.accel_bias)
     half = turning(0.5 * dt * rate[0], 0.5 * dt * rate[1], 0.5 * dt * rate[2])
     r = rotation(multiply(nav.attitude, half))
     c = dt * dt / 12.0
@@ -175,53 +197,70 @@ def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, 
         dt * rate[1] + c * (rate0[2] * rate1[0] - rate0[0] * rate1[2]),
         dt * rate[2] + c * (rate0[0] * rate1[1] - rate0[1] * rate1[0]),
     )
-    nav.attitude[:] = multiply(nav.attitude, whole)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        force[i] += (
-            dt / 12.0 * (rate0[j] * force1[k] - rate0[k] * force1[j] + force0[j] * rate1[k] - force0[k] * rate1[j])
-        )
-    f = apply(r, force)
-    accel = f.copy()
-    accel[2] -= GRAVITY_M_S2
+    _face(nav, multiply(nav.attitude, whole))
+    f = apply(
+        r,
+        (
+            force[0] + dt / 12.0 * _sculling(1, 2, force0, force1, rate0, rate1),
+            force[1] + dt / 12.0 * _sculling(2, 0, force0, force1, rate0, rate1),
+            force[2] + dt / 12.0 * _sculling(0, 1, force0, force1, rate0, rate1),
+        ),
+    )
+    accel = (f[0], f[1], f[2] - GRAVITY_M_S2)
     for i in range(3):
         nav.position[i] += nav.velocity[i] * dt + 0.5 * accel[i] * dt * dt
         nav.velocity[i] += accel[i] * dt
     _carry(nav.P, f, r, dt)
+    _carry(nav.P.T, f, r, dt)
     turn = apply(r, rate)
     hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
     missed = MISSED_SHARE * (1.0 - seen)
-    lost_m_s = (nav.noise.change_share + missed) * _norm(force1 - force0) * dt + _norm(accel) * hidden
-    lost_rad = (GYRO_CHANGE_SHARE + missed) * _norm(rate1 - rate0) * dt + _norm(turn) * hidden
+    lost_m_s = (nav.noise.change_share + missed) * _distance(force1, force0) * dt + math.sqrt(
+        dot(accel, accel)
+    ) * hidden
+    lost_rad = (GYRO_CHANGE_SHARE + missed) * _distance(rate1, rate0) * dt + math.sqrt(dot(turn, turn)) * hidden
     _add_noise(nav.P, nav.noise, dt, accel, turn, lost_m_s, lost_rad)
 
 
-@njit(cache=True)
-def _carry(P: Floats, f: Floats, r: Floats, dt: float) -> None:
-    """P <- F P F' with F = 1 + dt (dp = v, dv = -[f x] tilt - R b_a, dtilt = -R b_g): once on the rows, once on the columns."""
-    for side in range(2):
-        m = P if side == 0 else P.T
-        for c in range(SIZE):
-            for i in range(3):
-                m[POS + i, c] += dt * m[VEL + i, c]
-            x, y, z = m[TILT, c], m[TILT + 1, c], m[TILT + 2, c]
-            m[VEL, c] -= dt * (f[1] * z - f[2] * y)
-            m[VEL + 1, c] -= dt * (f[2] * x - f[0] * z)
-            m[VEL + 2, c] -= dt * (f[0] * y - f[1] * x)
-            for i in range(3):
-                m[VEL + i, c] -= dt * (
-                    r[i, 0] * m[ACCEL_BIAS, c] + r[i, 1] * m[ACCEL_BIAS + 1, c] + r[i, 2] * m[ACCEL_BIAS + 2, c]
-                )
-                turned = dt * (
-                    r[i, 0] * m[GYRO_BIAS, c] + r[i, 1] * m[GYRO_BIAS + 1, c] + r[i, 2] * m[GYRO_BIAS + 2, c]
-                )
-                m[TILT + i, c] -= turned
-            m[YAW, c] -= turned
+@njit(**LEAN)
+def _mean(share: float, earlier: Floats, later: Floats, bias: Floats) -> Vector:
+    """So much of the later sample (3,), the rest of the earlier one, less the bias."""
+    rest = 1.0 - share
+    return (
+        share * later[0] + rest * earlier[0] - bias[0],
+        share * later[1] + rest * earlier[1] - bias[1],
+        share * later[2] + rest * earlier[2] - bias[2],
+    )
 
 
-@njit(cache=True)
+@njit(**LEAN)
+def _sculling(j: int, k: int, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> float:
+    """The component of rate0 x force1 + force0 x rate1 that is square to j and k."""
+    return rate0[j] * force1[k] - rate0[k] * force1[j] + force0[j] * rate1[k] - force0[k] * rate1[j]
+
+
+@njit(**LEAN)
+def _carry(m: Floats, f: Vector, r: Matrix, dt: float) -> None:
+    """The errors after dt: m <- F m, F = 1 + dt (dp = v, dv = -[f x] tilt - R b_a, dtilt = -R b_g); on P and then on its transpose: F P F'."""
+    for c in range(SIZE):
+        for i in range(3):
+            m[POS + i, c] += dt * m[VEL + i, c]
+        x, y, z = m[TILT, c], m[TILT + 1, c], m[TILT + 2, c]
+        m[VEL, c] -= dt * (f[1] * z - f[2] * y)
+        m[VEL + 1, c] -= dt * (f[2] * x - f[0] * z)
+        m[VEL + 2, c] -= dt * (f[0] * y - f[1] * x)
+        for i in range(3):
+            m[VEL + i, c] -= dt * (
+                r[i][0] * m[ACCEL_BIAS, c] + r[i][1] * m[ACCEL_BIAS + 1, c] + r[i][2] * m[ACCEL_BIAS + 2, c]
+            )
+            turned = dt * (r[i][0] * m[GYRO_BIAS, c] + r[i][1] * m[GYRO_BIAS + 1, c] + r[i][2] * m[GYRO_BIAS + 2, c])
+            m[TILT + i, c] -= turned
+        m[YAW, c] -= turned
+
+
+@njit(**LEAN)
 def _add_noise(
-    P: Floats, noise: Noise, dt: float, accel: Floats, rate: Floats, lost_m_s: float, lost_rad: float
+    P: Floats, noise: Noise, dt: float, accel: Vector, rate: Vector, lost_m_s: float, lost_rad: float
 ) -> None:
     """Process noise; scale errors of the gyros turn the foot about the axis about which it turns anyway."""
     moving = accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2
@@ -243,25 +282,28 @@ def _add_noise(
     P[YAW, YAW] += vertical
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def observe(nav: Nav, at: int, error: float, variance: float) -> None:
     """Kalman update: error number `at` has been seen to be `error`, with this variance; the corrections go into the state."""
     P = nav.P
-    total = P[at, at] + variance
-    row = P[at].copy()
-    for i in range(SIZE):
+    row = P[at]
+    total = row[at] + variance
+    share = error / total
+    for i in range(3):
+        nav.position[i] += share * row[POS + i]
+        nav.velocity[i] += share * row[VEL + i]
+        nav.gyro_bias[i] += share * row[GYRO_BIAS + i]
+        nav.accel_bias[i] += share * row[ACCEL_BIAS + i]
+    turned = turning(share * row[TILT], share * row[TILT + 1], share * row[TILT + 2])
+    _face(nav, multiply(turned, nav.attitude))
+    for k in range(1, SIZE + 1):
+        i = (at + k) % SIZE  # the row itself last: the others need it as it was
         gain = row[i] / total
         for j in range(SIZE):
             P[i, j] -= gain * row[j]
-    row *= error / total
-    nav.position[:] += row[POS : POS + 3]
-    nav.velocity[:] += row[VEL : VEL + 3]
-    nav.gyro_bias[:] += row[GYRO_BIAS : GYRO_BIAS + 3]
-    nav.accel_bias[:] += row[ACCEL_BIAS : ACCEL_BIAS + 3]
-    nav.attitude[:] = multiply(turning(row[TILT], row[TILT + 1], row[TILT + 2]), nav.attitude)
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def turn(nav: Nav, centre: Floats, angle: float) -> None:
     """The yaw was wrong by this angle since the foot left `centre` (3,)."""
     c, s = math.cos(angle), math.sin(angle)
@@ -269,10 +311,10 @@ def turn(nav: Nav, centre: Floats, angle: float) -> None:
     u, v = nav.velocity[0], nav.velocity[1]
     nav.position[0], nav.position[1] = centre[0] + c * x - s * y, centre[1] + s * x + c * y
     nav.velocity[0], nav.velocity[1] = c * u - s * v, s * u + c * v
-    nav.attitude[:] = multiply(turning(0.0, 0.0, angle), nav.attitude)
+    _face(nav, multiply(turning(0.0, 0.0, angle), nav.attitude))
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def forget_start(nav: Nav) -> None:
     """Where the foot stands and looks now becomes the reference: those errors belong to the steps already told."""
     for at in (POS, POS + 1, POS + 2, TILT + 2):

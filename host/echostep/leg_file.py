@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep import lee2010, leg_swings
+from echostep.clipping import ends_of_range, unclipped
 from echostep.errors import EchostepError
 from echostep.heading import Heading
 from echostep.imu_checks import RATE_RANGE_HZ, sorted_by_time
@@ -193,12 +194,10 @@ def _notes(table: Floats) -> tuple[str, ...]:
     missing = 1.0 - len(forward) * float(np.median(forward)) / float(forward.sum())
     if missing > 0.02:
         found.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
-    for k, name in ((1, COLUMNS[1]), (2, COLUMNS[2])):
-        most = float(np.abs(table[:, k]).max())
-        cut = np.abs(table[:, k]) == most
-        if most > 2.0 and (cut[1:] & cut[:-1]).sum() >= 3:
+    for name, *ends in zip(COLUMNS[1:], *ends_of_range(table[:, 1:3]), strict=True):
+        if reached := [abs(end) for end in ends if math.isfinite(end)]:
             found.append(
-                f"{name} is cut off at {most:.3g} rad/s: the sensor's range is too small, the way will be short"
+                f"{name} is cut off at {min(reached):.3g} rad/s, the sensor's range is too small: tops are drawn in"
             )
     return tuple(found)
 
@@ -206,7 +205,8 @@ def _notes(table: Floats) -> tuple[str, ...]:
 def track_default(samples: LegSamples, settings: LegsSettings, heading_rad: float | None = None) -> LegTrack:
     """Ours: strides by both segments, heading by gyro and compass; `heading_rad` at the beginning, when it is known."""
     legs = Legs(settings)
-    strides = (*legs.feed(samples.t_s, samples.thigh, samples.shank), *legs.finish())
+    thigh, shank = unclipped(samples.t_s, np.column_stack([samples.thigh, samples.shank])).T
+    strides = (*legs.feed(samples.t_s, thigh, shank), *legs.finish())
     sign, how = belt_sign(samples)
     heading = Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD)
     still = standing(strides, samples.t_s)

@@ -32,7 +32,8 @@ TOE_OFF = 0.62
 PELVIS = 1.017  # of a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
 HALVES = (0.06, 0.08, 0.10)  # where half strides begin, foot all but flat
 ALONE = (0.14, 0.42)  # phases
-WITH_FOOT = 1.09  # of the thigh: a longer shank is measured to the floor (0.285 of the height, not 0.246; the thigh has 0.245) [Winter 2009]
+# A shank so much longer than the thigh is measured to the floor: 0.285 of the height, not 0.246; the thigh has 0.245 [Winter 2009]; people differ.
+WITH_FOOT = 1.14
 TO_FLOOR = 0.285 / 0.246
 
 MEAN_THIGH_RAD, MEAN_SHANK_RAD = math.radians(7.0), math.radians(-14.2)  # over a normal stride, by the same curves

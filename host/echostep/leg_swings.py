@@ -35,7 +35,7 @@ NEAR, SPENT = 0.2, 0.05  # of the way from mid swing, of the rate there
 LATEST_STRIKE_S = 0.45
 STILL = int(0.35 * GRID_HZ)
 STILL_RANGE_RAD_S = 0.16
-STILL_MEAN_RAD_S = 0.12
+STILL_MEAN_RAD_S = 0.2  # the bias of a poor gyro
 
 
 class Swings:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.clipping import Unclipped
 from echostep.gait import STANDING_PIECE_S, Leg
 from echostep.heading import Heading, HeadingSettings, Iron
 from echostep.leg_kinematics import Segments
@@ -24,8 +25,13 @@ from echostep.legs import Flag, Legs, LegsSettings, Stride
 Floats = NDArray[np.float64]
 
 TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes away again
+FRAME_SD_RAD = math.radians(
+    1.0
+)  # of the walk frame, which is where the compass pointed at first: what it says later tells the gyro's bias
+RANGE_RAD_S = math.radians(300.0)  # [ADIS16100 datasheet]
+SLOW_RAD_S = math.radians(10.0)  # of a leg that stands, with its gyro's bias
 SETTING_OFF_S = 1.0  # the first step
-SCALE_SD = 0.008  # by which the scale of strides wanders from one to the next
+SCALE_SD = 0.004  # by which the scale of strides wanders from one to the next
 CURVE_SD = 0.5  # of what a curve takes from a stride's length: he does not turn evenly
 TWIST_RAD = math.radians(12.0)  # so far the pelvis turns to and fro in a straight stride, which costs no way
 REMEMBERED_S = 12.0  # of headings: longer than any stride waits to be told
@@ -62,8 +68,9 @@ class LegPath:
         """`iron`: the compass', when it was calibrated."""
         segments = Segments(settings.thigh_m, settings.shank_m, settings.leg_scale)
         self._legs = Legs(LegsSettings(segments, calibrated=settings.leg_scale != 1.0))
+        self._unclipped = Unclipped(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
         self._left_m = settings.leg_left_m
-        self._heading = Heading(HeadingSettings(iron=iron))
+        self._heading = Heading(HeadingSettings(iron=iron, first_sd_rad=FRAME_SD_RAD))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
         self._told_s = -math.inf  # up to where legs were told
         self._begun = False
@@ -71,12 +78,13 @@ class LegPath:
 
     def feed(self, block: Block) -> list[Leg]:
         """The legs that a block makes certain, in order of time, without gaps once the first is told."""
-        still = np.full(len(block.t_s), self._legs.standing_since_s is not None)
+        still = (np.abs(block.thigh) < SLOW_RAD_S) & (np.abs(block.calf) < SLOW_RAD_S)
         found = self._heading.feed(block.t_s, block.belt, block.compass, still)
         self._headings.extend(zip(block.t_s.tolist(), found[:, 0].tolist(), strict=True))
         while self._headings and self._headings[0][0] < block.t_s[-1] - REMEMBERED_S:
             self._headings.popleft()
-        told = [self._leg(stride) for stride in self._legs.feed(block.t_s, block.thigh, block.calf)]
+        t_s, rates = self._unclipped.feed(block.t_s, np.column_stack([block.thigh, block.calf]))
+        told = [self._leg(stride) for stride in self._legs.feed(t_s, rates[:, 0], rates[:, 1])]
         legs = [leg for leg in told if leg is not None]
         since_s = self._legs.standing_since_s
         until_s = float(block.t_s[-1]) - RECENT_S
@@ -111,9 +119,10 @@ class LegPath:
         scale_sd = 0.0 if standing else SCALE_SD if self._begun else stride.scale_sd
         self._begun = self._begun or not standing
         sd = math.hypot(stride.length_sd_m, CURVE_SD * length * (1.0 - math.hypot(ahead, aside)))
+        turn_sd = math.hypot(TURN_SD_RAD, self._heading.bias_sd_rad_s * (t1 - t0))
         return Leg(
             t0, t1, length * ahead, length * aside,
-            self.heading_rad(t0), self.heading_rad(t1), sd, 0.0 if standing else TURN_SD_RAD, self.steps,
+            self.heading_rad(t0), self.heading_rad(t1), sd, 0.0 if standing else turn_sd, self.steps,
             scale_sd=scale_sd,
         )  # fmt: skip
 

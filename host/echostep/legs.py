@@ -67,7 +67,7 @@ BLIND_SD_M = 0.4  # of what this leg cannot see
 REST_SD_RAD_S = math.radians(0.15)
 LOOK = 3  # places on either side for a rate
 STANCE = 62  # percent of a stride
-FIRST_SWING = 0.62  # of the pace: from rest to the full pace it takes about a stride [Breniere and Do 1986]
+AT_LEAST = 0.5  # of the pace, in a swing that begins or ends a walk with the feet together; all of it when the foot comes from or to a whole stride
 STAYS = 0.44  # phase after which a foot that stays does not rise
 FORGET = 500
 
@@ -144,7 +144,8 @@ class _Bias:
 class _Bout:
     """A walk under way, in places of the grid: where it begins, whether it begins with standing, the middles of swings since.
 
-    `level`: angles of thigh and shank at place `level_at`; None until they can be known. `cycle` of its newest stride.
+    `level`: angles of thigh and shank at place `level_at`; None until they can be known. `cycle`, `reach_m`,
+    `trail_m` of its newest stride.
     """
 
     begin: int
@@ -154,6 +155,8 @@ class _Bout:
     level_at: int = 0
     cycle: int = int(USUAL_STRIDE_S * GRID_HZ)
     pace_m_s: float | None = None
+    reach_m: float = 0.0  # of the foot before the hips at the strike
+    trail_m: float = 0.0  # behind them at toe off
     blind: Flag = Flag.NONE  # of the newest stride
 
 
@@ -352,6 +355,8 @@ class Legs:
         strike = leg_swings.strike_after(shank)
         phase = np.arange(len(shank)) / cycle - strike / cycle
         stance = phase[strike:], thigh[strike:], shank[strike:]
+        self._bout.reach_m = self._ahead_m(thigh[strike], shank[strike])
+        self._bout.trail_m = -self._ahead_m(*(np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank)))
         stairs = _stairs(knee_at(*stance, at=0.02), knee_at(*stance, at=0.5))
         way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
         length = way.stride()[0]
@@ -398,7 +403,9 @@ class Legs:
         phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
         stood = bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
         stance = 0 if stood else int(np.argmax(phase > 0.0))
-        swinging = FIRST_SWING if bout.stood or (stood and phase[0] < -0.1) else 1.0
+        swinging = 1.0
+        if bout.stood or (stood and phase[0] < -0.1):
+            swinging = _edge_pace(-self._ahead_m(thigh[off], shank[off]), bout.trail_m)
         way = travel(phase, thigh, shank, self.settings.segments, struck=None)
         length = PELVIS * float(way.forward_m[off] - way.forward_m[stance])
         return length + pace_m_s * (stance + swinging * (span - off)) / GRID_HZ
@@ -442,7 +449,13 @@ class Legs:
             last = min(last, int(TOE_OFF * bout.cycle))
         way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
         length = PELVIS * float(way.forward_m[last] - way.forward_m[0])
-        return length + pace * ((FIRST_SWING if stands else 1.0) * strike + span - strike - last) / GRID_HZ
+        swinging = _edge_pace(self._ahead_m(thigh[strike], shank[strike]), bout.reach_m) if stands else 1.0
+        return length + pace * (swinging * strike + span - strike - last) / GRID_HZ
+
+    def _ahead_m(self, thigh: float, shank: float) -> float:
+        """How far the ankle is before the hip."""
+        segments = self.settings.segments
+        return float(segments.thigh_m * np.sin(thigh) + segments.to_ankle_m * np.sin(shank))
 
     def _tell_edge(self, begin: int, end: int, length: float) -> None:
         """A beginning or an end is certain; beside strides that cannot be seen it cannot either."""
@@ -485,6 +498,15 @@ class Legs:
         if self._still_since is not None:
             self._still_since -= k
         self._top = (self._top[0], self._top[1] - k)
+
+
+def _edge_pace(reach_m: float, usual_m: float) -> float:
+    """The hips' pace against the usual one while this leg swings for the first or the last time, by how far its foot is from under them.
+
+    Somebody who starts or stops with this foot beside the other hardly moves meanwhile, who does it with the other is at full pace [Jian 1993].
+    """
+    share = min(max(reach_m / usual_m, 0.0), 1.0) if usual_m > 0.0 else 0.0
+    return AT_LEAST + (1.0 - AT_LEAST) * share
 
 
 def _stairs(knee_at_strike: float, knee_half_later: float) -> Flag:

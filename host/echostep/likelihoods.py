@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.kernels import LEAN
 from echostep.sightlines import CORNER, EDGE
 
 Floats = NDArray[np.float64]
@@ -93,7 +94,7 @@ SILENT = 0.2  # of what nothing explains, no echo
 NEVER = -8.0  # of a logit, likewise
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def echo_density(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
 ) -> float:
@@ -117,13 +118,13 @@ def echo_density(
     return (1.0 - m.outlier) * density + m.outlier * (1.0 - SILENT) / span
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel) -> float:
     """Log p(range | sources), as `echo_density`."""
     return math.log(echo_density(range_m, count, distance_m, off_axis_rad, kind, m))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**LEAN, inline="always")
 def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel) -> float:
     """Probability that a source is heard: spreading, absorption, beam, and the weakness of a mere edge."""
     if distance_m < 0.5 * m.minimum_m:
@@ -137,7 +138,7 @@ def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel)
     return 1.0 / (1.0 + math.exp(-margin)) if margin > NEVER else 0.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**LEAN, inline="always")
 def normal(x: float, sd: float) -> float:
     """Normal density about zero."""
     z = x / sd

@@ -41,6 +41,8 @@ TURNING_RAD = math.radians(
 )  # a leg that turns more than this is no straight line, and its headings are guesses in between
 EXACT_SD_M = 0.005  # no plan is more exact
 PUZZLED_MORE = 3.0  # who understands nothing of what he hears keeps so many times more particles about him
+# Legs alone tell strides to 4 cm, headings to a degree: more particles miss none of the places that fit, also on the way after the legs told.
+COARSE_MORE, COARSE_WAY_M = 2.0, 20.0
 HEIGHT_SD_M = 0.3  # of one sample: an SCP1000 in its fast mode, a little worse than its documents say
 LATE_SAMPLES = 9  # a second
 AIR_SD_M = 0.1  # what the mean of many does not take away: draughts
@@ -64,6 +66,7 @@ class MapFilter:
         self._model = echo_model(self._echo)
         self._doubt_m = 0.0
         self._gone_m = 0.0
+        self._coarse_m = 0.0  # of way gone, up to which the cloud is a large one
         self._last_m = [-math.inf, -math.inf]
 
     def follow(self, passage: Passage, words: Sequence[Word] = ()) -> Estimate:
@@ -76,7 +79,9 @@ class MapFilter:
             self._doubt_m = math.hypot(self._doubt_m, leg.sd_m)
         else:
             heard = self._heard(passage)
-            self.cloud.puzzle(1.0 + PUZZLED_MORE * (1.0 - self._trust()))
+            self._coarse_m = self._gone_m + COARSE_WAY_M if leg.scale_sd > 0.0 else self._coarse_m
+            coarse = COARSE_MORE if self._gone_m < self._coarse_m else 0.0
+            self.cloud.puzzle(1.0 + coarse + PUZZLED_MORE * (1.0 - self._trust()))
             self._judge(self.cloud.follow(move, heard, self._model, self._walls), heard.power)
             self.cloud.climb(move, rise)
             self._doubt_m *= math.exp(-math.hypot(leg.dx_m, leg.dy_m) * self._trust() / REGAIN_M)

@@ -16,7 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep import ins
-from echostep.ins import Nav
+from echostep.ins import Nav, Vector
+from echostep.kernels import LEAN
 
 Floats = NDArray[np.float64]
 
@@ -25,31 +26,27 @@ ROUND = 0.6  # a tilt about one axis has squares along it only; noise and twisti
 MEMORY = 0.95  # of a swing, at the next
 
 
-@njit(cache=True)
-def tilt(nav: Nav) -> Floats:
+@njit(**LEAN)
+def tilt(nav: Nav) -> Vector:
     """How far the foot is tipped from its level: rotation vector (3,), z = 0, in the levelled axes of the foot itself."""
     r = ins.rotation(nav.attitude)
     yaw = ins.heading(nav)
     c, s = math.cos(yaw), math.sin(yaw)
-    tipped = np.zeros((3, 3))  # yaw undone on both sides
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                turned = c * r[i, k] + s * r[1, k] if i == 0 else (c * r[1, k] - s * r[0, k] if i == 1 else r[2, k])
-                tipped[i, j] += turned * nav.level[j, k]
-    x, y = 0.5 * (tipped[2, 1] - tipped[1, 2]), 0.5 * (tipped[0, 2] - tipped[2, 0])
+    ahead = (c * r[0][0] + s * r[1][0], c * r[0][1] + s * r[1][1], c * r[0][2] + s * r[1][2])  # yaw undone
+    left = (c * r[1][0] - s * r[0][0], c * r[1][1] - s * r[0][1], c * r[1][2] - s * r[0][2])
+    level_x, level_y, level_z = nav.level[0], nav.level[1], nav.level[2]
+    x = 0.5 * (ins.dot(r[2], level_y) - ins.dot(left, level_z))
+    y = 0.5 * (ins.dot(ahead, level_z) - ins.dot(r[2], level_x))
     size = math.hypot(x, y)
-    angle = math.atan2(size, 0.5 * (tipped[0, 0] + tipped[1, 1] + tipped[2, 2] - 1.0))
-    found = np.zeros(3)
-    if size > 1e-9:
-        found[0], found[1] = x / size * angle, y / size * angle
-    return found
+    upright = ins.dot(ahead, level_x) + ins.dot(left, level_y) + ins.dot(r[2], level_z)
+    angle = math.atan2(size, 0.5 * (upright - 1.0))
+    return (x / size * angle, y / size * angle, 0.0) if size > 1e-9 else (0.0, 0.0, 0.0)
 
 
-@njit(cache=True)
-def watch(square: Floats, cube: Floats, tipped: Floats, dt: float) -> None:
+@njit(**LEAN)
+def watch(square: Floats, cube: Floats, tipped: Vector, dt: float) -> None:
     """Add a sample of a swing, tipped by (3,) rad since the last stance: second moments xx, xy, yy and third moment times the vector."""
-    x, y = tipped[0], tipped[1]
+    x, y, _ = tipped
     square[0] += dt * x * x
     square[1] += dt * x * y
     square[2] += dt * y * y
@@ -57,7 +54,7 @@ def watch(square: Floats, cube: Floats, tipped: Floats, dt: float) -> None:
     cube[1] += dt * (x * x + y * y) * y
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def toe(square: Floats, cube: Floats) -> float:
     """Angle (rad) from the foot's yaw to its toe; NaN as long as the foot has not tipped enough to tell."""
     whole = square[0] + square[2]

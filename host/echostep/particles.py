@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from echostep.beacons import Beliefs, no_beliefs
 from echostep.climbing import ClimbSettings, Rise, carry, climb, climb_model
+from echostep.kernels import LEAN
 from echostep.likelihoods import EchoModel, echo_density
 from echostep.plan import Pose
 from echostep.reflectors import MOST_SOURCES, Walls, echo_sources
@@ -280,7 +281,7 @@ def _follow(
     return k, done, least
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _propagate(
     x: Floats, y: Floats, turn: Floats, scale: Floats, log_weight: Floats,
     dx: float, dy: float, share: float, noise: Floats, wall_cost: float, walls: WallIndex,
@@ -334,7 +335,7 @@ def _reweight(
     return math.log(explained / weight), total * total / squares
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def effective_size(log_weight: Floats) -> float:
     """Effective number of particles, (sum w)^2 / sum w^2."""
     total, squares = 0.0, 0.0

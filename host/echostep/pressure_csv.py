@@ -118,7 +118,10 @@ def _checked(table: Floats, lines: NDArray[np.int64]) -> PressureRecord:
     possible = (table[:, 1] >= LOWEST_PA) & (table[:, 1] <= HIGHEST_PA)
     notes += _told(~possible, lines, f"with pressure_pa outside of {LOWEST_PA:.0f} to {HIGHEST_PA:.0f} Pa: skipped")
     table, lines = table[possible], lines[possible]
-    back = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
+    again = np.concatenate([[False], np.diff(table[:, 0]) == 0.0])
+    notes += _told(again, lines, "with the t_s of the row before: skipped")
+    table, lines = table[~again], lines[~again]
+    back = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
     if len(back) > max(1.0, BACK_SHARE * len(table)):
         raise ValueError(
             f"line {lines[back[0] + 1]}: t_s does not advance, as in {len(back)} rows: sort the rows by t_s, one recording in a file"

@@ -12,13 +12,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.kernels import ALLOCATES, LEAN
 from echostep.sightlines import CORNER, EDGE, in_sector, tile_sources
 from echostep.walls import (
     BEARINGS,
     CONE_RAD,
     EAR_REACH_M,
     JOIN_M,
-    LEAN,
     TILE_M,
     SourceTable,
     WallIndex,
@@ -38,7 +38,6 @@ FARTHEST_M = 3.0
 FOOT_M = 1e-3  # what stands so close to a wall does not hide it: walls drawn twice
 NEAREST_M = 1e-6
 CONE = math.cos(CONE_RAD)
-ALLOCATES = {**LEAN, "_nrt": True}  # called by a kernel that must not
 
 
 class Walls:

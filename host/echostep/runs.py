@@ -104,7 +104,7 @@ def demo(
         about = _about(plan, scenario.start, seed, "", "simulated walk, simulated sensors")
         title = "echostep demo (simulated)"
         watched = views.terminal or views.page is not None
-        with _page(tracker, title, views) as page, _published(outlet, tracker, "simulated") as tell:
+        with _page(tracker, title, views, guided) as page, _published(outlet, tracker, "simulated") as tell:
             with Recorder(out / "walk.mcap", about) as recorder:
                 walked = with_beacons(scenario, plan, seed) if guide else scenario.chunks()
                 chunks = _with_check_ins(_paced(walked) if watched else walked, page)
@@ -136,7 +136,7 @@ def live(
         ports.send(BOARD, encode(Identify(), 0))
         about = {**_about(plan, tracker.start, seed, text, "live"), **_now()}
         with (
-            _page(tracker, "echostep live", views) as page,
+            _page(tracker, "echostep live", views, guided) as page,
             _published(outlet, tracker, "live") as tell,
             Recorder(out / "walk.mcap", about) as recorder,
         ):
@@ -185,7 +185,7 @@ def replay(
     guided = Guided(tracker, destination(guide, plan)) if guide else None
     tracker.warm_up()
     title = f"echostep replay {path.name}"
-    with _page(tracker, title, views, replay=True) as page, _published(outlet, tracker, "replay") as tell:
+    with _page(tracker, title, views, guided, replay=True) as page, _published(outlet, tracker, "replay") as tell:
         began = time.perf_counter()
         estimates = _run(
             tracker, recording.portions(), title, lambda: recording.fraction, views, page, tell, guided=guided
@@ -304,7 +304,7 @@ def _run(
                     page.shown(portion)
                 estimates += new
                 tell(new)
-                cues = guided.take(new) if guided else []
+                cues = guided.news() if guided else []
                 if view:
                     view.show(new, describe_cue(guided.cue) if guided and guided.cue else "")
                 else:
@@ -325,12 +325,14 @@ def _speak(cues: Sequence[Cue]) -> None:
 
 
 @contextmanager
-def _page(tracker: Tracker, title: str, views: Views, *, replay: bool = False) -> Iterator[LivePage | None]:
+def _page(
+    tracker: Tracker, title: str, views: Views, guided: Guided | None, *, replay: bool = False
+) -> Iterator[LivePage | None]:
     """The live page while the run lasts, if anybody wants one; its address is said."""
     if views.page is None:
         yield None
         return
-    with LivePage(tracker, title, views.page, replay=replay) as page:
+    with LivePage(tracker, title, views.page, guided, replay=replay) as page:
         console.print(f"The page: {page.url}", highlight=False)
         yield page
 

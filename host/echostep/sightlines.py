@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from echostep.kernels import LEAN
 from echostep.walls import BEARINGS, CONE_RAD, EAR_REACH_M, FACE, JOIN_M, POINT, TILE_M, SourceTable, WallIndex
 
 Floats = NDArray[np.float64]
@@ -114,7 +115,7 @@ def _frame(walls: Floats, w: int) -> tuple[float, float, float, float, float]:
     return walls[w, 0], walls[w, 1], ux / length, uy / length, length
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _extent(corners: Floats, x: float, y: float, tx: float, ty: float) -> tuple[float, float, float, float]:
     """Least and greatest place along a line of four corners, and least and greatest height over it."""
     s0, s1, low, high = np.inf, -np.inf, np.inf, -np.inf
@@ -125,7 +126,7 @@ def _extent(corners: Floats, x: float, y: float, tx: float, ty: float) -> tuple[
     return s0, s1, low, high
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _clip(
     walls: Floats, u: int, x: float, y: float, tx: float, ty: float, s0: float, s1: float
 ) -> tuple[float, float, float, float]:
@@ -144,7 +145,7 @@ def _clip(
     return a, b, ha, hb
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
     """Whether spans (from, to, height, height) leave no gap between low and high; those that do not join must overlap by so much."""
     reach, height = low, np.nan
@@ -269,7 +270,7 @@ def in_sector(dx: float, dy: float, ax: float, ay: float, bx: float, by: float) 
     return (after_a and before_b) if ax * by - ay * bx > 0.0 else (after_a or before_b)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _sector_meets(x: float, y: float, a: Floats, b: Floats, corners: Floats) -> bool:
     """Whether a tile may reach into the sector narrower than a half turn from a to b about x, y."""
     left_of_a, right_of_b = False, False
@@ -343,7 +344,7 @@ def _by_bearing(centre: Floats, spread: Floats, distance: Floats) -> tuple[Ints,
     return start, order[:count].copy()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAN)
 def _wedge(
     ax: float, ay: float, bx: float, by: float, ex: float, ey: float, low: float, high: float,
     corners: Floats, x: float, y: float,

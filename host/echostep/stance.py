@@ -19,7 +19,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from echostep import ins
-from echostep.ins import GYRO_BIAS, TILT, VEL, Nav
+from echostep.ins import GYRO_BIAS, TILT, VEL, Nav, Vector
+from echostep.kernels import LEAN
 
 Floats = NDArray[np.float64]
 
@@ -72,27 +73,28 @@ def new_rest() -> Rest:
     return Rest(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1), np.zeros(3))
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def put(window: Window, t_s: float, accel: Floats, gyro: Floats) -> None:
     """Add a sample."""
     at = window.taken[0] % RING
     window.t_s[at] = t_s
-    window.accel[at] = accel
-    window.gyro[at] = gyro
+    for i in range(3):
+        window.accel[at, i], window.gyro[at, i] = accel[i], gyro[i]
     window.taken[0] += 1
 
 
-@njit(cache=True)
-def mean_force(window: Window) -> Floats:
+@njit(**LEAN)
+def mean_force(window: Window) -> Vector:
     """Mean specific force (3,) over the window."""
     newest, n = window.taken[0] - 1, _length(window)
-    mean = np.zeros(3)
+    x, y, z = 0.0, 0.0, 0.0
     for k in range(n):
-        mean += window.accel[(newest - k) % RING]
-    return mean / n
+        at = (newest - k) % RING
+        x, y, z = x + window.accel[at, 0], y + window.accel[at, 1], z + window.accel[at, 2]
+    return x / n, y / n, z / n
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _length(window: Window) -> int:
     """How many of the latest samples the window holds."""
     newest = window.taken[0] - 1
@@ -103,42 +105,39 @@ def _length(window: Window) -> int:
     return n
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def activity(window: Window, bias: Floats) -> tuple[float, float]:
     """Mean squared angular rate (rad/s)2, and specific force less gravity along its own mean (m/s2)2 [Skog et al. 2010, eq. 12]."""
     newest, n = window.taken[0] - 1, _length(window)
     mean = mean_force(window)
-    mean *= ins.GRAVITY_M_S2 / max(math.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2), 1e-9)
+    scale = ins.GRAVITY_M_S2 / max(math.sqrt(ins.dot(mean, mean)), 1e-9)
     rate2, force2 = 0.0, 0.0
     for k in range(n):
         at = (newest - k) % RING
         for i in range(3):
             rate2 += (window.gyro[at, i] - bias[i]) ** 2
-            force2 += (window.accel[at, i] - mean[i]) ** 2
+            force2 += (window.accel[at, i] - scale * mean[i]) ** 2
     return rate2 / n, force2 / n
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def unrest(rate2: float, force2: float) -> float:
     """The sensors' verdict on their own: below 1 they would allow a stance."""
     return rate2 / REST_RAD_S**2 + force2 / REST_M_S2**2
 
 
-@njit(cache=True)
-def rolling(nav: Nav, gyro: Floats, height_m: float) -> Floats:
+@njit(**LEAN)
+def rolling(nav: Nav, gyro: Floats, height_m: float) -> Vector:
     """Velocity (3,) of a sensor at this height above the contact of a foot that rolls without sliding: rate x height."""
-    rate = ins.apply(ins.rotation(nav.attitude), gyro - nav.gyro_bias)
-    velocity = np.zeros(3)
-    velocity[0] = rate[1] * height_m
-    velocity[1] = -rate[0] * height_m
-    return velocity
+    rate = ins.apply(ins.rotation(nav.attitude), ins.difference(gyro, nav.gyro_bias))
+    return rate[1] * height_m, -rate[0] * height_m, 0.0
 
 
-@njit(cache=True)
-def surprise(nav: Nav, expected: Floats, variance: float, force: Floats) -> float:
+@njit(**LEAN)
+def surprise(nav: Nav, expected: Vector, variance: float, force: Vector) -> float:
     """Chi-square of velocity and acceleration, were the foot at rest under this mean specific force (3,)."""
-    accel = ins.apply(ins.rotation(nav.attitude), force - nav.accel_bias)
-    accel[2] -= ins.GRAVITY_M_S2
+    f = ins.apply(ins.rotation(nav.attitude), ins.difference(force, nav.accel_bias))
+    accel = (f[0], f[1], f[2] - ins.GRAVITY_M_S2)
     lean = ins.GRAVITY_M_S2**2 * (nav.P[TILT, TILT] + nav.P[TILT + 1, TILT + 1])
     total = 0.0
     for i in range(3):
@@ -147,78 +146,80 @@ def surprise(nav: Nav, expected: Floats, variance: float, force: Floats) -> floa
     return total
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def rest_variance(nav: Nav, rate2: float) -> float:
     """Variance (m/s)2 of the velocity of a standing foot about `rolling`."""
     return nav.noise.rest_m_s**2 + nav.noise.lever_m**2 * rate2
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def haste_variance(force2: float) -> float:
     """Variance (m/s)2 that comes on top while the foot may still be stopping: what its acceleration does within the window."""
     return WINDOW_S**2 * force2
 
 
-@njit(cache=True)
-def hold(nav: Nav, expected: Floats, variance: float, dt: float) -> None:
+@njit(**LEAN)
+def hold(nav: Nav, expected: Vector, variance: float, dt: float) -> None:
     """Zero-velocity update; what it is worth depends on the time it covers, not on the number of samples."""
     worth = max(1.0, nav.noise.kept_s / dt)
     for i in range(3):
         ins.observe(nav, VEL + i, expected[i] - nav.velocity[i], variance * worth)
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def distrust(nav: Nav, excess: float) -> None:
     """The foot rests although the filter cannot believe it: whatever made velocity, attitude and way wrong since the last rest was worse
     than the filter knew. Their covariance grows by the `excess`, so that they are corrected together, in the proportions in which they went wrong.
     """
     more = math.sqrt(min(excess, MOST_EXCESS))
-    for i in range(ins.GYRO_BIAS):
-        nav.P[i, :] *= more
-        nav.P[:, i] *= more
-    nav.P[ins.YAW, :] *= more
-    nav.P[:, ins.YAW] *= more
+    for i in range(ins.SIZE):
+        if i < ins.GYRO_BIAS or i == ins.YAW:
+            for j in range(ins.SIZE):
+                nav.P[i, j] *= more
+                nav.P[j, i] *= more
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def end_rest(rest: Rest) -> None:
     """The foot moves: an unfinished rest says nothing about the gyros."""
-    rest.part[:] = 0.0
-    rest.whole[:] = 0.0
+    for i in range(3):
+        rest.part[i] = rest.whole[i] = 0.0
     rest.part_s[0] = rest.whole_s[0] = rest.squares[0] = 0.0
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def learn_bias(nav: Nav, rest: Rest, dt: float, gyro0: Floats, gyro1: Floats) -> bool:
     """Zero-angular-rate update after each half second of rest; true when there was one."""
-    rest.part[:] += 0.5 * dt * (gyro0 + gyro1)
+    for i in range(3):
+        rest.part[i] += 0.5 * dt * (gyro0[i] + gyro1[i])
     rest.part_s[0] += dt
     if rest.part_s[0] < PART_S - 1e-6:
         return False
     for i in range(3):
         rest.whole[i] += rest.part[i]
         rest.squares[0] += rest.part[i] ** 2 / rest.part_s[0]
+        rest.part[i] = 0.0
     rest.whole_s[0] += rest.part_s[0]
-    rest.part[:] = 0.0
     rest.part_s[0] = 0.0
     if rest.whole_s[0] < PARTS * PART_S - 1e-6:
         return False
-    mean = rest.whole / rest.whole_s[0]
+    span_s: float = rest.whole_s[0]
+    mean = (rest.whole[0] / span_s, rest.whole[1] / span_s, rest.whole[2] / span_s)
     _observe_bias(nav, rest, mean, _bias_variance(rest, mean))
     end_rest(rest)
     return True
 
 
-@njit(cache=True)
-def _bias_variance(rest: Rest, mean: Floats) -> float:
+@njit(**LEAN)
+def _bias_variance(rest: Rest, mean: Vector) -> float:
     """Variance of the mean rate (3,), by how still this rest was: its scatter holds the sensor's noise and the person's sway alike."""
     span_s: float = rest.whole_s[0]
-    scatter: float = rest.squares[0] / span_s - (mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
+    scatter: float = rest.squares[0] / span_s - ins.dot(mean, mean)
     return BIAS_FLOOR_RAD_S**2 + max(scatter, 0.0) / 3.0 * PARTS / (PARTS - 1) * SWAY_S / span_s
 
 
-@njit(cache=True)
-def _observe_bias(nav: Nav, rest: Rest, mean: Floats, variance: float) -> None:
+@njit(**LEAN)
+def _observe_bias(nav: Nav, rest: Rest, mean: Vector, variance: float) -> None:
     """A mean rate that nobody believes (a foot that turns slowly) is refused; refused again, it makes the next one more credible."""
     for i in range(3):
         error = mean[i] - nav.gyro_bias[i]

@@ -67,7 +67,7 @@ class Tracker:
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self.gateway = Gateway()
         self._words: list[Word] = []  # that wait for their leg
-        self.watch: Watch | None = None
+        self.watchers: list[Watch] = []  # are told in this order
         self.check_ins = 0
         self.bad_check_ins = 0
         self._rng = np.random.default_rng(seed)
@@ -144,15 +144,17 @@ class Tracker:
         return words
 
     def _tell(self, passage: Passage | None, told: Estimate) -> None:
-        if self.watch:
-            self.watch(passage, told)
+        for watch in self.watchers:
+            watch(passage, told)
 
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
         self.intake.warm_up()
         leg = Leg(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         one = Passage(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
-        self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0)).follow(one)
+        first = self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
+        first.follow(one, [Word(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+        first.crumbs.places(first.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
 
     def _first(self, walk_heading_rad: float) -> MapFilter | None:

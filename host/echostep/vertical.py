@@ -32,7 +32,7 @@ CONNECTOR, OUTSIDE = 1, 2  # place: on stairs or in a lift by the plan, or certa
 DT, CLAIMED, NOISE, GAIT, PLACE, FOOT, FOOT_SD, LOWEST, HIGHEST = range(9)  # what is seen in a step
 
 LONGEST_STEP_S = 0.5  # modes may change so often
-MOST_STEPS = 240  # in one gap
+GAP_S = 5.0  # of silence: what happened meanwhile is not followed, but weighed
 TINY, TINIEST = 1e-9, 1e-14  # hypotheses below are forgotten; successors below are not looked at
 
 # How often what begins and ends, 1/s
@@ -41,13 +41,19 @@ HELD_FADES, FADING_HOLDS = 0.3, 0.1
 SHIFTS, GUST_SHIFTS = 1 / 1200, 1 / 60  # the pressure of the building changes for good
 CLIMB_BEGINS, CLIMB_ENDS, CLIMB_TURNS = 1 / 150, 0.5, 1 / 60
 RIDE_BEGINS, RIDE_ENDS = 1 / 200, 1.0
+RESTS, UNDER_WAY, WANDERED_M = (
+    0.5,
+    0.2,
+    10.0,
+)  # after a silence: still there; else on stairs or in a lift; how far, without storeys
 BETWEEN_S = 40.0  # mean time on stairs and in lifts
 
-WEATHER_M = 0.015  # random walk in a second: 1 hPa/h is 2.3 mm/s
+WEATHER_M = 0.015  # random walk in a second
+TREND_M_S = 0.0023  # 1 hPa/h, for times that nobody saw
 GUST_M = 1.5  # sd of doors and fans: 18 Pa
 HELD_WANDERS_M, FADING_WANDERS_M, FADING_WANDERS = 0.2, 0.4, 0.2  # in a second; the last one times the gust
 FADES_S = 1.5
-SHIFT_M = 1.2
+SHIFT_M = 0.8  # fans and stack effect: 10 Pa
 # All that was known of the weather is wrong: an air lock, a first sample that was a spike. How often, 1/s; sd; only for what is far off
 SEALED, SEALED_M, SEALED_OFF_M = 1e-6, 100.0, 15.0
 FREE_RATES = 0.5  # without storeys each metre is a place to stop at, so setting off is the rarer
@@ -93,13 +99,14 @@ def follow(state: State, heights_m: Floats, free: bool, seen: Floats, found: Flo
     )
     chain = np.zeros((size, size))
     for i in range(len(seen)):
-        steps = min(max(1, math.ceil(seen[i, DT] / LONGEST_STEP_S - 1e-9)), MOST_STEPS)
+        gap = seen[i, DT] > GAP_S
+        steps = 1 if gap else max(1, math.ceil(seen[i, DT] / LONGEST_STEP_S - 1e-9))
         for part in range(steps):
             now = seen[i].copy()
             now[DT] /= steps
             if part < steps - 1:
                 now[CLAIMED] = np.nan
-            _step(state, heights_m, free, now[DT], now, merged)
+            _step(state, heights_m, free, gap, now[DT], now, merged)
             if len(joint):
                 chain = merged[3].copy() if part == 0 else _chained(merged[3], chain)
         for s in range(size):
@@ -140,13 +147,16 @@ def backward(joint: Floats, last: Floats) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
-def _step(state: State, heights_m: Floats, free: bool, dt: float, seen: Floats, merged: Merged) -> None:
+def _step(state: State, heights_m: Floats, free: bool, gap: bool, dt: float, seen: Floats, merged: Merged) -> None:
     """One step of time: every hypothesis with each of its successors, updated and merged into the state."""
     weights, means, covariances = state
     w, m, p, xi, _, _ = merged
     w[:], m[:], p[:], xi[:] = 0.0, 0.0, 0.0, 0.0
     for s in range(len(weights)):
         if weights[s] < TINY:
+            continue
+        if gap:
+            _reappears(state, s, heights_m, free, dt, seen, merged)
             continue
         left = weights[s] - _air(state, s, dt, seen, merged)
         if s % WAYS == ON:
@@ -263,6 +273,55 @@ def _arrives(state: State, s: int, heights_m: Floats, free: bool, dt: float, see
         _take(x, c, share, here + other, s, seen, merged)
         gone += share
     return gone
+
+
+@njit(cache=True, error_model="numpy")
+def _reappears(state: State, s: int, heights_m: Floats, free: bool, dt: float, seen: Floats, merged: Merged) -> None:
+    """After a silence he is where he was, on another storey or on a way; the weather has walked on, in a building with any pressure."""
+    count, own, weight = len(heights_m), s // MODES, state[0][s]
+    stays = max(RESTS, math.exp(-dt * 2.0 * (CLIMB_BEGINS + RIDE_BEGINS))) if s % WAYS == ON else 0.0
+    last = seen.copy()
+    last[DT], last[FOOT] = 0.0, math.nan
+    for j in range(2 if free else count):
+        home = j == (0 if free else own)
+        share = stays * home + (1.0 - stays) * (1.0 - UNDER_WAY) * ((not home) if free else 1.0 / count)
+        for shifted in range(2):
+            x, c = _gone_by(state, s, dt, shifted == 1, merged)
+            if not free:
+                _forget(x, c, 0, 0.0)
+                x[0] = heights_m[j]
+            elif not home:
+                c[0, 0] += WANDERED_M**2
+            _take(x, c, weight * share * _shift_share(dt, shifted), (0 if free else j) * MODES + ON, s, last, merged)
+    for target in range(STAIRS_UP, WAYS):
+        x, c = _gone_by(state, s, dt, False, merged)
+        wide = WANDERED_M if free else 0.5 * (heights_m[count - 1] - heights_m[0]) + STOREY_M
+        _forget(x, c, 0, wide)
+        x[0] = state[1][s, 0] if free else 0.5 * (heights_m[count - 1] + heights_m[0])
+        stairs = target < LIFT_UP
+        c[1, 1] = (CLIMB_SD_M_S if stairs else RIDE_SD_M_S) ** 2
+        x[1] = (CLIMB_M_S if stairs else RIDE_M_S) * (1.0 if target in (STAIRS_UP, LIFT_UP) else -1.0)
+        share = (1.0 - stays) * UNDER_WAY / 4.0
+        _take(x, c, weight * share, own * MODES + target, s, last, merged)
+
+
+@njit(cache=True, error_model="numpy")
+def _gone_by(state: State, s: int, dt: float, shifted: bool, merged: Merged) -> tuple[Floats, Floats]:
+    """Hypothesis s after a time that nobody saw: at rest, no gust, the weather walked on."""
+    x, c = _copied(state, s, merged)
+    c[2, 2] += WEATHER_M**2 * dt + (TREND_M_S * dt) ** 2
+    _forget(x, c, 1, 0.0)
+    _forget(x, c, 3, 0.0)
+    if shifted:
+        c[2, 2] += SHIFT_M**2
+    return x, c
+
+
+@njit(cache=True, error_model="numpy")
+def _shift_share(dt: float, shifted: int) -> float:
+    """Probability that the building's pressure has shifted, or not, in so long."""
+    share = _share(SHIFTS + 0.5 * GUST_BEGINS, dt)
+    return share if shifted else 1.0 - share
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,7 +8,7 @@ the index, what a ranger may hear from a tile, is filled by `reflectors.Walls`.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,6 +17,7 @@ from numba.extending import typeof_impl
 from numpy.typing import NDArray
 
 from echostep.errors import EchostepError
+from echostep.kernels import LEAN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -28,8 +29,6 @@ CONE_RAD = math.radians(
     35.0
 )  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
 MAX_TILES = 40_000_000
-# Options of a kernel that runs once per particle: it counts no references, which takes as long as its work; so it must not allocate.
-LEAN: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 SHORTEST_M = 1e-6  # shorter walls are points, they bound nothing
 
 

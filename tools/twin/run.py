@@ -2,7 +2,7 @@
 
 In: the ELF and the twin; the MTx begins as it is sold, and answers its configuration. Out: two ports that
 `echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port is opened, and starts anew when it is over,
-until Ctrl-C. Simulated hardware, real firmware.
+until Ctrl-C. With `--beacons udp://127.0.0.1:9000` a gateway tells there what beacons along the walk hear. Simulated hardware, real firmware.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tty
 from importlib.resources import as_file, files
@@ -22,8 +23,10 @@ from typing import IO
 
 import numpy as np
 
+from echostep.beacon_simulator import simulate_gateway
 from echostep.plan import load_plan
 from echostep.simulation.board import Sent
+from echostep.simulation.gateway import SPACING_M
 from echostep.simulation.mtx_device import MtxDevice
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.simulation.stimulus import NO_SYNC, ROW
@@ -153,6 +156,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--once", action="store_true", help="end after one walk")
     parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
+    parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway there, in step with the walk")
     options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
@@ -161,13 +165,18 @@ def main() -> int:
         board = PtyBoard()
         mtx = PtyMtx()
         options.out.mkdir(parents=True, exist_ok=True)
+        more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
         print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n"
-              f"  .venv/bin/echostep live --plan {path} --board {board.port} --mtx {mtx.port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
+              f"  .venv/bin/echostep live --plan {path} --board {board.port} --mtx {mtx.port}{more}\n\nCtrl-C ends.", flush=True)  # fmt: skip
     try:
         while True:
             scenario = demo_scenario(plan, options.seed, board)
             wait_for_listener(board, mtx)
-            scenario.write_truth(options.out / "truth.csv", board.t_s)
+            truth = options.out / "truth.csv"
+            scenario.write_truth(truth, board.t_s)
+            if options.beacons:
+                told = (path, truth, options.beacons, SPACING_M, 1.0, options.seed)
+                threading.Thread(target=simulate_gateway, args=told, daemon=True).start()
             play(scenario, board, mtx)
             if options.once:
                 break

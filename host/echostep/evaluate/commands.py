@@ -79,6 +79,20 @@ def trails(
     study(runs, seed, out, json, scheduler)
 
 
+@app.command("legs")
+def legs_command(
+    runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/legs"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Walks of 5 m by many people without calibration, and what each fault of the sensors does (simulated)."""
+    from echostep.evaluate.legs import evaluate_legs
+
+    evaluate_legs(runs, seed, json, out, scheduler)
+
+
 @app.command("floors")
 def floors_command(
     runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,

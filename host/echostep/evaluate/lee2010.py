@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 LAP: tuple[Waypoint, ...] = ((0.0, 0.0), (40.0, 0.0), (40.0, 30.0), (0.0, 30.0), (0.0, 0.0))  # [Lee 2010, Figure 6]
 CORRIDOR_M, STOREY_M, STOREYS = 80.0, 3.5, 5  # [Lee 2010, Figure 7]; the storey's height is not printed
 PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
-BLOCK_MS = 50
+BLOCK_MS = 1000
 CALIBRATION_M = 10.0
 HALF_WIDE_M = 1.0  # of the corridor
 START_NS, PORTION = 1_000_000_000, 1000
@@ -176,7 +176,7 @@ def chunks_of(walked: Walk, levels: Sequence[Level], seed: int) -> list[Chunk]:
         board.send(encode(m.Configure(NO_PINGS, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED), 0))
     gathered: dict[int, bytes] = {}
     for start in range(0, len(walked.t_s), BLOCK_MS):
-        for t_ns, part in board.advance(sensors.rows(start, start + BLOCK_MS)):
+        for t_ns, part in board.advance(sensors.rows(start, min(start + BLOCK_MS, len(walked.t_s)))):
             gathered[t_ns] = gathered.get(t_ns, b"") + part
     return [Chunk(BOARD, START_NS + t_ns, part) for t_ns, part in gathered.items()]
 

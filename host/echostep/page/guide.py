@@ -1,32 +1,84 @@
-"""Guidance: which way to a destination.
+"""Guidance: what a page shows of a cue, and the way to a destination of its own.
 
-In: estimates, a place, the plan. Out: `Guidance` for one page. Owns the plan's routes (made when first asked for, in a thread) and how far along
-the way the wearer has come. Until the way is found, and where there is none, it is the straight line.
+In: cues with their way; for a page's own destination estimates, a place, the plan. Out: `Guidance`. Owns the plan's routes (made when first asked
+for, in a thread) and how far along its own way the wearer has come. Until that way is found, and where there is none, it is the straight line.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from echostep.estimate import Estimate
-from echostep.guidance import CueKind, Guide
+from echostep.guidance import NO_HEADING, Cue, CueKind, GuidanceSettings, Guide
 from echostep.plan import Plan
+from echostep.polyline import along, way_m
 from echostep.routes import Place, Route, Routes
 
 ARRIVED_M = 1.0
 AGAIN_S = 5.0  # a new way is looked for no sooner, in data time
+UNKNOWN_RAD = math.radians(GuidanceSettings().heading_sd_deg)
+ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
+NO_WAY = "No way was found. The arrow shows the straight line."
+STRAIGHT = "straight"  # the kind of a guidance that knows no way
 
 
 @dataclass(frozen=True, slots=True)
 class Guidance:
-    """What to do, in words; `arrow_rad` is the direction to go now in the map, `path` the way on this level as points."""
+    """What to do, in words; `arrow_rad`: where to walk, from where he looks, counter-clockwise; `path`: what is left of the way on his
+    level, as points.
 
+    `kind` is a `CueKind` or `STRAIGHT`, `left_m` the way that is left, None where that helps nobody. `spoken` is the last sentence and `spoken_s`
+    when it was said. `own`: the page's own destination, not the run's.
+    """
+
+    kind: str
     text: str
     arrow_rad: float | None
-    distance_m: float
+    left_m: float | None
     path: tuple[tuple[float, float], ...]
+    spoken: str = ""
+    spoken_s: float = 0.0
+    own: bool = False
+
+    def turned(self, by_rad: float) -> Guidance:
+        """The same for somebody who has turned to the left since."""
+        return self if self.arrow_rad is None else replace(self, arrow_rad=self.arrow_rad - by_rad)
+
+    def stopped(self, why: str, t_s: float) -> Guidance:
+        """Nothing is known any more: no arrow; the way stays to be seen."""
+        text = f"Stop. {why}"
+        return replace(
+            self, kind=CueKind.STOP.value, text=text, arrow_rad=None, left_m=None, spoken=f"{text}.", spoken_s=t_s
+        )
+
+
+def guidance(cue: Cue, route: Route | None, level: int, before: Guidance | None) -> Guidance:
+    """A cue as it is shown on a level; `before`: what was shown until now, whose sentence stands as long as there is no new one."""
+    said = (cue.spoken, cue.t_s) if cue.spoken else (before.spoken, before.spoken_s) if before else ("", cue.t_s)
+    path = () if route is None or math.isnan(cue.left_m) else rest(route, level, cue.left_m)
+    left_m = cue.left_m if cue.kind in ON_THE_WAY else None
+    return Guidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *said)
+
+
+def rest(route: Route, level: int, left_m: float) -> tuple[tuple[float, float], ...]:
+    """The last `left_m` of a way, what of it is on a level, as points."""
+    points: list[tuple[float, float]] = []
+    for stretch in reversed(route.stretches):
+        if left_m <= 0.0:
+            break
+        line, length_m = stretch.line_m, way_m(stretch.line_m)
+        if stretch.level == level:
+            if left_m < length_m:
+                x, y, _ = along(line, length_m - left_m)
+                come_m = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
+                line = np.vstack([(x, y), line[come_m > length_m - left_m]])
+            points[:0] = [(x, y) for x, y in line.tolist()]
+        left_m -= length_m
+    return tuple(points)
 
 
 class Ways:
@@ -69,7 +121,10 @@ class Errand:
     def guidance(self, told: Estimate) -> Guidance:
         """What to do at an estimate."""
         if self._last is None or self._last[0] is not told:
-            self._last = told, self._along(told) if self._guide else straight(told, self.goal, self._why)
+            self._last = (
+                told,
+                replace(self._along(told) if self._guide else straight(told, self.goal, self._why), own=True),
+            )
         return self._last[1]
 
     def _along(self, told: Estimate) -> Guidance:
@@ -77,11 +132,7 @@ class Errand:
         cue = self._guide.cue(told)
         if cue.kind is CueKind.OFF and self._again_s == math.inf:
             self._again_s = told.t_s
-        lines = [stretch.line_m for stretch in self._guide.route.stretches if stretch.level == told.level]
-        path = tuple((float(x), float(y)) for line in lines for x, y in line)
-        arrow = None if cue.arrow_rad is None else cue.arrow_rad + told.heading_rad
-        left = "" if cue.kind is CueKind.ARRIVED else f", {cue.left_m:.0f} m to go"
-        return Guidance(f"{cue.text}{left}", arrow, cue.left_m, path)
+        return guidance(cue, self._guide.route, told.level, self._last[1] if self._last else None)
 
 
 def straight(told: Estimate, goal: Place, why: str = "") -> Guidance:
@@ -90,7 +141,10 @@ def straight(told: Estimate, goal: Place, why: str = "") -> Guidance:
     distance_m = math.hypot(dx, dy)
     path = ((told.x_m, told.y_m), (goal.x_m, goal.y_m))
     if distance_m <= ARRIVED_M and not levels:
-        return Guidance("You have arrived", None, distance_m, path)
+        return Guidance(CueKind.ARRIVED.value, "You have arrived", None, None, path, "You have arrived.")
     climb = f", {abs(levels)} level{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
-    text = f"{distance_m:.0f} m in a straight line{climb}"
-    return Guidance(f"{text} ({why})" if why else text, math.atan2(dy, dx), distance_m, path)
+    if told.heading_sd_rad > UNKNOWN_RAD:
+        return Guidance(CueKind.STOP.value, NO_HEADING, None, None, path, f"{NO_HEADING}.")
+    arrow = math.remainder(math.atan2(dy, dx) - told.heading_rad, 2.0 * math.pi)
+    text = f"In a straight line{climb}{': ' if why else ''}{why}"
+    return Guidance(STRAIGHT, text, arrow, distance_m, path, NO_WAY if why else "")

@@ -1,6 +1,7 @@
 """The live page of a run: watches a tracker and shows what it knows.
 
-In: a tracker, and the moment after each portion that it took. Out: scenes on a stage that a server serves; check-ins for the tracker. Owns both.
+In: a tracker, who guides its wearer, and the moment after each portion that it took. Out: scenes on a stage that a server serves; check-ins for the
+tracker. Owns both.
 """
 
 from __future__ import annotations
@@ -14,20 +15,24 @@ from types import TracebackType
 from typing import Self
 
 from echostep.estimate import Estimate, unwatched
+from echostep.guided import Guided
 from echostep.likelihoods import echo_model
 from echostep.page.ahead import ahead
 from echostep.page.beams import beams, expected_range
+from echostep.page.guide import guidance
+from echostep.page.marks import marks
 from echostep.page.scene import MOST_SHOWN, Scene, specks, words
 from echostep.page.server import Address, PageServer
 from echostep.page.stage import Stage
 from echostep.page.streams import Pulse
-from echostep.sources import Portion
+from echostep.sources import BOARD, MTX, Portion
 from echostep.tracker import Tracker
 from echostep.waiting import Passage
 
 STEP_M = 0.02  # the trail gets a point when he has moved so far
 PULSE_NS = 250_000_000
-SILENT_S = 2.0
+SILENT_S = 2.0  # without bytes of the foot or the board
+STEPLESS_S = 6.0  # with bytes that tell no step: longer than the first steps are held back
 STALE_S = 1.5  # echoes are shown no longer
 MOST_KEPT = 2000  # specks of each scene of a film
 
@@ -35,15 +40,20 @@ MOST_KEPT = 2000  # specks of each scene of a film
 class LivePage:
     """Call `shown` after each portion; `said` gives what pages had to say, as bytes of chunks."""
 
-    def __init__(self, tracker: Tracker, title: str, address: Address, *, replay: bool = False) -> None:
+    def __init__(
+        self, tracker: Tracker, title: str, address: Address, guided: Guided | None = None, *, replay: bool = False
+    ) -> None:
+        """`guided` was made before, so that its cue of an estimate is there when the page is told of it."""
         self.wanted = True  # until Ctrl-C
         self._tracker = tracker
+        self._guided = guided
         self._stage = Stage(tracker.plan, title, replay=replay)
         self.server = PageServer(self._stage, address)
         self._model = echo_model(tracker.settings.echo)
         self._pulse = Pulse()
         self._pulsed_ns = 0
         self._arrived_ns = 0
+        self._heard_ns = 0  # foot or board
         self._told_ns = 0
         self._ahead: Scene | None = None  # of the foot's last step, as long as its echoes are not in
         self._ahead_s = -math.inf
@@ -68,12 +78,12 @@ class LivePage:
         return self.server.pages
 
     def __enter__(self) -> Self:
-        self._tracker.watch = self._watch
+        self._tracker.watchers.append(self._watch)
         self.server.__enter__()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._tracker.watch = None
+        self._tracker.watchers.remove(self._watch)
         self.server.__exit__(kind, error, at)
 
     def said(self) -> Iterator[bytes]:
@@ -89,6 +99,8 @@ class LivePage:
         """The tracker has taken a portion: publish what it told, and now and then how the streams are."""
         if len(portion.t_arrival_ns):
             self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
+            if BOARD in portion.ports or MTX in portion.ports:
+                self._heard_ns = self._arrived_ns
         else:
             self._arrived_ns = max(self._arrived_ns, time.monotonic_ns())
         if self._new:
@@ -112,23 +124,27 @@ class LivePage:
         self._ahead_s = since[-1].t1_s
         there = ahead(told, self._tracker.leg, since)
         cloud = self._scene.specks and self._scene.specks.moved(there.x_m - told.x_m, there.y_m - told.y_m)
+        guide = self._scene.guidance and self._scene.guidance.turned(there.heading_rad - told.heading_rad)
         self._ahead = replace(
-            self._scene, born_ns=self._born_ns, t_s=there.t_s, told=there, specks=cloud, words=words(there)
-        )
+            self._scene, born_ns=self._born_ns, t_s=there.t_s, told=there, specks=cloud, words=words(there), guidance=guide
+        )  # fmt: skip
         self._stage.publish(self._ahead)
 
     def _meanwhile(self) -> Scene:
-        """What is known without news: when nothing has come from the foot for a while, that he may be anywhere near."""
-        scene, silent_s = (
-            replace(self._ahead or self._scene, born_ns=self._born_ns),
-            (self._arrived_ns - self._told_ns) * 1e-9,
-        )
+        """What is known without news: when no step has been told for a while, that he may be anywhere near."""
+        scene = replace(self._ahead or self._scene, born_ns=self._born_ns)
         if scene.told is None:
             return replace(scene, words=words(None, waits=self._tracker.lost_at_start))
-        if silent_s < SILENT_S:
+        untold_s = (self._arrived_ns - self._told_ns) * 1e-9
+        silent = self._arrived_ns - self._heard_ns >= SILENT_S * 1e9
+        if not silent and untold_s < STEPLESS_S:
             return scene
-        told = unwatched(scene.told, scene.told.t_s + silent_s)
-        return replace(scene, told=told, beams=(), words=f"lost: nothing from the foot for {silent_s:.0f} s")
+        why = "nothing from the foot" if silent else "no step of the foot"
+        guide = scene.guidance and scene.guidance.stopped(f"There is {why}", scene.t_s)
+        return replace(
+            scene, told=unwatched(scene.told, scene.told.t_s + untold_s), beams=(), words=f"lost: {why} for {untold_s:.0f} s",
+            guidance=guide, marks=tuple(replace(mark, heard=False) for mark in scene.marks),
+        )  # fmt: skip
 
     def _watch(self, passage: Passage | None, told: Estimate) -> None:
         """The tracker told an estimate."""
@@ -147,8 +163,12 @@ class LivePage:
             new = beams(passage, told, told.level * sheet.storeys.pitch_m, sheet.walls.index, self._model)
             heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)
         heard = tuple(sorted((b for b in heard if told.t_s - b.t_s < STALE_S), key=attrgetter("ranger")))
+        guide = self._scene.guidance
+        if self._guided and self._guided.cue:
+            guide = guidance(self._guided.cue, self._guided.route, told.level, guide)
         self._scene = replace(
             self._scene, born_ns=self._born_ns, t_s=told.t_s, told=told, walked=len(self._stage.trail),
-            words=words(told, taps=not self._replay), specks=shown, beams=heard,
+            words=words(told, taps=not self._replay), specks=shown, beams=heard, guidance=guide,
+            marks=marks(tracker, told.t_s),
         )  # fmt: skip
         self._new.append(self._scene)

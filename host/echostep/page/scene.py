@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from echostep.estimate import Estimate, Status
 from echostep.page.beams import Beam
+from echostep.page.guide import Guidance
+from echostep.page.marks import Mark
 from echostep.page.streams import Streams
 from echostep.particles import Cloud
 
@@ -36,7 +38,10 @@ class Specks:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """One moment: `walked` points of the trail belong to it; `born_ns` is the host's monotonic clock when its bytes had come."""
+    """One moment: `walked` points of the trail belong to it; `born_ns` is the host's monotonic clock when its bytes had come.
+
+    `guidance` is the run's; a page's own destination is the session's.
+    """
 
     born_ns: int
     t_s: float
@@ -46,6 +51,8 @@ class Scene:
     streams: Streams | None
     walked: int
     words: str
+    marks: tuple[Mark, ...] = ()
+    guidance: Guidance | None = None
 
 
 def specks(cloud: Cloud, most: int = MOST_SHOWN) -> Specks:

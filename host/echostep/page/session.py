@@ -144,7 +144,7 @@ class Session:
         self._undrawn[self._serial] = scene.born_ns if news else None
         begin = min(self._walked, scene.walked)
         new = scene.specks if scene.specks is not self._specks else None
-        guidance = None
+        guidance = scene.guidance
         if scene.told and self._errand:
             guidance = self._errand.guidance(scene.told)
             if self._errand.lacks_way(scene.told):

@@ -192,6 +192,7 @@ def frame(
         "streams": asdict(scene.streams) if scene.streams else None,
         "trail": {"from": trail_from, "count": len(trail) // 12},
         "cloud": grid,
+        "beacons": [asdict(mark) for mark in scene.marks],
         "guidance": asdict(guidance) if guidance else None,
         "play": play,
     }

@@ -27,8 +27,9 @@ RATE_HZ = 500
 ANKLE_DEG = (1, -3, -1, 3, 6, 8, 10, 11, 12, 13, 9, -2, -14, -16, -7, -2, 1, 2, 2, 2)  # dorsiflexion
 LOADED = 0.30  # of the stride: until then the knee's flexion is that under load
 DOUBLE = 0.12  # of the stride on both feet, twice [Perry 1992]
+LONGEST_STEP_S = 1.0
 CARRY_M = 0.004  # a point so much above the other carries a third as much
-START_S = 0.9  # from standing to the whole movement
+START = 0.55  # of the stride's time, from standing to the whole movement: the first step is a little shorter than the others [Breniere and Do 1986]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +88,25 @@ def draw_stroller(rng: np.random.Generator) -> Stroller:
 
 
 def stroll(person: Stroller, manner: Manner, walk_s: float, rng: np.random.Generator, stand_s: float = 1.5) -> Gait:
-    """Stand, walk for so long, stand: which leg goes first is drawn, too."""
-    t = np.arange(0.0, walk_s + 2.0 * stand_s, 1.0 / RATE_HZ)
+    """Stand, walk for so long or up to half a stride longer, stand: which leg goes first is drawn, too.
+
+    He begins with a foot that leaves the floor and ends with one that comes down beside the other [Jian 1993].
+    """
+    t = np.arange(0.0, walk_s + 2.0 * stand_s + LONGEST_STEP_S, 1.0 / RATE_HZ)
     stride_s = manner.stride_s * person.pace
-    moves = _ease((t - stand_s) / START_S) * _ease((stand_s + walk_s - t) / START_S)
-    wander = np.interp(t, np.arange(0.0, t[-1] + 2.0, 1.0), 1.0 + 0.03 * rng.standard_normal(int(t[-1] + 2.0) + 1))
-    phase = np.cumsum(wander) / RATE_HZ / stride_s + rng.choice([0.62, 0.12])
+    seconds = np.arange(int(t[-1]) + 3)
+    wander = np.interp(t, seconds, 1.0 + 0.03 * rng.standard_normal(len(seconds)))
+    phase = np.cumsum(wander) / RATE_HZ / stride_s
+    phase += rng.choice([0.62, 0.12]) - phase[int(stand_s * RATE_HZ)]
+    steps = 2.0 * phase[int((stand_s + walk_s) * RATE_HZ)]
+    stop_s = float(np.interp(0.5 * math.ceil(steps), phase, t))
+    moves = _ease((t - stand_s) / (START * stride_s)) * _ease((stop_s - t) / (START * stride_s))
     right, left = (_angles(person, manner, phase + k, moves, 1.0 if k == 0.0 else person.other) for k in (0.0, 0.5))
     turned = HALF_PELVIS_M * np.sin(math.radians(person.pelvis_deg) * manner.hip * moves * np.cos(2.0 * np.pi * phase))
-    steps = (
+    moved = (
         _hip_step(_points(person, angles)) - side * np.gradient(turned) for angles, side in ((right, 1.0), (left, -1.0))
     )
-    way = np.cumsum(sum(_carried(phase + k) * step for k, step in zip((0.0, 0.5), steps, strict=True)))
+    way = np.cumsum(sum(_carried(phase + k) * step for k, step in zip((0.0, 0.5), moved, strict=True)))
     thigh, shank = (np.gradient(angle) * RATE_HZ for angle in right[:2])
     return Gait(t, thigh, shank, way)
 

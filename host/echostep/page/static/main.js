@@ -6,6 +6,7 @@ import { Painter } from './paint.js';
 import { Panel } from './panel.js';
 import { PlanView } from './plan.js';
 import { Replay } from './replay.js';
+import { Speech } from './speech.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
 
@@ -19,6 +20,7 @@ const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072
 let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetAt = null, turned = 0, fitted = false, wanted = 0, invited = false;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('Not taken: this is a replay, or it is too busy.', 3000), onState: connection });
+const speech = new Speech($('speech'), $('sentence'));
 const replay = new Replay((kind, fields) => link.say(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.say('drawn', { seq }));
@@ -56,6 +58,7 @@ function frame(got) {
   if (got.cloud) scene.cloud = got.cloud;
   extend(scene.trail, got.trail);
   undrawn.push(got.seq);
+  speech.hear(got.guidance);
   dirty = true;
 }
 
@@ -87,7 +90,7 @@ function draw() {
   if (mode && $('cross').hidden === false) posing(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
-    panel.frame(scene.frame, plan.levels[scene.level].rooms, view.turn);
+    panel.frame(scene.frame, plan.levels[scene.level].rooms);
     panel.floors(scene.level, told);
     replay.frame(scene.frame.play);
     if (!told && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
@@ -108,7 +111,7 @@ function enter(next, byKey = false) {
   $('here').setAttribute('aria-pressed', String(mode === 'here'));
   $('map').classList.toggle('takes', mode !== null);
   $('cross').hidden = !(mode && byKey);
-  $('goal').value = mode === 'go' ? 'map' : scene.frame?.guidance ? $('goal').value : '';
+  $('goal').value = mode === 'go' ? 'map' : scene.frame?.guidance?.own ? $('goal').value : '';
   hint(mode === 'here' ? 'Stand still. Tap where you are, drag to where you look.' : mode === 'go' ? 'Tap where you want to go.' : '');
   view.changed();
 }

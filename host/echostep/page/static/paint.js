@@ -1,4 +1,4 @@
-// Paints what moves on a canvas: cloud, trail, echoes, position with its ellipse, heading, destination, a pose that is being tapped.
+// Paints what moves on a canvas: cloud, trail, beacons, echoes, position with its ellipse, heading, destination, a pose that is being tapped.
 
 const GRADES = 4;  // of weight
 const SPECK_PX = 2.5;
@@ -13,7 +13,7 @@ export class Painter {
   recolour() {
     const style = getComputedStyle(document.documentElement);
     this.colour = Object.fromEntries(
-      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'ink'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
   paint(view, scene) {
@@ -27,6 +27,7 @@ export class Painter {
     this.trail(view, scene.trail, scene.level);
     const { told } = scene.frame ?? {};
     if (scene.frame?.guidance?.path.length && told?.level === scene.level) this.way(view, scene.frame.guidance.path);
+    this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
     if (told && told.level === scene.level) {
       for (const beam of scene.frame.beams) this.beam(view, beam);
       this.ellipse(view, told);
@@ -97,6 +98,63 @@ export class Painter {
       this.line([[end[0] - bx, end[1] - by], [end[0] + bx, end[1] + by]], colour, 3.5);
     } else {
       this.line([from, at(0.6)], colour, 2.5, [1, 6]);
+    }
+  }
+
+  // Those that speak lie on top; a number that would cover another is left out.
+  beacons(view, shown) {
+    const { pen } = this, taken = [], order = [...shown].sort((a, b) => a.heard - b.heard);
+    for (const beacon of order) this.beacon(view, beacon);
+    pen.font = '600 12px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.lineWidth = 3;
+    pen.strokeStyle = this.colour.halo;
+    for (const { number, x_m, y_m, state } of order.reverse()) {
+      const [sx, sy] = view.toScreen(x_m, y_m);
+      if (taken.some(([tx, ty]) => Math.abs(tx - sx) < 18 && Math.abs(ty - sy) < 14)) continue;
+      taken.push([sx, sy]);
+      pen.fillStyle = state === 'well' ? this.colour.beacon : this.colour.bad;
+      pen.strokeText(number, sx, sy + 18);
+      pen.fillText(number, sx, sy + 18);
+    }
+  }
+
+  // A triangle in the circle of its spread. Full: well, with waves while it speaks. Hollow: moved (it has a tail), or silent (it is struck out).
+  beacon(view, { x_m, y_m, radius95_m, state, heard }) {
+    const { pen } = this, [sx, sy] = view.toScreen(x_m, y_m), colour = state === 'well' ? this.colour.beacon : this.colour.bad;
+    pen.strokeStyle = pen.fillStyle = colour;
+    pen.lineWidth = 1.5;
+    if (radius95_m * view.scale > 9) {  // else the triangle covers it
+      pen.beginPath();
+      pen.arc(sx, sy, radius95_m * view.scale, 0, 2 * Math.PI);
+      pen.globalAlpha = 0.12;
+      pen.fill();
+      pen.globalAlpha = 1;
+      pen.setLineDash([2, 4]);
+      pen.stroke();
+      pen.setLineDash([]);
+    }
+    pen.beginPath();
+    pen.moveTo(sx, sy - 7);
+    pen.lineTo(sx + 6.5, sy + 4);
+    pen.lineTo(sx - 6.5, sy + 4);
+    pen.closePath();
+    pen.lineWidth = 4;
+    pen.strokeStyle = this.colour.halo;
+    pen.stroke();
+    pen.lineWidth = 2;
+    pen.strokeStyle = colour;
+    if (state === 'well') pen.fill();
+    pen.stroke();
+    if (state === 'silent') this.line([[sx - 8, sy + 8], [sx + 8, sy - 9]], colour, 2);
+    if (state === 'moved') this.line([[sx - 20, sy + 5], [sx - 11, sy + 5]], colour, 2, [2, 4]);
+    if (heard) {
+      for (const side of [0, Math.PI]) {
+        pen.beginPath();
+        pen.arc(sx, sy - 1, 12, side - 0.6, side + 0.6);
+        pen.lineWidth = 2;
+        pen.stroke();
+      }
     }
   }
 

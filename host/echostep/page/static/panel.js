@@ -1,14 +1,16 @@
-// Words and numbers around the map: status, place, health of the streams, guidance, floors, scale bar; and what a screen reader is told.
+// Words and numbers around the map: status, place, health of the streams, beacons, guidance, floors, scale bar; and what a screen reader is told.
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕' };
-const COMPASS = ['east', 'north-east', 'north', 'north-west', 'west', 'south-west', 'south', 'south-east'];
+const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
 const SPOKEN_MS = 8000;  // a screen reader hears a new place no sooner
+const FASTEST_RAD_S = Math.PI;  // as the arrow of the guide turns
 const $ = (id) => document.getElementById(id);
 
 export class Panel {
   constructor(onFloor) {
     this.onFloor = onFloor;
     this.spoken = { at: -Infinity, status: '', text: '' };
+    this.turn = 0;  // of the arrow, in turns without end, so that it goes the short way
   }
 
   hello({ title, plan }) {
@@ -27,7 +29,7 @@ export class Panel {
     }));
   }
 
-  frame({ told, words, streams, guidance, beams }, rooms, turn) {
+  frame({ told, words, streams, guidance, beams, beacons }, rooms) {
     const status = told?.status ?? 'waiting';
     this.status(status, words);
     $('place').textContent = told ? whereabouts(told, rooms) : '';
@@ -35,13 +37,28 @@ export class Panel {
     $('health').textContent = streams ? rates(streams) : 'no bytes yet';
     $('wrong').textContent = streams?.wrong ?? '';
     $('wrong').hidden = !streams?.wrong;
-    $('guidance').hidden = !guidance;
-    if (guidance) {
-      $('way').textContent = guidance.text;
-      $('turn').style.visibility = guidance.arrow_rad === null ? 'hidden' : 'visible';
-      $('turn').style.transform = `rotate(${Math.PI / 2 - (guidance.arrow_rad ?? 0) - turn}rad)`;
-    }
+    $('beacons').textContent = census(beacons);
+    $('beacons').hidden = !beacons.length;
+    this.guide(guidance);
     this.speak(`${status} ${streams?.wrong ?? ''}`, [words, told ? near(told, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
+  }
+
+  // The arrow points from where he looks: up is straight ahead.
+  guide(guidance) {
+    $('guidance').hidden = !guidance;
+    if (!guidance) return;
+    const { kind, text, arrow_rad, left_m, own } = guidance;
+    $('guidance').dataset.kind = kind;
+    $('turn').dataset.sign = arrow_rad !== null ? 'arrow' : kind === 'arrived' ? 'there' : 'halt';
+    const by = arrow_rad === null ? 0 : Math.atan2(Math.sin(-arrow_rad - this.turn), Math.cos(-arrow_rad - this.turn));
+    if (by) {
+      this.turn += by;
+      $('arrow').style.transition = `transform ${0.2 + Math.abs(by) / FASTEST_RAD_S}s ease-out`;
+      $('arrow').style.transform = `rotate(${this.turn}rad)`;
+    }
+    $('cue').textContent = text;
+    $('left').textContent = left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`;
+    $('nowhere').hidden = !own;
   }
 
   status(status, words) {
@@ -81,14 +98,21 @@ function near({ x_m, y_m }, rooms) {
 
 function whereabouts(told, rooms) {
   const degrees = ((told.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((told.heading_sd_rad * 180) / Math.PI);
-  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ± ${spread}°` : 'heading unknown';
-  return [near(told, rooms), `x ${told.x_m.toFixed(1)} m, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
+  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
+  return [near(told, rooms), `x ${told.x_m.toFixed(1)}, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
 }
 
 function echoes(beams) {
   const one = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
   const heard = beams.map((beam) => `${beam.ranger ? 'right' : 'left'} ${one(beam)}`);
   return heard.length ? heard.join(' · ') : 'no echoes';
+}
+
+// Beacons in words, those that are not well by number.
+function census(beacons) {
+  const of = (state) => beacons.filter((beacon) => beacon.state === state).map(({ number }) => number).join(', ');
+  const heard = `beacons: ${beacons.filter((beacon) => beacon.heard).length} of ${beacons.length} heard`;
+  return [heard, of('silent') && `silent: ${of('silent')}`, of('moved') && `moved: ${of('moved')}`].filter(Boolean).join(' · ');
 }
 
 const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
