@@ -72,6 +72,18 @@ def test_ours_gets_people_out_where_the_paper_does_not_always() -> None:
     assert 30 < paper < 60
 
 
+def test_nearly_all_come_out_of_a_map_that_was_made_on_the_way_in() -> None:
+    assert sum(one_return(Case("", OURS, deployed=True), seed) for seed in range(12)) >= 11
+
+
+def test_three_dead_beacons_in_a_row_are_a_gap_that_is_crossed() -> None:
+    """20 m without a beacon leave 4 m in which nobody hears him; who was sent back once goes on."""
+    for seed in range(3):
+        world = ground(replace(NOMINAL, sources=0), np.random.default_rng(seed))
+        world.works[5:8] = False
+        assert guided_return(world, OURS, seed).arrived
+
+
 def test_equal_seeds_equal_returns() -> None:
     world = ground(NOMINAL, np.random.default_rng(4))
     one, two = (guided_return(world, OURS, 4) for _ in range(2))

@@ -68,6 +68,23 @@ def test_warns_when_leaving_the_range_of_the_last_beacon_then_sends_back() -> No
     assert kinds == [CueKind.AHEAD] * 3 + [CueKind.OFF] * 3 + [CueKind.RETURN] * 3
 
 
+def test_who_was_sent_back_may_go_twice_as_far_until_he_is_heard_for_long() -> None:
+    """Three dead beacons in a row are a gap that nobody would ever cross if he were always sent back as early."""
+    g = guide()
+
+    def sent_back_at(heard_s: float) -> int:
+        """Seconds of silence until he is sent back, after one more second."""
+        times = range(1, 60)
+        found = [t for t in times if g.cue(at(heard_s + t, 5.0, 0.0), heard_s=heard_s).kind is CueKind.STOP]
+        return found[0]
+
+    g.cue(at(0, 5.0, 0.0), heard_s=0.0)
+    assert [sent_back_at(100.0 * k) for k in range(1, 4)] == [6, 12, 24]
+    for t in range(400, 420):
+        g.cue(at(t, 5.0, 0.0), heard_s=float(t))
+    assert sent_back_at(500.0) == 6
+
+
 def test_warns_when_leaving_the_path_and_leads_back_to_it() -> None:
     g = guide()
     g.cue(at(0, 4.0, 0.0))

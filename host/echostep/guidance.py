@@ -54,7 +54,8 @@ class Cue:
 class GuidanceSettings:
     """`ahead_m`: the target along the way [Fischer 2008, 4.2]. `off_m`: from the way, beyond what the estimate allows, until he has left it.
 
-    `deaf_s`, `return_s`: without any beacon until he is warned and sent back. `heading_sd_deg`: beyond it nobody knows where he looks.
+    `deaf_s`, `return_s`: without any beacon until he is warned and sent back; twice as long when that has brought
+    him back once, for the next beacons may be dead, until he has been heard for `safe_s`. `heading_sd_deg`: beyond it nobody knows where he looks.
     `arrow_s`: time constant of the arrow, `arrow_deg_s` its greatest speed. `say_again_s`: a sentence is repeated no sooner.
     """
 
@@ -63,6 +64,7 @@ class GuidanceSettings:
     off_m: float = 2.0
     deaf_s: float = 3.0
     return_s: float = 6.0
+    safe_s: float = 15.0
     heading_sd_deg: float = 45.0
     turn_deg: float = 30.0
     arrow_s: float = 0.5
@@ -92,6 +94,9 @@ class Guide:
         self._arrow: float | None = None
         self._arrow_s = -math.inf
         self._sure: Place | None = None
+        self._leash_s = self._settings.return_s
+        self._sent_back = False
+        self._heard_since_s = -math.inf
         self._said = ""
         self._said_s = -math.inf
         self.replanned = 0
@@ -99,17 +104,30 @@ class Guide:
     def cue(self, e: Estimate, heard_s: float | None = None) -> Cue:
         """What to tell him at this estimate; `heard_s`: when a beacon last heard him, None where there are none."""
         silent_s = 0.0 if heard_s is None else e.t_s - heard_s
+        self._lengthen(e.t_s, silent_s)
         if e.status is not Status.LOST and silent_s < self._settings.deaf_s:
             self._sure = Place(e.x_m, e.y_m, e.level)
         if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
             return self._told(e, CueKind.STOP, NO_HEADING, None)
-        if e.status is Status.LOST or silent_s >= self._settings.return_s:
+        if e.status is Status.LOST or silent_s >= self._leash_s:
             return self._back(e, silent_s)
         self._find(e)
         cue = self._along(e)
         if silent_s >= self._settings.deaf_s and cue.kind is not CueKind.ARRIVED:
             return self._told(e, CueKind.OFF, "You leave the beacons' range", cue.arrow_rad)
         return cue
+
+    def _lengthen(self, t_s: float, silent_s: float) -> None:
+        """How long he may be out of range before he is sent back: who has come back from silence may go on further into it."""
+        if silent_s >= self._settings.deaf_s:
+            self._heard_since_s = math.inf
+            self._sent_back = self._sent_back or silent_s >= self._leash_s
+            return
+        self._heard_since_s = min(self._heard_since_s, t_s)
+        if self._sent_back:
+            self._leash_s, self._sent_back = 2.0 * self._leash_s, False
+        elif t_s - self._heard_since_s > self._settings.safe_s:
+            self._leash_s = self._settings.return_s
 
     @property
     def left_m(self) -> float:
@@ -186,7 +204,7 @@ class Guide:
 
     def _back(self, e: Estimate, silent_s: float) -> Cue:
         """Nobody knows well enough where he is: back to the last known place, as long as his steps tell the direction."""
-        why = "No beacon hears you" if silent_s >= self._settings.return_s else "Your place is not known"
+        why = "No beacon hears you" if silent_s >= self._leash_s else "Your place is not known"
         if self._sure is None or self._sure.level != e.level:
             return self._told(e, CueKind.STOP, f"Stop. {why}", None)
         dx, dy = self._sure.x_m - e.x_m, self._sure.y_m - e.y_m

@@ -7,7 +7,7 @@ nothing. Events: inertial every 10 ms, ultrasound every 200 ms, guidance every 2
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -49,6 +49,8 @@ THRESHOLD_M = 1.0
 DEAF_S = 3.0  # who has not been heard for so long goes back to where he was; twice as long when he is there again
 SAFE_S = 15.0  # who has been heard for so long is sent back early again
 PARTICLES = 100
+MORE_PARTICLES = 300  # where the map is learnt or known badly, or somebody is seldom heard
+SELDOM_S = 2.0
 DROPPED_BEFORE_M = 0.3  # a beacon lies when he has come so near to its place
 
 
@@ -63,6 +65,7 @@ class Person:
 
 OBEDIENT = Person()
 IRON = BeaconSettings(kick_per_m=0.3, tries_per_m=0.5)  # for a heading that a compass leads, as the paper's
+MAPPING = replace(IRON, kick_per_m=0.1)  # a map that is learnt is bent by every jump that is believed
 
 
 class Return(NamedTuple):
@@ -127,7 +130,7 @@ _WALKER = np.dtype([(name, "f8") for name in _Walker.__annotations__])
 
 def guided_return(
     world: Ground, system: int, seed: int, period_s: float = 0.2, person: Person = OBEDIENT, *, deployed: bool = False,
-    place_sd_m: float = 0.0, axis_sd_rad: float = 0.0, particles: int = PARTICLES, settings: BeaconSettings | None = None,
+    place_sd_m: float = 0.0, axis_sd_rad: float = 0.0, particles: int | None = None, settings: BeaconSettings | None = None,
     threshold_m: float = THRESHOLD_M,
 ) -> Return:  # fmt: skip
     """Guide one person back along the trail; equal seeds, equal returns.
@@ -135,7 +138,8 @@ def guided_return(
     `period_s`: between ultrasound measurements. `deployed`: nothing is known of the beacons but what was heard on the way in, which is simulated too;
     else `world.believed` is known within `place_sd_m` and `axis_sd_rad`.
     """
-    settings = settings or IRON
+    settings = settings or (MAPPING if deployed else IRON)
+    particles = particles or (MORE_PARTICLES if deployed or place_sd_m > 0.0 or period_s >= SELDOM_S else PARTICLES)
     rules = _Rules(
         system, max(round(period_s / TICK_S), 1), threshold_m, round(person.delay_s / TICK_S), math.radians(person.heading_sd_deg),
         person.wrong_turns, deployed, settings.drop_sd_m**2, settings.step_sd, max(DEAF_S, 1.5 * period_s),
@@ -184,15 +188,16 @@ def _return(
     if not rules.deployed:
         _start(cloud, w.x, w.y, rng)
     inside = np.zeros(len(world.sources), np.bool_)
+    heard_ticks = np.full(len(world.beacons), -np.inf)
     arrived, n, tick, end_m = False, 0, 0, np.inf
     while n < len(truth):
         if tick % rules.ultrasound_ticks == 0:
             if rules.system == OURS:
-                _listen(world, rules, cloud, model, walls, rng, w, tick)
+                _listen(world, rules, cloud, model, walls, rng, w, tick, heard_ticks)
             elif rules.system == PAPER:
                 _correct(world, rules, rng, w)
         if tick % GUIDANCE_TICKS == 0:
-            stop = _guide(world, rules, cloud, rng, w, tick)
+            stop = _guide(world, rules, cloud, rng, w, tick, heard_ticks)
             truth[n], believed[n] = (w.x, w.y), (w.believed_x, w.believed_y)
             n += 1
             if stop:
@@ -222,7 +227,8 @@ def _walk(world: Ground, w: _Walker, inside: Bools) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _listen(
-    world: Ground, rules: _Rules, cloud: _Cloud, model: BeaconModel, walls: WallIndex, rng: np.random.Generator, w: _Walker, tick: int
+    world: Ground, rules: _Rules, cloud: _Cloud, model: BeaconModel, walls: WallIndex, rng: np.random.Generator, w: _Walker, tick: int,
+    heard_ticks: Floats,
 ) -> None:  # fmt: skip
     """One ultrasound event for our cloud."""
     _advance(cloud, rules, model, w.piece_x, w.piece_y, rng)
@@ -230,7 +236,7 @@ def _listen(
     heard = False
     for k in range(len(world.beacons)):
         if hears(world, k, w.x, w.y):
-            heard = True
+            heard, heard_ticks[k] = True, tick
             range_m, bearing = measured(world, k, w.x, w.y, rng)
             _hear(cloud, k, range_m, bearing, rules, model, walls, rng)
     if not heard:
@@ -257,44 +263,51 @@ def _correct(world: Ground, rules: _Rules, rng: np.random.Generator, w: _Walker)
 
 
 @njit(cache=True, error_model="numpy")
-def _guide(world: Ground, rules: _Rules, cloud: _Cloud, rng: np.random.Generator, w: _Walker, tick: int) -> bool:
+def _guide(
+    world: Ground, rules: _Rules, cloud: _Cloud, rng: np.random.Generator, w: _Walker, tick: int, heard_ticks: Floats
+) -> bool:  # fmt: skip
     """One guidance event [Fischer 2008, Figure 8]; whether the system believes that he has arrived."""
     if rules.system == OURS:
         w.believed_x, w.believed_y, _ = _mean(cloud)
-        w.wanted, rest_m = _homeward(cloud, world.trail, rules.deployed, w.heading + w.error)
+        w.wanted, rest_m = _homeward(
+            cloud, world.trail, rules.deployed, w.heading + w.error, heard_ticks >= tick - rules.deaf_s / TICK_S
+        )
         if (tick - w.heard_tick) * TICK_S > w.leash_s:
             w.wanted = math.atan2(w.heard_y - w.walk_y, w.heard_x - w.walk_x) - (w.heading + w.error)
             w.back = 1.0
     else:
         if w.confirmed:
             w.reliable_x, w.reliable_y, w.confirmed = w.believed_x, w.believed_y, 0.0
-        way, rest_m = _ahead(world.trail, w.believed_x, w.believed_y)
+        way, rest_m = _ahead(world.trail, w.believed_x, w.believed_y, 0.0, np.inf)
         w.wanted = way - (w.heading + w.error + w.offset)
     w.wanted += rules.heading_sd_rad * rng.standard_normal()
     if rng.random() < rules.wrong_turns:
         w.wanted += 0.5 * math.pi if rng.random() < 0.5 else -0.5 * math.pi
     w.wanted_tick = tick + rules.delay_ticks
-    return rest_m < ARRIVED_M
+    return rest_m < ARRIVED_M and (rules.system != OURS or (tick - w.heard_tick) * TICK_S < rules.deaf_s)
 
 
 @njit(cache=True, error_model="numpy")
-def _ahead(path: Floats, x: float, y: float) -> tuple[float, float]:
-    """Direction of the target on a path, and the distance of its end, from (x, y) [Fischer 2008, Figure 8]."""
-    s, _ = nearest(path, x, y, 0.0, np.inf)
+def _ahead(path: Floats, x: float, y: float, from_m: float, to_m: float) -> tuple[float, float]:
+    """Direction of the target on a path, and the distance of its end, from (x, y), which is between `from_m`
+
+    and `to_m` along it [Fischer 2008, Figure 8].
+    """
+    s, _ = nearest(path, x, y, from_m, to_m)
     to_x, to_y, _ = along(path, s + AHEAD_M)
     return math.atan2(to_y - y, to_x - x), math.hypot(x - path[-1, 0], y - path[-1, 1])
 
 
 @njit(cache=True, error_model="numpy")
-def _homeward(cloud: _Cloud, trail: Floats, deployed: bool, heading: float) -> tuple[float, float]:
+def _homeward(cloud: _Cloud, trail: Floats, deployed: bool, heading: float, heard: Bools) -> tuple[float, float]:
     """The turn to be made, and the distance of the exit: the cloud's means of what each particle says, whose maps may differ by more than places."""
     total, east, north, rest = 0.0, 0.0, 0.0, 0.0
-    path = trail
+    path, from_m, to_m = trail, 0.0, np.inf
     for i in range(len(cloud.x)):
         w = math.exp(cloud.log_weight[i])
         if deployed:
-            path = _crumbs(cloud, i, trail[-1, 0], trail[-1, 1])
-        way, rest_m = _ahead(path, cloud.x[i], cloud.y[i])
+            path, from_m, to_m = _crumbs(cloud, i, trail[-1, 0], trail[-1, 1], heard)
+        way, rest_m = _ahead(path, cloud.x[i], cloud.y[i], from_m, to_m)
         way -= heading + cloud.turn[i]
         total += w
         east += w * math.cos(way)
@@ -386,15 +399,28 @@ def _way_in(
 
 
 @njit(cache=True, error_model="numpy")
-def _crumbs(cloud: _Cloud, i: int, exit_x: float, exit_y: float) -> Floats:
-    """The way back as a particle believes it: from beacon to beacon, to the exit."""
-    count = cloud.beliefs.mean.shape[1]
+def _crumbs(cloud: _Cloud, i: int, exit_x: float, exit_y: float, heard: Bools) -> tuple[Floats, float, float]:
+    """The way back as a particle believes it, from beacon to beacon to the exit, and between which lengths along it (m) he must be.
+
+    He is within one beacon of those that he hears (b,): a bent map may come by again, but there other beacons are heard.
+    """
+    count = len(heard)
     path = np.empty((count + 1, 2))
     path[:count] = cloud.beliefs.mean[i, :, :2]
     path[count] = exit_x, exit_y
-    keep = np.ones(count + 1, np.bool_)
-    keep[:count] = cloud.health.known
-    return path[keep]
+    for k in range(count - 1, -1, -1):
+        if not cloud.health.known[k]:
+            path[k] = path[k + 1]
+    from_m, to_m, length_m = 0.0, np.inf, 0.0
+    before, found = 0.0, False
+    for k in range(count):
+        if heard[k] and not found:
+            from_m, found = before, True
+        before = length_m
+        length_m += math.hypot(path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1])
+        if heard[k]:
+            to_m = length_m
+    return path, from_m, to_m
 
 
 @njit(cache=True, error_model="numpy")
