@@ -141,6 +141,11 @@ def test_short_stays_are_storeys_too() -> None:
     assert found == pytest.approx([0.0, 3.5, 7.0, 10.5], abs=0.4)
 
 
+def test_one_way_without_a_stay_has_two_ends() -> None:
+    found = find_storeys(record(walk([(20.0, 0.5), (0.0, 70.0)], 2.0), 2.0), BarometerSettings(2.0))
+    assert found == pytest.approx([0.0, 20.0], abs=1.5)
+
+
 def test_weather_lifts_no_storey() -> None:
     """Half an hour on each floor while the pressure falls by 2 hPa an hour."""
     legs = [(0.0, 1800.0), (3.5, 14.0), (3.5, 1800.0), (0.0, 12.0), (0.0, 900.0)]

@@ -24,6 +24,7 @@ SHORTEST_STAY_S, SHORTEST_END_S, SETTLES_S, LEVEL_S = 4.0, 1.0, 3.0, 8.0
 MOST_ROUNDS, SETTLED_M = 4, 0.02
 PASSED_S, PASSED_P = 2.0, 0.8  # so short, or so probably on the way, is a stay on a storey that is known
 EDGE_S = 1.5  # of a stay, which may be part of the way
+SHIFTS_M = 3.0  # more is no pressure of the building
 DRIFTS_S = 120.0  # of stays that show the drift
 NOISE_TIMES_S, SMOOTH_PA = (0.5, 1.0), 0.02
 SAME_STOREY_M, LOWEST_STOREY_M = 1.2, 2.0
@@ -83,6 +84,8 @@ def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
         before = heights
         visited = stays(FloorFilter(heights, settings).look_back(samples), PASSED_S, PASSED_P)
         heights = _apart(_fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]), before))
+        if before[-1] - heights[-1] > SHIFTS_M:  # stays that he had are lost
+            heights = before
         if len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M:
             break
     if len(heights) < 2:
@@ -163,6 +166,8 @@ def _rises(heights: Heights) -> list[float]:
         for a, b in edges.reshape(-1, 2).tolist()
         if heights.t_s[b - 1] - heights.t_s[a] >= (SHORTEST_END_S if a == 0 or b == len(level) else SHORTEST_STAY_S)
     ]
+    if len(stays) < 2:  # one way without a stay
+        stays = [(0, 1), (len(level) - 1, len(level))]
     found = []
     for (_, leaves), (arrives, ends) in zip(stays, stays[1:], strict=False):
         before = heights.height_m[leaves - 1]

@@ -132,7 +132,7 @@ def _checked(table: Floats, lines: NDArray[np.int64]) -> PressureRecord:
     _check_rate(table[:, 0])
     gaps = np.flatnonzero(np.diff(table[:, 0]) > LONGEST_GAP_S)
     notes += tuple(
-        f"line {lines[k + 1]}: {table[k + 1, 0] - table[k, 0]:.0f} s without a sample: the floor after it is uncertain"
+        f"line {lines[k + 1]}: {table[k + 1, 0] - table[k, 0]:.0f} s without a sample: judged by the pressure before and after"
         for k in gaps[:3]
     )
     if np.ptp(table[:, 1]) == 0.0:
