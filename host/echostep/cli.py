@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
 LOCAL = "127.0.0.1"
 app = typer.Typer(
-    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help="Indoor pedestrian tracking."
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Indoor pedestrian tracking.",
 )
 app.add_typer(evaluate, name="evaluate")
 app.add_typer(beacon_app, name="beacons")
@@ -130,7 +134,7 @@ def live(
     beacons: BeaconsPort = None,
     guide: GuideTo = None,
 ) -> None:
-    """Track the wearer of a board and an MTx, or of the board alone; everything is recorded."""
+    """Track a wearer live and record everything. Without an MTx the leg gyros of the board carry."""
     from echostep import runs
 
     views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
@@ -209,7 +213,7 @@ def legs(
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
 ) -> None:
-    """Distance and track from gyros on thigh and shank, and on the belt."""
+    """Distance and track of a recorded leg. Gyros on thigh and shank, and on the belt if there is one."""
     from echostep import runs
 
     runs.legs(samples, thigh, shank, out, profile, scale, walked)
@@ -247,7 +251,7 @@ def floors(
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
 ) -> None:
-    """Floors of a recorded barometer: t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
     from echostep import floor_run
 
     floor_run.floors(pressure, heights, out, start, plot=plot)
@@ -270,7 +274,7 @@ def doctor(
     seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
     udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
 ) -> None:
-    """Look at ports, board and MTx, and say what is wrong and what to do; exit status 1 when something is."""
+    """Say what is wrong with ports, board and MTx. And what to do about it; exit status 1 when something is."""
     from echostep import doctor as examination
 
     if udev:
@@ -312,7 +316,7 @@ def calibrate(
     shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
     walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
 ) -> None:
-    """Measure the wearer's gyros, mounting, compass and legs, and write them as settings."""
+    """Measure gyros, mounting, compass and legs. Writes them as settings."""
     from rich.console import Console
 
     from echostep import calibrate as calibration
