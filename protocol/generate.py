@@ -428,7 +428,7 @@ def outputs(messages: list[Message]) -> dict[Path, str]:
     return {
         ROOT / "firmware/messages.h": c_header(of_board(messages)),
         ROOT / "firmware/messages.c": c_code(of_board(messages)),
-        ROOT / "host/echostep/messages.py": python_code(messages),
+        ROOT / "host/echostep/board/messages.py": python_code(messages),
         HERE / "README.md": readme(messages),
         HERE / "vectors.jsonl": vectors(messages),
     }

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from echostep import messages as m
-from echostep.frames import BoardReader, encode
-from echostep.simulation.board import BoardProcess
+from echostep.board import messages as m
+from echostep.board.frames import BoardReader, encode
+from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from echostep.arrays import Floats
+
 RATE_HZ = 1000
 GRAVITY = np.array([0.0, 0.0, 9.81])
 STAND_S = 2.0

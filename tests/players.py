@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from board_runs import ROOT, quiet_rows
-from echostep.simulation.board import PythonBoard
+from echostep.simulation.devices.board import PythonBoard
 
 sys.path.insert(0, str(ROOT / "tools/twin"))
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
-from echostep.estimate import Estimate, Status, digest
-from echostep.plan import Plan, Pose, load_plan
-from echostep.simulation.board import BoardProcess, PythonBoard
+from echostep.localization.estimate import Estimate, TrackStatus, digest
+from echostep.localization.metrics import Truth, errors
+from echostep.plan.model import Plan, Pose, load_plan
+from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
+from echostep.simulation.devices.board import BoardProcess, PythonBoard
 from echostep.simulation.scenario import Scenario, demo_scenario
-from echostep.sources import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep.truth import Truth, errors
 from echostep.xsens import FrameReader, encode_frame
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
@@ -45,7 +45,7 @@ def test_the_walk_is_tracked() -> None:
     assert off.coverage95 > 0.8
     assert tracker.intake.timeline.synchronised
     assert tracker.intake.counts.late_pings == tracker.intake.counts.bad_times == 0
-    assert {e.status for e in found} == {Status.TRACKING}
+    assert {e.status for e in found} == {TrackStatus.TRACKING}
 
 
 def test_estimates_are_in_order_and_finite() -> None:
@@ -98,7 +98,7 @@ def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
 
 def sure_but_wrong(found: list[Estimate], truth: Truth) -> list[Estimate]:
     off = np.array([(e.x_m, e.y_m) for e in found]) - truth.at(np.array([e.t_s for e in found]))
-    return [e for e, d in zip(found, np.hypot(*off.T), strict=True) if e.status == Status.TRACKING and d > 1.0]
+    return [e for e, d in zip(found, np.hypot(*off.T), strict=True) if e.status == TrackStatus.TRACKING and d > 1.0]
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ from functools import cache
 from itertools import takewhile
 
 from board_runs import ROOT
-from echostep.plan import load_plan
-from echostep.simulation.board import PythonBoard
+from echostep.plan.model import load_plan
+from echostep.ports.chunks import Chunk
+from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
-from echostep.sources import Chunk
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
 

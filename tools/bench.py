@@ -25,14 +25,15 @@ from unittest import mock
 
 import numpy as np
 import shapely
-from numba import njit
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from echostep.plan import load_plan
-from echostep.reflectors import Walls, lambda_ray_ranges
-from echostep.walls import WallIndex, build_index, crosses_wall
+from echostep.arrays import Floats
+from echostep.jit import kernel
+from echostep.papers.girard2011_rays import lambda_ray_ranges
+from echostep.plan.model import load_plan
+from echostep.walls.echo_sources import Walls
+from echostep.walls.index import WallIndex, build_index, crosses_wall
 from peers import (
     APERTURE_RAD,
     MAPLESS,
@@ -45,7 +46,6 @@ from peers import (
     shapely_reader,
 )
 
-Floats = NDArray[np.float64]
 Work = Callable[[], object]
 MEASURED_M = np.array([1.2, 1.4])
 SLANT_RAD = 0.5 * APERTURE_RAD / RAYS
@@ -108,7 +108,7 @@ def our_reading(owner: Walls, x: Floats, y: Floats, heading: Floats) -> Floats:
     return our_weights(lambda_ray_ranges(x, y, heading, owner.near(x, y), RAYS, APERTURE_RAD, MAXIMUM_M))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def our_weights(readings: Floats) -> Floats:
     """The same in one sweep."""
     out = np.empty(len(readings))
@@ -184,7 +184,7 @@ def crossing(scale: Scale) -> Iterator[Row]:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def crossings(x: Floats, y: Floats, to_x: Floats, to_y: Floats, index: WallIndex) -> int:
     """How many moves cross a wall."""
     found = 0
@@ -227,9 +227,9 @@ def _json_s(path: Path) -> float:
 FIRST_FIX = """
 import time
 import numpy as np
-from echostep.likelihoods import EchoSettings, echo_model
-from echostep.particles import _reweight
-from echostep.reflectors import Walls
+from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.particles import _reweight
+from echostep.walls.echo_sources import Walls
 x = np.linspace(0.5, 3.5, 300)
 index = Walls(np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0]])).near(x, x * 0.5)
 _reweight(x, x * 0.5, x * 0.1, np.zeros(300), 1.57, 1.2, 1.0, echo_model(EchoSettings()), index)
@@ -263,7 +263,7 @@ def _cpu_s(command: list[str]) -> float:
 def stepping(scale: Scale) -> Iterator[Row]:
     """The whole step of [Girard 2011] with its map, against other filters' updates without one, and against itself with rays."""
     try:
-        from echostep import girard2011
+        from echostep.papers import girard2011
     except ImportError:
         return
     walls = offices(scale.office)
@@ -296,7 +296,7 @@ def stepping(scale: Scale) -> Iterator[Row]:
     step = stepper(3000)
 
     def with_rays() -> object:
-        with mock.patch("echostep.girard2011.lambda_ray_ranges", plain_rays):
+        with mock.patch("echostep.papers.girard2011.lambda_ray_ranges", plain_rays):
             return step()
 
     yield compared("step at nu = 150; the same by our own plain rays", step, with_rays, scale.rounds, 10.0)

@@ -19,10 +19,10 @@ import typer
 import typer.models
 
 from echostep.cli import app
-from echostep.derived import TOPICS
-from echostep.recording import Topic
+from echostep.output.derived import TOPICS
+from echostep.output.foxglove import FRAME, LOCATION, POSE, SCENE
+from echostep.recording.recorder import Topic
 from echostep.settings import Settings
-from echostep.viewers import FRAME, LOCATION, POSE, SCENE
 
 DOCS = Path(__file__).resolve().parent.parent / "host" / "docs"
 BEGIN, END = "<!-- made by make docs -->", "<!-- end -->"

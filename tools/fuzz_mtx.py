@@ -13,7 +13,7 @@ from collections import Counter
 
 import numpy as np
 
-from echostep.simulation.mtx_device import pack
+from echostep.simulation.devices.mtx_setup import pack
 from echostep.xsens import MTDATA, MTDATA2, PROJECT, MtBatch, MtSample, MtxLimits, MtxReader, OutputFormat, encode_frame
 from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.packets import read_packets

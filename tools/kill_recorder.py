@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.logs import repair
-from echostep.recording import open_recording
-from echostep.records import MCAP_MAGIC
+from echostep.recording.edit import repair
+from echostep.recording.mcap_records import MCAP_MAGIC
+from echostep.recording.recorder import open_recording
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
 HANDED = struct.Struct("<Qq")
@@ -33,9 +33,9 @@ LIMIT_S = 1.0
 
 WRITER = """
 import os, struct, sys, time
-from echostep.recording import Note, Recorder
-from echostep.sources import Chunk
-from echostep.viewers import pose
+from echostep.recording.recorder import Note, Recorder
+from echostep.ports.chunks import Chunk
+from echostep.output.foxglove import pose
 path, pipe = sys.argv[1], int(sys.argv[2])
 number, busy = 0, [(k * 7919) % 100_003 for k in range(100_003)]
 with Recorder(path, {"note": "to be killed"}) as recorder:

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numba import njit
 from numpy.typing import NDArray
 
-from echostep.walls import TILE_M, WallIndex, tile_at
+from echostep.arrays import Floats
+from echostep.jit import kernel
+from echostep.walls.index import TILE_M, WallIndex, tile_at
 
-Floats = NDArray[np.float64]
 Reader = Callable[[Floats, Floats, Floats], Floats]  # poses -> what each ranger reads (n, 2)
 
 RAYS, APERTURE_RAD, MAXIMUM_M = 7, math.radians(55.0), 6.0
@@ -94,7 +94,7 @@ def shapely_reader(walls: Floats) -> Reader:
     return read
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def plain_rays(
     x: Floats, y: Floats, heading: Floats, index: WallIndex,
     rays: int = RAYS, aperture_rad: float = APERTURE_RAD, maximum_m: float = MAXIMUM_M,
@@ -112,7 +112,7 @@ def plain_rays(
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _first_hit(px: float, py: float, ux: float, uy: float, index: WallIndex, limit: float) -> tuple[float, float]:
     """Distance of the first wall on a ray, and the cosine between the ray and its normal (-1: none within `limit`)."""
     walls, start, ids = index.walls, index.start, index.ids

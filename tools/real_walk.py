@@ -19,28 +19,27 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from rich.console import Console
 from scipy.io import loadmat
 
-from echostep import messages as m
-from echostep.estimate import Estimate, digest
-from echostep.evaluate.judges import align, rmse
-from echostep.foot import Step, walk_track
-from echostep.frames import encode
-from echostep.picture import draw_track, write_track
-from echostep.plan import Plan, Pose, load_plan
-from echostep.recording import Recorder, open_recording
+from echostep.arrays import Floats
+from echostep.board import messages as m
+from echostep.board.frames import encode
+from echostep.evaluate.feet.metrics import align, rmse
+from echostep.foot.steps import Step, walk_track
+from echostep.localization.estimate import Estimate, digest
+from echostep.localization.metrics import load_truth
+from echostep.output.track_plot import draw_track, write_track
+from echostep.plan.model import Plan, Pose, load_plan
+from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.recording.recorder import Recorder, open_recording
 from echostep.settings import parse_settings
-from echostep.simulation.board import PythonBoard
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.people.walker import RATE_HZ, Walk
 from echostep.simulation.stimulus import BoardSensors
-from echostep.simulation.walker import RATE_HZ, Walk
-from echostep.sources import BOARD, MTX, Chunk
 from echostep.tracker import Tracker
-from echostep.truth import load_truth
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
-Floats = NDArray[np.float64]
 NAME = "GX5 33"
 NOTE = "foot real (GX5 33, surveyed footprints); plan drawn around the surveyed path, echoes simulated from it at the true positions"
 MTX_RATE_HZ = 200

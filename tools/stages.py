@@ -14,8 +14,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from echostep.plan import load_plan
-from echostep.recording import open_recording
+from echostep.plan.model import load_plan
+from echostep.recording.recorder import open_recording
 from echostep.tracker import Tracker
 
 Spent = dict[str, float]

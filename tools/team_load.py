@@ -24,12 +24,12 @@ from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from echostep.plan import Plan, load_plan
+from echostep.plan.model import Plan, load_plan
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.mqtt import MqttLine
 from echostep.team.outbox import Outbox
 from echostep.team.publish import blank
-from echostep.team.report import Motion, Position, Report, Streams
+from echostep.team.report import Motion, Position, Report, StreamReport
 
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -38,7 +38,7 @@ def report_at(base: Report, k: int, t_s: float) -> Report:
     """Somebody who walks in a circle."""
     x_m, y_m = 10.0 + 5.0 * math.cos(0.2 * t_s + k), 5.0 + 3.0 * math.sin(0.2 * t_s + k)
     position = Position(t_s, 0.0, x_m, y_m, 0.04, 0.0, 0.04, 0.5, 0.0, 0.1, 0, "Ground floor", 1.0, 0.0, 0.1)
-    motion, streams = Motion(int(t_s), t_s, 1.0, 0.0), Streams(100.0, 360.0, 0, 0, 0, True, ())
+    motion, streams = Motion(int(t_s), t_s, 1.0, 0.0), StreamReport(100.0, 360.0, 0, 0, 0, True, ())
     return replace(base, status="tracking", position=position, motion=motion, streams=streams)
 
 

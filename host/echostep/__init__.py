@@ -9,18 +9,18 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from echostep import messages
-    from echostep.capture import read_capture
+    from echostep.board import messages
+    from echostep.recording.capture import read_capture
     from echostep.tracker import Tracker
 
 __all__ = ["Tracker", "messages", "read_capture"]
 
-_HOMES = {"Tracker": "echostep.tracker", "read_capture": "echostep.capture"}
+_HOMES = {"Tracker": "echostep.tracker", "read_capture": "echostep.recording.capture"}
 
 
 def __getattr__(name: str) -> Any:
     if name == "messages":
-        return importlib.import_module("echostep.messages")
+        return importlib.import_module("echostep.board.messages")
     if name in _HOMES:
         return getattr(importlib.import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'echostep' has no attribute {name!r}")

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echostep.beacon_commands import app as beacon_app
+from echostep.commands.beacons import app as beacon_app
+from echostep.commands.evaluate import app as evaluate
+from echostep.commands.plan import app as plan_app
+from echostep.commands.recordings import app as logs
 from echostep.errors import EchostepError
-from echostep.evaluate.commands import app as evaluate
-from echostep.logs_cli import app as logs
-from echostep.plan_commands import app as plan_app
 
 if TYPE_CHECKING:
-    from echostep.plan import Pose
-    from echostep.runs import Views
+    from echostep.commands.run import Views
+    from echostep.plan.model import Pose
     from echostep.team.endpoint import Outlet
 
 LOCAL = "127.0.0.1"
@@ -109,7 +109,7 @@ def demo(
     port: Port = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team), guide=guide)
 
@@ -135,7 +135,7 @@ def live(
     guide: GuideTo = None,
 ) -> None:
     """Track a wearer live and record everything. Without an MTx the leg gyros of the board carry."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
     runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet, beacons=beacons, guide=guide)
@@ -152,7 +152,7 @@ def record(
     beacons: BeaconsPort = None,
 ) -> None:
     """Record both ports without tracking."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     runs.record(board, mtx, out, seconds, beacons)
 
@@ -176,7 +176,7 @@ def replay(
     guide: GuideTo = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     views = _views(headless, page, host, port, stays=sys.stdout.isatty())
     outlet = _outlet(publish, name, team)
@@ -193,7 +193,7 @@ def foot(
     plot: Annotated[bool, typer.Option("--plot", help="Draw it beside the track, as PNG.")] = False,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     runs.foot(imu, out, profile, plot=plot)
 
@@ -214,7 +214,7 @@ def legs(
     ] = None,
 ) -> None:
     """Distance and track of a recorded leg. Gyros on thigh and shank, and on the belt if there is one."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     runs.legs(samples, thigh, shank, out, profile, scale, walked)
 
@@ -252,7 +252,7 @@ def floors(
     plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
-    from echostep import floor_run
+    from echostep.commands import floors as floor_run
 
     floor_run.floors(pressure, heights, out, start, plot=plot)
 
@@ -262,7 +262,7 @@ def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
     """Print a capture as JSON, one message a line."""
-    from echostep import runs
+    from echostep.commands import run as runs
 
     runs.decode(file)
 
@@ -275,7 +275,7 @@ def doctor(
     udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
 ) -> None:
     """Say what is wrong with ports, board and MTx. And what to do about it; exit status 1 when something is."""
-    from echostep import doctor as examination
+    from echostep.commissioning import doctor as examination
 
     if udev:
         typer.echo(examination.rules_text(), nl=False)
@@ -296,7 +296,7 @@ def flash(
     """Write the firmware to a board (needs avrdude)."""
     from rich.console import Console
 
-    from echostep import flash as flashing
+    from echostep.commissioning import flash as flashing
 
     flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
 
@@ -319,7 +319,7 @@ def calibrate(
     """Measure gyros, mounting, compass and legs. Writes them as settings."""
     from rich.console import Console
 
-    from echostep import calibrate as calibration
+    from echostep.commissioning import calibrate as calibration
 
     wearer = calibration.Wearer(thigh, shank, walked)
     calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
@@ -332,14 +332,14 @@ def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
 
 
 def _pose(text: str | None) -> Pose | None:
-    from echostep.runs import parse_pose
+    from echostep.commands.run import parse_pose
 
     return None if text is None else parse_pose(text)
 
 
 def _views(headless: bool, page: bool | None, host: str, port: int | None, *, stays: bool = False) -> Views:
+    from echostep.commands.run import Views
     from echostep.page.server import Address
-    from echostep.runs import Views
 
     if headless and page:
         raise EchostepError("--headless shows nothing: leave it out, or leave out --page")

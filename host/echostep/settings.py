@@ -12,17 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from echostep.beacons import BeaconSettings
-from echostep.calibration import GyroSettings, RangerSettings
-from echostep.climbing import ClimbSettings
+from echostep.board.calibration import GyroSettings, RangerSettings
 from echostep.errors import EchostepError
-from echostep.foot import FootSettings
-from echostep.gait import GaitSettings
-from echostep.heading import Iron
-from echostep.legpath import WearerSettings
-from echostep.likelihoods import EchoSettings
-from echostep.particles import CloudSettings
-from echostep.timeline import MtxTiming
+from echostep.foot.steps import FootSettings
+from echostep.foot.trunk_path import GaitSettings
+from echostep.legs.heading import CompassErrors
+from echostep.legs.trunk_path import WearerSettings
+from echostep.localization.beacon_slam import BeaconSettings
+from echostep.localization.echo_likelihood import EchoSettings
+from echostep.localization.level_changes import ClimbSettings
+from echostep.localization.particles import CloudSettings
+from echostep.timing.timeline import MtxTiming
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Settings:
     mtx: MtxTiming = field(default_factory=MtxTiming)
     ranger: RangerSettings = field(default_factory=RangerSettings)
     gyro: GyroSettings = field(default_factory=GyroSettings)
-    compass: Iron = field(default_factory=Iron)
+    compass: CompassErrors = field(default_factory=CompassErrors)
     foot: FootSettings = field(default_factory=FootSettings)
     gait: GaitSettings = field(default_factory=GaitSettings)
     echo: EchoSettings = field(default_factory=EchoSettings)

@@ -12,26 +12,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from echostep.checkin import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
+from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
-from echostep.estimate import Estimate, estimate, unwatched
-from echostep.gait import Leg
-from echostep.gateway import Gateway, Word
-from echostep.heading import Iron
-from echostep.intake import Intake
-from echostep.mapfilter import MapFilter
-from echostep.particles import CloudSettings, Move, systematic
-from echostep.plan import Plan, Pose
+from echostep.legs.heading import CompassErrors
+from echostep.localization.estimate import Estimate, estimate, unobserved
+from echostep.localization.map_filter import MapFilter
+from echostep.localization.particles import CloudSettings, Move, systematic
+from echostep.odometry.front_end import FrontEnd
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.model import Plan, Pose
+from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
+from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
 from echostep.settings import Settings
-from echostep.sources import GATEWAY, Chunk, Portion, portion_of
-from echostep.storeys import building
-from echostep.waiting import Passage
+from echostep.walls.level_sheet import lay_out_levels
 
 MOST_WORDS = 4096  # of beacons that wait for the foot; older ones are forgotten
 KNOWN_SD_RAD = 0.5  # of a heading; beyond it the cloud must look everywhere
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[
-    [Passage | None, Estimate], None
+    [MeasuredSegment | None, Estimate], None
 ]  # is told of each estimate and of what it came from; None: of a silent foot
 
 
@@ -60,19 +59,19 @@ class Tracker:
         self.plan = plan
         self.start = pose
         s = self.settings
-        self.intake = Intake(
-            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == Iron() else s.compass
+        self.intake = FrontEnd(
+            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == CompassErrors() else s.compass
         )
-        self.building = building(plan)
+        self.laid_out = lay_out_levels(plan)
         self.filter: MapFilter | None = None  # from the moment when the foot has stood still
         self.gateway = Gateway()
-        self._words: list[Word] = []  # that wait for their leg
+        self._words: list[BeaconReading] = []  # that wait for their leg
         self.watchers: list[Watch] = []  # are told in this order
         self.check_ins = 0
         self.bad_check_ins = 0
         self._rng = np.random.default_rng(seed)
         self._last: Estimate | None = None
-        self.leg: Leg | None = None  # the last one
+        self.leg: PathSegment | None = None  # the last one
         self._said: CheckIn | None = None
 
     @property
@@ -112,7 +111,7 @@ class Tracker:
         self.filter = self._drawn(said, self.leg.heading1_rad)
         t_s = max(self.leg.t1_s, self._last.t_s) if self._last else self.leg.t1_s
         self._last = estimate(self.filter.cloud, t_s, self.leg.heading1_rad, self.leg.step)
-        self._tell(Passage(self.leg, *NO_PINGS), self._last)
+        self._tell(MeasuredSegment(self.leg, *NO_PINGS), self._last)
         return [self._last]
 
     def _cut(self, portion: Portion) -> list[Estimate]:
@@ -122,38 +121,38 @@ class Tracker:
         """Take chunks of which the last alone may be the gateway's: what beacons said is known from then on."""
         estimates: list[Estimate] = []
         for piece in self.intake.take(portion):
-            if isinstance(piece, Passage):
-                self.leg = piece.leg
-                self.filter = self.filter or self._first(piece.leg.heading0_rad)
+            if isinstance(piece, MeasuredSegment):
+                self.leg = piece.segment
+                self.filter = self.filter or self._first(piece.segment.heading0_rad)
                 if self.filter is None:
                     continue
-                self._last = self.filter.follow(piece, self._words_until(piece.leg.t1_s))
+                self._last = self.filter.follow(piece, self._words_until(piece.segment.t1_s))
                 estimates.append(self._last)
                 self._tell(piece, self._last)
             elif self._last is not None:
-                estimates.append(unwatched(self._last, piece.t_s))
+                estimates.append(unobserved(self._last, piece.t_s))
                 self._tell(None, estimates[-1])
         if said := portion.of(GATEWAY).received:
             self._words += self.gateway.take(said, self.intake.newest_s)
         return estimates
 
-    def _words_until(self, t_s: float) -> list[Word]:
+    def _words_until(self, t_s: float) -> list[BeaconReading]:
         """What beacons have said up to then and nobody has heard yet."""
         words = [word for word in self._words if word.t_s <= t_s]
         self._words = [word for word in self._words if word.t_s > t_s][-MOST_WORDS:]
         return words
 
-    def _tell(self, passage: Passage | None, told: Estimate) -> None:
+    def _tell(self, passage: MeasuredSegment | None, told: Estimate) -> None:
         for watch in self.watchers:
             watch(passage, told)
 
     def warm_up(self) -> None:
         """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
         self.intake.warm_up()
-        leg = Leg(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
-        one = Passage(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
+        leg = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
+        one = MeasuredSegment(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
         first = self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
-        first.follow(one, [Word(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+        first.follow(one, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
         first.crumbs.places(first.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
 
@@ -178,5 +177,5 @@ class Tracker:
     def _begin(
         self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
     ) -> MapFilter:
-        s, b = self.settings, self.building
+        s, b = self.settings, self.laid_out
         return MapFilter(b.walls, start, walk_heading_rad, rng, cloud or s.cloud, s.echo, b.storeys, s.climb, s.beacons)

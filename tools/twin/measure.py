@@ -17,9 +17,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from echostep import messages as m
-from echostep.frames import BoardReader, encode
-from echostep.simulation.board import BoardProcess
+from echostep.board import messages as m
+from echostep.board.frames import BoardReader, encode
+from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -23,11 +23,11 @@ from typing import IO
 
 import numpy as np
 
-from echostep.beacon_simulator import simulate_gateway
-from echostep.plan import load_plan
-from echostep.simulation.board import Sent
-from echostep.simulation.gateway import SPACING_M
-from echostep.simulation.mtx_device import MtxDevice
+from echostep.commands.beacon_player import simulate_gateway
+from echostep.plan.model import load_plan
+from echostep.simulation.devices.beacon_gateway import SPACING_M
+from echostep.simulation.devices.board import Sent
+from echostep.simulation.devices.mtx_setup import MtxDevice
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.simulation.stimulus import NO_SYNC, ROW
 from echostep.xsens import MtxReader

@@ -1,4 +1,4 @@
-"""Studies: the papers' experiments and ours, walked in simulation or taken from real recordings, and judged against truth.
+"""The papers' experiments and ours: one module or folder a study; `study` is the frame that all of them share.
 
-Every study writes JSON of one form, `{study, runs, seed, rows}`, and says on the terminal how it compares with what others reported.
+In: seeds, or recordings. Out: rows, a table, JSON, Parquet, pictures. Owns a journal to resume from.
 """

@@ -15,17 +15,15 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from echostep import vertical
-from echostep.altitude import BarometerSettings, Pressures
+from echostep.arrays import Bools, Floats, Ints
+from echostep.barometer import vertical_kernels as vertical
+from echostep.barometer.altitude import BarometerSettings, Pressures
+from echostep.barometer.floor_filter import FloorFilter, Floors
 from echostep.evaluate.study import Row, Study, print_table, write_json, write_parquet
-from echostep.floors import FloorFilter, Floors
-from echostep.simulation.climbs import Climb, climb
-from echostep.simulation.sensors import PRESSURE_NOISE_PA, Mode
-from echostep.simulation.weather import Weather, device_temperatures, pressures
-
-Floats = NDArray[np.float64]
+from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
+from echostep.simulation.people.vertical_day import VerticalMove, climb
+from echostep.simulation.world.air_pressure import Weather, device_temperatures, pressures
 
 STOREYS_M = (0.0, 3.5, 7.0, 10.5, 14.0)
 RUN_S = 1200.0
@@ -38,7 +36,7 @@ STORM = Weather()
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class FloorScene:
     """`known_start`: the first floor is told; `gait`: walking and standing are told, as legs or foot do.
 
     `whole`: judged with the whole record, as `echostep floors` does.
@@ -53,14 +51,14 @@ class Scene:
 
 
 SCENES = {
-    "floors/stairs": Scene("stairs"),
-    "floors/lift": Scene("lift"),
-    "floors/both": Scene(),
-    "floors/pulses": Scene(weather=replace(STORM, doors_s=30.0, fan_s=90.0, fan_pa=15.0)),
-    "floors/high-resolution": Scene(mode="high-resolution"),
-    "floors/pressure-only": Scene(gait=False),
-    "floors/unknown-start": Scene(known_start=False, gait=False, whole=True),
-    "floors/record": Scene(gait=False, whole=True),
+    "floors/stairs": FloorScene("stairs"),
+    "floors/lift": FloorScene("lift"),
+    "floors/both": FloorScene(),
+    "floors/pulses": FloorScene(weather=replace(STORM, doors_s=30.0, fan_s=90.0, fan_pa=15.0)),
+    "floors/high-resolution": FloorScene(mode="high-resolution"),
+    "floors/pressure-only": FloorScene(gait=False),
+    "floors/unknown-start": FloorScene(known_start=False, gait=False, whole=True),
+    "floors/record": FloorScene(gait=False, whole=True),
 }
 COLUMNS = {
     "name": "", "runs": "runs", "floor_right": "right %", "strict_right": "strict %", "worst_right": "worst run %",
@@ -84,7 +82,7 @@ def one_run(seed: int) -> list[Row]:
     return [_row(name, scene, seed) for name, scene in SCENES.items()]
 
 
-def _row(name: str, scene: Scene, seed: int) -> Row:
+def _row(name: str, scene: FloorScene, seed: int) -> Row:
     rng = np.random.default_rng([seed, 50])
     way = climb(STOREYS_M, RUN_S, rng, scene.ways)
     sign = float(rng.choice((-1.0, 1.0)))
@@ -100,8 +98,8 @@ def _row(name: str, scene: Scene, seed: int) -> Row:
 
 
 def _measured(
-    way: Climb, weather: Weather, scene: Scene, rng: np.random.Generator
-) -> tuple[NDArray[np.int64], Pressures]:
+    way: VerticalMove, weather: Weather, scene: FloorScene, rng: np.random.Generator
+) -> tuple[Ints, Pressures]:
     """What the SCP1000 reports of it, in counts and back, and which times of the walk these are."""
     air = pressures(way.t_s, way.height_m, way.in_shaft, weather, rng)
     device = device_temperatures(way.t_s, weather.air_c, rng)
@@ -126,7 +124,7 @@ def judge(found: Floors, away_m: Floats) -> Row:
     }
 
 
-def longest_s(t_s: Floats, wrong: NDArray[np.bool_]) -> float:
+def longest_s(t_s: Floats, wrong: Bools) -> float:
     """The longest time without a right sample, to the first right one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], wrong.astype(np.int8), [0]]))).reshape(-1, 2)
     return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in edges.tolist()), default=0.0)

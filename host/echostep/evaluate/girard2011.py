@@ -12,17 +12,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from echostep.arrays import Floats
 from echostep.evaluate.study import Row, Study, print_table, summary, write_json, write_parquet
-from echostep.gait import Leg
-from echostep.girard2011 import Girard, GirardSettings
-from echostep.mapfilter import MapFilter
-from echostep.plan import Pose
-from echostep.reflectors import Walls
-from echostep.simulation.markers import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
-from echostep.simulation.sites import (
-    Site,
+from echostep.localization.map_filter import MapFilter
+from echostep.papers.girard2011 import Girard, GirardSettings
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.model import Pose
+from echostep.simulation.people.marker_walk import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
+from echostep.simulation.world.sites import (
+    SimulatedSite,
     angled,
     displaced,
     furnished,
@@ -33,16 +32,14 @@ from echostep.simulation.sites import (
     thousand,
     with_doors,
 )
-from echostep.waiting import Passage
+from echostep.walls.echo_sources import Walls
 
-Floats = NDArray[np.float64]
-
-System = Callable[[Site, MarkerWalk, int], Iterator["Seen"]]
+System = Callable[[SimulatedSite, MarkerWalk, int], Iterator["Seen"]]
 
 STEP_SD_M = 0.02  # of a careful step, per axis
 AFTER_HALL_S = 10.0
 HALL_X_M = 0.0
-SITES: dict[str, Callable[[int], Site]] = {
+SITES: dict[str, Callable[[int], SimulatedSite]] = {
     "furniture": furnished,
     "doors": with_doors,
     "hall": lambda _: hall(),
@@ -122,14 +119,16 @@ def one_run(seed: int) -> list[Row]:
     return rows
 
 
-def dead_reckoned(_site: Site, walk: MarkerWalk, _seed: int) -> Iterator[Seen]:
+def dead_reckoned(_site: SimulatedSite, walk: MarkerWalk, _seed: int) -> Iterator[Seen]:
     """Fixed steps in the measured directions [Girard 2011, Figure 10]."""
     way = np.column_stack([np.cos(walk.heading_rad), np.sin(walk.heading_rad)]) * STEP_M
     for x, y in (walk.trunk_m[0] + np.cumsum(way, axis=0)).tolist():
         yield Seen((x, y), None, np.array([[x, y]]))
 
 
-def girard(site: Site, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True) -> Iterator[Seen]:
+def girard(
+    site: SimulatedSite, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True
+) -> Iterator[Seen]:
     """The paper's filter: on its plan or without, with one pair of pings a step or without."""
     walls = site.plan if model else None
     x0, y0 = walk.trunk_m[0].tolist()
@@ -140,7 +139,7 @@ def girard(site: Site, walk: MarkerWalk, seed: int, *, model: bool = True, rangi
         yield Seen(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
 
 
-def default(site: Site, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
+def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
     """Ours: the same steps and headings, and every ping on the way."""
     x0, y0 = walk.trunk_m[0].tolist()
     start = Pose(x0, y0, walk.start_heading_rad)
@@ -163,14 +162,14 @@ SYSTEMS: dict[str, System] = {
 }
 
 
-def _passage(leg: Leg, walk: MarkerWalk, since_s: float) -> Passage:
+def _passage(leg: PathSegment, walk: MarkerWalk, since_s: float) -> MeasuredSegment:
     """A leg with the pings since the one before it."""
     p = walk.pings
     on_it = (p.t_s > since_s) & (p.t_s <= leg.t1_s)
-    return Passage(leg, p.t_s[on_it], p.ranger[on_it], p.range_m[on_it])
+    return MeasuredSegment(leg, p.t_s[on_it], p.ranger[on_it], p.range_m[on_it])
 
 
-def _legs(walk: MarkerWalk) -> Iterator[tuple[Leg | None, Leg]]:
+def _legs(walk: MarkerWalk) -> Iterator[tuple[PathSegment | None, PathSegment]]:
     """The turn on the spot before each step, if there is one, and the step, with the covariance that the unit states."""
     sd_m = math.hypot(STEP_SD_M, STEP_M * math.radians(ImuModel().noise_deg))
     before = walk.start_heading_rad
@@ -178,13 +177,13 @@ def _legs(walk: MarkerWalk) -> Iterator[tuple[Leg | None, Leg]]:
         t0, leaves, t1 = float(walk.t_s[k]), float(walk.leaves_s[k]), float(walk.t_s[k + 1])
         turn_sd = float(walk.turn_sd_rad[k])
         turns = leaves > t0
-        turning = Leg(t0, leaves, 0.0, 0.0, before, heading, 0.0, turn_sd, k) if turns else None
+        turning = PathSegment(t0, leaves, 0.0, 0.0, before, heading, 0.0, turn_sd, k) if turns else None
         dx, dy = STEP_M * math.cos(heading), STEP_M * math.sin(heading)
-        yield turning, Leg(leaves, t1, dx, dy, heading, heading, sd_m, 0.0 if turns else turn_sd, k + 1)
+        yield turning, PathSegment(leaves, t1, dx, dy, heading, heading, sd_m, 0.0 if turns else turn_sd, k + 1)
         before = heading
 
 
-def _walk(site: Site, seed: int) -> MarkerWalk:
+def _walk(site: SimulatedSite, seed: int) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers)
 
 

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from echostep.clipping import unclipped
+from echostep.arrays import Floats
 from echostep.evaluate.study import Row, Study, console, print_table, write_json, write_parquet
-from echostep.leg_kinematics import Segments
-from echostep.legs import Legs, LegsSettings
-from echostep.simulation.gaits import FAST, NATURAL, SLOW, Gait, Manner, Stroller, draw_stroller, stroll
-
-Floats = NDArray[np.float64]
+from echostep.legs.clipping import unclipped
+from echostep.legs.kinematics import LegLengths
+from echostep.legs.strides import Legs, LegsSettings
+from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, Gait, Manner, Stroller, draw_stroller, stroll
 
 PACES = {"slow": SLOW, "natural": NATURAL, "fast": FAST}
 WAY_M, NEAR_M, TRIES = 5.0, 0.4, 8
@@ -30,7 +28,7 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Sensors:
+class LegSensors:
     """`bias_rad_s` and `noise_rad_s` standard deviations, `range_rad_s` where they clip, `aslant_rad` between their axes and the knee's."""
 
     rate_hz: float = 100.0
@@ -42,12 +40,12 @@ class Sensors:
 
 
 CAUSES = {
-    "": Sensors(),
-    "bias 0.05 rad/s": Sensors(bias_rad_s=0.05),
-    "bias 0.05 rad/s, never standing": Sensors(bias_rad_s=0.05, stand_s=0.0),
-    "clipped at 300 deg/s": Sensors(range_rad_s=math.radians(300.0)),
-    "15 degrees aslant": Sensors(aslant_rad=math.radians(15.0)),
-    "50 Hz, noise 0.03 rad/s": Sensors(rate_hz=50.0, noise_rad_s=0.03),
+    "": LegSensors(),
+    "bias 0.05 rad/s": LegSensors(bias_rad_s=0.05),
+    "bias 0.05 rad/s, never standing": LegSensors(bias_rad_s=0.05, stand_s=0.0),
+    "clipped at 300 deg/s": LegSensors(range_rad_s=math.radians(300.0)),
+    "15 degrees aslant": LegSensors(aslant_rad=math.radians(15.0)),
+    "50 Hz, noise 0.03 rad/s": LegSensors(rate_hz=50.0, noise_rad_s=0.03),
 }
 
 
@@ -89,7 +87,7 @@ def five_metres(person: Stroller, manner: Manner, seed: int) -> Gait:
     return min(found, key=lambda g: abs(float(g.way_m[-1]) - WAY_M))
 
 
-def measured_m(gait: Gait, person: Stroller, sensors: Sensors, seed: int) -> float:
+def measured_m(gait: Gait, person: Stroller, sensors: LegSensors, seed: int) -> float:
     """What our method says of the way when these sensors are worn."""
     rng = np.random.default_rng([seed, 52])
     moves = np.flatnonzero(np.abs(gait.shank_rad_s) > 0.0)
@@ -99,7 +97,7 @@ def measured_m(gait: Gait, person: Stroller, sensors: Sensors, seed: int) -> flo
     rates = math.cos(sensors.aslant_rad) * rng.choice([-1.0, 1.0], 2) * true
     rates += sensors.bias_rad_s * rng.standard_normal(2) + sensors.noise_rad_s * rng.standard_normal(rates.shape)
     rates = np.clip(rates, -sensors.range_rad_s, sensors.range_rad_s)
-    legs = Legs(LegsSettings(Segments(person.leg.thigh_m, person.leg.shank_m)))
+    legs = Legs(LegsSettings(LegLengths(person.leg.thigh_m, person.leg.shank_m)))
     thigh, shank = unclipped(t_s, rates).T
     return sum(s.length_m for s in (*legs.feed(t_s, thigh, shank), *legs.finish()))
 

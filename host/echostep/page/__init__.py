@@ -1,4 +1,5 @@
-"""The live page: what the tracker knows, in every browser that looks.
+"""The browser: the live page, the replay page and the plan editor.
 
-`server.py` serves it from a thread of its own, `scene.py` says what it shows, `session.py` speaks with one page, `static/` is the page itself.
+In: the tracker's published state. Out: HTML and a WebSocket of frames; check-ins of the wearer. Owns the server and its thread, which
+never block the tracker.
 """

@@ -14,20 +14,20 @@ from operator import attrgetter
 from types import TracebackType
 from typing import Self
 
-from echostep.estimate import Estimate, unwatched
-from echostep.guided import Guided
-from echostep.likelihoods import echo_model
-from echostep.page.ahead import ahead
-from echostep.page.beams import beams, expected_range
-from echostep.page.guide import guidance
-from echostep.page.marks import marks
-from echostep.page.scene import MOST_SHOWN, Scene, specks, words
+from echostep.guidance.guided_run import GuidedRun
+from echostep.localization.echo_likelihood import echo_model
+from echostep.localization.estimate import Estimate, unobserved
+from echostep.page.elements.beacon_marks import marks
+from echostep.page.elements.echo_lines import beams, expected_range
+from echostep.page.elements.guidance import guidance
+from echostep.page.elements.lookahead import ahead
+from echostep.page.elements.scene import MOST_SHOWN, PageScene, specks, words
+from echostep.page.elements.stream_rates import Pulse
+from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
-from echostep.page.stage import Stage
-from echostep.page.streams import Pulse
-from echostep.sources import BOARD, MTX, Portion
+from echostep.path import MeasuredSegment
+from echostep.ports.chunks import BOARD, MTX, Portion
 from echostep.tracker import Tracker
-from echostep.waiting import Passage
 
 STEP_M = 0.02  # the trail gets a point when he has moved so far
 PULSE_NS = 250_000_000
@@ -41,13 +41,13 @@ class LivePage:
     """Call `shown` after each portion; `said` gives what pages had to say, as bytes of chunks."""
 
     def __init__(
-        self, tracker: Tracker, title: str, address: Address, guided: Guided | None = None, *, replay: bool = False
+        self, tracker: Tracker, title: str, address: Address, guided: GuidedRun | None = None, *, replay: bool = False
     ) -> None:
         """`guided` was made before, so that its cue of an estimate is there when the page is told of it."""
         self.wanted = True  # until Ctrl-C
         self._tracker = tracker
         self._guided = guided
-        self._stage = Stage(tracker.plan, title, replay=replay)
+        self._stage = Mailbox(tracker.plan, title, replay=replay)
         self.server = PageServer(self._stage, address)
         self._model = echo_model(tracker.settings.echo)
         self._pulse = Pulse()
@@ -55,17 +55,17 @@ class LivePage:
         self._arrived_ns = 0
         self._heard_ns = 0  # foot or board
         self._told_ns = 0
-        self._ahead: Scene | None = None  # of the foot's last step, as long as its echoes are not in
+        self._ahead: PageScene | None = None  # of the foot's last step, as long as its echoes are not in
         self._ahead_s = -math.inf
-        self._new: list[Scene] = []
-        self._scene = Scene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
+        self._new: list[PageScene] = []
+        self._scene = PageScene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
         self._replay = replay
         self._last: Estimate | None = None  # in the trail
         self._check_ins = 0
         self._born_ns = time.monotonic_ns()
         if not replay:
             self._stage.publish(self._scene)
-        expected_range(0.0, 0.0, 0.0, tracker.building.walls.index, self._model)  # compiled now, not at the first step
+        expected_range(0.0, 0.0, 0.0, tracker.laid_out.walls.index, self._model)  # compiled now, not at the first step
 
     @property
     def url(self) -> str:
@@ -130,7 +130,7 @@ class LivePage:
         )  # fmt: skip
         self._stage.publish(self._ahead)
 
-    def _meanwhile(self) -> Scene:
+    def _meanwhile(self) -> PageScene:
         """What is known without news: when no step has been told for a while, that he may be anywhere near."""
         scene = replace(self._ahead or self._scene, born_ns=self._born_ns)
         if scene.told is None:
@@ -142,11 +142,11 @@ class LivePage:
         why = "nothing from the foot" if silent else "no step of the foot"
         guide = scene.guidance and scene.guidance.stopped(f"There is {why}", scene.t_s)
         return replace(
-            scene, told=unwatched(scene.told, scene.told.t_s + untold_s), beams=(), words=f"lost: {why} for {untold_s:.0f} s",
+            scene, told=unobserved(scene.told, scene.told.t_s + untold_s), beams=(), words=f"lost: {why} for {untold_s:.0f} s",
             guidance=guide, marks=tuple(replace(mark, heard=False) for mark in scene.marks),
         )  # fmt: skip
 
-    def _watch(self, passage: Passage | None, told: Estimate) -> None:
+    def _watch(self, passage: MeasuredSegment | None, told: Estimate) -> None:
         """The tracker told an estimate."""
         tracker = self._tracker
         self._ahead = None
@@ -159,7 +159,7 @@ class LivePage:
         shown, heard = self._scene.specks, self._scene.beams
         if passage is not None and tracker.filter is not None:
             shown = specks(tracker.filter.cloud, MOST_KEPT if self._replay else MOST_SHOWN)
-            sheet = tracker.building
+            sheet = tracker.laid_out
             new = beams(passage, told, told.level * sheet.storeys.pitch_m, sheet.walls.index, self._model)
             heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)
         heard = tuple(sorted((b for b in heard if told.t_s - b.t_s < STALE_S), key=attrgetter("ranger")))

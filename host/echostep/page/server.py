@@ -26,11 +26,11 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
-from echostep.page import wire
-from echostep.page.guard import LOOPBACK, Guard
-from echostep.page.guide import Ways
+from echostep.page import protocol as wire
+from echostep.page.access import LOOPBACK, Guard
+from echostep.page.elements.guidance import Ways
+from echostep.page.mailbox import Mailbox
 from echostep.page.session import PageCounts, Session
-from echostep.page.stage import Stage
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
@@ -51,7 +51,7 @@ class Address:
 class PageServer:
     """Serves a stage until it is closed; raises EchostepError when the address cannot be had."""
 
-    def __init__(self, stage: Stage, address: Address = Address()) -> None:
+    def __init__(self, stage: Mailbox, address: Address = Address()) -> None:
         self.counts = PageCounts()
         self.sessions: set[Session] = set()
         self._stage = stage

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from echostep.checkin import CheckIn
 from echostep.errors import EchostepError
-from echostep.estimate import Estimate
-from echostep.page import wire
-from echostep.page.cursor import Cursor
-from echostep.page.guide import Errand, Ways
-from echostep.page.scene import Scene, Specks
-from echostep.page.stage import Stage
+from echostep.localization.estimate import Estimate
+from echostep.page import protocol as wire
+from echostep.page.elements.guidance import Errand, Ways
+from echostep.page.elements.scene import PageScene, Specks
+from echostep.page.mailbox import Mailbox
+from echostep.page.replay_cursor import Cursor
+from echostep.ports.check_in import CheckIn
 
 FRAME_S = 1.0 / 30.0
 MOST_UNDRAWN = 2
@@ -41,7 +41,7 @@ class PageCounts:
 class Session:
     """Speaks with one page until it goes away."""
 
-    def __init__(self, socket: WebSocket, stage: Stage, ways: Ways, counts: PageCounts) -> None:
+    def __init__(self, socket: WebSocket, stage: Mailbox, ways: Ways, counts: PageCounts) -> None:
         self.latency_s: deque[float] = deque(
             maxlen=512
         )  # from the coming of an estimate's bytes to the word that it is drawn
@@ -57,7 +57,7 @@ class Session:
             int, int | None
         ] = {}  # serial number of a frame sent: birth of the estimate that is new in it
         self._serial = 0
-        self._last: Scene | None = None
+        self._last: PageScene | None = None
         self._specks: Specks | None = None
         self._walked = 0
         self._asked = True
@@ -136,7 +136,7 @@ class Session:
             except (WebSocketDisconnect, RuntimeError):
                 return
 
-    def _frame(self, scene: Scene) -> bytes:
+    def _frame(self, scene: PageScene) -> bytes:
         """A frame with what this page has not seen; it is then counted as sent."""
         self._asked = False
         self._serial += 1

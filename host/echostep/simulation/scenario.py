@@ -10,19 +10,17 @@ from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from echostep.frames import encode
-from echostep.messages import Configure
-from echostep.plan import Plan, Pose
-from echostep.simulation.board import Board
-from echostep.simulation.magnetism import Magnetism
-from echostep.simulation.mtx import MtxModel, stream
+from echostep.arrays import Floats
+from echostep.board.frames import encode
+from echostep.board.messages import Configure
+from echostep.plan.model import Plan, Pose
+from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.simulation.devices.board import Board
+from echostep.simulation.devices.mtx import MtxModel, stream
+from echostep.simulation.people.walker import Person, Waypoint, walk
 from echostep.simulation.stimulus import BoardSensors
-from echostep.simulation.walker import Person, Waypoint, walk
-from echostep.sources import BOARD, MTX, Chunk
-
-Floats = NDArray[np.float64]
+from echostep.simulation.world.magnetic_field import Magnetism
 
 BLOCK_MS = 50
 USB_LATENCY_NS = 1_000_000

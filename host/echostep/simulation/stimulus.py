@@ -10,14 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.plan import Level
-from echostep.simulation.acoustics import SRF02, speed_of_sound_m_s
-from echostep.simulation.magnetism import Magnetism
-from echostep.simulation.sensors import Adis16100, Compass, Scp1000
-from echostep.simulation.walker import Walk
-from echostep.simulation.world import echoes, ranger_bias_m
-
-Floats = NDArray[np.float64]
+from echostep.arrays import Floats
+from echostep.plan.model import Level
+from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model
+from echostep.simulation.people.walker import Walk
+from echostep.simulation.world.acoustics import SRF02, speed_of_sound_m_s
+from echostep.simulation.world.echoes import echoes, ranger_bias_m
+from echostep.simulation.world.magnetic_field import Magnetism
 
 ROW = np.dtype(
     [
@@ -48,10 +47,10 @@ class BoardSensors:
         self._acoustics = SRF02._replace(speed_m_s=speed_of_sound_m_s(TEMPERATURE_C))
         self._echo_rng, *rest = rng.spawn(6)
         self._range_bias_m = ranger_bias_m(self._echo_rng, self._acoustics)
-        self._thigh, self._calf, self._belt = (Adis16100(r) for r in rest[:3])
+        self._thigh, self._calf, self._belt = (Adis16100Model(r) for r in rest[:3])
         self._air_pa = air_pa
-        self._barometer = Scp1000(rest[3])
-        self._compass = Compass(magnetism, rest[4])
+        self._barometer = Scp1000Model(rest[3])
+        self._compass = CompassModel(magnetism, rest[4])
 
     def rows(self, start: int, stop: int) -> NDArray[np.void]:
         """Rows of the milliseconds start..stop-1 of the walk; past its end the last posture goes on."""

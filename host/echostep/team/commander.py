@@ -21,13 +21,13 @@ from rich.table import Table
 from rich.text import Text
 
 from echostep.errors import EchostepError
-from echostep.plan import Plan, load_plan
+from echostep.plan.model import Plan, load_plan
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import Inbox, Reception
 from echostep.team.mqtt import Listener
+from echostep.team.picture import draw_team
 from echostep.team.report import checked_name
 from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, Need, Roster, nearest
-from echostep.team.team_picture import draw_team
 
 LOOK_S = 0.25
 WIDE = 110  # columns of a terminal that has room for all

@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from echostep.estimate import WALKER_M_S, ellipse95, trust
+from echostep.localization.estimate import WALKER_M_S, ellipse95, trust
 from echostep.team.report import Position, Report, moment
 
 HEARTBEAT_S = 2.0  # without a new estimate the last one is told again, older and wider

@@ -17,16 +17,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
+from echostep.board.health import board_findings
 from echostep.errors import EchostepError
-from echostep.estimate import CHI2_95, Estimate
-from echostep.health import board_findings
-from echostep.plan import Level, Plan
+from echostep.localization.estimate import CHI2_95, Estimate
+from echostep.plan.model import Level, Plan
 from echostep.team.cot import StreamLine, UdpLine
-from echostep.team.earth import Ground
 from echostep.team.endpoint import Endpoint, Outlet
+from echostep.team.georeference import GroundPlane
 from echostep.team.mqtt import MqttLine
 from echostep.team.outbox import HEARTBEAT_S, Line, Outbox
-from echostep.team.report import Motion, Position, Report, Streams, printable
+from echostep.team.report import Motion, Position, Report, StreamReport, printable
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -40,11 +40,11 @@ class Publishing:
 
     def __init__(self, outlet: Outlet, tracker: Tracker, source: Source, say: Callable[[str], None]) -> None:
         self._tracker, self._say = tracker, say
-        self._trail, self._levels = Trail(), tracker.plan.levels
-        self._before, self._told_s = Trail(), time.monotonic()  # the first estimate
+        self._trail, self._levels = PublishedTrail(), tracker.plan.levels
+        self._before, self._told_s = PublishedTrail(), time.monotonic()  # the first estimate
         run = secrets.token_hex(4)
         self._blank = blank(tracker.plan, outlet.name, outlet.team, run, source)
-        self._ground = Ground(tracker.plan) if tracker.plan.georeference else None
+        self._ground = GroundPlane(tracker.plan) if tracker.plan.georeference else None
         lines = [(_line(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(line, name, say) for line, name in lines]
         self._offer(self._blank)
@@ -81,7 +81,7 @@ class Publishing:
             outbox.offer(made)
 
 
-class Trail:
+class PublishedTrail:
     """What one estimate does not tell: steps and way so far, rates of the streams."""
 
     def __init__(self) -> None:
@@ -104,7 +104,7 @@ class Trail:
         speed = min(way_m / span_s, 100.0) if span_s > 0.5 else 0.0
         return Motion(max(e.step, 0), min(self._walked_m, 1e9), speed, max(e.t_s - self._stepped_s, 0.0))
 
-    def streams(self, tracker: Tracker, t_s: float) -> Streams:
+    def streams(self, tracker: Tracker, t_s: float) -> StreamReport:
         """Health of the streams; rates by the tracker's clock."""
         intake = tracker.intake
         board, mtx, status = intake.board.counts, intake.mtx.counts, intake.status
@@ -114,7 +114,7 @@ class Trail:
             self._counts.popleft()
         span_s = t_s - self._counts[0][0]
         mtx_hz, board_hz = ((counts[k] - self._counts[0][k]) / span_s if span_s > 0.0 else 0.0 for k in (1, 2))
-        return Streams(
+        return StreamReport(
             mtx_hz=min(mtx_hz, 1e6),
             board_hz=min(board_hz, 1e6),
             bad=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
@@ -135,7 +135,12 @@ def blank(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
 
 
 def report(
-    blank: Report, levels: Sequence[Level], ground: Ground | None, e: Estimate, motion: Motion, streams: Streams
+    blank: Report,
+    levels: Sequence[Level],
+    ground: GroundPlane | None,
+    e: Estimate,
+    motion: Motion,
+    streams: StreamReport,
 ) -> Report:
     """The report of an estimate."""
     radius = e.ellipse95.major_m

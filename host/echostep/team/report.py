@@ -69,7 +69,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ReportedPlace:
     """Where that is on Earth, when the plan has a georeference."""
 
     lat_deg: Annotated[float, Meta(ge=-90.0, le=90.0, description="WGS 84")]
@@ -84,7 +84,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Streams:
+class StreamReport:
     """Health of what the sensors send."""
 
     mtx_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="samples of the MTx per second")]
@@ -119,8 +119,8 @@ class Report:
     ]
     position: Annotated[Position | None, Meta(description="missing while waiting")]
     motion: Annotated[Motion | None, Meta(description="missing while waiting")]
-    place: Annotated[Place | None, Meta(description="missing without a georeference")]
-    streams: Annotated[Streams | None, Meta(description="missing until something is heard")]
+    place: Annotated[ReportedPlace | None, Meta(description="missing without a georeference")]
+    streams: Annotated[StreamReport | None, Meta(description="missing until something is heard")]
     plan: Annotated[str, Meta(max_length=64, description="name of the plan that he is tracked on")]
     plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="of the plan's file")]
     version: Annotated[str, Meta(max_length=32, description="of the tracker's echostep")]

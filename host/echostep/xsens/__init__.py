@@ -10,7 +10,8 @@ CMT: the constants of Xsens' public C++ SDK (cmtdef.h), where both are silent.
 
 from echostep.xsens.frames import MTDATA, MTDATA2, Frame, FrameReader, encode_frame
 from echostep.xsens.mtdata import PROJECT, OutputFormat, pack_mtdata
-from echostep.xsens.reader import MtBatch, MtSample, MtxCounts, MtxLimits, MtxReader
+from echostep.xsens.reader import MtBatch, MtxCounts, MtxLimits, MtxReader
+from echostep.xsens.sample import MtSample
 
 __all__ = [
     "MTDATA", "MTDATA2", "PROJECT", "Frame", "FrameReader", "MtBatch", "MtSample", "MtxCounts", "MtxLimits", "MtxReader",

@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from echostep.arrays import Bools, Floats
 
 ENU, NED, NWU = 0x0, 0x4, 0x8  # coordinate bits of an MTData2 identifier [LLCP, MTData2]
 EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees, and some rounding
@@ -90,7 +89,7 @@ def from_matrix(columns: Floats) -> Floats:
     return rotation[:, None] * rows[best, index] / (2.0 * np.sqrt(squares[index, best]))[:, None]
 
 
-def _are_rotations(columns: Floats) -> NDArray[np.bool_]:
+def _are_rotations(columns: Floats) -> Bools:
     """Whether the columns (n, 9) are orthonormal and right-handed."""
     with np.errstate(all="ignore"):
         first, second, third = columns[:, 0:3], columns[:, 3:6], columns[:, 6:9]

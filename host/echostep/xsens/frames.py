@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+
+from echostep.arrays import Ints, Octets
+from echostep.jit import kernel
 
 PREAMBLE = 0xFA
 BUS_ID = 0xFF
@@ -24,8 +25,6 @@ ERROR = 0x42
 MAX_LENGTH = 2048  # longest payload that an MT sends
 SHORTEST = 5  # bytes in a frame without payload
 
-Bytes = NDArray[np.uint8]
-Ints = NDArray[np.int64]
 
 SKIPPED, BAD_CHECKSUM = 0, 1  # what `_scan` counts
 
@@ -37,12 +36,12 @@ class Frame(NamedTuple):
     payload: bytes
 
 
-class Frames(NamedTuple):
+class MtFrames(NamedTuple):
     """Complete frames: `stream` holds them; `mid`, `body` and `length` of each payload (n,); `end` (n,): after which of
     the bytes just fed it was clear that it is a frame: its last one, or that of a false frame which began before it.
     """
 
-    stream: Bytes
+    stream: Octets
     mid: Ints
     body: Ints
     length: Ints
@@ -50,8 +49,8 @@ class Frames(NamedTuple):
 
 
 @dataclass(slots=True)
-class FrameCounts:
-    """Bytes that belong to no frame, and frames with a wrong checksum."""
+class MtFrameCounts:
+    """Octets that belong to no frame, and frames with a wrong checksum."""
 
     skipped_bytes: int = 0
     bad_checksum: int = 0
@@ -70,15 +69,15 @@ def encode_frame(mid: int, payload: bytes = b"", bus_id: int = BUS_ID) -> bytes:
 class FrameReader:
     """Frames out of a byte stream; after damage it looks for the next preamble inside what it rejected."""
 
-    counts: FrameCounts = field(default_factory=FrameCounts)
+    counts: MtFrameCounts = field(default_factory=MtFrameCounts)
     _rest: bytes = b""
 
     @property
     def pending(self) -> int:
-        """Bytes of the unfinished frame."""
+        """Octets of the unfinished frame."""
         return len(self._rest)
 
-    def scan(self, received: bytes) -> Frames:
+    def scan(self, received: bytes) -> MtFrames:
         """Frames completed by these bytes."""
         stream = np.frombuffer(self._rest + received, np.uint8)
         found = np.empty((len(stream) // SHORTEST, 4), np.int64)
@@ -89,7 +88,7 @@ class FrameReader:
         before = len(self._rest)
         self._rest = stream[resume:].tobytes()
         mid, body, length, end = found[:count].T
-        return Frames(stream, mid, body, length, end - before)
+        return MtFrames(stream, mid, body, length, end - before)
 
     def feed(self, received: bytes) -> list[Frame]:
         """Frames completed by these bytes, one by one."""
@@ -98,8 +97,8 @@ class FrameReader:
         return [Frame(mid, found.stream[body : body + length].tobytes()) for mid, body, length in rows]
 
 
-@njit(cache=True, error_model="numpy")
-def payloads_at(stream: Bytes, begin: Ints, length: int) -> Bytes:
+@kernel
+def payloads_at(stream: Octets, begin: Ints, length: int) -> Octets:
     """Rows of `length` bytes (n, length) that begin at `begin` (n,)."""
     rows = np.empty((len(begin), length), np.uint8)
     for k in range(len(begin)):
@@ -107,8 +106,8 @@ def payloads_at(stream: Bytes, begin: Ints, length: int) -> Bytes:
     return rows
 
 
-@njit(cache=True, error_model="numpy")
-def _scan(stream: Bytes, found: Ints, counted: Ints) -> tuple[int, int]:
+@kernel
+def _scan(stream: Octets, found: Ints, counted: Ints) -> tuple[int, int]:
     """Fill rows (message, body, length, known) of `found`; returns their number, and where the unfinished frame begins.
 
     `known` is the byte after which it is clear that the frame is one: its end, or the end of a false frame that began before it.

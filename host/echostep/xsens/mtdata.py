@@ -9,18 +9,13 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from echostep.arrays import Bools, Floats, Ints, Octets
 from echostep.xsens.axes import from_euler, from_matrix
-from echostep.xsens.frames import Bytes
-
-if TYPE_CHECKING:
-    from echostep.xsens.reader import MtSample
-
-Floats = NDArray[np.float64]
+from echostep.xsens.sample import MtSample
 
 # Output mode [Manual 5.3.3, SetOutputMode; status: CMT].
 TEMPERATURE, CALIBRATED, ORIENTATION, AUXILIARY, STATUS, RAW = 0x0001, 0x0002, 0x0004, 0x0008, 0x0800, 0x4000
@@ -47,8 +42,8 @@ class Decoded(NamedTuple):
     """
 
     values: Floats
-    counter: NDArray[np.int64]
-    sent: NDArray[np.bool_]
+    counter: Ints
+    sent: Bools
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,7 @@ class OutputFormat:
         return tuple(columns for bit, columns in pairs if self.mode & CALIBRATED and not self.settings & bit)
 
     @cached_property
-    def sent(self) -> NDArray[np.bool_]:
+    def sent(self) -> Bools:
         """Whether accel, gyro, mag and orientation are sent (4,)."""
         return np.array([c in self.calibrated for c in (ACCEL, GYRO, MAG)] + [self.orientation_values > 0])
 
@@ -94,7 +89,7 @@ class OutputFormat:
 
     @cached_property
     def length(self) -> int:
-        """Bytes of a payload."""
+        """Octets of a payload."""
         counter = 2 * (self.settings & SAMPLE_COUNTER)
         if self.mode & RAW:
             return RAW_BYTES + counter
@@ -105,7 +100,7 @@ class OutputFormat:
 PROJECT = OutputFormat(CALIBRATED | ORIENTATION, SAMPLE_COUNTER | QUATERNION | FLOAT)  # 54 bytes
 
 
-def decode_mtdata(rows: Bytes, output: OutputFormat) -> Decoded:
+def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
     """Values of payloads (n, `output.length`); raw data are not calibrated and give NaN."""
     count = len(rows)
     values = np.full((count, COLUMNS), np.nan)

@@ -10,14 +10,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
+from echostep.arrays import Bools, Floats, Ints, Octets
+from echostep.jit import kernel
 from echostep.xsens.axes import from_euler, from_matrix, to_mt_world
-from echostep.xsens.frames import Bytes, Ints, payloads_at
+from echostep.xsens.frames import payloads_at
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, COLUMNS, GYRO, MAG, Decoded
-
-Floats = NDArray[np.float64]
 
 FLOAT32, FP1220, FP1632, FLOAT64 = 0, 1, 2, 3  # low two bits of an identifier
 WIDTHS = (4, 4, 6, 8)
@@ -37,10 +35,10 @@ class Places(NamedTuple):
 
     at: Ints
     bits: Ints
-    whole: NDArray[np.bool_]
+    whole: Bools
 
 
-def find_packets(stream: Bytes, body: Ints, length: Ints) -> Places:
+def find_packets(stream: Octets, body: Ints, length: Ints) -> Places:
     """Places of the quantities of a sample in payloads that begin at `body` (n,) and are `length` (n,) long."""
     places = Places(
         np.zeros((len(body), len(_TYPES)), np.int64),
@@ -51,9 +49,9 @@ def find_packets(stream: Bytes, body: Ints, length: Ints) -> Places:
     return places
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _find(
-    stream: Bytes, body: Ints, length: Ints, types: Ints, values: Ints, at: Ints, bits: Ints, whole: NDArray[np.bool_]
+    stream: Octets, body: Ints, length: Ints, types: Ints, values: Ints, at: Ints, bits: Ints, whole: Bools
 ) -> None:
     for k in range(len(body)):
         here, end = body[k], body[k] + length[k]
@@ -74,7 +72,7 @@ def _find(
             at[k] = 0
 
 
-def decode_mtdata2(stream: Bytes, places: Places) -> Decoded:
+def decode_mtdata2(stream: Octets, places: Places) -> Decoded:
     """Values of the payloads whose packets lie at these places."""
     count = len(places.at)
     values = np.full((count, COLUMNS), np.nan)
@@ -106,7 +104,7 @@ def _quaternions(quantity: int, numbers: Floats) -> Floats:
     return from_matrix(numbers) if quantity == _MATRIX else from_euler(numbers)
 
 
-def read_numbers(rows: Bytes, form: int) -> Floats:
+def read_numbers(rows: Octets, form: int) -> Floats:
     """Numbers (n, k) of rows of bytes (n, k * width): float32, 12.20, 16.32 (fraction first), double [LLCP, output formats]."""
     with np.errstate(invalid="ignore"):  # a damaged float may be a signalling NaN
         if form == FLOAT32:

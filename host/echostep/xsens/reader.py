@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, Frames, Ints, encode_frame, payloads_at
+from echostep.arrays import Bools, Floats, Ints
+from echostep.jit import kernel
+from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, MtFrames, encode_frame, payloads_at
 from echostep.xsens.mtdata import (
     ACCEL,
     ATTITUDE,
@@ -28,25 +28,12 @@ from echostep.xsens.mtdata import (
     pack_mtdata,
 )  # fmt: skip
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
-
-Floats = NDArray[np.float64]
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from echostep.xsens.sample import MtSample
 
 # Verdicts, in the order of the gates; also rows of the reader's tally.
 GOOD, INCOMPLETE, NOT_FINITE, BAD_QUATERNION, OUT_OF_RANGE, REPEATED, BAD_COUNTER, LOST = range(8)
 
 MAX_GAP = 500  # a counter that is further ahead, or behind, is believed when the next one follows it
-
-
-class MtSample(NamedTuple):
-    """One measurement: accel m/s2, gyro rad/s, mag in units of the earth's field, quaternion w x y z (sensor -> MT world), u16 counter."""
-
-    counter: int
-    accel: Vector
-    gyro: Vector
-    mag: Vector
-    quaternion: Quaternion
 
 
 class MtBatch(NamedTuple):
@@ -162,7 +149,7 @@ class MtxReader:
             counter, values[:, ACCEL], values[:, GYRO], values[:, MAG], values[:, ATTITUDE], values[:, CELSIUS], end
         )
 
-    def _decoded(self, frames: Frames) -> tuple[Decoded, Ints]:
+    def _decoded(self, frames: MtFrames) -> tuple[Decoded, Ints]:
         """All measurement messages in order, and their ends (n,); the other messages are counted."""
         legacy = (frames.mid == MTDATA) & (frames.length == self._output.length)
         if legacy.all():
@@ -182,7 +169,7 @@ class MtxReader:
             self._bad_length += int(np.sum(~places.whole))
         return Decoded(*(part[taken] for part in found)), frames.end[taken]
 
-    def _count_others(self, frames: Frames) -> None:
+    def _count_others(self, frames: MtFrames) -> None:
         mid = frames.mid
         self._bad_length += int(np.sum((mid == MTDATA) & (frames.length != self._output.length)))
         self._other += int(np.sum((mid != MTDATA) & (mid != MTDATA2)))
@@ -195,10 +182,8 @@ def _fill(found: Decoded, which: Ints, part: Decoded) -> None:
         into[which] = values
 
 
-@njit(cache=True, error_model="numpy")
-def _judge(
-    values: Floats, counter: Ints, sent: NDArray[np.bool_], limits: Floats, last: Ints, tally: Ints
-) -> NDArray[np.bool_]:
+@kernel
+def _judge(values: Floats, counter: Ints, sent: Bools, limits: Floats, last: Ints, tally: Ints) -> Bools:
     """Which samples pass every gate after the checksum; `last` is carried on, `tally` gets the verdicts and the lost samples.
 
     The checksum is 8 bits wide and lets one damaged frame in 256 through.
@@ -215,7 +200,7 @@ def _judge(
     return kept
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continuity(counter: int, last: Ints, tally: Ints) -> int:
     """Whether a counter follows the last one; what is missing between them is counted as lost."""
     gap = (counter - last[0]) & 0xFFFF
@@ -230,8 +215,8 @@ def _continuity(counter: int, last: Ints, tally: Ints) -> int:
     return GOOD
 
 
-@njit(cache=True, error_model="numpy")
-def _verdict(row: Floats, sent: NDArray[np.bool_], limits: Floats) -> int:
+@kernel
+def _verdict(row: Floats, sent: Bools, limits: Floats) -> int:
     """The first gate that a sample fails, of what was sent: finite, |q| = 1, within the sensor's range."""
     for group in range(4):
         for j in range(3 * group, 3 * group + (4 if group == 3 else 3)):

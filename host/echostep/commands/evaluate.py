@@ -1,0 +1,154 @@
+"""`echostep evaluate ...`: one command a study. Heavy imports wait until a command runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(no_args_is_help=True, help="The papers' experiments and ours, with figures and plots.")
+
+Seed = Annotated[int, typer.Option("--seed", help="Seed of the first run; run k has this plus k.", min=0)]
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the rows there.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for plots, journal and Parquet.")]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, not on this machine.")
+]
+
+
+@app.callback()
+def evaluate() -> None:
+    """The papers' experiments and ours, with figures and plots."""
+
+
+@app.command()
+def girard2011(
+    runs: Annotated[int, typer.Option("--runs", help="Walks to simulate.", min=1)] = 200,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/girard2011"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated)."""
+    from echostep.evaluate.girard2011 import evaluate_girard2011
+
+    evaluate_girard2011(runs, seed, json, out, scheduler)
+
+
+@app.command()
+def echoes(
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/echoes"),
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Fit the likelihood's settings to simulated pings (minutes).")
+    ] = False,
+) -> None:
+    """What simulated rangers hear, and how well the tracker's likelihood expects it."""
+    from echostep.evaluate.echoes.study import evaluate_echoes
+
+    evaluate_echoes(seed, json, out, fit=fit)
+
+
+@app.command()
+def lee2010(
+    runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/lee2010"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated)."""
+    from echostep.evaluate.lee2010.study import evaluate_lee2010
+
+    evaluate_lee2010(runs, seed, json, out, scheduler)
+
+
+@app.command()
+def trails(
+    runs: Annotated[int, typer.Option("--runs", help="Walks of each trail, each by another person.", min=1)] = 10,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/trails"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated)."""
+    from echostep.evaluate.trails.study import trails as study
+
+    study(runs, seed, out, json, scheduler)
+
+
+@app.command("legs")
+def legs_command(
+    runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/legs"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Walks of 5 m by many people without calibration, and what each fault of the sensors does (simulated)."""
+    from echostep.evaluate.legs import evaluate_legs
+
+    evaluate_legs(runs, seed, json, out, scheduler)
+
+
+@app.command("floors")
+def floors_command(
+    runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/floors"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
+    from echostep.evaluate.floors import evaluate_floors
+
+    evaluate_floors(runs, seed, json, out, scheduler)
+
+
+@app.command("storeys")
+def storeys_command(
+    runs: Annotated[int, typer.Option("--runs", help="Walks through each building.", min=1)] = 10,
+    seed: Seed = 1,
+    folder: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
+    ] = None,
+    json: Json = None,
+    out: Out = Path("out/storeys"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Walks through all floors of a building by stairs and lift (simulated)."""
+    from echostep.evaluate.multi_floor import evaluate_storeys
+
+    evaluate_storeys(runs, seed, folder, json, out, scheduler)
+
+
+@app.command("feet")
+def feet_command(
+    folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
+    json: Json = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Draw the tracks there.")] = None,
+    left_out: Annotated[
+        bool,
+        typer.Option("--leave-one-out", help="Also with the constants that the other sets would choose (minutes)."),
+    ] = False,
+) -> None:
+    """The foot on real recordings, one setting for all, beside the peers' figures."""
+    from echostep.evaluate.feet.study import feet
+
+    feet(folder, json, out, left_out=left_out)
+
+
+@app.command()
+def fischer2008(
+    runs: Annotated[int, typer.Option("--runs", help="Guided returns to simulate.", min=1)] = 1000,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/fischer2008"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated)."""
+    from echostep.evaluate.fischer2008.study import evaluate_fischer2008
+
+    evaluate_fischer2008(runs, seed, json, out, scheduler)

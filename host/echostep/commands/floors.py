@@ -1,0 +1,108 @@
+"""`echostep floors`: a recorded barometer, its floors as CSV, in words and as a picture.
+
+In: a file, heights. Out: files and words. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from echostep.arrays import Floats
+from echostep.barometer.altitude import BarometerSettings, Pressures
+from echostep.barometer.floor_filter import FloorFilter, Floors, checked_heights
+from echostep.barometer.floor_record import describe, find_storeys, noise_of_record, thinned
+from echostep.errors import EchostepError
+from echostep.offline.pressure_csv import load_pressures, write_floors
+
+console = Console(soft_wrap=True, highlight=False)
+
+
+def floors(path: Path, heights: str, out: Path, start: int | None, *, plot: bool) -> None:
+    """Write the floors of a record and say what was visited; raises EchostepError for what cannot be used."""
+    wanted = None if heights.strip().lower() == "auto" else parse_heights(heights)
+    if start is not None and wanted is None:
+        raise EchostepError("--start is an index into --heights: with --heights auto there are none yet")
+    if start is not None and wanted is not None and not 0 <= start < len(wanted):
+        raise EchostepError(f"--start {start}: the floors of --heights are 0 to {len(wanted) - 1}")
+    record = load_pressures(path)
+    for note in record.notes:
+        console.print(f"{path}: {note}", markup=False)
+    found = _named(path, record.samples, wanted, start)
+    write_floors(out, found)
+    if wanted is None:
+        console.print("storeys found: --heights " + ",".join(f"{h:g}" for h in found.heights_m))
+    console.print(describe(found), markup=False)
+    if plot:
+        picture = out.with_suffix(".png")
+        draw_floors(picture, found, path.name)
+        console.print(f"{out} and {picture} written", markup=False)
+
+
+def record_floors(samples: Pressures, heights_m: Floats, start: int | None = None) -> Floors:
+    """Floors at all samples of a record, each by all of it; its own noise is measured, ten samples a second are looked at."""
+    few, group = thinned(samples)
+    prior = np.ones(len(heights_m)) if start is None else np.eye(len(heights_m))[start]
+    found = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).look_back(few)
+    return Floors(
+        samples.t_s, found.heights_m, found.floor[group], found.probability[group], found.height_m[group], found.up[group], found.down[group]
+    )  # fmt: skip
+
+
+def _named(path: Path, samples: Pressures, heights_m: Floats | None, start: int | None) -> Floors:
+    try:
+        if heights_m is None:
+            few, _ = thinned(samples)
+            heights_m = find_storeys(few, BarometerSettings(noise_of_record(samples, few)))
+        return record_floors(samples, heights_m, start)
+    except EchostepError as error:
+        raise EchostepError(f"{path}: {error}") from error
+
+
+def parse_heights(text: str) -> Floats:
+    """Heights of the storeys out of "0,3.5,7"; raises EchostepError."""
+    try:
+        found = [float(cell) for cell in text.split(",")]
+    except ValueError as error:
+        raise EchostepError(
+            f"--heights {text}: metres with commas between are expected, as 0,3.5,7, or auto"
+        ) from error
+    return checked_heights(np.array(found))
+
+
+def draw_floors(path: Path, floors: Floors, title: str) -> None:
+    """Height over time on the storeys, and the probability of each floor, as a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 6.5), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    few = slice(None, None, max(1, len(floors.t_s) // 5000))
+    for k, height in enumerate(floors.heights_m):
+        above.axhline(height, color="#cccccc", linewidth=0.8)
+        above.text(1.005, height, f"{k}", transform=above.get_yaxis_transform(), va="center", fontsize=8)
+    above.plot(floors.t_s[few], floors.height_m[few], color="#0072b2", linewidth=1.2, label="height")
+    above.step(
+        floors.t_s[few],
+        floors.heights_m[floors.floor[few]],
+        color="#009e73",
+        where="post",
+        linewidth=2,
+        alpha=0.5,
+        label="floor",
+    )
+    above.set(title=title, ylabel="height / m")
+    above.legend(fontsize=8)
+    mesh = below.imshow(
+        floors.probability[few].T, origin="lower", aspect="auto", vmin=0.0, vmax=1.0, cmap="Blues", interpolation="nearest",
+        extent=(floors.t_s[0], floors.t_s[-1], -0.5, len(floors.heights_m) - 0.5),
+    )  # fmt: skip
+    below.set(xlabel="t / s", ylabel="floor")
+    figure.colorbar(mesh, ax=below, label="probability")
+    try:
+        figure.savefig(path)
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error

@@ -1,0 +1,167 @@
+"""`echostep plan import | check | show | edit`.
+
+In: what the user typed. Out: plans, pictures, findings. Heavy imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from echostep.errors import EchostepError
+
+if TYPE_CHECKING:
+    from echostep.plan.model import Plan
+
+MOST_LINES, MOST_MARKS = 200, 300  # in a terminal, in a picture
+
+app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show, edit.")
+
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(metavar="FILE", help="A building in another format: a file or folder; DXF: one file a storey."),
+]
+
+
+@app.command("import")
+def import_(
+    files: Files,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
+    storey: Annotated[
+        float,
+        typer.Option("--storey", metavar="M", help="Height of a storey where the file has none.", min=1.0, max=50.0),
+    ] = 3.5,
+    layer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--layer",
+            metavar="KIND=PATTERN",
+            help="DXF: layers of walls, windows, doors, stairs, lifts, rooms or obstacles, as walls=A-WALL*; may be repeated.",
+        ),
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="UNIT", help="DXF: mm, cm, m, in or ft instead of the file's.")
+    ] = None,
+) -> None:
+    """Make a plan of a building that is drawn in another format."""
+    from echostep.plan.importers.formats import Hints, import_plan
+    from echostep.plan.writer import save_plan
+
+    plan = import_plan(files[0], Hints(storey, _unit(units), _layers(layer or [])), files[1:])
+    save_plan(plan, out)
+    for level in plan.levels:
+        counts = f"{len(level.walls)} walls, {len(level.windows)} windows, {len(level.doors)} doors, {len(level.rooms)} rooms"
+        print(f"{level.name}, {level.height_m:g} m: {counts}")
+    print(f"{len(plan.connectors)} stairs, lifts and ramps; {out}")
+
+
+def _unit(name: str | None) -> str | None:
+    from echostep.plan.importers.dxf.entities import METRES
+
+    if name is not None and name not in METRES:
+        raise EchostepError(f"--units {name}: expected one of {', '.join(METRES)}")
+    return name
+
+
+def _layers(texts: list[str]) -> dict[str, list[str]]:
+    from echostep.plan.importers.dxf.drawing import LAYERS
+
+    layers: dict[str, list[str]] = {}
+    for text in texts:
+        kind, _, pattern = text.partition("=")
+        if kind not in LAYERS or not pattern:
+            raise EchostepError(f"--layer {text}: expected KIND=PATTERN with KIND one of {', '.join(LAYERS)}")
+        layers.setdefault(kind, []).append(pattern)
+    return layers
+
+
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
+
+
+@app.command()
+def check(
+    file: PlanFile,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw what is wrong (.png, .svg).")
+    ] = None,
+) -> None:
+    """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
+    from echostep.plan.check import check_plan
+    from echostep.plan.drawing import draw_plan
+    from echostep.plan.importers.formats import open_plan
+
+    plan = open_plan(file)
+    findings = check_plan(plan)
+    for finding in findings[:MOST_LINES]:
+        x, y = finding.at_m
+        print(f"{finding.number}. {plan.levels[finding.level].name}, x {x:.2f} m, y {y:.2f} m: {finding.text}")
+    if len(findings) > MOST_LINES:
+        print(f"... and {len(findings) - MOST_LINES} more")
+    counts = Counter(finding.kind for finding in findings)
+    print(f"{file}: " + (", ".join(f"{count} x {kind}" for kind, count in counts.items()) or "nothing wrong"))
+    if picture is not None:
+        levels = sorted({finding.level for finding in findings}) or list(range(len(plan.levels)))
+        draw_plan(plan, picture, levels, None, findings[:MOST_MARKS])
+    if findings:
+        raise typer.Exit(1)
+
+
+@app.command()
+def show(
+    file: PlanFile,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The picture to write (.png, .svg).")],
+    level: Annotated[
+        str | None, typer.Option("--level", metavar="NAME", help="One level, by name or index; all without it.")
+    ] = None,
+    bounds: Annotated[
+        str | None, typer.Option("--bounds", metavar="X0,Y0,X1,Y1", help="Show this rectangle only, in metres.")
+    ] = None,
+) -> None:
+    """Draw a plan."""
+    from echostep.plan.drawing import draw_plan
+    from echostep.plan.importers.formats import open_plan
+
+    plan = open_plan(file)
+    draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
+
+
+@app.command()
+def edit(
+    file: Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON); one that does not exist begins empty.")],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="IMAGE", help="Draw over this picture (PNG, JPEG, SVG).")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)
+    ] = None,
+    headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
+) -> None:
+    """Draw and drag walls and doors on a page in the browser, until Ctrl-C."""
+    from echostep.page.editor import edit_plan
+
+    edit_plan(file, picture, port, browser=not headless)
+
+
+def _level(plan: Plan, name: str) -> int:
+    names = [level.name for level in plan.levels]
+    if name in names:
+        return names.index(name)
+    if name.isascii() and name.isdigit() and int(name) < len(names):
+        return int(name)
+    raise EchostepError(f"--level {name}: the levels are {', '.join(names)[:300]}")
+
+
+def _bounds(text: str | None) -> tuple[float, float, float, float] | None:
+    if text is None:
+        return None
+    try:
+        x0, y0, x1, y1 = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise EchostepError(f"--bounds {text}: expected X0,Y0,X1,Y1 in metres") from error
+    if not (abs(x0) < 1e6 and abs(y0) < 1e6 and x0 < x1 < 1e6 and y0 < y1 < 1e6):
+        raise EchostepError(f"--bounds {text}: expected X0 < X1 and Y0 < Y1")
+    return x0, y0, x1, y1

@@ -1,0 +1,206 @@
+"""`echostep flash`: writes the firmware to a board through its Caterina bootloader.
+
+In: a port and a hex file, or the ones that are found and shipped. Out: a board that runs the firmware, or one line that says why not. Owns the
+conversation with avrdude, which speaks the bootloader's protocol (avr109).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import serial
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from echostep.commissioning.probe import listen
+from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
+from echostep.errors import EchostepError
+from echostep.ports.chunks import BOARD
+
+TOUCH_BAUD = 1200  # opened at this rate and closed, the board restarts in its bootloader
+BOOTLOADER_S = 10.0  # Windows and busy hubs take some seconds; the bootloader itself waits for eight
+BACK_S = 10.0
+POLL_S = 0.05
+AVRDUDE_S = 120.0
+FLASH_MAX = 32768 - 4096  # the bootloader has the rest
+FULL_BAR = 50  # avrdude's
+PRESS = "press its reset button (Pro Micro: twice, quickly) and run this again within eight seconds"
+
+
+def flash(port: str | None, hex_file: Path | None, console: Console) -> None:
+    """Write the firmware and see it answer; raises EchostepError with what is missing and what to do."""
+    avrdude = shutil.which("avrdude")
+    if avrdude is None:
+        raise EchostepError("avrdude is not installed: sudo apt install avrdude (macOS: brew install avrdude)")
+    with _hex(hex_file) as path:
+        size = check_hex(path)
+        wanted = port or _find_board()
+        for finding in access_findings("board", wanted):
+            raise EchostepError(str(finding))
+        console.print(f"{path.name}, {size} bytes, to {wanted}")
+        bootloader = enter_bootloader(wanted)
+        console.print(f"bootloader at {bootloader}")
+        write(avrdude, bootloader, path)
+    console.print(_confirm(wanted))
+
+
+@contextmanager
+def _hex(hex_file: Path | None) -> Iterator[Path]:
+    if hex_file is not None:
+        yield hex_file
+        return
+    with as_file(files("echostep") / "firmware" / "echostep.hex") as shipped:
+        yield shipped
+
+
+def check_hex(path: Path) -> int:
+    """Bytes of program in an Intel HEX file; raises EchostepError naming the file and the line."""
+    try:
+        lines = path.read_text(encoding="ascii").split()
+    except (OSError, UnicodeDecodeError) as error:
+        raise EchostepError(f"{path}: cannot read the firmware: {error}; build it: make firmware") from error
+    size, ended = 0, False
+    for number, line in enumerate(lines, 1):
+        try:
+            record = bytes.fromhex(line.removeprefix(":")) if line.startswith(":") else b""
+        except ValueError:
+            record = b""
+        if len(record) < 5 or len(record) != record[0] + 5 or sum(record) % 256:
+            raise EchostepError(f"{path}: line {number} is no record of Intel HEX; build it anew: make firmware")
+        if record[3] == 0:
+            size += record[0]
+            if int.from_bytes(record[1:3], "big") + record[0] > FLASH_MAX:
+                raise EchostepError(f"{path}: line {number} lies beyond {FLASH_MAX} bytes, in the bootloader")
+        ended = ended or record[3] == 1
+    if not ended or size == 0:
+        raise EchostepError(f"{path}: {'ends too early' if not ended else 'holds no program'}; build it: make firmware")
+    return size
+
+
+def _find_board() -> str:
+    seen = list_seen()
+    for role in (Role.BOOTLOADER, Role.BOARD, Role.SKETCH):
+        if port := find(seen, role, BOARD_NAME):
+            return port
+    others = f"; the ports here are {', '.join(p.path for p in seen)}" if seen else ""
+    raise EchostepError(f"no board is plugged in: plug it in, or name its port with --port{others}")
+
+
+def enter_bootloader(port: str) -> str:
+    """The port of the bootloader, which the board is made to enter unless it is there already."""
+    if any(seen.path == os.path.realpath(port) and seen.role is Role.BOOTLOADER for seen in list_seen()):
+        return port
+    before = {seen.path for seen in list_seen()}
+    was = os.path.realpath(port)
+    try:
+        touched = serial.Serial(port, TOUCH_BAUD, timeout=0.1)
+        with suppress(OSError):  # a port without modem lines
+            touched.dtr = False
+        touched.close()
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise EchostepError(f"{port}: cannot open the port: {error}") from error
+
+    gone = False
+
+    def found() -> str | None:
+        nonlocal gone
+        seen = list_seen()
+        gone = gone or not Path(port).exists() or os.path.realpath(port) != was
+        fresh = next((s.path for s in seen if s.role is Role.BOOTLOADER or s.path not in before), None)
+        return fresh or (port if gone and Path(port).exists() else None)
+
+    where = _await(found, BOOTLOADER_S)
+    if where is None:
+        raise EchostepError(f"{port}: the board did not enter its bootloader in {BOOTLOADER_S:.0f} s: {PRESS}")
+    _await(lambda: where if os.access(where, os.R_OK | os.W_OK) else None, 2.0)  # udev is still setting it up
+    return where
+
+
+def _await(look: Callable[[], str | None], seconds: float) -> str | None:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if (found := look()) is not None:
+            return found
+        time.sleep(POLL_S)
+    return None
+
+
+def write(avrdude: str, port: str, path: Path) -> None:
+    """Let avrdude write and verify, with a bar; raises EchostepError with its own last words."""
+    command = [avrdude, "-p", "atmega32u4", "-c", "avr109", "-P", port, "-b", "57600", "-D", "-U", f"flash:w:{path}:i"]
+    columns = (TextColumn("{task.description:10}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    with Progress(*columns) as bars:
+        tasks = {
+            "Writing": bars.add_task("writing", total=FULL_BAR),
+            "Reading": bars.add_task("verifying", total=FULL_BAR),
+        }
+        said = ""
+        for said in _output(command):
+            for phase, task in tasks.items():
+                if marks := re.findall(rf"{phase} \|\s*(#+)", said):
+                    bars.update(task, completed=len(marks[-1]))
+
+
+def _output(command: list[str]) -> Iterator[str]:
+    """All that the program has said so far, each time that it says more; raises EchostepError when it fails."""
+    child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert child.stdout is not None
+    said, deadline = b"", time.monotonic() + AVRDUDE_S
+    try:
+        while True:
+            ready, _, _ = select.select([child.stdout], [], [], max(0.0, deadline - time.monotonic()))
+            if not ready:
+                raise EchostepError(f"avrdude did not end in {AVRDUDE_S:.0f} s: unplug the board and plug it in again")
+            received = os.read(child.stdout.fileno(), 4096)
+            if not received:
+                break
+            said += received
+            yield said.decode(errors="replace")
+        if status := child.wait(timeout=5.0):
+            raise EchostepError(
+                f"avrdude failed (status {status}): {_last_words(said.decode(errors='replace'))}; {PRESS}"
+            )
+    finally:
+        if child.poll() is None:
+            child.kill()
+            child.wait()
+        child.stdout.close()
+
+
+def _last_words(said: str) -> str:
+    """The line that says what went wrong."""
+    lines = [line.strip() for line in said.splitlines() if line.strip() and "Thank you" not in line and "#" not in line]
+    telling = [line for line in lines if re.search("error|not responding|mismatch|cannot|can't|fail", line, re.I)]
+    return (telling or lines or ["it said nothing"])[0 if telling else -1].removeprefix("avrdude: ")
+
+
+def _confirm(port: str) -> str:
+    """Wait for the board to come back, and for its first word."""
+    back = _await(lambda: port if Path(port).exists() else find(list_seen(), Role.BOARD, BOARD_NAME), BACK_S)
+    if back is None:
+        raise EchostepError(
+            f"written and verified, but the board did not come back in {BACK_S:.0f} s: unplug it and plug it in again"
+        )
+    deadline = time.monotonic() + BACK_S
+    while time.monotonic() < deadline:
+        try:
+            heard = listen({BOARD: back}, 1.2)
+        except EchostepError:  # it is still changing from the bootloader to the board
+            time.sleep(POLL_S)
+            continue
+        if heard.stale:
+            return f"written and verified; {heard.stale}"
+        if i := heard.words.identity:
+            return f"written and verified; firmware {i.version_major}.{i.version_minor}.{i.version_patch} answers at {back}"
+    raise EchostepError(
+        f"written and verified, but {back} is silent: unplug the board and plug it in again, then: echostep doctor"
+    )

@@ -1,0 +1,143 @@
+"""The serial ports of this computer: which is the board, which the MTx, and whether we may use them.
+
+In: the system's list of ports, /sys and /proc. Out: `PortSeen`s, and `Finding`s about them. Opens nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass
+from enum import Enum
+from importlib.resources import files
+from pathlib import Path
+
+from serial.tools import list_ports
+
+from echostep.board.health import Finding, Severity
+
+BOARD_NAME, MTX_NAME = Path("/dev/echostep"), Path("/dev/echostep-mtx")  # by the udev rules
+RULES = "99-echostep.rules"
+RULE_FOLDERS = tuple(
+    map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"))
+)
+BOARD_IDS = {(0x1209, 0x0001)}
+BOOTLOADER_IDS = {(0x2341, 0x0036), (0x2341, 0x0037), (0x2A03, 0x0036), (0x2A03, 0x0037), (0x1B4F, 0x9205)}
+SKETCH_IDS = {(0x2341, 0x8036), (0x2341, 0x8037), (0x2A03, 0x8036), (0x2A03, 0x8037), (0x1B4F, 0x9206)}
+FTDI, XSENS = 0x0403, 0x2639
+FTDI_IDS = {0x6001, *range(0xD388, 0xD390)}  # FT232R; Xsens' converters [Linux, ftdi_sio_ids.h]
+LATENCY_MAX_MS = 1
+
+
+class Role(Enum):
+    """What hangs on a port, as far as its USB identifiers tell."""
+
+    BOARD = "sensor board"
+    BOOTLOADER = "sensor board in its bootloader"
+    SKETCH = "ATmega32U4 board with another program"
+    MTX = "MTx, or another FTDI adapter"
+    OTHER = "something else"
+
+
+@dataclass(frozen=True, slots=True)
+class PortSeen:
+    """A serial port and what hangs on it."""
+
+    path: str
+    role: Role
+    text: str
+
+
+def list_seen() -> list[PortSeen]:
+    """The USB serial ports of this computer."""
+    return [
+        PortSeen(port.device, _role(port.vid, port.pid), port.description or "")
+        for port in sorted(list_ports.comports())
+        if port.vid is not None
+    ]
+
+
+def _role(vendor: int, product: int) -> Role:
+    for role, identifiers in ((Role.BOARD, BOARD_IDS), (Role.BOOTLOADER, BOOTLOADER_IDS), (Role.SKETCH, SKETCH_IDS)):
+        if (vendor, product) in identifiers:
+            return role
+    return Role.MTX if vendor == XSENS or (vendor == FTDI and product in FTDI_IDS) else Role.OTHER
+
+
+def find(seen: list[PortSeen], role: Role, name: Path) -> str | None:
+    """The port with the stable name, else the first one in this role."""
+    if name.exists():
+        return str(name)
+    return next((port.path for port in seen if port.role is role), None)
+
+
+def is_url(port: str) -> bool:
+    """Whether it is a pyserial URL and no file."""
+    return "://" in port
+
+
+def access_findings(subject: str, port: str) -> list[Finding]:
+    """Why this port cannot be opened, if it cannot; raises nothing."""
+    path = Path(port)
+    if is_url(port):
+        return []
+    if not path.exists():
+        remedy = "plug it in and look again; see which ports there are: ls /dev/serial/by-id"
+        return [Finding(Severity.FAULT, subject, f"{port}: there is no such port", remedy)]
+    if not path.is_char_device():
+        return [Finding(Severity.FAULT, subject, f"{port} is no serial port", "name one as /dev/ttyACM0")]
+    if os.access(path, os.R_OK | os.W_OK):
+        return []
+    what = f"{port}: this user may not open it (it belongs to {path.owner()}:{path.group()})"
+    remedy = f"sudo usermod -aG {path.group()} $USER, then log out and in; or install the udev rules (echostep doctor --udev)"
+    return [Finding(Severity.FAULT, subject, what, remedy)]
+
+
+def holder_findings(subject: str, port: str, processes: Path = Path("/proc")) -> list[Finding]:
+    """Other programs that have the port open: they steal its bytes. A pseudo terminal is always held by whoever plays the device."""
+    if is_url(port) or os.path.realpath(port).startswith("/dev/pts/"):
+        return []
+    held = []
+    target = os.path.realpath(port)
+    for folder in processes.glob("[0-9]*"):
+        if folder.name == str(os.getpid()):
+            continue
+        with contextlib.suppress(OSError):
+            if any(os.path.realpath(link) == target for link in (folder / "fd").iterdir()):
+                held.append(f"{(folder / 'comm').read_text().strip()} (process {folder.name})")
+    if not held:
+        return []
+    what = f"{port} is also open in {', '.join(held)}"
+    return [Finding(Severity.WARNING, subject, what, "close that program: it takes bytes away")]
+
+
+def latency_findings(subject: str, port: str, system: Path = Path("/sys")) -> list[Finding]:
+    """The latency timer of an FTDI adapter, 16 ms unless somebody set it."""
+    name = Path(os.path.realpath(port)).name
+    try:
+        latency_ms = int((system / "bus/usb-serial/devices" / name / "latency_timer").read_text())
+    except (OSError, ValueError):
+        return []
+    if latency_ms <= LATENCY_MAX_MS:
+        return []
+    what = f"its adapter waits up to {latency_ms} ms before it passes bytes on"
+    remedy = f"install the udev rules (echostep doctor --udev), or now: echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
+    return [Finding(Severity.WARNING, subject, what, remedy)]
+
+
+def rules_text() -> str:
+    """The udev rules that come with this package."""
+    return (files("echostep") / "firmware" / RULES).read_text()
+
+
+def rules_findings(folders: tuple[Path, ...] = RULE_FOLDERS) -> list[Finding]:
+    """Whether the udev rules are installed, and these ones."""
+    found = next((folder / RULES for folder in folders if (folder / RULES).exists()), None)
+    remedy = f"echostep doctor --udev | sudo tee /etc/udev/rules.d/{RULES} && sudo udevadm control --reload && sudo udevadm trigger"
+    if found is None:
+        what = "are not installed: no stable names (/dev/echostep, /dev/echostep-mtx), no low latency for the MTx"
+        return [Finding(Severity.NOTE, "udev rules", what, remedy)]
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        if found.read_text().strip() == rules_text().strip():
+            return []
+    return [Finding(Severity.NOTE, "udev rules", f"{found} is not this version's", remedy)]

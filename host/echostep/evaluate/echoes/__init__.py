@@ -1,0 +1,4 @@
+"""What simulated rangers hear, and how well the echo likelihood expects it.
+
+In: simulated pings. Out: rows and pictures. Owns nothing.
+"""

@@ -1,0 +1,136 @@
+"""`echostep evaluate feet`: the foot on real recordings with truth, one setting for all, beside the peers' figures.
+
+In: the folder of recordings. Out: rows `{set, recording, metric, value, distance_m, peer, peer_name}`, JSON, a table, on request a picture.
+Owns nothing. Nothing is set for a recording: the foot has one setting, and it stays at its default.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from statistics import median
+
+from echostep.errors import EchostepError
+from echostep.evaluate.feet.datasets import FootRecording, read_recordings
+from echostep.evaluate.feet.latency import pace_rows
+from echostep.evaluate.feet.leave_one_out import add_left_out, leave_one_out, said
+from echostep.evaluate.feet.metrics import Figure, align, places, way
+from echostep.evaluate.study import Row, console, print_table, write_json
+from echostep.foot.ins import Noise
+from echostep.foot.steps import Track, walk_track
+
+COLUMNS = {
+    "set": "set",
+    "recording": "recording",
+    "metric": "metric",
+    "value": "m",
+    "distance_m": "way m",
+    "peer": "peer's",
+}
+
+
+def feet(folder: Path, json: Path | None, out: Path | None, *, left_out: bool) -> None:
+    """Print the table of all recordings in the folder; raises EchostepError when there is none."""
+    recordings = recordings_in(folder)
+    tracks = [track_of(recording) for recording in recordings]
+    rows = [row for recording, track in zip(recordings, tracks, strict=True) for row in rows_of(recording, track)]
+    rows += medians(rows)
+    columns = COLUMNS
+    if left_out:
+        choices = leave_one_out(recordings, track_of)
+        add_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
+        columns = COLUMNS | {"left_out": "left out, m"}
+        for group, noise in choices.items():
+            console.print(f"{group} left out, the others choose: {said(noise)}")
+    print_table("The foot on real recordings, one setting", [_printed(row) for row in rows], columns)
+    live = pace_rows(recordings)
+    for row in live:
+        console.print(f"{row['metric']}: {row['value']:.4f}")
+    if json:
+        write_json(json, "feet", len(recordings), 0, rows + live)
+    if out:
+        draw_tracks(out / "feet.png", recordings, tracks)
+
+
+def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> list[Row]:
+    """The rows of one set with other constants."""
+    rows = [row for r in recordings if r.group == group for row in rows_of(r, track_of(r, noise))]
+    return rows + medians(rows)
+
+
+def recordings_in(folder: Path) -> list[FootRecording]:
+    """The recordings of the folder; what is skipped is said."""
+    if not folder.is_dir():
+        raise EchostepError(f"{folder}: no such folder: say with --data where the recordings are")
+    recordings, skipped = read_recordings(folder)
+    for line in skipped:
+        console.print(line)
+    if not recordings:
+        raise EchostepError(f"{folder}: no recording of any known set in it")
+    return recordings
+
+
+def track_of(recording: FootRecording, noise: Noise | None = None) -> Track:
+    """The foot's track, with the one setting unless other constants are given."""
+    return walk_track(recording.t_s, recording.accel, recording.gyro, noise=noise)
+
+
+def rows_of(recording: FootRecording, track: Track) -> list[Row]:
+    """One row for each figure of a recording."""
+    return [_row(recording.group, recording.name, figure, way(track)) for figure in recording.judge(track)]
+
+
+def medians(rows: list[Row]) -> list[Row]:
+    """The median of each metric of a set that has several recordings; of its size where it has a sign."""
+    found = []
+    for group, metric in dict.fromkeys((row["set"], row["metric"]) for row in rows if row["set"] != "stairs"):
+        same = [row for row in rows if (row["set"], row["metric"]) == (group, metric)]
+        if len(same) > 1:
+            middle = Figure(metric, median(abs(row["value"]) for row in same))
+            found.append(_row(group, f"median of {len(same)}", middle, median(row["distance_m"] for row in same)))
+    return found
+
+
+def _row(group: str, name: str, figure: Figure, way_m: float) -> Row:
+    peer_name, peer = figure.peer or (None, None)
+    return {
+        "set": group,
+        "recording": name,
+        "metric": figure.metric,
+        "value": round(figure.value, 4),
+        "distance_m": round(way_m, 2),
+        "peer": peer,
+        "peer_name": peer_name,
+    }
+
+
+def _printed(row: Row) -> Row:
+    """With three digits, and the peer's name beside its figure."""
+    peer = "" if row["peer"] is None else f"{row['peer']:.3f} {row['peer_name']}"
+    digits = {key: f"{row[key]:.3f}" for key in ("value", "left_out") if row.get(key) is not None}
+    return row | digits | {"peer": peer}
+
+
+def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]) -> None:
+    """Every track from above, on its truth where that is a path, as one PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Sheet
+
+    from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
+
+    across = 6
+    down = -(-len(recordings) // across)
+    sheet = Sheet(figsize=(3 * across, 3 * down), dpi=80, layout="constrained")
+    FigureCanvasAgg(sheet)
+    for k, (recording, track) in enumerate(zip(recordings, tracks, strict=True)):
+        axes = sheet.add_subplot(down, across, k + 1, aspect="equal", title=f"{recording.group} {recording.name}")
+        xy = track.position_m[:, :2]
+        if recording.truth_m is not None and recording.truth_t_s is not None:
+            axes.plot(*recording.truth_m.T, color=TRUTH_COLOUR, linewidth=3, alpha=0.5)
+            xy = align(places(track, recording.truth_t_s), recording.truth_m)
+        axes.plot(*xy.T, color=TRACK_COLOUR, linewidth=1)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        sheet.savefig(path)
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
+    console.print(f"{path}: tracks blue, truth green")

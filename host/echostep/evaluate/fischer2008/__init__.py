@@ -1,0 +1,4 @@
+"""The guided returns of Fischer et al. 2008.
+
+In: seeds. Out: rows and pictures. Owns nothing. Everything is simulated.
+"""

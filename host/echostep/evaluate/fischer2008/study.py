@@ -1,0 +1,146 @@
+"""The guided returns of [Fischer 2008, 4]: dead reckoning alone, the paper's fusion and ours, and what happens as beacons get worse (simulated).
+
+In: how many returns, a seed. Out: rows `{name, success, low95, high95, runs}`, the paper's Figures 9 and 10, a picture of the sweeps. Return k of
+every row is on the same ground: trail, beacons and sources of seed + k.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echostep.evaluate.fischer2008.simulator import OBEDIENT, OURS, PAPER, PDR, ObedientPerson, guided_return
+from echostep.evaluate.study import Row, Study, print_table, write_json, write_parquet
+from echostep.simulation.world.beacon_ground import GroundSettings, ground
+
+BATCH = 50  # returns a task
+PEOPLE = ObedientPerson(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)
+SYSTEMS = {"pdr": PDR, "fischer2008": PAPER, "default": OURS}
+NOMINAL = GroundSettings()
+UNCERTAIN = replace(NOMINAL, place_sd_m=1.0, axis_sd_deg=15.0, outliers=0.2)
+SWEEPS: dict[str, tuple[float, ...]] = {
+    "place_sd_m": (0.5, 1.0, 2.0, 3.0),
+    "axis_sd_deg": (15.0, 45.0, 90.0),
+    "reach_m": (3.0, 5.0, 12.0),
+    "spacing_m": (3.0, 8.0, 12.0),
+    "outliers": (0.0, 0.2, 0.4),
+    "period_s": (1.0, 2.0, 5.0),
+}
+SAMPLE = 20  # a sweep has one return for so many of the main rows
+CLOSER = 4  # and the rows of one condition one for so many
+COLUMNS = {"name": "", "percent": "% out", "low_percent": "from", "high_percent": "to (95 %)", "runs": "runs"}
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A row: who estimates, on what ground, how often heard, who walks.
+
+    `deployed`: beacons are known from the way in alone. `every`: one of so many returns.
+    """
+
+    name: str
+    system: int
+    settings: GroundSettings = NOMINAL
+    period_s: float = 0.2
+    person: ObedientPerson = OBEDIENT
+    deployed: bool = False
+    every: int = 1
+
+
+def cases() -> Iterator[Case]:
+    """All rows of the study."""
+    for name, system in SYSTEMS.items():
+        yield Case(name, system)
+    for name, system in list(SYSTEMS.items())[1:]:
+        yield Case(f"{name}/known-to-1m", system, replace(UNCERTAIN, axis_sd_deg=0.0), every=CLOSER)
+        yield Case(f"{name}/uncertain", system, UNCERTAIN, every=CLOSER)
+        yield Case(f"{name}/people", system, person=PEOPLE, every=CLOSER)
+        yield Case(f"{name}/moved", system, replace(NOMINAL, moved=0.1), every=SAMPLE)
+        yield Case(f"{name}/dead", system, replace(NOMINAL, dead=0.2), every=SAMPLE)
+    yield Case("default/deployed", OURS, deployed=True, every=SAMPLE)
+    yield Case("default/deployed-no-iron", OURS, replace(NOMINAL, sources=0), deployed=True, every=SAMPLE)
+    for parameter, values in SWEEPS.items():
+        for value in values:
+            for name, system in list(SYSTEMS.items())[1:]:
+                label = f"sweep/{parameter}={value:g}/{name}"
+                if parameter == "period_s":
+                    yield Case(label, system, period_s=value, every=SAMPLE)
+                else:
+                    yield Case(label, system, _with(parameter, value), every=SAMPLE)
+
+
+def _with(parameter: str, value: float) -> GroundSettings:
+    changed: dict[str, Any] = {parameter: value}
+    return replace(NOMINAL, **changed)
+
+
+def evaluate_fischer2008(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
+    """Run the study, print success rates with 95 % intervals, and write JSON, Parquet and the pictures."""
+    one = partial(one_batch, first=seed, runs=runs)
+    each = Study("fischer2008", math.ceil(runs / BATCH), 0, one, out, scheduler).rows()
+    rows = [_summary(name, [r for r in each if r["name"] == name]) for name in dict.fromkeys(r["name"] for r in each)]
+    printed = [
+        r | {"percent": 100 * r["success"], "low_percent": 100 * r["low95"], "high_percent": 100 * r["high95"]}
+        for r in rows
+    ]
+    print_table(f"People guided back to the exit in time, {runs} simulated returns", printed, COLUMNS)
+    write_parquet(out / "fischer2008.parquet", rows)
+    draw(out, rows)
+    if json_path is not None:
+        write_json(json_path, "fischer2008", runs, seed, rows)
+
+
+def one_batch(batch: int, first: int, runs: int) -> list[Row]:
+    """The returns [batch * BATCH, ...) of all rows: how many there were and how many came out."""
+    returns = range(batch * BATCH, min((batch + 1) * BATCH, runs))
+    found = []
+    for case in cases():
+        chosen = [k for k in returns if k % case.every == 0]
+        if chosen:
+            found.append(
+                {"name": case.name, "runs": len(chosen), "out": sum(one_return(case, first + k) for k in chosen)}
+            )
+    return found
+
+
+def one_return(case: Case, seed: int) -> bool:
+    """Whether one person gets out."""
+    world = ground(case.settings, np.random.default_rng([seed, 1]))
+    return guided_return(
+        world, case.system, seed, case.period_s, case.person, deployed=case.deployed,
+        place_sd_m=case.settings.place_sd_m, axis_sd_rad=math.radians(case.settings.axis_sd_deg),
+    ).arrived  # fmt: skip
+
+
+def _summary(name: str, batches: list[Row]) -> Row:
+    runs, out = sum(b["runs"] for b in batches), sum(b["out"] for b in batches)
+    low, high = wilson95(out, runs)
+    return {"name": name, "success": out / runs, "low95": low, "high95": high, "runs": runs}
+
+
+def wilson95(successes: int, runs: int) -> tuple[float, float]:
+    """Interval that holds the true rate with 95 % confidence [Wilson 1927]."""
+    z = 1.959963984540054
+    share, part = successes / runs, z * z / runs
+    middle = (share + part / 2) / (1 + part)
+    half = z * math.sqrt(share * (1 - share) / runs + part / (4 * runs)) / (1 + part)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def draw(out: Path, rows: list[dict[str, Any]]) -> None:
+    """The paper's Figures 9 and 10 and ours on the same ground, and the sweeps."""
+    from echostep.evaluate.fischer2008.pictures import draw_returns, draw_sweeps
+
+    trail = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [45.0, 15.0], [45.0, -5.0], [70.0, -5.0]])
+    world = ground(NOMINAL, np.random.default_rng(9), trail)
+    seen = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
+    draw_returns(out / "figures9-10.png", world, seen)
+    base = {r["name"]: r for r in rows}
+    nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
+    draw_sweeps(out / "sweeps.png", SWEEPS, nominal, base)

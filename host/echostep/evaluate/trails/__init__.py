@@ -1,0 +1,4 @@
+"""The trails of Fischer et al. 2008, walked by simulated people.
+
+In: seeds. Out: rows and pictures. Owns nothing.
+"""

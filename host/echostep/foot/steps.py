@@ -1,0 +1,202 @@
+"""Zero-velocity inertial navigation of one foot: samples -> stances and steps.
+
+In: time, specific force and angular rate of the foot, any mounting, 50-500 Hz. Out: `Step` when the foot has landed, `Stance` when it has left.
+Owns the filter's state (`ins`), the stance detector's (`stance`) and the footing (`footsteps`). Walk frame: levelled, z up, origin and yaw those
+of the first rest; yaw is how far the foot has turned since.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats, Ints
+from echostep.foot import ins, stance
+from echostep.foot import zupt_ins as footsteps
+from echostep.foot.magnetometer import new_compass
+
+NO_MAG: Floats = np.empty((0, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class FootSettings:
+    """`height_m`: of the sensor above the sole's contact with the floor; the instep of a shoe by default."""
+
+    height_m: float = 0.08
+
+
+@dataclass(frozen=True, slots=True)
+class Stance:
+    """The foot stood from `t_start_s` to `t_end_s`; `heading_rad` is its yaw in the walk frame when it left."""
+
+    t_start_s: float
+    t_end_s: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The foot left at `t_start_s`, landed at `t_end_s` and moved by `move_m` (walk frame) with `covariance` (3, 3) m2.
+
+    `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's
+    error: its square is the growth of the variance. All moves together are the position. `toe_rad` is the angle from the yaw to the direction of the
+    toe, as known so far; None until the foot has tipped enough to tell.
+    """
+
+    t_start_s: float
+    t_end_s: float
+    move_m: tuple[float, float, float]
+    covariance: Floats
+    heading_rad: float
+    heading_sd_rad: float
+    toe_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FootCounts:
+    """Samples that came; `impossible` (not finite, or beyond any foot) and `not_later` ones were skipped, `saturated` ones trusted less.
+
+    `forced` samples of rest contradicted the filter, which gave in. After each of the `gaps`, and when all rests contradict the filter, the
+    foot waits for a new level.
+    """
+
+    samples: int
+    impossible: int
+    not_later: int
+    saturated: int
+    gaps: int
+    forced: int
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A whole walk: `t_s` (n,), `position_m` (n, 3), `heading_rad` (n,), `stance` (n,) bool, the events and the counts.
+
+    `toe_known`: yaw zero is the direction of the toe when the foot was levelled (`alignment.aligned`); otherwise it is arbitrary.
+    `compass`: stances in which the magnetometer was trusted, and in which it was read.
+    """
+
+    t_s: Floats
+    position_m: Floats
+    heading_rad: Floats
+    stance: Bools
+    events: list[Step | Stance]
+    counts: FootCounts
+    toe_known: bool = False
+    compass: tuple[int, int] = (0, 0)
+
+    @property
+    def steps(self) -> list[Step]:
+        """The steps among the events."""
+        return [event for event in self.events if isinstance(event, Step)]
+
+
+@dataclass(frozen=True, slots=True)
+class FootEvents:
+    """What samples (n,) told: `events`, `told` (k,) = the sample that told each, and the foot after each sample: `heading_rad`, `stance` (n,)."""
+
+    events: list[Step | Stance]
+    told: Ints
+    heading_rad: Floats
+    stance: Bools
+
+
+class Foot:
+    """Feed it samples in any portions; equal samples give equal events, bit for bit."""
+
+    def __init__(self, settings: FootSettings | None = None, noise: ins.Noise | None = None) -> None:
+        self._height_m = (settings or FootSettings()).height_m
+        self._footing = np.zeros(1, footsteps.FOOTING)
+        self._nav = ins.new_nav(noise or ins.Noise())
+        self._window = stance.new_window()
+        self._rest = stance.new_rest()
+        self._compass = new_compass()
+
+    @property
+    def in_stance(self) -> bool:
+        """Whether the foot stands."""
+        return bool(self._footing["in_stance"][0])
+
+    @property
+    def position_m(self) -> tuple[float, float, float]:
+        """Position in the walk frame."""
+        x, y, z = self._nav.position.tolist()
+        return x, y, z
+
+    @property
+    def heading_rad(self) -> float:
+        """Yaw in the walk frame."""
+        return float(ins.heading(self._nav))
+
+    @property
+    def compass(self) -> tuple[int, int]:
+        """Stances in which the magnetometer was trusted, and in which it was read."""
+        return int(self._compass.seen[2]), int(self._compass.seen[0])
+
+    @property
+    def counts(self) -> FootCounts:
+        """What the samples were like so far."""
+        return FootCounts(*(int(self._footing[name][0]) for name in FootCounts.__slots__))
+
+    def feed(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> list[Step | Stance]:
+        """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, mag (n, 3) of any unit, body frame.
+
+        Raises ValueError for other shapes.
+        """
+        return self._run(t_s, accel, gyro, mag, np.empty((0, footsteps.ROW_SIZE)))
+
+    def follow(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:
+        """The same, and when each event was told."""
+        rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
+        events = self._run(t_s, accel, gyro, mag, rows)
+        told = np.searchsorted(rows[:, 5], np.arange(1, len(events) + 1))
+        return FootEvents(events, told, rows[:, 3], rows[:, 4] > 0.0)
+
+    def _run(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None, rows: Floats) -> list[Step | Stance]:
+        t_s, accel, gyro = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro))
+        mag = NO_MAG if mag is None else np.ascontiguousarray(mag, np.float64)
+        if t_s.ndim != 1 or any(v.shape != (len(t_s), 3) for v in (accel, gyro, *([] if mag is NO_MAG else [mag]))):
+            raise ValueError(
+                f"samples of shapes {t_s.shape}, {accel.shape}, {gyro.shape}; expected (n,), (n, 3), (n, 3), mag as gyro"
+            )
+        events = np.zeros((footsteps.EVENTS_PER_SAMPLE * len(t_s), footsteps.EVENT_SIZE))
+        found = footsteps.walk(
+            self._footing[0], self._nav, self._window, self._rest, self._compass, self._height_m,
+            t_s, accel, gyro, mag, events, rows,
+        )  # fmt: skip
+        return [_event(row) for row in events[:found]]
+
+
+def walk_track(
+    t_s: Floats,
+    accel: Floats,
+    gyro: Floats,
+    settings: FootSettings | None = None,
+    noise: ins.Noise | None = None,
+    mag: Floats | None = None,
+) -> Track:
+    """The whole walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s at once: what `Foot` would have told live."""
+    foot = Foot(settings, noise)
+    rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
+    events = foot._run(t_s, accel, gyro, mag, rows)
+    return Track(
+        np.asarray(t_s, np.float64),
+        rows[:, :3],
+        rows[:, 3],
+        rows[:, 4] > 0.0,
+        events,
+        foot.counts,
+        compass=foot.compass,
+    )
+
+
+def _event(row: Floats) -> Step | Stance:
+    kind, start, end, dx, dy, dz = row[:6].tolist()
+    heading, heading_sd, toe = row[15:].tolist()
+    if kind == footsteps.STANCE:
+        return Stance(start, end, heading)
+    return Step(
+        start, end, (dx, dy, dz), row[6:15].reshape(3, 3).copy(), heading, heading_sd, None if math.isnan(toe) else toe
+    )

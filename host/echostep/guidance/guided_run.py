@@ -1,0 +1,100 @@
+"""A run that is guided: the tracker's estimates in, cues out, to show, to speak and to keep.
+
+In: a tracker, where to go. Out: a `Cue` for each estimate, at the moment when it is told; cues.csv. Owns the guide. What beacons have said is
+asked at that moment, so a replay gives the cues of the run, in whatever portions its chunks come.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.guidance.cues import Cue, CueKind, Guide
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.path import MeasuredSegment
+from echostep.plan.model import Plan
+from echostep.plan.routing import Route, RoutePlace, Routes
+from echostep.tracker import Tracker
+
+NO_WAY = "Stop. No way leads there from here"
+CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
+
+
+def destination(text: str, plan: Plan) -> RoutePlace:
+    """The place of a room's name, of X,Y[,LEVEL], or the plan's start (`start`); raises EchostepError that lists the rooms."""
+    if text == "start" and plan.start is not None:
+        return RoutePlace(plan.start.x_m, plan.start.y_m, max(plan.start.level, 0))
+    for k, level in enumerate(plan.levels):
+        for room in level.rooms:
+            if room.name.casefold() == text.casefold():
+                return RoutePlace(*room.at_m, k)
+    try:
+        x, y, *rest = (float(part) for part in text.split(","))
+        level_number = int(rest[0]) if rest else 0
+        if len(rest) > 1 or not (math.isfinite(x) and math.isfinite(y)) or not 0 <= level_number < len(plan.levels):
+            raise ValueError
+    except (ValueError, OverflowError) as error:
+        names = sorted({room.name for level in plan.levels for room in level.rooms})
+        known = f"one of: {', '.join(names)}" if names else "this plan names no rooms"
+        raise EchostepError(f"--guide {text}: expected start, X,Y[,LEVEL] on the plan, or a room; {known}") from error
+    return RoutePlace(x, y, level_number)
+
+
+class GuidedRun:
+    """Guides the wearer of one tracker to one place; the way is laid at the first estimate."""
+
+    def __init__(self, tracker: Tracker, to: RoutePlace) -> None:
+        """Raises EchostepError for a place outside the plan, before anybody walks."""
+        self._tracker = tracker
+        self._to = to
+        self._routes = Routes(tracker.plan)
+        first = Guide(self._routes.way(to, to))
+        first.cue(
+            Estimate(0.0, to.x_m, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, to.level)
+        )  # compiled now, not on the way
+        self._guide: Guide | None = None
+        self._asked = 0
+        self.cues: list[Cue] = []
+        tracker.watchers.append(self._watch)
+
+    @property
+    def cue(self) -> Cue | None:
+        """The newest cue."""
+        return self.cues[-1] if self.cues else None
+
+    @property
+    def route(self) -> Route | None:
+        """The way as it is now."""
+        return self._guide.route if self._guide else None
+
+    def news(self) -> list[Cue]:
+        """The cues since it was last asked."""
+        begin, self._asked = self._asked, len(self.cues)
+        return self.cues[begin:]
+
+    def write(self, path: Path) -> None:
+        """All cues as CSV."""
+        with path.open("w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(CUE_COLUMNS)
+            writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)
+
+    def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
+        """The tracker told an estimate."""
+        if self._guide is None:
+            self._lay(e)
+        if self._guide is None:
+            self.cues.append(Cue(e.t_s, CueKind.STOP, NO_WAY, None, "" if self.cues else f"{NO_WAY}."))
+            return
+        crumbs = self._tracker.filter.crumbs if self._tracker.filter else None
+        self.cues.append(self._guide.cue(e, crumbs.heard_s if crumbs else None))
+
+    def _lay(self, e: Estimate) -> None:
+        """Lay the way from a first estimate; a place from which no way leads is asked again at the next."""
+        try:
+            route = self._routes.way(RoutePlace(e.x_m, e.y_m, e.level), self._to)
+        except EchostepError:
+            return
+        self._guide = Guide(route, planner=self._routes)

@@ -1,0 +1,60 @@
+"""How kernels are compiled: the only place that configures numba.
+
+In: functions. Out: the same, compiled when first called and cached beside their source. Owns the options.
+
+numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
+than their work: `lean_kernel` counts none, so it returns numbers or tuples of them and makes no arrays. numba has no public option for this.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from numba import njit
+from numba.np import linalg
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}  # a division by zero is inf or NaN, as in numpy
+_UNCOUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": False}
+_COUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": True}
+
+
+def kernel(function: Function) -> Function:
+    """A kernel that may make arrays, but for when a lean kernel calls it: then it is compiled as lean as its caller."""
+    return njit(**_OPTIONS)(function)
+
+
+def lean_kernel(function: Function) -> Function:
+    """A kernel that makes no arrays and counts no references to those that it is given."""
+    return njit(**_UNCOUNTED)(function)
+
+
+def allocating_kernel(function: Function) -> Function:
+    """A kernel that makes arrays although a lean kernel calls it."""
+    return njit(**_COUNTED)(function)
+
+
+def inline_kernel(function: Function) -> Function:
+    """A kernel that is copied into each of its callers and compiled with their options."""
+    return njit(**_OPTIONS, inline="always")(function)
+
+
+def _defer_blas() -> None:
+    """Load the part of numba that looks for BLAS through all of scipy (0.15 s), and let it look when a kernel asks for BLAS; none of ours does.
+
+    numba has no public way to say so: without the inner name nothing is deferred.
+    """
+    look = getattr(linalg, "ensure_blas", None)
+    if look is None or "numba.np.arraymath" in sys.modules:
+        return
+    linalg.ensure_blas = lambda: None
+    try:
+        from numba.np import arraymath  # noqa: F401
+    finally:
+        linalg.ensure_blas = look
+
+
+_defer_blas()

@@ -1,0 +1,140 @@
+"""log p(echo | pose): what a ranger may report where the plan has these echo sources; one function, for the cloud to call.
+
+In: a range and the echo sources that the plan shows to the ranger, nearest first. Out: a log-likelihood. Owns nothing.
+
+An SRF02 reports the first echo that it hears. So each source answers if it is heard and no nearer one was; before all of them something that is
+not on the plan may stand, and after them a second reflection may come. The mixture is the beam model's, with that order [Thrun et al. 2005, 6.3].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from echostep.arrays import Floats
+from echostep.jit import inline_kernel, lean_kernel
+from echostep.walls.visibility import CORNER, EDGE
+
+
+@dataclass(frozen=True, slots=True)
+class EchoSettings:
+    """What an SRF02 may report; lengths in metres, probabilities of one ping.
+
+    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` a radian off the axis.
+    A wall is heard while its level, spread over the way there and back and through a beam that is `rim_db` down at 27.5 degrees each way
+    [Girard 2011, 2.6.2, 2.6.3], exceeds that of a wall straight ahead at `maximum_m`; `soft_db`: how sharply.
+    The inside of a corner answers `corner_db` more weakly, any other wall end `edge_db`, and more so with distance.
+    `short`: something nearer that is not on the plan; `stray`: a second reflection where nothing on the plan was heard; `outlier`: anything else.
+    `correlation_m`: travel over which errors of successive echoes become independent.
+    """
+
+    sd_m: float = 0.036
+    slant_m: float = 0.05
+    rim_db: float = 6.0
+    maximum_m: float = 6.0
+    minimum_m: float = 0.15
+    soft_db: float = 2.0
+    edge_db: float = 20.0
+    corner_db: float = 3.0
+    short: float = 0.15
+    stray: float = 0.3
+    outlier: float = 0.05
+    correlation_m: float = 0.06
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for lengths of zero and for probabilities that are none."""
+        for name in ("sd_m", "soft_db", "correlation_m", "outlier"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"[echo] {name}: must be greater than 0")
+        for name in ("short", "stray", "outlier"):
+            if getattr(self, name) >= 1.0:
+                raise ValueError(f"[echo] {name}: must be a probability below 1")
+        if not 0.0 < self.minimum_m < 0.5 * self.maximum_m:
+            raise ValueError("[echo] minimum_m: must be well below maximum_m")
+
+
+class EchoModel(NamedTuple):
+    """`EchoSettings` as the kernels take them: levels as logit per dB, the beam per square radian."""
+
+    sd_m: float
+    slant_m: float
+    reach: float
+    per_db: float
+    beam: float
+    edge: float
+    corner: float
+    maximum_m: float
+    minimum_m: float
+    short: float
+    stray: float
+    outlier: float
+
+
+def echo_model(s: EchoSettings) -> EchoModel:
+    """The settings in the kernels' units."""
+    per_db = 1.0 / s.soft_db
+    beam = 2.0 * s.rim_db / math.radians(27.5) ** 2
+    reach = per_db * (20.0 * math.log10(s.maximum_m) + ABSORPTION_DB_M * s.maximum_m)
+    return EchoModel(
+        s.sd_m, s.slant_m, reach, per_db, per_db * beam, per_db * s.edge_db, per_db * s.corner_db,
+        s.maximum_m, s.minimum_m, s.short, s.stray, s.outlier,
+    )  # fmt: skip
+
+
+ABSORPTION_DB_M = 2.6  # there and back, 40 kHz in air [ISO 9613-1]
+DB = 20.0 / math.log(10.0)
+DEAF = 1e-4  # of a probability: nothing behind is worth a look
+SILENT = 0.2  # of what nothing explains, no echo
+NEVER = -8.0  # of a logit, likewise
+
+
+@lean_kernel
+def echo_density(
+    range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
+) -> float:
+    """Density per metre of a range given `count` sources, nearest first; range 0: the probability of no echo."""
+    first = distance_m[0] if count else m.maximum_m
+    unheard, hit = 1.0, 0.0
+    for k in range(count):
+        heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
+        unheard -= heard
+        sd = m.sd_m + m.slant_m * off_axis_rad[k]
+        if heard > 0.0 and abs(range_m - distance_m[k]) < 6.0 * sd:
+            hit += heard * normal(range_m - distance_m[k], sd)
+        if unheard < DEAF:
+            break
+    span = m.maximum_m - m.minimum_m
+    if range_m <= 0.0:
+        return (1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * SILENT
+    before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
+    short = 1.0 / before if range_m < m.minimum_m + before else 0.0
+    density = (1.0 - m.short) * (hit + unheard * m.stray / span) + m.short * short
+    return (1.0 - m.outlier) * density + m.outlier * (1.0 - SILENT) / span
+
+
+@lean_kernel
+def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel) -> float:
+    """Log p(range | sources), as `echo_density`."""
+    return math.log(echo_density(range_m, count, distance_m, off_axis_rad, kind, m))
+
+
+@inline_kernel
+def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel) -> float:
+    """Probability that a source is heard: spreading, absorption, beam, and the weakness of a mere edge."""
+    if distance_m < 0.5 * m.minimum_m:
+        return 0.0
+    log_d = math.log(distance_m) * DB
+    margin = m.reach - m.per_db * (log_d + ABSORPTION_DB_M * distance_m) - m.beam * off_axis_rad * off_axis_rad
+    if kind == EDGE:
+        margin -= m.edge + 0.5 * m.per_db * log_d
+    elif kind == CORNER:
+        margin -= m.corner
+    return 1.0 / (1.0 + math.exp(-margin)) if margin > NEVER else 0.0
+
+
+@inline_kernel
+def normal(x: float, sd: float) -> float:
+    """Normal density about zero."""
+    z = x / sd
+    return math.exp(-0.5 * z * z) / (sd * 2.5066282746310002)

@@ -1,0 +1,249 @@
+"""What a recording says besides the ports' bytes: estimates, steps, echoes, pressure, the board's status, in messages that viewers show.
+
+In: portions as they come from the ports, and the estimates that the tracker made of them. Out: `Note`s for the recorder. Owns a board reader of
+its own and the last estimate; it asks the tracker for its counts and its clock and changes nothing. No replay reads what is written here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from echostep.board.calibration import ranges
+from echostep.board.frames import BoardReader, Frames
+from echostep.board.messages import BY_ID, Ping, Pressure, Ranger, Status
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate
+from echostep.output.foxglove import (
+    ELLIPSE,
+    LEFT_BEAM,
+    LINE_STRIP,
+    NUMBER,
+    RIGHT_BEAM,
+    TEXT,
+    TRACK,
+    TRUTH,
+    WHOLE,
+    Place,
+    Shape,
+    array,
+    fields,
+    location,
+    pose,
+    scene,
+    topic,
+    walls,
+)  # fmt: skip
+from echostep.plan.georeference import EarthTransform
+from echostep.plan.model import Plan
+from echostep.ports.chunks import BOARD, Portion
+from echostep.recording.recorder import Note, Topic
+from echostep.tracker import Tracker
+
+PRESSURE_PA, TEMPERATURE_C = 0.25, 0.05  # a count
+NO_TEMPERATURE = -32768
+ELLIPSE_POINTS = 17
+TRACK_PIECE = 40  # points of the track that are drawn as one
+BEAM_S = 1.0  # an older echo is not drawn any more
+
+_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
+_SHAPES: dict[str, Shape] = {
+    "float": NUMBER,
+    "int": WHOLE,
+    "Status": TEXT,
+    "str": TEXT,
+    "bool": TRUTH,
+    "tuple[float, ...]": array(NUMBER),
+}
+_SIDES = ("left", "right")
+
+ESTIMATE = topic(
+    "/estimate",
+    fields(
+        "echostep.Estimate",
+        **{f.name: _SHAPES.get(str(f.type), NUMBER) for f in dataclasses.fields(Estimate)},
+        heading_deg=NUMBER,
+        radius95_m=NUMBER,
+    ),
+)
+STEP = topic(
+    "/step",
+    fields(
+        "echostep.Step", t_s=NUMBER, step=WHOLE, x_m=NUMBER, y_m=NUMBER, length_m=NUMBER, duration_s=NUMBER, speed_m_s=NUMBER, heading_deg=NUMBER,
+    ),
+)  # fmt: skip
+ECHO = tuple(
+    topic(f"/echo/{side}", fields("echostep.Echo", ticks=WHOLE, heard=TRUTH, range_m=NUMBER, time_of_flight_us=WHOLE))
+    for side in _SIDES
+)
+PRESSURE = topic("/pressure", fields("echostep.Pressure", ticks=WHOLE, pressure_pa=NUMBER, temperature_c=NUMBER))
+STATUS = topic(
+    "/status",
+    fields(
+        "echostep.Status", **dict.fromkeys(Status._fields, WHOLE), frames=WHOLE, frames_rejected=WHOLE, frames_lost=WHOLE, mtx_samples=WHOLE,
+        late_pings=WHOLE, bad_times=WHOLE, synchronised=TRUTH, particles=WHOLE,
+    ),
+)  # fmt: skip
+TOPICS: tuple[Topic, ...] = (ESTIMATE, STEP, *ECHO, PRESSURE, STATUS)
+
+
+class Derived:
+    """`take` after the tracker has taken the same portion."""
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+        tracker.intake.timeline.arrival_ns(0.0)  # compiled before anything is in a hurry
+        self._earth = earth_of(tracker.plan)
+        self._board = BoardReader()
+        self._drawn = False
+        self._last: Estimate | None = None
+        self._walked: list[Place] = []
+        self._heard: dict[int, tuple[int, float]] = {}
+
+    def take(self, portion: Portion, estimates: list[Estimate]) -> list[Note]:
+        """The messages of a portion."""
+        notes: list[Note] = []
+        from_board = portion.of(BOARD)
+        if from_board.received:
+            frames = self._board.frames(from_board.received)
+            t_ns = portion.t_arrival_ns[from_board.rows_of(frames.end)]
+            notes += self._echoes(frames, t_ns) + _pressures(frames, t_ns) + self._status(frames, t_ns)
+        for estimate in estimates:
+            notes += self._estimate(estimate)
+        return notes
+
+    def _echoes(self, frames: Frames, t_ns: Any) -> list[Note]:
+        at, pings = frames.rows(_IDS[Ping])
+        notes = []
+        for k, ping, range_m in zip(
+            at.tolist(), pings, ranges(pings, self._tracker.settings.ranger).tolist(), strict=True
+        ):
+            which, body = int(ping["ranger"]), {"ticks": int(ping["ticks"]), "heard": not math.isnan(range_m)}
+            if body["heard"]:
+                body |= {"range_m": range_m, "time_of_flight_us": int(ping["time_of_flight_us"])}
+                self._heard[which] = int(t_ns[k]), range_m
+            notes.append(Note(ECHO[which], int(t_ns[k]), body))
+        return notes
+
+    def _status(self, frames: Frames, t_ns: Any) -> list[Note]:
+        at, rows = frames.rows(_IDS[Status])
+        intake, cloud = self._tracker.intake, self._tracker.filter
+        own = {
+            "frames": intake.board.counts.good,
+            "frames_rejected": intake.board.counts.rejected,
+            "frames_lost": intake.board.counts.lost,
+            "mtx_samples": intake.mtx.counts.good,
+            "late_pings": intake.counts.late_pings,
+            "bad_times": intake.counts.bad_times,
+            "synchronised": intake.timeline.synchronised,
+            "particles": 0 if cloud is None else len(cloud.cloud.x_m),
+        }
+        return [
+            Note(STATUS, int(t_ns[k]), {**Status.unpack(row.tobytes())._asdict(), **own})
+            for k, row in zip(at.tolist(), rows, strict=True)
+        ]
+
+    def _estimate(self, e: Estimate) -> list[Note]:
+        numbers = {k: v for k, v in dataclasses.asdict(e).items() if not isinstance(v, float) or math.isfinite(v)}
+        if not {"t_s", "x_m", "y_m", "heading_rad"} <= numbers.keys():
+            return []
+        t_ns = self._tracker.intake.timeline.arrival_ns(e.t_s)
+        ellipse = e.ellipse95
+        body = {
+            **numbers,
+            "status": e.status.value,
+            "heading_deg": math.degrees(e.heading_rad),
+            "radius95_m": ellipse.major_m,
+        }
+        notes = [Note(ESTIMATE, t_ns, body)]
+        notes += pose(t_ns, (e.x_m, e.y_m, e.z_m), e.heading_rad)
+        notes += self._location(e, t_ns)
+        notes += self._step(e, t_ns)
+        notes.append(self._scene(e, t_ns))
+        self._last = e
+        return notes
+
+    def _location(self, e: Estimate, t_ns: int) -> list[Note]:
+        georeference = self._tracker.plan.georeference
+        if self._earth is None or georeference is None:
+            return []
+        longitude, latitude = self._earth.degrees(np.array([[e.x_m, e.y_m]]))[0].tolist()
+        ee, en, nn = east_north(georeference.rotation_rad, e.xx_m2, e.xy_m2, e.yy_m2)
+        covariance = (ee, en, 0.0, en, nn, 0.0, 0.0, 0.0, e.z_sd_m**2)
+        return [location(t_ns, longitude, latitude, e.z_m, covariance)]
+
+    def _step(self, e: Estimate, t_ns: int) -> list[Note]:
+        """A step ends at the first estimate that counts it; it began at the last estimate of the step before."""
+        before = self._last
+        if before is None or e.step <= before.step:
+            return []
+        length_m, duration_s = math.hypot(e.x_m - before.x_m, e.y_m - before.y_m), e.t_s - before.t_s
+        body = {
+            "t_s": e.t_s, "step": e.step, "x_m": e.x_m, "y_m": e.y_m, "length_m": length_m, "duration_s": duration_s,
+            "heading_deg": math.degrees(e.heading_rad),
+        }  # fmt: skip
+        if duration_s > 0.0:
+            body["speed_m_s"] = length_m / duration_s
+        return [Note(STEP, t_ns, body)]
+
+    def _scene(self, e: Estimate, t_ns: int) -> Note:
+        """The plan once, and what moves."""
+        here = (e.x_m, e.y_m, e.z_m)
+        self._walked.append(here)
+        begun = (len(self._walked) - 2) // TRACK_PIECE * TRACK_PIECE if len(self._walked) > 1 else 0
+        drawn = {
+            f"track_{begun}": (LINE_STRIP, TRACK, self._walked[begun:]),
+            "ellipse95": (LINE_STRIP, ELLIPSE, _outline(e)),
+        }
+        for which, color in ((Ranger.LEFT, LEFT_BEAM), (Ranger.RIGHT, RIGHT_BEAM)):
+            heard_ns, range_m = self._heard.get(which, (-1 << 62, 0.0))
+            axis = e.heading_rad + (0.5 if which == Ranger.LEFT else -0.5) * math.pi
+            fresh = abs(t_ns - heard_ns) < BEAM_S * 1e9
+            end = (e.x_m + range_m * math.cos(axis), e.y_m + range_m * math.sin(axis), e.z_m)
+            drawn[f"echo_{_SIDES[which]}"] = (LINE_STRIP, color, [here, end] if fresh else [])
+        if not self._drawn:
+            self._drawn = True
+            drawn |= {f"plan {k} {level.name}": walls(level) for k, level in enumerate(self._tracker.plan.levels)}
+        return scene(t_ns, **drawn)
+
+
+def earth_of(plan: Plan) -> EarthTransform | None:
+    """Where the plan lies on EarthTransform, if that is known; raises EchostepError when it cannot be understood."""
+    try:
+        return None if plan.georeference is None else EarthTransform(plan.georeference)
+    except ValueError as error:
+        raise EchostepError(f"plan {plan.name}: {error}") from error
+
+
+def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) -> tuple[float, float, float]:
+    """A covariance on the map's axes as variances east, of both, north; `rotation_rad`: from east to the map's x axis."""
+    c, s = math.cos(rotation_rad), math.sin(rotation_rad)
+    east = c * c * xx_m2 - 2.0 * c * s * xy_m2 + s * s * yy_m2
+    north = s * s * xx_m2 + 2.0 * c * s * xy_m2 + c * c * yy_m2
+    return east, c * s * (xx_m2 - yy_m2) + (c * c - s * s) * xy_m2, north
+
+
+def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
+    at, rows = frames.rows(_IDS[Pressure])
+    notes = []
+    for k, row in zip(at.tolist(), rows, strict=True):
+        if not row["pressure"]:
+            continue
+        body: dict[str, Any] = {"ticks": int(row["ticks"]), "pressure_pa": PRESSURE_PA * int(row["pressure"])}
+        if row["temperature"] != NO_TEMPERATURE:
+            body["temperature_c"] = round(TEMPERATURE_C * int(row["temperature"]), 3)
+        notes.append(Note(PRESSURE, int(t_ns[k]), body))
+    return notes
+
+
+def _outline(e: Estimate) -> list[Place]:
+    major_m, minor_m, angle_rad = e.ellipse95
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return [
+        (e.x_m + c * u - s * v, e.y_m + s * u + c * v, e.z_m)
+        for turn in np.linspace(0.0, 2.0 * math.pi, ELLIPSE_POINTS).tolist()
+        for u, v in [(major_m * math.cos(turn), minor_m * math.sin(turn))]
+    ]

@@ -1,0 +1,167 @@
+"""The terminal view: the plan, the track and the health of the streams, redrawn a few times a second.
+
+In: a tracker and its estimates. Out: text on the terminal. Owns the canvas; the tracker never waits for it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from rich.console import Console, Group
+from rich.live import Live
+from rich.panel import Panel
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from echostep.arrays import Octets
+from echostep.board.health import Finding, Severity, board_findings
+from echostep.localization.estimate import Estimate
+from echostep.plan.model import Level
+from echostep.tracker import Tracker
+
+REFRESH_S = 0.1
+MOST_FINDINGS = 3
+DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille dots by row and column
+
+
+class Canvas:
+    """The plan in braille dots (two by four to a character), with marks on top."""
+
+    def __init__(self, level: Level, columns: int = 76, rows: int = 22) -> None:
+        ends = level.walls.reshape(-1, 2) if len(level.walls) else np.array([[0.0, 0.0], [10.0, 10.0]])
+        self._low = ends.min(0)
+        extent = np.maximum(ends.max(0) - self._low, 1.0)
+        self._scale = float(min((2 * columns - 1) / extent[0], (4 * rows - 1) / extent[1]))
+        self._columns = math.ceil((extent[0] * self._scale + 1) / 2)
+        self._rows = math.ceil((extent[1] * self._scale + 1) / 4)
+        self._walls = np.zeros((self._rows, self._columns), np.uint8)
+        self._track = np.zeros_like(self._walls)
+        self._last: Estimate | None = None
+        for x0, y0, x1, y1 in level.walls:
+            self.line(self._walls, x0, y0, x1, y1)
+
+    def line(self, layer: Octets, x0: float, y0: float, x1: float, y1: float) -> None:
+        """Draw a line (map metres) into a layer."""
+        steps = int(math.hypot(x1 - x0, y1 - y0) * self._scale) + 1
+        for k in range(steps + 1):
+            self._dot(layer, x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps)
+
+    def walked(self, estimate: Estimate) -> None:
+        """Go on with the track to a place."""
+        before, self._last = self._last or estimate, estimate
+        self.line(self._track, before.x_m, before.y_m, estimate.x_m, estimate.y_m)
+
+    def _dot(self, layer: Octets, x: float, y: float) -> None:
+        column, row = self._place(x, y)
+        if 0 <= column < 2 * self._columns and 0 <= row < 4 * self._rows:
+            layer[row // 4, column // 2] |= DOTS[row % 4][column % 2]
+
+    def _place(self, x: float, y: float) -> tuple[int, int]:
+        column = round((x - self._low[0]) * self._scale)
+        return column, 4 * self._rows - 1 - round((y - self._low[1]) * self._scale)
+
+    def render(self, here: Estimate | None) -> Text:
+        """The picture as text: walls grey, track blue, the wearer a star."""
+        mark = (-1, -1) if here is None else self._place(here.x_m, here.y_m)
+        text = Text()
+        for r in range(self._rows):
+            for c in range(self._columns):
+                if (mark[1] // 4, mark[0] // 2) == (r, c):
+                    text.append("●", style="bold bright_yellow")
+                elif self._track[r, c]:
+                    text.append(chr(0x2800 + int(self._track[r, c] | self._walls[r, c])), style="bright_blue")
+                else:
+                    text.append(chr(0x2800 + int(self._walls[r, c])), style="grey62")
+            text.append("\n")
+        return text
+
+
+class TerminalView:
+    """Shows a running tracker; `progress` tells how much of the run is over, 0 to 1, None: nobody knows."""
+
+    def __init__(
+        self, tracker: Tracker, title: str, progress: Callable[[], float] | None = None, console: Console | None = None
+    ) -> None:
+        self._tracker = tracker
+        self._title = title
+        at = tracker.start.level if tracker.start else 0
+        self._level = at if at in range(len(tracker.plan.levels)) else 0
+        self._canvas = Canvas(tracker.plan.levels[self._level])
+        self._progress = Progress(
+            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()
+        )
+        self._fraction = progress
+        self._bar = self._progress.add_task("walk", total=1.0 if progress else None)
+        self._last: Estimate | None = None
+        self._drawn = 0.0
+        self._live = Live(console=console, auto_refresh=False, transient=False)
+
+    def __enter__(self) -> Self:
+        self._live.__enter__()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.show([], final=True)
+        self._live.__exit__(kind, error, at)
+
+    def _storey(self) -> str:
+        """The level in words, where there are several."""
+        levels, here = self._tracker.plan.levels, self._last
+        if len(levels) < 2 or here is None:
+            return ""
+        return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
+
+    def show(self, estimates: list[Estimate], notice: str = "", *, final: bool = False) -> None:
+        """Take new estimates; redraw when it is time."""
+        for e in estimates:
+            if e.level != self._level:
+                self._level, self._canvas = e.level, Canvas(self._tracker.plan.levels[e.level])
+            self._canvas.walked(e)
+            self._last = e
+        now = time.monotonic()
+        if not final and now - self._drawn < REFRESH_S:
+            return
+        self._drawn = now
+        if self._fraction:
+            self._progress.update(self._bar, completed=self._fraction())
+        parts = [
+            self._canvas.render(self._last),
+            Text(describe(self._last) + self._storey()),
+            Text(health(self._tracker), style="grey62"),
+            *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
+        ]
+        if notice:
+            parts.append(Text(notice, style="bold"))
+        self._live.update(Panel(Group(*parts, self._progress), title=self._title, expand=False), refresh=True)
+
+
+def describe(e: Estimate | None) -> str:
+    """The estimate in words."""
+    if e is None:
+        return "waiting for the foot to stand still"
+    return (
+        f"{e.status.value}, {e.ellipse95.major_m:.2f} m   x {e.x_m:.2f} m  y {e.y_m:.2f} m  "
+        f"heading {math.degrees(e.heading_rad) % 360:.0f}°   step {e.step}   t {e.t_s:.1f} s"
+    )
+
+
+def health(tracker: Tracker) -> str:
+    """The streams in words: what was rejected, lost or dropped."""
+    board, status = tracker.intake.board.counts, tracker.intake.status
+    dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
+    sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
+    heard = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
+    return (
+        f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}{heard}"
+    )
+
+
+def findings(tracker: Tracker) -> list[Finding]:
+    """The worst that the board says is wrong, in words."""
+    found = board_findings(tracker.intake.words)
+    return [finding for finding in found if finding.severity > Severity.NOTE][:MOST_FINDINGS]

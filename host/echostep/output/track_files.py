@@ -1,0 +1,208 @@
+"""Tracks of recordings for other programs.
+
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, or a recording with newly derived messages, by the name of the file. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import sqlite3
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate
+from echostep.output.derived import Derived, earth_of
+from echostep.plan.georeference import EarthTransform
+from echostep.plan.importers.formats import open_plan
+from echostep.plan.model import Plan
+from echostep.ports.chunks import Portion
+from echostep.recording.recorder import Recorder, Recording, open_recording
+from echostep.tracker import Tracker
+
+Columns = dict[str, list[Any]]
+
+ELLIPSE_POINTS = 33
+KML = "http://www.opengis.net/kml/2.2"
+COLORS = {"tracking": "ffff8020", "uncertain": "ff20a0ff", "lost": "ff2020ff"}  # alpha, blue, green, red
+
+
+def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recording, Plan], Tracker]) -> str:
+    """Track a recording and write its track in the format that the name of `out` asks for; returns what was written, in words.
+
+    Raises EchostepError for an unknown format, a map that is nowhere on EarthTransform where one is needed, and a recording without a walk.
+    """
+    if out.suffix not in FORMATS:
+        raise EchostepError(f"{out}: unknown kind of file; there are {', '.join(FORMATS)}")
+    recording, plan = open_recording(path), open_plan(plan_path)
+    if earth_of(plan) is None and out.suffix in ON_EARTH:
+        raise EchostepError(
+            f"{plan_path}: has no georeference, which {out.suffix} needs: the longitude and latitude of the map's origin"
+        )
+    if out.exists() and out.resolve() == path.resolve():
+        raise EchostepError(f"{out}: that is the recording itself: give another name with -o")
+    tracker = tracker_of(recording, plan)
+    estimates: list[Estimate] = []
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if out.suffix == ".mcap":
+            _record(recording, tracker, out, estimates)
+        else:
+            for portion in shown(recording, f"tracking {path.name}"):
+                estimates += tracker.take(portion)
+            if not estimates:
+                raise EchostepError(f"{path}: no estimate: the foot never stood still, or no MTx bytes came")
+            FORMATS[out.suffix](out, estimates, plan)
+    except (OSError, sqlite3.Error) as error:
+        raise EchostepError(f"{out}: cannot write: {getattr(error, 'strerror', None) or error}") from error
+    return f"{out}: {len(estimates)} estimates, {estimates[-1].t_s - estimates[0].t_s if estimates else 0.0:.1f} s"
+
+
+def shown(recording: Recording, title: str) -> Iterator[Portion]:
+    """The recording's portions, with a progress bar on a terminal."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(title, total=1.0)
+        for portion in recording.portions():
+            yield portion
+            progress.update(task, completed=recording.fraction)
+
+
+def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
+    """The estimates' fields by name, and longitude and latitude where the map lies somewhere on EarthTransform."""
+    columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
+    columns["status"] = [e.status.value for e in estimates]
+    if earth := earth_of(plan):
+        columns["longitude_deg"], columns["latitude_deg"] = _places(estimates, earth).T.tolist()
+    return columns
+
+
+def _places(estimates: list[Estimate], earth: EarthTransform) -> Floats:
+    return earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
+
+
+def _flat(columns: Columns) -> Columns:
+    """Lists within columns as text, for formats that know none."""
+    return {
+        name: [" ".join(map(str, v)) if isinstance(v, tuple) else v for v in column] for name, column in columns.items()
+    }
+
+
+def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[Estimate]) -> None:
+    """The same bytes again, with what is derived from them now."""
+    derived = Derived(tracker)
+    with Recorder(out, recording.about) as recorder:
+        for portion in shown(recording, f"tracking {recording.path.name}"):
+            for chunk in portion.chunks():
+                recorder.write(chunk)
+                recorder.settle(chunk)
+            new = tracker.take(portion)
+            estimates += new
+            recorder.notes(derived.take(portion, new))
+    if recorder.notices:
+        raise EchostepError(recorder.notices[0])
+
+
+def _write_csv(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+    columns = _flat(columns_of(estimates, plan))
+    with out.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def _write_parquet(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+    import pyarrow
+    from pyarrow import parquet
+
+    table = pyarrow.table(columns_of(estimates, plan))
+    parquet.write_table(table.replace_schema_metadata({"plan": plan.name, "plan_sha256": plan.digest}), out)
+
+
+def _write_geopackage(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+    import shapely
+
+    from echostep.output.geopackage import Layer, write_geopackage
+
+    columns = _flat(columns_of(estimates, plan))
+    longitude, latitude = columns.pop("longitude_deg"), columns.pop("latitude_deg")
+    kinds = {float: "REAL", int: "INTEGER", str: "TEXT"}
+    named = [(name, kinds.get(type(values[0]), "TEXT")) for name, values in columns.items()]
+    points = [shapely.Point(place) for place in zip(longitude, latitude, strict=True)]
+    layers = [Layer("estimates", "POINT", named, list(zip(points, zip(*columns.values(), strict=True), strict=True)))]
+    if len(points) > 1:
+        line = shapely.LineString(points)
+        layers.append(Layer("track", "LINESTRING", [("name", "TEXT")], [(line, (plan.name,))]))
+    write_geopackage(out, layers)
+
+
+def _write_kml(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+    """The track as a line, each estimate as a point with its 95 % ellipse."""
+    earth = earth_of(plan)
+    assert earth is not None
+    ET.register_namespace("", KML)
+    root = ET.Element(f"{{{KML}}}kml")
+    document = _element(root, "Document")
+    _element(document, "name", plan.name)
+    for status, color in COLORS.items():
+        style = _element(document, "Style", id=status)
+        line = _element(style, "LineStyle")
+        _element(line, "color", color)
+        _element(line, "width", "2")
+        _element(_element(style, "PolyStyle"), "color", "40" + color[2:])
+    places = _places(estimates, earth)
+    track = _element(document, "Placemark")
+    _element(track, "name", "track")
+    _element(track, "styleUrl", "#tracking")
+    _element(_element(track, "LineString"), "coordinates", _coordinates(places))
+    folder = _element(document, "Folder")
+    _element(folder, "name", "estimates")
+    for k, e in enumerate(estimates):
+        mark = _element(folder, "Placemark")
+        _element(mark, "name", f"{e.t_s:.1f} s")
+        _element(mark, "description", f"step {e.step}, {e.status.value}, 95 % within {e.ellipse95.major_m:.2f} m")
+        _element(mark, "styleUrl", f"#{e.status.value}")
+        both = _element(mark, "MultiGeometry")
+        _element(_element(both, "Point"), "coordinates", _coordinates(places[k : k + 1]))
+        ring = _element(_element(_element(both, "Polygon"), "outerBoundaryIs"), "LinearRing")
+        _element(ring, "coordinates", _coordinates(_ellipse(e, earth)))
+    ET.indent(root)
+    ET.ElementTree(root).write(out, encoding="utf-8", xml_declaration=True)
+
+
+def _element(parent: ET.Element, name: str, text: str | None = None, **attributes: str) -> ET.Element:
+    element = ET.SubElement(parent, f"{{{KML}}}{name}", attributes)
+    element.text = text
+    return element
+
+
+def _coordinates(places: Floats) -> str:
+    return " ".join(f"{x:.9f},{y:.9f}" for x, y in places.tolist())
+
+
+def _ellipse(e: Estimate, earth: EarthTransform) -> Floats:
+    major_m, minor_m, angle_rad = e.ellipse95
+    turn = np.linspace(0.0, 2.0 * math.pi, ELLIPSE_POINTS)
+    u, v = major_m * np.cos(turn), minor_m * np.sin(turn)
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return earth.degrees(np.column_stack((e.x_m + c * u - s * v, e.y_m + s * u + c * v)))
+
+
+Write = Callable[[Path, list[Estimate], Plan], None]
+FORMATS: dict[str, Write] = {
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+    ".gpkg": _write_geopackage,
+    ".kml": _write_kml,
+    ".mcap": lambda *_: None,
+}
+ON_EARTH = (".gpkg", ".kml")

@@ -1,0 +1,160 @@
+"""track.csv and track.png: a run to keep and to look at.
+
+In: a plan, estimates, the truth where known. Out: two files. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.foot.steps import Track
+from echostep.localization.beacon_map import BeaconPlace, BeaconState
+from echostep.localization.estimate import Estimate
+from echostep.localization.metrics import Truth
+from echostep.plan.model import Level, Plan
+from echostep.plan.routing import Route
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+COLUMNS = (
+    "t_s",
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "xx_m2",
+    "xy_m2",
+    "yy_m2",
+    "heading_sd_rad",
+    "step",
+    "status",
+    "level",
+    "z_m",
+    "z_sd_m",
+)
+MOST_INCHES = 40.0
+ELSEWHERE_S = 5.0
+WAY_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
+TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # told apart by the colour-blind [Okabe and Ito 2008]
+
+
+def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
+    """All estimates as CSV; numbers are written so that they read back to the same bits."""
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        writer.writerows([getattr(e, name) for name in COLUMNS] for e in estimates)
+
+
+def draw_track(
+    path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
+    route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
+) -> None:  # fmt: skip
+    """Plan, truth, way, beacons, estimate and 95 % ellipses as a PNG, the levels that he was on one above the other."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    visited = sorted({e.level for e in estimates}) or [0]
+    inches = min(sum(_height(plan.levels[k]) for k in visited), MOST_INCHES)
+    figure = Figure(figsize=(10, inches), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, parse_math=False)
+    for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
+        here = [e for e in estimates if e.level == k]
+        _draw_level(axes, plan.levels[k], here, truth.between(here) if truth else None)
+        _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
+        if len(plan.levels) > 1:
+            axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
+    figure.savefig(path)
+
+
+def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m: Floats | None) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import Ellipse as Patch
+
+    axes.set(aspect="equal", xlabel="x / m", ylabel="y / m")
+    axes.add_collection(LineCollection(list(level.solid.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
+    for room in level.rooms:
+        axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8, parse_math=False)
+    if truth_m is not None:
+        axes.plot(*truth_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
+    for e in _spread(estimates, 60):
+        ellipse = e.ellipse95
+        patch = Patch(
+            (e.x_m, e.y_m),
+            2 * ellipse.major_m,
+            2 * ellipse.minor_m,
+            angle=math.degrees(ellipse.angle_rad),
+            facecolor=TRACK_COLOUR,
+            alpha=0.15,
+        )
+        axes.add_patch(patch)
+    track = _with_gaps([(e.t_s, e.x_m, e.y_m) for e in estimates])
+    axes.plot(*track.T, color=TRACK_COLOUR, linewidth=1, marker=".", markersize=4, label="estimate, 95 % ellipses")
+    axes.autoscale_view()
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _draw_guidance(axes: Axes, level: int, route: Route | None, beacons: Sequence[BeaconPlace]) -> None:
+    """The way, and each beacon with its standard deviation; those that were moved or are silent are hollow."""
+    from matplotlib.patches import Circle
+
+    for stretch in route.stretches if route else ():
+        if stretch.level == level:
+            axes.plot(*stretch.line_m.T, color=WAY_COLOUR, linewidth=2, linestyle="--", label="way")
+    for b in beacons:
+        full = b.state is BeaconState.WELL
+        axes.plot(b.x_m, b.y_m, "^", color=BEACON_COLOUR, mfc=BEACON_COLOUR if full else "none", markersize=6)
+        axes.add_patch(Circle((b.x_m, b.y_m), 2.0 * b.sd_m, color=BEACON_COLOUR, alpha=0.15, lw=0))
+    if beacons:
+        axes.plot([], [], "^", color=BEACON_COLOUR, label="beacons (hollow: moved or silent)")
+    if beacons or route:
+        axes.legend(loc="upper right", fontsize=8)
+
+
+def _with_gaps(rows: Sequence[tuple[float, float, float]]) -> Floats:
+    """Places (n, 2) of rows of t_s, x, y; a break in the line where he was elsewhere."""
+    table = np.array(rows).reshape(-1, 3)
+    breaks = np.flatnonzero(np.diff(table[:, 0]) > ELSEWHERE_S) + 1
+    found: Floats = np.insert(table[:, 1:], breaks, np.nan, axis=0)
+    return found
+
+
+def draw_foot(path: Path, track: Track, title: str) -> None:
+    """The foot's way from above and its height over time, stances as dots, as a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 7), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    above, side = figure.subplots(2, 1, height_ratios=(3, 1))
+    x, y, z = track.position_m.T
+    above.plot(x, y, color=TRACK_COLOUR, linewidth=1)
+    above.plot(x[track.stance], y[track.stance], ".", color=TRUTH_COLOUR, markersize=3, label="foot stands")
+    above.plot(x[:1], y[:1], "k^", label="start")
+    above.set(aspect="equal", title=title, xlabel="x / m", ylabel="y / m")
+    above.legend(fontsize=8)
+    side.plot(track.t_s, z, color=TRACK_COLOUR, linewidth=1)
+    side.set(xlabel="t / s", ylabel="height / m")
+    figure.savefig(path)
+
+
+def _height(level: Level) -> float:
+    """Inches that suit the plan's shape at a width of ten."""
+    if not len(level.solid):
+        return 6.5
+    width, height = np.ptp(level.solid.reshape(-1, 2), axis=0)
+    return float(np.clip(1.0 + 9.2 * height / max(width, 1e-9), 4.0, 12.0))
+
+
+def _spread(estimates: Sequence[Estimate], most: int) -> Sequence[Estimate]:
+    """At most so many of them, evenly."""
+    return estimates[:: max(1, len(estimates) // most)]

@@ -1,0 +1,297 @@
+"""What the cones of many poses read, by the tiles in which they are.
+
+In: poses and the tables of their tiles. Out: for each ranger the shortest ray that counts [Girard 2011, eq. 3]. Owns nothing.
+Every loop goes over the poses of one tile, without a branch and over few arrays, so that the compiler makes vector instructions of it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Int32s
+from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
+from echostep.walls.echo_sources import bearing, hidden
+from echostep.walls.index import (
+    BEARINGS,
+    CONE_RAD,
+    SourceTable,
+    WallIndex,
+    tile_at,
+)
+from echostep.walls.visibility import tile_sources
+
+Eight = tuple[float, float, float, float, float, float, float, float]
+
+MOST_RAYS = 8  # of a fan
+POSES = 256  # of a tile at a time: their columns stay in the nearest cache
+COLUMNS = 10
+FEWEST = 10  # in a tile: for less it takes longer than one by one
+SAME_M = 1e-9  # a ray meets walls so close together at once
+
+
+class Fan(NamedTuple):
+    """Rays of a ranger: `cosine` and `sine` of each off the axis; `bound`: sine of the bound before it, `last` behind the last one."""
+
+    cosine: Eight
+    sine: Eight
+    bound: Eight
+    last: float
+
+
+@lean_kernel
+def sort_by_tile(
+    x: Floats, y: Floats, heading: Floats, index: WallIndex, which: Int32s, begin: Int32s, order: Int32s
+) -> int:
+    """Numbers of the poses (n,) into `order`, tile by tile in the order in which they were looked at: `begin` (looked + 2,), zeros before.
+
+    Returns how many there are in tiles with FEWEST at least; the others come last.
+    """
+    odd = index.looked
+    for i in range(len(x)):
+        tile = tile_at(x[i], y[i], index)
+        k = index.seen[tile] - 1 if tile >= 0 and math.isfinite(heading[i]) else odd
+        which[i] = k if 0 <= k < odd else odd
+        begin[which[i] + 1] += 1
+    for i in range(len(x)):
+        if begin[which[i] + 1] < FEWEST:
+            which[i] = odd
+    for k in range(odd):
+        if begin[k + 1] < FEWEST:
+            begin[odd + 1] += begin[k + 1]
+            begin[k + 1] = 0
+    for k in range(odd + 1):
+        begin[k + 1] += begin[k]
+    sorted_ = begin[odd]
+    for i in range(len(x)):
+        order[begin[which[i]]] = i
+        begin[which[i]] += 1
+    for k in range(odd, -1, -1):
+        begin[k + 1] = begin[k]
+    begin[0] = 0
+    return sorted_
+
+
+@lean_kernel
+def read_cones(
+    x: Floats, y: Floats, heading: Floats, index: WallIndex, order: Int32s, begin: Int32s, fan: Fan, maximum_m: float,
+    columns: Floats, ranges: Floats,
+) -> None:  # fmt: skip
+    """Fill `ranges` (n, 2) of the poses that were sorted into tiles; `columns` (COLUMNS, POSES) is scratch."""
+    for k in range(index.looked):
+        for first in range(begin[k], begin[k + 1], POSES):
+            chosen = order[first : min(first + POSES, begin[k + 1])]
+            m = len(chosen)
+            px, py, ax, ay, left, right = (
+                columns[0, :m], columns[1, :m], columns[2, :m], columns[3, :m], columns[4, :m], columns[5, :m]
+            )  # fmt: skip
+            for i in range(m):
+                j = chosen[i]
+                px[i], py[i], ax[i], ay[i] = x[j], y[j], -math.sin(heading[j]), math.cos(heading[j])
+                left[i] = right[i] = maximum_m
+            for face in range(index.faces.tile_start[k], index.faces.tile_start[k + 1]):
+                _meet(face, index, fan, maximum_m, columns, m)
+            for i in range(m):
+                ranges[chosen[i], 0], ranges[chosen[i], 1] = left[i], right[i]
+
+
+@lean_kernel
+def _meet(face: int, index: WallIndex, fan: Fan, maximum_m: float, columns: Floats, m: int) -> None:
+    """The rays of m poses that meet one wall first."""
+    px, py, ax, ay, left, right = (
+        columns[0, :m], columns[1, :m], columns[2, :m], columns[3, :m], columns[4, :m], columns[5, :m]
+    )  # fmt: skip
+    s, h, c, e = columns[6, :m], columns[7, :m], columns[8, :m], columns[9, :m]
+    faces, walls = index.faces, index.walls
+    x, y, tx, ty = faces.rows[face, 0], faces.rows[face, 1], faces.rows[face, 2], faces.rows[face, 3]
+    _place(px, py, x, y, tx, ty, s, h)
+    _place(ax, ay, 0.0, 0.0, tx, ty, e, c)
+    if not _end(c, e, h, s, faces.rows[face, 4], fan, maximum_m):
+        return
+    for j in range(faces.screen_start[face], faces.screen_start[face + 1]):
+        w = faces.screens[j]
+        _hide(c, px, py, s, x, y, tx, ty, walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3], maximum_m)
+    _keep(c, e, left, right)
+
+
+@lean_kernel
+def _place(px: Floats, py: Floats, x: float, y: float, tx: float, ty: float, along: Floats, aside: Floats) -> None:
+    """Places (or directions, from 0, 0) along and to the left of a line from x, y with tangent t."""
+    for i in range(len(px)):
+        dx, dy = px[i] - x, py[i] - y
+        along[i], aside[i] = dx * tx + dy * ty, dy * tx - dx * ty
+
+
+@lean_kernel
+def _end(c: Floats, e: Floats, h: Floats, s: Floats, width_m: float, fan: Fan, maximum_m: float) -> int:
+    """Where the ray nearest to the wall's normal ends, and how many count.
+
+    In: the axis to the left of the wall's tangent and along it, the pose likewise. Out: `c` length of the ray (`maximum_m` where it does not
+    count), `s` its end along the wall, `e` 1 for the left ranger and -1 for the right one.
+    """
+    cos0, cos1, cos2, cos3, cos4, cos5, cos6, cos7 = fan.cosine
+    sin0, sin1, sin2, sin3, sin4, sin5, sin6, sin7 = fan.sine
+    bound0, bound1, bound2, bound3, bound4, bound5, bound6, bound7 = fan.bound
+    count = 0
+    for i in range(len(c)):
+        side = -1.0 if c[i] * h[i] > 0.0 else 1.0
+        d, towards, aside = abs(h[i]), -side * c[i], -side * e[i] * h[i]
+        u, v = cos0, sin0
+        u, v = (cos1 if aside >= bound1 * d else u), (sin1 if aside >= bound1 * d else v)
+        u, v = (cos2 if aside >= bound2 * d else u), (sin2 if aside >= bound2 * d else v)
+        u, v = (cos3 if aside >= bound3 * d else u), (sin3 if aside >= bound3 * d else v)
+        u, v = (cos4 if aside >= bound4 * d else u), (sin4 if aside >= bound4 * d else v)
+        u, v = (cos5 if aside >= bound5 * d else u), (sin5 if aside >= bound5 * d else v)
+        u, v = (cos6 if aside >= bound6 * d else u), (sin6 if aside >= bound6 * d else v)
+        u, v = (cos7 if aside >= bound7 * d else u), (sin7 if aside >= bound7 * d else v)
+        length = d / abs(u * towards - v * side * e[i])
+        foot = s[i] + length * (u * side * e[i] + v * towards)
+        counts = (aside >= bound0 * d) & (aside < fan.last * d) & (foot >= 0.0) & (foot <= width_m)
+        counts &= (length < maximum_m) & (c[i] * h[i] != 0.0)
+        c[i] = length if counts else maximum_m
+        s[i], e[i] = foot, side
+        count += 1 if counts else 0
+    return count
+
+
+@lean_kernel
+def _hide(
+    length: Floats, px: Floats, py: Floats, s: Floats, x: float, y: float, tx: float, ty: float,
+    ax: float, ay: float, bx: float, by: float, maximum_m: float,
+) -> None:  # fmt: skip
+    """Rays to a wall do not count if they meet the wall from a to b before it; touching counts (`walls.segments_cross`)."""
+    vx, vy = bx - ax, by - ay
+    for i in range(len(length)):
+        share = 1.0 - SAME_M / length[i]
+        ux, uy = share * (x + s[i] * tx - px[i]), share * (y + s[i] * ty - py[i])
+        cx, cy = ax - px[i], ay - py[i]
+        d1, d2 = ux * cy - uy * cx, ux * (cy + vy) - uy * (cx + vx)
+        here = vy * cx - vx * cy
+        met = (d1 * d2 <= 0.0) & (d1 != d2) & (here * (here + vx * uy - vy * ux) <= 0.0)
+        length[i] = maximum_m if met else length[i]
+
+
+@lean_kernel
+def _keep(length: Floats, side: Floats, left: Floats, right: Floats) -> None:
+    """The shorter one, for the ranger that it belongs to."""
+    for i in range(len(length)):
+        left[i] = length[i] if (side[i] > 0.0) & (length[i] < left[i]) else left[i]
+        right[i] = length[i] if (side[i] < 0.0) & (length[i] < right[i]) else right[i]
+
+
+@kernel
+def lambda_ray_ranges(
+    x: Floats, y: Floats, heading_rad: Floats, index: WallIndex,
+    rays: int = 7, aperture_rad: float = math.radians(55.0), maximum_m: float = 6.0,
+) -> Floats:  # fmt: skip
+    """What each of n poses reads with rangers to the left and to the right, (n, 2) [Girard 2011, eq. 3].
+
+    Each ranger sends `rays` rays, `aperture_rad` / `rays` apart about its axis. A ray ends at the first wall it meets, and counts if it meets that
+    within half the spacing from its normal. The reading is the shortest ray that counts, `maximum_m` (at most EAR_REACH_M) if there is none.
+    No ray is cast: a wall can only answer on the ray that is nearest to its normal. Fast where `Walls` was made for half the spacing.
+    """
+    ranges = np.empty((len(x), 2))
+    spacing = aperture_rad / rays
+    angle = (np.arange(rays + 1) + 0.5 - 0.5 * rays) * spacing
+    bound = np.sin(np.minimum(np.maximum(angle - 0.5 * spacing, -0.5 * math.pi), 0.5 * math.pi))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    slant = math.tan(0.5 * spacing) * (1.0 + 1e-12)
+    tables_hold = slant <= index.slant * (1.0 + 1e-11) and 0.5 * aperture_rad <= CONE_RAD
+    order, others = np.arange(len(x)).astype(np.int32), 0
+    if tables_hold and rays <= MOST_RAYS:
+        begin = np.zeros(index.looked + 2, np.int32)
+        others = sort_by_tile(x, y, heading_rad, index, np.empty(len(x), np.int32), begin, order)
+        eight = Fan(_eight(cosine, rays, 0.0), _eight(sine, rays, 0.0), _eight(bound, rays, np.inf), bound[rays])
+        columns = np.empty((COLUMNS, POSES))
+        read_cones(x, y, heading_rad, index, order, begin, eight, maximum_m, columns, ranges)
+    fan = np.vstack((cosine, sine, bound))
+    _cone_ranges(order[others:], x, y, heading_rad, index, fan, slant, tables_hold, maximum_m, ranges)
+    return ranges
+
+
+@kernel
+def _eight(values: Floats, count: int, beyond: float) -> Eight:
+    """The first ones of `values`, at most MOST_RAYS, and the rest of them `beyond`."""
+    row = np.full(MOST_RAYS, beyond)
+    row[:count] = values[:count]
+    return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
+
+
+@lean_kernel
+def _cone_ranges(
+    chosen: Int32s, x: Floats, y: Floats, heading: Floats, index: WallIndex,
+    fan: Floats, slant: float, tables_hold: bool, maximum_m: float, ranges: Floats,
+) -> None:  # fmt: skip
+    """Fill `ranges` of the chosen poses, one by one.
+
+    `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of its width.
+    """
+    for i in chosen:
+        tile = tile_at(x[i], y[i], index)
+        if tile < 0 or not math.isfinite(heading[i]):
+            ranges[i, 0] = ranges[i, 1] = maximum_m
+            continue
+        k = index.seen[tile] - 1
+        ax, ay = -math.sin(heading[i]), math.cos(heading[i])
+        if not (0 <= k < index.looked and tables_hold):
+            ranges[i, 0] = _cone_range_unseen(x[i], y[i], ax, ay, tile, index, fan, slant, maximum_m)
+            ranges[i, 1] = _cone_range_unseen(x[i], y[i], -ax, -ay, tile, index, fan, slant, maximum_m)
+            continue
+        left = bearing(heading[i] + 0.5 * math.pi)
+        right = (left + BEARINGS // 2) % BEARINGS
+        left, right = left + k * BEARINGS, right + k * BEARINGS
+        ranges[i, 0] = _cone_range(x[i], y[i], ax, ay, index.walls, index.faces, left, fan, slant, maximum_m)
+        ranges[i, 1] = _cone_range(x[i], y[i], -ax, -ay, index.walls, index.faces, right, fan, slant, maximum_m)
+
+
+@allocating_kernel
+def _cone_range_unseen(
+    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex, fan: Floats, slant: float, maximum_m: float
+) -> float:
+    """The same where the tables do not hold."""
+    faces, _ = tile_sources(tile, index, slant)
+    shortest = maximum_m
+    for u in range(BEARINGS):
+        shortest = min(shortest, _cone_range(px, py, ax, ay, index.walls, faces, u, fan, slant, maximum_m))
+    return shortest
+
+
+@inline_kernel
+def _cone_range(
+    px: float,
+    py: float,
+    ax: float,
+    ay: float,
+    walls: Floats,
+    faces: SourceTable,
+    u: int,
+    fan: Floats,
+    slant: float,
+    maximum_m: float,
+) -> float:
+    """The shortest ray that counts about the axis a, among the walls of unit u."""
+    shortest, rays = maximum_m, fan.shape[1] - 1
+    for at in range(faces.start[u], faces.start[u + 1]):
+        i = faces.order[at]
+        dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
+        tx, ty = faces.rows[i, 2], faces.rows[i, 3]
+        h = dy * tx - dx * ty
+        d, aside = abs(h), -(ax * tx + ay * ty) * h
+        s, aslant = dx * tx + dy * ty, d * slant
+        if not (d < shortest and -aslant <= s <= faces.rows[i, 4] + aslant and (ax * ty - ay * tx) * h > 0.0):
+            continue
+        if aside < fan[2, 0] * d or aside >= fan[2, rays] * d:
+            continue
+        k = 0  # the ray nearest to the wall's normal
+        for j in range(1, rays):
+            k += aside >= fan[2, j] * d
+        rx, ry = ax * fan[0, k] - ay * fan[1, k], ay * fan[0, k] + ax * fan[1, k]
+        length = d / abs(rx * ty - ry * tx)
+        foot = s + length * (rx * tx + ry * ty)
+        if not (length < shortest and 0.0 <= foot <= faces.rows[i, 4]):
+            continue
+        if not hidden(px, py, px + (length - SAME_M) * rx, py + (length - SAME_M) * ry, walls, faces, i):
+            shortest = length
+    return shortest

@@ -1,0 +1,72 @@
+"""The types that odometry and localization exchange: the trunk's path in pieces, and what was measured on each.
+
+In: nothing. Out: `PathSegment`, `MeasuredSegment`, `Dropout`. Owns nothing. Frame: walk (z up, origin and yaw arbitrary at the start).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from echostep.angles import wrap
+from echostep.arrays import Floats, Ints
+
+STANDING_PIECE_S = 0.5  # duration of the segments into which standing is cut: two estimates a second
+UNOBSERVED_SD_M = 0.75  # a segment with a larger standard deviation was not observed: half a stride of an adult
+
+
+@dataclass(frozen=True, slots=True)
+class PathSegment:
+    """The trunk moves evenly by (dx, dy) in the walk frame, from `t0_s` to `t1_s`, turning from `heading0_rad` to `heading1_rad`.
+
+    `sd_m`: standard deviation of the move per axis. `turn_sd_rad`: growth of the yaw's standard deviation. `step`: steps so far.
+    `anchor_sd_m`: standard deviation of each end per axis, the same at both. `rise_m`: height gained by the foot, with its standard deviation,
+    infinite where no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share.
+    """
+
+    t0_s: float
+    t1_s: float
+    dx_m: float
+    dy_m: float
+    heading0_rad: float
+    heading1_rad: float
+    sd_m: float
+    turn_sd_rad: float
+    step: int
+    anchor_sd_m: float = 0.0
+    rise_m: float = 0.0
+    rise_sd_m: float = math.inf
+    scale_sd: float = 0.0
+
+    @property
+    def unobserved(self) -> bool:
+        """Whether the foot was silent for so long that the move is a guess, and the way to it unknown."""
+        return self.sd_m > UNOBSERVED_SD_M
+
+    def heading_rad(self, t_s: float) -> float:
+        """Heading of the trunk at a time on this segment, interpolated along the shorter arc."""
+        share = (t_s - self.t0_s) / (self.t1_s - self.t0_s) if self.t1_s > self.t0_s else 1.0
+        return self.heading0_rad + share * wrap(self.heading1_rad - self.heading0_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredSegment:
+    """A path segment with the pings triggered since the segment before it, oldest first.
+
+    `t_s`, `ranger` (0 looks left, 1 right) and `range_m` (NaN: no echo) are (n,). `height_m` (k,): heights by pressure in the same time.
+    """
+
+    segment: PathSegment
+    t_s: Floats
+    ranger: Ints
+    range_m: Floats
+    height_m: Floats = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Dropout:
+    """At `t_s` the board sends, but neither foot nor legs have been observed for a second: the position is unknown from here on."""
+
+    t_s: float

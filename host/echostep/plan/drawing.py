@@ -1,0 +1,214 @@
+"""Pictures of plans, PNG or SVG: rooms, walls, windows, doors, ways between levels, and what the check has found.
+
+In: a `Plan`, a place to look at, findings. Out: a file. Owns the colours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from echostep.errors import EchostepError
+from echostep.plan.cropping import Bounds, extent, within
+from echostep.plan.model import Level, Plan, Room
+
+if TYPE_CHECKING:
+    from echostep.plan.check import PlanFinding
+
+WALL, WINDOW, DOOR, ROOM, WAY, OBSTACLE, WRONG = (
+    "#333333",
+    "#56b4e9",
+    "#d55e00",
+    "#f3efe6",
+    "#009e73",
+    "#bbbbbb",
+    "#d0021b",
+)
+WIDTH_PX = 1500  # of a picture; a level has 900 at least
+MANY = 20_000  # more lines than these are drawn as pixels
+MOST_NAMES = 500  # of rooms in one picture, after which none could be read
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A part of the map on paper: how many points (1/72 inch) a metre has, how many metres a pixel."""
+
+    bounds: Bounds
+    points_m: float
+    pixel_m: float
+
+
+def draw_plan(
+    plan: Plan, path: Path, levels: Sequence[int], bounds: Bounds | None = None, findings: Sequence[PlanFinding] = ()
+) -> None:
+    """The levels side by side, or what lies within the bounds; raises EchostepError when the file cannot be written."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    if path.suffix.casefold() not in (".png", ".svg"):
+        raise EchostepError(f"{path}: pictures are .png or .svg")
+    columns = math.ceil(math.sqrt(len(levels)))
+    wide_px = max(WIDTH_PX, 900 * columns)
+    rows = math.ceil(len(levels) / columns)
+    x0, y0, x1, y1 = bounds or _about([plan.levels[i] for i in levels])
+    shape = min(max((y1 - y0) / (x1 - x0), 0.3), 2.5)
+    cell = 10.0 if columns == 1 else 6.0  # inches
+    figure = Figure(figsize=(cell * columns, ((cell - 0.4) * shape + 0.5) * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    view = View((x0, y0, x1, y1), 72.0 * cell / (x1 - x0), 1.1 * max(x1 - x0, (y1 - y0) / shape) * columns / wide_px)
+    for number, i in enumerate(levels):
+        axes = figure.add_subplot(rows, columns, number + 1, aspect="equal")
+        _draw_level(axes, plan, i, view, [f for f in findings if f.level == i])
+    try:
+        figure.savefig(
+            path,
+            dpi=max(60, round(wide_px / figure.get_figwidth())),
+            metadata={"Date": None} if path.suffix == ".svg" else None,
+        )
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+
+
+def _about(levels: Sequence[Level]) -> Bounds:
+    """All of these levels with a margin."""
+    boxes = np.array([extent(level.solid) for level in levels])
+    x0, y0 = boxes[:, :2].min(axis=0)
+    x1, y1 = boxes[:, 2:].max(axis=0)
+    edge = 0.03 * max(x1 - x0, y1 - y0, 1.0)
+    return x0 - edge, y0 - edge, x1 + edge, y1 + edge
+
+
+def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[PlanFinding]) -> None:
+    from matplotlib.collections import PolyCollection
+
+    x0, y0, x1, y1 = view.bounds
+    level = plan.levels[i]
+    outlines = [room.outline_m for room in level.rooms if room.outline_m is not None]
+    ways = [connector for connector in plan.connectors if i in connector.levels]
+    axes.add_collection(PolyCollection(outlines, facecolors=ROOM, edgecolors="none", zorder=0))
+    axes.add_collection(
+        PolyCollection([way.outline_m for way in ways], facecolors=WAY, alpha=0.3, edgecolors="none", zorder=1)
+    )
+    axes.add_collection(
+        PolyCollection(list(level.obstacles), facecolors=OBSTACLE, edgecolors=WALL, linewidths=0.5, zorder=1)
+    )
+    _lines(axes, level.walls, view, WALL, 0.9)
+    _lines(axes, level.windows, view, WINDOW, 0.9)
+    _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
+    for way in ways:
+        axes.text(
+            *way.outline_m.mean(axis=0),
+            shown(way.name),
+            parse_math=False,
+            size=6,
+            ha="center",
+            va="center",
+            color="#00553e",
+            clip_on=True,
+            zorder=5,
+        )
+    named = [room for room in level.rooms if x0 <= room.at_m[0] <= x1 and y0 <= room.at_m[1] <= y1]
+    for room in named if len(named) <= MOST_NAMES else ():
+        size = _letter_pt(room, view.points_m)
+        axes.text(
+            *room.at_m,
+            shown(room.name),
+            parse_math=False,
+            size=size,
+            ha="center",
+            va="center",
+            color="#555555",
+            clip_on=True,
+            zorder=5,
+        )
+    if plan.start is not None and plan.start.level == i:
+        axes.plot(
+            plan.start.x_m,
+            plan.start.y_m,
+            marker=(3, 0, math.degrees(plan.start.heading_rad) - 90),
+            color=WAY,
+            markersize=9,
+            zorder=6,
+        )
+    for finding in findings:
+        _mark(axes, finding)
+    axes.set_xlim(x0, x1)
+    axes.set_ylim(y0, y1)
+    axes.set_title(shown(f"{level.name}, {level.height_m:g} m"), size=9, parse_math=False)
+    axes.tick_params(labelsize=6, colors="#888888")
+    for side in axes.spines.values():
+        side.set_color("#dddddd")
+
+
+def shown(name: str) -> str:
+    """A name in a picture: one line, without what is not printed, not too long."""
+    return "".join(letter if letter.isprintable() else " " for letter in name)[:80]
+
+
+def _letter_pt(room: Room, points_m: float) -> float:
+    """Letters that let the name fit between the room's walls, where that can be read."""
+    if room.outline_m is None:
+        return 6.0
+    x, y = room.outline_m.T
+    area_m2 = 0.5 * abs(float(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))))
+    wide_m = min(float(np.ptp(x)), 1.1 * math.sqrt(area_m2))
+    return min(8.0, max(3.0, wide_m * points_m / (0.6 * max(len(room.name), 1))))
+
+
+def _lines(axes: Any, segments: Any, view: View, colour: str, width: float) -> None:
+    """Segments as lines; as pixels when there are very many."""
+    from matplotlib.collections import LineCollection
+
+    seen = within(segments, view.bounds)
+    if len(seen) <= MANY:
+        axes.add_collection(
+            LineCollection(list(seen.reshape(-1, 2, 2)), colors=colour, linewidths=width, capstyle="round", zorder=3)
+        )
+    else:
+        image = np.zeros((*(drawn := _pixels(seen, view)).shape, 4), dtype=np.uint8)
+        image[drawn] = (*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), 255)
+        x0, y0, x1, y1 = view.bounds
+        axes.imshow(image, extent=(x0, x1, y0, y1), origin="lower", interpolation="nearest", zorder=3)
+
+
+def _pixels(segments: Any, view: View) -> Any:
+    """Which pixels have a wall: points along every segment, a pixel apart."""
+    x0, y0, x1, y1 = view.bounds
+    width, height = (max(1, math.ceil((high - low) / view.pixel_m)) for low, high in ((x0, x1), (y0, y1)))
+    image = np.zeros((height, width), dtype=bool)
+    counts = np.minimum(
+        np.ceil(np.abs(segments[:, 2:] - segments[:, :2]).max(axis=1) / view.pixel_m) + 1, 2 * WIDTH_PX
+    ).astype(int)
+    for first in range(0, len(segments), 100_000):
+        some, count = segments[first : first + 100_000], counts[first : first + 100_000]
+        row = np.repeat(np.arange(len(some)), count)
+        step = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[row] - 1, 1)
+        x, y = (some[row, :2] + step[:, None] * (some[row, 2:] - some[row, :2])).T
+        column, line = ((x - x0) / (x1 - x0) * width).astype(int), ((y - y0) / (y1 - y0) * height).astype(int)
+        seen = (column >= 0) & (column < width) & (line >= 0) & (line < height)
+        image[line[seen], column[seen]] = True
+    return image
+
+
+def _mark(axes: Any, finding: PlanFinding) -> None:
+    """A ring about the place, and the wrong lines themselves."""
+    for x0, y0, x1, y1 in finding.lines_m:
+        axes.plot((x0, x1), (y0, y1), color=WRONG, linewidth=2.0, alpha=0.6, zorder=7)
+    axes.plot(
+        *finding.at_m, "o", markersize=11, markerfacecolor="none", markeredgecolor=WRONG, markeredgewidth=1.2, zorder=8
+    )
+    axes.annotate(
+        str(finding.number),
+        finding.at_m,
+        (5, 5),
+        textcoords="offset points",
+        size=7,
+        color=WRONG,
+        zorder=8,
+        annotation_clip=True,
+    )

@@ -1,0 +1,69 @@
+"""A folder or a zip file with a few JSON files, read within bounds.
+
+In: a path. Out: texts by name. Owns the limits: a zip may not grow beyond them, whatever its directory says.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.plan.importers.parsing import decode, read_text
+
+LARGEST_BYTES = 256 * 2**20
+MOST_FILES = 1000
+
+
+class Archive:
+    """Files by their last names; close it, or use it in a with statement."""
+
+    def __init__(self, path: Path) -> None:
+        """Open it; raises EchostepError when it is neither a folder nor a zip file."""
+        self.path = path
+        self._zip: zipfile.ZipFile | None = None
+        self._names: dict[str, str] = {}
+        if path.is_dir():
+            return
+        try:
+            self._zip = zipfile.ZipFile(path)
+            names = self._zip.namelist()
+        except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+            raise EchostepError(f"{path}: not a zip file: {error}") from error
+        if len(names) > MOST_FILES:
+            self._zip.close()
+            raise EchostepError(f"{path}: {len(names)} files in it; expected {MOST_FILES} at most")
+        self._names = {name.rsplit("/", 1)[-1]: name for name in names if "__MACOSX" not in name}
+
+    def __enter__(self) -> Archive:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the zip file."""
+        if self._zip is not None:
+            self._zip.close()
+
+    def place(self, name: str) -> str:
+        """How a mistake names the file."""
+        return f"{self.path}: {name}"
+
+    def has(self, name: str) -> bool:
+        """Whether the file is there."""
+        return name in self._names if self._zip is not None else (self.path / name).is_file()
+
+    def text(self, name: str) -> str:
+        """The text of a file."""
+        if self._zip is None:
+            return read_text(self.path / name)
+        if name not in self._names:
+            raise EchostepError(f"{self.place(name)}: not in the archive")
+        try:
+            with self._zip.open(self._names[name]) as file:
+                raw = file.read(LARGEST_BYTES + 1)
+        except (OSError, zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, EOFError) as error:
+            raise EchostepError(f"{self.place(name)}: cannot be read: {error}") from error
+        if len(raw) > LARGEST_BYTES:
+            raise EchostepError(f"{self.place(name)}: larger than {LARGEST_BYTES // 2**20} MiB when unpacked")
+        return decode(raw, self.place(name))

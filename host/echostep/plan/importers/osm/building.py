@@ -1,0 +1,197 @@
+"""OpenStreetMap Simple Indoor Tagging (XML, or JSON of Overpass) -> `Plan`.
+
+In: an .osm, .xml or .json file. Out: `Plan`. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a building's outline is a wall
+on each of its levels; a door is a node on a wall. Levels are `storey_m` apart, level 0 at 0 m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from echostep.errors import EchostepError
+from echostep.plan.georeference import EarthTransform
+from echostep.plan.importers.osm.elements import Elements, Tags, read_osm
+from echostep.plan.importers.osm.levels import levels_of
+from echostep.plan.importers.storey import Storey, Way, areas, room
+from echostep.plan.importers.walkways import connect
+from echostep.plan.json_fields import LIMIT_M
+from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
+
+DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map has none
+MOST_LEVELS = 200
+
+
+@dataclass(slots=True)
+class OsmSite:
+    """Storeys by their level numbers, and the walls that each node lies on."""
+
+    storeys: dict[float, Storey]
+    order: list[float]
+    walls_at: dict[tuple[float, int], list[LineString]] = field(default_factory=dict)
+
+    def on(self, levels: list[float]) -> Iterator[Storey]:
+        """The storeys with these numbers."""
+        return (self.storeys[level] for level in levels if level in self.storeys)
+
+
+def import_osm(path: Path, storey_m: float) -> Plan:
+    """The building in a file; raises EchostepError that names the file and the element."""
+    elements = read_osm(path)
+    levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
+    if not levels:
+        raise EchostepError(f"{path}: nothing is tagged indoor=* with a level")
+    if len(levels) > MOST_LEVELS:
+        raise EchostepError(f"{path}: {len(levels)} levels; a plan has {MOST_LEVELS} at most")
+    georeference = _origin(elements, path)
+    elements.project(EarthTransform(georeference).metres)
+    if np.abs(np.array(list(elements.at_m.values()))).max() > LIMIT_M:
+        raise EchostepError(f"{path}: nodes are further than {LIMIT_M / 1000:.0f} km apart: cut out one building")
+    site = OsmSite({level: Storey(f"level {level:g}", round(level * storey_m, 6)) for level in levels}, levels)
+    _outlines(site, elements)
+    _spaces(site, elements)
+    _doors(site, elements)
+    _lifts(site, elements)
+    storeys = [site.storeys[level] for level in levels]
+    name = next((tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags), path.stem)
+    return Plan(name, tuple(storey.level() for storey in storeys), None, "", connect(storeys), georeference)
+
+
+def _origin(elements: Elements, path: Path) -> Georeference:
+    """The middle of the nodes of all that is indoors, to a hundred thousandth of a degree."""
+    used = [node for _, nodes, tags in elements.lines() if "indoor" in tags or "building" in tags for node in nodes]
+    if not used:
+        raise EchostepError(f"{path}: no way is tagged indoor=*")
+    lon, lat = np.array([elements.degrees[node] for node in used]).mean(axis=0).round(5)
+    return Georeference(float(lon), float(lat))
+
+
+def _outlines(site: OsmSite, elements: Elements) -> None:
+    """The outside walls of buildings."""
+    for where, nodes, tags in elements.lines():
+        if tags.get("building", "no") != "no":
+            own = levels_of(tags, where) or [
+                level
+                for level in site.order
+                if _within(level, tags.get("building:min_level") or tags.get("min_level"), tags.get("max_level"))
+            ]
+            _wall(site, elements, nodes, own, tags)
+
+
+def _within(level: float, least: str | None, most: str | None) -> bool:
+    try:
+        return float(least or -math.inf) <= level <= float(most or math.inf)
+    except ValueError:
+        return True
+
+
+def _spaces(site: OsmSite, elements: Elements) -> None:
+    """Rooms, areas, corridors, walls, stairs and lifts that are drawn as lines or areas."""
+    for where, nodes, tags in elements.lines():
+        levels, kind = levels_of(tags, where), tags.get("indoor", "no")
+        line = elements.line(nodes)
+        closed = nodes[0] == nodes[-1] and len(nodes) > 3
+        area = Polygon(line) if closed and line is not None else None
+        way = _way(tags)
+        if kind in ("room", "wall"):
+            _wall(site, elements, nodes, levels, tags)
+        if kind in ("column", "pillar") and area is not None:
+            for storey in site.on(levels):
+                storey.filled += areas([area])
+        if way is not None and line is not None:
+            where_to = area or line.buffer(_metres(tags, STAIRS_M) / 2, cap_style="flat")
+            _ways(site, way, tags, where_to, levels)
+        name = tags.get("name") or tags.get("ref") or ""
+        if name and area is not None and kind in ("room", "area", "corridor") and way is None:
+            for storey in site.on(levels):
+                storey.rooms += [room(name[:80], part) for part in areas([area])]
+
+
+def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[float], tags: Tags) -> None:
+    """A line of wall on each of its levels; glass is a window."""
+    line = elements.line(nodes)
+    if line is None:
+        return
+    glass = "glass" in (tags.get("material"), tags.get("wall"))
+    for level in levels:
+        if level in site.storeys:
+            (site.storeys[level].windows if glass else site.storeys[level].walls).append(line)
+            for node in set(nodes):
+                site.walls_at.setdefault((level, node), []).append(line)
+
+
+def _doors(site: OsmSite, elements: Elements) -> None:
+    """Nodes with a door, on each level where they lie on a wall."""
+    for node, tags in elements.nodes():
+        if "door" not in tags and "entrance" not in tags and tags.get("indoor") != "door":
+            continue
+        own = levels_of(tags, f"node {node}") or site.order
+        for level in own:
+            for line in site.walls_at.get((level, node), [])[:1]:
+                found = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
+                site.storeys[level].doors.append(
+                    Door(found, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80])
+                )
+
+
+def _gap(line: LineString, at: Point, wide_m: float) -> tuple[float, float, float, float]:
+    """The door's line along the wall's longer piece at the node, moved off the corner where it would not fit."""
+    corners = list(line.coords)
+    sides = [LineString(pair) for pair in zip(corners, corners[1:], strict=False) if pair[0] != pair[1]]
+    near = [side for side in sides if side.distance(at) < 0.01]
+    side = max(near or sides, key=lambda side: side.length)
+    middle = min(max(side.project(at), wide_m / 2), max(side.length - wide_m / 2, side.length / 2))
+    first, last = (side.interpolate(middle + sign * min(wide_m, side.length) / 2) for sign in (-1, 1))
+    return round(first.x, 3), round(first.y, 3), round(last.x, 3), round(last.y, 3)
+
+
+def _state(tags: Tags) -> DoorState:
+    if tags.get("door") == "no":
+        return "open"
+    return "closed" if tags.get("locked") == "yes" or tags.get("access") == "no" else "unknown"
+
+
+def _lifts(site: OsmSite, elements: Elements) -> None:
+    """Lifts that are drawn as one node."""
+    for node, tags in elements.nodes():
+        way = _way(tags)
+        if way is not None:
+            _ways(
+                site,
+                way,
+                tags,
+                Point(elements.at_m[node]).buffer(LIFT_M / 2, cap_style="square"),
+                levels_of(tags, f"node {node}"),
+            )
+
+
+def _way(tags: Tags) -> ConnectorKind | None:
+    """What kind of way between levels this is."""
+    said = {tags.get("highway"), tags.get("room"), tags.get("indoor"), tags.get("buildingpart:verticalpassage")}
+    if "elevator" in said or tags.get("elevator") == "yes":
+        return "lift"
+    if said & {"steps", "stairs", "stairway", "escalator"} or tags.get("stairs") == "yes":
+        return "stairs"
+    return "ramp" if "ramp" in said or tags.get("ramp") == "yes" else None
+
+
+def _ways(site: OsmSite, kind: ConnectorKind, tags: Tags, area: BaseGeometry, levels: list[float]) -> None:
+    """The way on each of its levels; where it leads when it has several."""
+    known = tuple(site.order.index(level) for level in levels if level in site.storeys)
+    for storey in site.on(levels):
+        storey.ways += [Way(kind, tags.get("name", "")[:80], part, known) for part in areas([area])]
+
+
+def _metres(tags: Tags, otherwise: float) -> float:
+    """The width in metres, within reason."""
+    try:
+        width = float(tags.get("width", "").removesuffix("m").strip())
+    except ValueError:
+        return otherwise
+    return width if 0.3 <= width <= 20.0 else otherwise

@@ -1,0 +1,160 @@
+"""Nodes, ways and multipolygons of an OpenStreetMap file.
+
+In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`). Out: `Elements`. An entity or a DTD in the XML is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely.geometry import LineString
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.plan.importers.parsing import parse_json, read_text
+from echostep.plan.json_fields import number, typed
+
+Tags = dict[str, str]
+
+
+@dataclass(slots=True)
+class Elements:
+    """What a file holds; `degrees` longitude and latitude of nodes, `at_m` their places once they are projected."""
+
+    degrees: dict[int, tuple[float, float]] = field(default_factory=dict)
+    node_tags: dict[int, Tags] = field(default_factory=dict)
+    ways: dict[int, list[int]] = field(default_factory=dict)
+    way_tags: dict[int, Tags] = field(default_factory=dict)
+    relations: list[tuple[int, list[int], Tags]] = field(default_factory=list)
+    at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+    def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
+        """Ways, and the member ways of tagged multipolygons, with their names and tags; at least two nodes each."""
+        for key, nodes in self.ways.items():
+            if len(nodes) > 1:
+                yield f"way {key}", nodes, self.way_tags[key]
+        for key, members, tags in self.relations:
+            for nodes in (self.ways.get(member, []) for member in members):
+                if len(nodes) > 1:
+                    yield f"relation {key}", nodes, tags
+
+    def nodes(self) -> Iterator[tuple[int, Tags]]:
+        """Nodes with tags."""
+        return ((key, tags) for key, tags in self.node_tags.items() if tags)
+
+    def indoor_tags(self) -> Iterator[Tags]:
+        """Tags of all that is indoors."""
+        return (tags for _, _, tags in self.lines() if "indoor" in tags)
+
+    def project(self, metres: Callable[[Floats], Floats]) -> None:
+        """Find all places."""
+        places = metres(np.array(list(self.degrees.values())).reshape(-1, 2))
+        self.at_m = {key: (float(x), float(y)) for key, (x, y) in zip(self.degrees, places, strict=True)}
+
+    def line(self, nodes: list[int]) -> LineString | None:
+        """The places of nodes as a line, None when they are one place."""
+        places = [self.at_m[node] for node in nodes]
+        return LineString(places) if len(set(places)) > 1 else None
+
+
+def read_osm(path: Path) -> Elements:
+    """The elements of a file; raises EchostepError that names the file and the element."""
+    text = read_text(path)
+    try:
+        rows = _json_rows(text, path) if text.lstrip()[:1] == "{" else _xml_rows(text)
+        elements = Elements()
+        for row in rows:
+            _take(elements, row)
+        _resolve(elements)
+    except ValueError as error:
+        raise EchostepError(f"{path}: {error}") from error
+    return elements
+
+
+def _json_rows(text: str, path: Path) -> list[Any]:
+    tree = typed(parse_json(text, str(path)), "the file", dict)
+    return list(typed(tree.get("elements"), "elements", list))
+
+
+def _xml_rows(text: str) -> list[dict[str, Any]]:
+    """Elements of the XML in the form of Overpass JSON."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError("an OSM file has no DTD and no entities")
+    try:
+        root = ET.fromstring(text)
+    except ET.ParseError as error:
+        raise ValueError(f"not XML: {error}") from error
+    if root.tag != "osm":
+        raise ValueError(f"<{root.tag[:40]}> is not <osm>")
+    return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
+
+
+def _xml_row(element: ET.Element) -> dict[str, Any]:
+    row: dict[str, Any] = {"type": element.tag, "id": _json_number(element.get("id"))}
+    row["tags"] = {tag.get("k", ""): tag.get("v", "") for tag in element.iterfind("tag")}
+    row["lon"], row["lat"] = _json_number(element.get("lon")), _json_number(element.get("lat"))
+    row["nodes"] = [_json_number(nd.get("ref")) for nd in element.iterfind("nd")]
+    row["members"] = [
+        {"type": member.get("type"), "ref": _json_number(member.get("ref")), "role": member.get("role")}
+        for member in element.iterfind("member")
+    ]
+    return row
+
+
+def _json_number(text: str | None) -> Any:
+    """An attribute as JSON would have it."""
+    try:
+        return None if text is None else json.loads(text, parse_constant=str)
+    except (ValueError, RecursionError):
+        return text
+
+
+def _take(elements: Elements, row: Any) -> None:
+    row = typed(row, "elements", dict)
+    kind, key = row.get("type"), row.get("id")
+    if isinstance(key, bool) or not isinstance(key, int):
+        raise ValueError(f"{str(kind)[:20]} {str(key)[:20]!r}: its id is not a whole number")
+    where = f"{str(kind)[:20]} {key}"
+    tags = _tags(row.get("tags") or {}, where)
+    if kind == "node":
+        elements.degrees[key] = _degrees(row, where)
+        elements.node_tags[key] = tags
+    elif kind == "way":
+        nodes = [_ref(ref, where) for ref in typed(row.get("nodes") or [], f"{where}: nodes", list)]
+        for node, place in zip(nodes, typed(row.get("geometry") or [], f"{where}: geometry", list), strict=False):
+            elements.degrees.setdefault(node, _degrees(typed(place, f"{where}: geometry", dict), where))
+        elements.ways[key], elements.way_tags[key] = nodes, tags
+    elif kind == "relation" and tags.get("type") == "multipolygon":
+        members = [
+            typed(member, f"{where}: members", dict)
+            for member in typed(row.get("members") or [], f"{where}: members", list)
+        ]
+        elements.relations.append((key, [_ref(m.get("ref"), where) for m in members if m.get("type") == "way"], tags))
+
+
+def _degrees(row: dict[str, Any], where: str) -> tuple[float, float]:
+    return number(row.get("lon"), f"{where}: lon", 180.0, "degrees"), number(
+        row.get("lat"), f"{where}: lat", 90.0, "degrees"
+    )
+
+
+def _ref(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError(f"{where}: {str(value)[:20]!r} is not the id of an element")
+    return value
+
+
+def _tags(value: Any, where: str) -> Tags:
+    return {str(key): str(text)[:500] for key, text in typed(value, f"{where}: tags", dict).items()}
+
+
+def _resolve(elements: Elements) -> None:
+    """Ways keep the nodes that the file holds: an extract cuts ways at its edge."""
+    for key, nodes in elements.ways.items():
+        elements.ways[key] = [node for node in nodes if node in elements.degrees]

@@ -1,0 +1,153 @@
+"""One storey as its drawing gives it -> a `Level`.
+
+In: shapes of walls, windows, doors, obstacles, rooms and stairs, in map metres. Out: `Level`. Walls with a thickness become both faces and their
+ends, because these are what a ranger hears and what a person can touch; walls drawn as one line stay one line, open at the doors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from echostep.arrays import Floats
+from echostep.plan.importers.straight import merge_collinear
+from echostep.plan.model import ConnectorKind, Door, Level, Room
+
+CLOSE_M = 0.01  # half of the widest crack between two pieces of a wall that is closed
+FLAT_M = 0.005  # a curve may be drawn so far off
+SLIVER_M2 = 1e-3
+GRID_M = 1e-3
+TOUCH_M = 2e-3  # a face so near to a wall is the wall's
+FLECK_M = 0.02  # a shorter piece of glass is not one
+
+
+@dataclass(slots=True)
+class Way:
+    """A shape of stairs, a lift or a ramp on one storey; on `levels` when the drawing says where it leads."""
+
+    kind: ConnectorKind
+    name: str
+    area: Polygon
+    levels: tuple[int, ...] = ()
+
+
+@dataclass(slots=True)
+class Storey:
+    """What was drawn of one storey."""
+
+    name: str
+    height_m: float
+    walls: list[BaseGeometry] = field(default_factory=list)
+    windows: list[BaseGeometry] = field(default_factory=list)
+    filled: list[Polygon] = field(default_factory=list)  # nobody gets in: shafts, cores
+    doors: list[Door] = field(default_factory=list)
+    obstacles: list[Polygon] = field(default_factory=list)
+    rooms: list[Room] = field(default_factory=list)
+    ways: list[Way] = field(default_factory=list)
+    openings: list[Polygon] = field(default_factory=list)  # holes in the floor
+
+    def level(self) -> Level:
+        """The storey in the plan's terms; coordinates are rounded to a millimetre."""
+        wall_faces, window_faces = _faces([*self.walls, *self.filled], self.windows)
+        return Level(
+            self.name,
+            self.height_m,
+            walls=merge_collinear(np.concatenate((wall_faces, self._lines(self.walls)))),
+            rooms=tuple(self.rooms),
+            doors=tuple(self.doors),
+            windows=merge_collinear(np.concatenate((window_faces, self._lines(self.windows)))),
+            obstacles=tuple(corners for area in self.obstacles if len(corners := ring(area)) > 2),
+        )
+
+    def _lines(self, shapes: Iterable[BaseGeometry]) -> Floats:
+        """Walls drawn as one line, without the doors' openings."""
+        lines = [part for part in pieces(shapes) if isinstance(part, LineString)]
+        if not lines:
+            return np.zeros((0, 4))
+        openings = [LineString([door.line[:2], door.line[2:]]).buffer(0.05, cap_style="flat") for door in self.doors]
+        tree = shapely.STRtree(openings)
+        return _segments(cut(line, [openings[i] for i in tree.query(line)]) for line in lines)
+
+
+def cut(line: BaseGeometry, openings: list[BaseGeometry]) -> BaseGeometry:
+    """What is left of a line."""
+    return line if not openings else line.difference(shapely.union_all(openings))
+
+
+def pieces(shapes: Iterable[BaseGeometry]) -> list[BaseGeometry]:
+    """Lines and areas, out of collections; nothing that is empty."""
+    parts = (part for shape in shapes for part in shapely.get_parts(shape, return_index=False))
+    flat = [inner for part in parts for inner in (pieces(part.geoms) if hasattr(part, "geoms") else [part])]
+    return [part for part in flat if not part.is_empty]
+
+
+def areas(shapes: Iterable[BaseGeometry]) -> list[Polygon]:
+    """The areas among the shapes, made valid."""
+    sound = (part if part.is_valid else shapely.make_valid(part) for part in pieces(shapes))
+    return [part for part in pieces(sound) if isinstance(part, Polygon) and part.area > SLIVER_M2]
+
+
+def ring(area: Polygon) -> Floats:
+    """Outer corners of an area, (n, 2), the first not repeated, rounded to a millimetre."""
+    corners = np.asarray(area.simplify(FLAT_M).exterior.coords)[:-1, :2].round(3)
+    return corners[(corners != np.roll(corners, 1, axis=0)).any(1)]
+
+
+def room(name: str, area: Polygon) -> Room:
+    """A room with its outline, its name where there is space for it."""
+    at = area.representative_point()
+    return Room(name, (round(at.x, 3), round(at.y, 3)), ring(area))
+
+
+def opening(area: Polygon) -> tuple[float, float, float, float]:
+    """The line along the middle of a door's area, from jamb to jamb."""
+    box = np.asarray(area.minimum_rotated_rectangle.exterior.coords)[:4, :2]
+    if np.linalg.norm(box[1] - box[0]) < np.linalg.norm(box[2] - box[1]):
+        box = np.roll(box, -1, axis=0)
+    x0, y0 = (box[0] + box[3]) / 2
+    x1, y1 = (box[1] + box[2]) / 2
+    return round(float(x0), 3), round(float(y0), 3), round(float(x1), 3), round(float(y1), 3)
+
+
+def _faces(walls: Iterable[BaseGeometry], windows: Iterable[BaseGeometry]) -> tuple[Floats, Floats]:
+    """Faces of all that has a thickness: of walls, and of windows where no wall covers them."""
+    stone, glass = _solid(areas(walls)), _solid(areas(windows))
+    both = _solid(pieces([stone, glass]))
+    outside = shapely.union_all([part.boundary for part in pieces([both])])
+    stone_faces, glass_faces = outside, LineString()
+    if not glass.is_empty:
+        near = stone.buffer(TOUCH_M)
+        bits = pieces([joined(outside.difference(near))])
+        glass_faces = shapely.union_all([bit for bit in bits if bit.length > FLECK_M])
+        flecks = [bit for bit in bits if bit.length <= FLECK_M]
+        stone_faces = shapely.union_all([outside.intersection(near), *flecks])
+    return _segments([joined(stone_faces)]), _segments([joined(glass_faces)])
+
+
+def joined(lines: BaseGeometry) -> BaseGeometry:
+    """Lines that continue each other as one."""
+    return lines if lines.is_empty or isinstance(lines, LineString) else shapely.line_merge(lines)
+
+
+def _solid(parts: list[BaseGeometry]) -> BaseGeometry:
+    """One shape without cracks and slivers."""
+    if not parts:
+        return Polygon()
+    one = shapely.union_all(parts, grid_size=GRID_M)
+    closed = one.buffer(CLOSE_M, join_style="mitre").buffer(-CLOSE_M, join_style="mitre")
+    return shapely.union_all([area for area in pieces([closed]) if area.area > SLIVER_M2])
+
+
+def _segments(lines: Iterable[BaseGeometry]) -> Floats:
+    """Straight pieces, (n, 4), rounded to a millimetre, curves within 5 mm."""
+    rows = [np.zeros((0, 4))]
+    for line in pieces(lines):
+        points = np.asarray(line.simplify(FLAT_M).coords)[:, :2].round(3)
+        rows.append(np.concatenate((points[:-1], points[1:]), axis=1))
+    found = np.concatenate(rows)
+    return found[(found[:, :2] != found[:, 2:]).any(1)]

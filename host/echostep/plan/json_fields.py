@@ -1,0 +1,107 @@
+"""Checks on the fields of a JSON tree that somebody else wrote.
+
+In: a value and the name of its place, `levels[0].doors[2].line`. Out: the value in its type, or a ValueError that names the place. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from echostep.arrays import Floats
+
+LIMIT_M = 1e5
+
+
+def number(value: Any, where: str, limit: float = LIMIT_M, unit: str = "m") -> float:
+    """A finite number within +-limit."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= limit:
+        raise ValueError(f"{where}: {_short(value)} is not a finite number within {limit:.0f} {unit}")
+    return float(value)
+
+
+def text(value: Any, where: str) -> str:
+    """A text."""
+    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
+        raise ValueError(f"{where}: {_short(value)} is not a text")
+    return value
+
+
+def choice(value: Any, where: str, words: Sequence[str]) -> str:
+    """One of these words."""
+    if not isinstance(value, str) or value not in words:
+        raise ValueError(f"{where}: {_short(value)} is none of {', '.join(words)}")
+    return value
+
+
+def typed(value: Any, where: str, kind: type) -> Any:
+    """A list, or an object (dict)."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{where}: expected {'a list' if kind is list else 'an object'}, found {type(value).__name__}")
+    return value
+
+
+def point(value: Any, where: str) -> tuple[float, float]:
+    """[x, y] in metres."""
+    if len(typed(value, where, list)) != 2:
+        raise ValueError(f"{where}: expected [x, y]")
+    return number(value[0], where), number(value[1], where)
+
+
+def outline(value: Any, where: str) -> Floats:
+    """At least three corners; (n, 2) float64, the first is not repeated at the end."""
+    corners = [point(row, f"{where}[{i}]") for i, row in enumerate(typed(value, where, list))]
+    if len(corners) > 1 and corners[0] == corners[-1]:
+        corners.pop()
+    if len(set(corners)) < 3:
+        raise ValueError(f"{where}: an outline needs three corners")
+    return np.array(corners, dtype=np.float64)
+
+
+def segments(rows: Any, where: str) -> Floats:
+    """Lists of x0 y0 x1 y1 -> (n, 4) float64, none without length."""
+    rows = typed(rows, where, list)
+    sound = _sound(rows)
+    return _checked(rows, where) if sound is None else sound
+
+
+def _sound(rows: list[Any]) -> Floats | None:
+    """All segments at once if nothing is wrong with any; a city has a million walls."""
+    if set(map(type, rows)) != {list} or set(map(len, rows)) != {4}:
+        return None
+    if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
+        return None
+    try:
+        found = np.array(rows, dtype=np.float64)
+    except OverflowError:
+        return None
+    within = (np.abs(found) <= LIMIT_M).all() and (found[:, :2] != found[:, 2:]).any(1).all()
+    return found if within else None
+
+
+def _checked(rows: list[Any], where: str) -> Floats:
+    """One segment after the other, to name the one that is wrong."""
+    for i, row in enumerate(rows):
+        segment(row, f"{where}[{i}]")
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def segment(row: Any, where: str) -> tuple[float, float, float, float]:
+    """[x0, y0, x1, y1] in metres, with a length."""
+    if not isinstance(row, list) or len(row) != 4:
+        raise ValueError(f"{where}: expected [x0, y0, x1, y1] in metres")
+    x0, y0, x1, y1 = (number(value, where) for value in row)
+    if (x0, y0) == (x1, y1):
+        raise ValueError(f"{where}: a wall without length")
+    return x0, y0, x1, y1
+
+
+def _short(value: Any) -> str:
+    """The value as it is shown in one line."""
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 1000:
+        return "a huge number"
+    shown = repr(value)
+    return shown if len(shown) <= 60 else shown[:57] + "..."

@@ -1,0 +1,56 @@
+"""Ways as polylines (k, 2) in metres: how long, what lies so far along, what is nearest.
+
+Kernels for the guidance, the routes and the simulation. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.jit import kernel
+
+
+def way_m(line: Floats) -> float:
+    """Length of a polyline (k, 2)."""
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+@kernel
+def along(line: Floats, s_m: float) -> tuple[float, float, float]:
+    """Place (m) and heading (rad) on a polyline (k, 2), `s_m` from its beginning; its ends are held."""
+    rest = max(s_m, 0.0)
+    x, y, heading = line[0, 0], line[0, 1], 0.0
+    for k in range(len(line) - 1):
+        dx, dy = line[k + 1, 0] - line[k, 0], line[k + 1, 1] - line[k, 1]
+        length = math.hypot(dx, dy)
+        if length <= 0.0:
+            continue
+        share = min(rest / length, 1.0)
+        x, y, heading = line[k, 0] + share * dx, line[k, 1] + share * dy, math.atan2(dy, dx)
+        if rest <= length:
+            break
+        rest -= length
+    return x, y, heading
+
+
+@kernel
+def nearest(line: Floats, x: float, y: float, from_m: float, to_m: float) -> tuple[float, float]:
+    """How far along a polyline (k, 2) the point nearest to (x, y) is, and its distance; only points between `from_m` and `to_m` along it count."""
+    best_s, best = from_m, np.inf
+    begin = 0.0
+    for k in range(len(line) - 1):
+        dx, dy = line[k + 1, 0] - line[k, 0], line[k + 1, 1] - line[k, 1]
+        length = math.hypot(dx, dy)
+        if length > 0.0 and begin <= to_m and begin + length >= from_m:
+            s = ((x - line[k, 0]) * dx + (y - line[k, 1]) * dy) / length
+            s = min(max(s, 0.0, from_m - begin), length, to_m - begin)
+            off = math.hypot(line[k, 0] + s / length * dx - x, line[k, 1] + s / length * dy - y)
+            if off < best:
+                best_s, best = begin + s, off
+        begin += length
+    if best == np.inf:
+        best = math.hypot(line[0, 0] - x, line[0, 1] - y)
+    return best_s, best

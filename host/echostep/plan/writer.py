@@ -1,0 +1,108 @@
+"""A plan as plan.json again, so that reading it loses nothing.
+
+In: a `Plan`. Out: the text or file, one wall a line. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Room
+
+
+def save_plan(plan: Plan, path: Path | str) -> None:
+    """Write the plan; what `load_plan` reads back differs in the digest alone. Raises EchostepError when the file cannot be written."""
+    try:
+        Path(path).write_text(plan_json(plan), encoding="utf-8")
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the plan: {error.strerror or error}") from error
+
+
+def plan_json(plan: Plan) -> str:
+    """The text of plan.json."""
+    tree: dict[str, Any] = {"echostep_plan": FORMAT_VERSION, "name": plan.name}
+    if plan.uncertainty_m is not None:
+        tree["uncertainty_m"] = plan.uncertainty_m
+    if plan.georeference is not None:
+        tree["georeference"] = _georeference(plan.georeference)
+    tree["levels"] = [_level(level) for level in plan.levels]
+    if plan.connectors:
+        tree["connectors"] = [_connector(connector) for connector in plan.connectors]
+    if plan.start is not None:
+        tree["start"] = _start(plan.start)
+    return _lines(tree) + "\n"
+
+
+def _level(level: Level) -> dict[str, Any]:
+    tree: dict[str, Any] = {"name": level.name, "height_m": level.height_m, "walls": level.walls.tolist()}
+    if len(level.windows):
+        tree["windows"] = level.windows.tolist()
+    if level.doors:
+        tree["doors"] = [_door(door) for door in level.doors]
+    if level.obstacles:
+        tree["obstacles"] = [_corners(corners) for corners in level.obstacles]
+    return tree | {"rooms": [_room(room) for room in level.rooms]}
+
+
+def _door(door: Door) -> dict[str, Any]:
+    return {"line": list(door.line), "state": door.state} | ({"name": door.name} if door.name else {})
+
+
+def _room(room: Room) -> dict[str, Any]:
+    return {"name": room.name, "at": list(room.at_m)} | (
+        {} if room.outline_m is None else {"outline": _corners(room.outline_m)}
+    )
+
+
+def _connector(connector: Connector) -> dict[str, Any]:
+    return {
+        "kind": connector.kind,
+        "name": connector.name,
+        "levels": list(connector.levels),
+        "outline": _corners(connector.outline_m),
+    }
+
+
+def _start(start: Pose) -> dict[str, Any]:
+    tree: dict[str, Any] = {"x": start.x_m, "y": start.y_m, "heading_deg": _degrees(start.heading_rad)}
+    return tree | ({"level": start.level} if start.level else {})
+
+
+def _georeference(georeference: Georeference) -> dict[str, Any]:
+    return {
+        "crs": georeference.crs,
+        "origin": [georeference.longitude_deg, georeference.latitude_deg],
+        "rotation_deg": _degrees(georeference.rotation_rad),
+    }
+
+
+def _corners(corners: Floats) -> list[list[float]]:
+    found: list[list[float]] = corners.tolist()
+    return found
+
+
+def _degrees(angle_rad: float) -> float:
+    """The shortest number of degrees that reads back to the same bits, where there is one."""
+    angle = math.degrees(angle_rad)
+    below, above = math.nextafter(angle, -math.inf), math.nextafter(angle, math.inf)
+    tried = [*(round(angle, digits) for digits in range(16)), angle, below, above]
+    return next((found for found in tried if math.radians(found) == angle_rad), angle)
+
+
+def _lines(tree: Any, depth: int = 0) -> str:
+    """JSON with one row of a list a line: short to read, quick to write."""
+    inner = " " * (depth + 1)
+    if isinstance(tree, dict):
+        rows = [f"{json.dumps(key)}: {_lines(value, depth + 1)}" for key, value in tree.items()]
+        return "{\n" + inner + f",\n{inner}".join(rows) + "\n" + " " * depth + "}"
+    if not isinstance(tree, list) or not tree or not isinstance(tree[0], dict | list):
+        return json.dumps(tree)
+    if isinstance(tree[0], dict) and any(len(json.dumps(row)) > 1000 for row in tree):
+        rows = [_lines(row, depth + 1) for row in tree]
+        return "[\n" + inner + f",\n{inner}".join(rows) + "\n" + " " * depth + "]"
+    return "[\n" + inner + f",\n{inner}".join(json.dumps(row) for row in tree) + "\n" + " " * depth + "]"

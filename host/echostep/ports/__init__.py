@@ -1,0 +1,4 @@
+"""Where bytes come from: serial ports, UDP, check-ins from the page.
+
+In: URLs of ports. Out: `Chunk(port, t_arrival_ns, data)`, and `Portion`s of many chunks as columns. Owns the open ports. Decodes nothing.
+"""

@@ -1,0 +1,161 @@
+"""People who walk by the joints' own curves: what the hips do follows from feet that roll on the floor and do not slip.
+
+In: a gait (slow, natural, fast), a person drawn from a seed, how long. Out: `Gait`: rates of thigh and shank, and where the hips are. Owns
+the curves.
+
+Nothing here knows how far a stride goes. Heel and ball of both feet hang from the hips by thigh, shank and foot; the lower one of a foot that
+carries stays where it is, and the hips move against it. So the way is that of the whole chain, two legs and their ankles, each person's own.
+`walker` does it the other way round: it places feet and trunk and asks which legs join them.
+
+Joint curves every 5 % of the stride, degrees, read from [Winter 2009; Perry 1992; Kadaba 1990]; slow and fast walking scale them as in
+[Winter 1991; Murray 1984; Bovi 2011]: with speed the hips' excursion and the knee's flexion under load grow, and the stride takes less time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.simulation.people.leg_angles import HALF_PELVIS_M, KNEE_DEG, THIGH_DEG, LegDimensions, series
+
+RATE_HZ = 500
+ANKLE_DEG = (1, -3, -1, 3, 6, 8, 10, 11, 12, 13, 9, -2, -14, -16, -7, -2, 1, 2, 2, 2)  # dorsiflexion
+LOADED = 0.30  # of the stride: until then the knee's flexion is that under load
+DOUBLE = 0.12  # of the stride on both feet, twice [Perry 1992]
+LONGEST_STEP_S = 1.0
+CARRY_M = 0.004  # a point so much above the other carries a third as much
+START = 0.55  # of the stride's time, from standing to the whole movement: the first step is a little shorter than the others [Breniere and Do 1986]
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How one walks: `hip` and `load` scale the hip's excursion and the knee's flexion under load, `swing` that in the swing, `stride_s`."""
+
+    hip: float
+    load: float
+    swing: float
+    stride_s: float
+
+
+SLOW, NATURAL, FAST = Manner(0.78, 0.55, 0.93, 1.42), Manner(1.0, 1.0, 1.0, 1.10), Manner(1.14, 1.25, 1.03, 0.97)
+
+
+@dataclass(frozen=True, slots=True)
+class Stroller:
+    """One person: the leg, the foot (`ankle_m` high, `heel_m` behind and `ball_m` ahead of the ankle), and how the curves are this person's own."""
+
+    leg: LegDimensions
+    ankle_m: float
+    heel_m: float
+    ball_m: float
+    thigh_deg: float  # more flexion all the time
+    ankle_deg: float
+    hip: float  # of the curve
+    knee: float
+    ankle: float
+    other: float  # amplitude of the other leg against this
+    pace: float
+    pelvis_deg: float  # turned either way
+
+
+@dataclass(frozen=True, slots=True)
+class Gait:
+    """Arrays of n samples at `RATE_HZ`: time, rates of thigh and shank (rad/s, forward positive), how far the hips have come."""
+
+    t_s: Floats
+    thigh_rad_s: Floats
+    shank_rad_s: Floats
+    way_m: Floats
+
+
+def draw_stroller(rng: np.random.Generator) -> Stroller:
+    """An adult of 1.50 to 1.95 m, proportions after [Winter 2009], each a little otherwise; curves that differ as people's do [Kadaba 1990]."""
+    height = rng.uniform(1.50, 1.95)
+    share = 1.0 + 0.04 * rng.standard_normal(5)
+    leg = LegDimensions(0.245 * height * share[0], 0.246 * height * share[1])
+    thigh_deg, ankle_deg = (3.0 * rng.standard_normal(2)).tolist()
+    hip, knee, ankle, other, pace = (1.0 + np.array([0.08, 0.08, 0.15, 0.03, 0.05]) * rng.standard_normal(5)).tolist()
+    pelvis_deg = 4.0 + 1.2 * rng.standard_normal()
+    ankle_m, heel_m, ball_m = (np.array([0.039, 0.032, 0.075]) * height * share[2:]).tolist()
+    return Stroller(
+        leg, ankle_m, heel_m, ball_m, thigh_deg, ankle_deg, hip, knee, ankle, other, pace, pelvis_deg
+    )  # fmt: skip
+
+
+def stroll(person: Stroller, manner: Manner, walk_s: float, rng: np.random.Generator, stand_s: float = 1.5) -> Gait:
+    """Stand, walk for so long or up to half a stride longer, stand: which leg goes first is drawn, too.
+
+    He begins with a foot that leaves the floor and ends with one that comes down beside the other [Jian 1993].
+    """
+    t = np.arange(0.0, walk_s + 2.0 * stand_s + LONGEST_STEP_S, 1.0 / RATE_HZ)
+    stride_s = manner.stride_s * person.pace
+    seconds = np.arange(int(t[-1]) + 3)
+    wander = np.interp(t, seconds, 1.0 + 0.03 * rng.standard_normal(len(seconds)))
+    phase = np.cumsum(wander) / RATE_HZ / stride_s
+    phase += rng.choice([0.62, 0.12]) - phase[int(stand_s * RATE_HZ)]
+    steps = 2.0 * phase[int((stand_s + walk_s) * RATE_HZ)]
+    stop_s = float(np.interp(0.5 * math.ceil(steps), phase, t))
+    moves = _ease((t - stand_s) / (START * stride_s)) * _ease((stop_s - t) / (START * stride_s))
+    right, left = (_angles(person, manner, phase + k, moves, 1.0 if k == 0.0 else person.other) for k in (0.0, 0.5))
+    turned = HALF_PELVIS_M * np.sin(math.radians(person.pelvis_deg) * manner.hip * moves * np.cos(2.0 * np.pi * phase))
+    moved = (
+        _hip_step(_points(person, angles)) - side * np.gradient(turned) for angles, side in ((right, 1.0), (left, -1.0))
+    )
+    way = np.cumsum(sum(_carried(phase + k) * step for k, step in zip((0.0, 0.5), moved, strict=True)))
+    thigh, shank = (np.gradient(angle) * RATE_HZ for angle in right[:2])
+    return Gait(t, thigh, shank, way)
+
+
+def _angles(
+    person: Stroller, manner: Manner, phase: Floats, moves: Floats, amplitude: float
+) -> tuple[Floats, Floats, Floats]:
+    """Thigh, shank and foot against their standing (rad, forward and toe up positive)."""
+    part = phase % 1.0
+    thigh_mean = math.radians(sum(THIGH_DEG) / len(THIGH_DEG))
+    thigh = thigh_mean + manner.hip * person.hip * amplitude * (series(THIGH_DEG, phase) - thigh_mean)
+    loaded = _ease((LOADED + 0.08 - part) / 0.16) + _ease((part - 0.96) / 0.04)
+    knee = (
+        series(KNEE_DEG, phase) * person.knee * (manner.swing + (manner.load - manner.swing) * np.minimum(loaded, 1.0))
+    )
+    ankle = person.ankle * series(ANKLE_DEG, phase) + math.radians(person.ankle_deg)
+    thigh = moves * (thigh + math.radians(person.thigh_deg))
+    knee = np.maximum(moves * knee, 0.0) + math.radians(3.0)
+    shank = thigh - knee
+    return thigh, shank, shank + moves * ankle + (1.0 - moves) * (knee - thigh)
+
+
+def _points(person: Stroller, angles: tuple[Floats, Floats, Floats]) -> Floats:
+    """Heel and ball (n, 2, 2) from the hip, forward and up."""
+    thigh, shank, foot = angles
+    leg, found = person.leg, []
+    x = leg.thigh_m * np.sin(thigh) + leg.shank_m * np.sin(shank)
+    z = -leg.thigh_m * np.cos(thigh) - leg.shank_m * np.cos(shank)
+    c, s = np.cos(foot), np.sin(foot)
+    for ahead in (-person.heel_m, person.ball_m):
+        found.append(np.stack([x + ahead * c + person.ankle_m * s, z + ahead * s - person.ankle_m * c], axis=1))
+    return np.stack(found, axis=1)
+
+
+def _hip_step(points: Floats) -> Floats:
+    """How far the hip goes from sample to sample (n,) over heel and ball (n, 2, 2) of which the lower does not slip."""
+    low = points[:, :, 1] - points[:, :, 1].min(axis=1, keepdims=True)
+    carry = np.exp(-low / CARRY_M)
+    carry /= carry.sum(axis=1, keepdims=True)
+    found: Floats = -(carry * np.gradient(points[:, :, 0], axis=0)).sum(axis=1)
+    return found
+
+
+def _carried(phase: Floats) -> Floats:
+    """The leg's share of the weight (n,): both legs' shares are 1 together."""
+    part = phase % 1.0
+    return np.interp(part, [0.0, DOUBLE, 0.5, 0.5 + DOUBLE, 1.0], [0.0, 1.0, 1.0, 0.0, 0.0])
+
+
+def _ease(share: Floats) -> Floats:
+    """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
+    v = np.clip(share, 0.0, 1.0)
+    found: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
+    return found

@@ -1,0 +1,83 @@
+"""How loud an echo is, in dB against a wall straight ahead at one metre, and whether an SRF02 notices.
+
+In: the geometry of one echo. Out: its level. Owns the one table of acoustic constants, `Acoustics`; the tracker's likelihood shares nothing with it.
+
+The rangers' transducer is taken as a piston: it sends and hears with the same directivity, so that an echo has it twice. To this
+come the spreading of the wave, the absorption by the air and the losses at reflectors; what exceeds the noisy threshold is heard. The
+range therefore shrinks toward the rim of the cone, and a small reflector is heard less far than a wall [Girard 2011, 2.6.2, 2.6.3].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from echostep.jit import kernel
+
+SILENT_DB = -1e3
+FIRST_NULL = (
+    3.8317  # of a piston's directivity 2 J1(x) / x; the side lobes beyond are 17 dB down each way and not modelled
+)
+PIPE_RADIUS_M = 0.0275  # the 55 mm pipe of [Girard 2011, Figure 2a]
+
+
+class Acoustics(NamedTuple):
+    """What decides whether an echo is heard; levels in dB against a wall on the axis at 1 m."""
+
+    speed_m_s: float = 343.2  # of sound, dry air at 20 degC
+    size: float = 4.797  # wave number x piston radius: -6 dB at 27.5 degrees each way, the 55 degree cone [Robot Electronics, sonar FAQ]
+    absorption_db_m: float = 1.3  # 40 kHz, 20 degC, 50 % humidity [ISO 9613-1]
+    frame_radius_m: float = 0.01  # a wall's end echoes like a rod of this radius: the rounded profile of a door frame
+    bounce_db: float = -1.5  # each reflection after the first
+    body_db: float = -8.0  # passing by the wearer
+    body_m: float = 0.2  # half his width
+    threshold_db: float = -28.6  # a wall on the axis is heard half of the time at 6 m [SRF02 technical specification]
+    threshold_sd_db: float = 1.5  # of the comparison, from ping to ping
+    minimum_m: float = 0.15  # the transducer still rings [SRF02 technical specification]
+    maximum_m: float = 6.0  # the ranger stops listening
+    noise_m: float = (
+        0.025  # which wavefront crosses the threshold, phasing; with the bias 3-4 cm [Robot Electronics, sonar FAQ]
+    )
+    bias_m: float = 0.025  # standard deviation over rangers
+
+
+SRF02 = Acoustics()
+
+
+def speed_of_sound_m_s(temperature_c: float) -> float:
+    """Speed of sound in dry air, an ideal gas: 343.2 m/s at 20 degC."""
+    return 331.3 * math.sqrt(1.0 + temperature_c / 273.15)
+
+
+@kernel
+def directivity_db(off_axis_rad: float, size: float) -> float:
+    """Level at an angle off the axis against the axis, one way: 2 J1(x) / x by its power series [Kinsler et al. 2000, 7.4]."""
+    x = size * math.sin(min(abs(off_axis_rad), 0.5 * math.pi))
+    if x >= FIRST_NULL:
+        return SILENT_DB
+    term = 1.0
+    total = 1.0
+    for k in range(1, 12):
+        term *= -0.25 * x * x / (k * (k + 1))
+        total += term
+    return 20.0 * math.log10(max(total, 1e-9))
+
+
+@kernel
+def path_db(range_m: float, off_out_rad: float, off_in_rad: float, bounces: int, a: Acoustics) -> float:
+    """Level of an echo from flat walls: half the way of the sound, angles off the axis when it leaves and when it comes back."""
+    spread = -20.0 * math.log10(max(range_m, 1e-3)) - 2.0 * a.absorption_db_m * (range_m - 1.0)
+    turned = directivity_db(off_out_rad, a.size) + directivity_db(off_in_rad, a.size)
+    return spread + turned + a.bounce_db * (bounces - 1)
+
+
+@kernel
+def wall_db(distance_m: float, off_axis_rad: float, a: Acoustics) -> float:
+    """Level of a wall whose nearest point is that far away and that much off the axis [Girard 2011, Figure 1b, c]."""
+    return path_db(distance_m, off_axis_rad, off_axis_rad, 1, a)
+
+
+@kernel
+def rod_db(distance_m: float, off_axis_rad: float, radius_m: float, a: Acoustics) -> float:
+    """Level of an upright rod: a wall's, less the spreading by its curved face, sqrt(radius / (radius + distance)) in amplitude."""
+    return wall_db(distance_m, off_axis_rad, a) + 10.0 * math.log10(radius_m / (radius_m + distance_m))

@@ -1,0 +1,72 @@
+"""The team on its plan, as a picture.
+
+In: a plan, members. Out: a PNG or SVG. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from echostep.errors import EchostepError
+from echostep.localization.estimate import ellipse95
+from echostep.plan.model import Plan
+from echostep.team.report import Position
+from echostep.team.roster import Member, Need
+
+CROWD_M = 1.5
+COLOURS = {  # told apart by the colour-blind [Okabe and Ito 2008]
+    Need.LOST: "#d55e00", Need.STALE: "#cc79a7", Need.UNCERTAIN: "#e69f00",
+    Need.WAITING: "#56b4e9", Need.TRACKING: "#009e73", Need.ENDED: "#888888",
+}  # fmt: skip
+
+
+def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -> None:
+    """Every floor that somebody is on, everybody with his 95 % ellipse, heading and state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    placed = [m for m in members if m.report.position is not None and 0 <= m.report.position.floor < len(plan.levels)]
+    floors = sorted({m.report.position.floor for m in placed if m.report.position}) or [0]
+    figure = Figure(figsize=(10, 6 * len(floors)), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    for k, floor in enumerate(floors):
+        level = plan.levels[floor]
+        axes = figure.add_subplot(
+            len(floors), 1, k + 1, aspect="equal", title=f"{plan.name}: {level.name}", xlabel="x / m", ylabel="y / m"
+        )
+        axes.add_collection(LineCollection(list(level.solid.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
+        for room in level.rooms:
+            axes.text(*room.at_m, room.name.replace("$", r"\$"), ha="center", va="center", color="#888888", fontsize=8)
+        axes.autoscale_view()
+        axes.autoscale(enable=False)  # the ellipse of somebody lost may be larger than the plan
+        labels: list[tuple[float, float]] = []
+        for m in placed:
+            if (p := m.position(now_s)) and p.floor == floor:
+                crowd = sum(math.dist(at, (p.x_m, p.y_m)) < CROWD_M for at in labels)
+                labels.append((p.x_m, p.y_m))
+                _draw_member(axes, m.report.name, p, m.need(now_s), crowd)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        figure.savefig(path)
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
+
+
+def _draw_member(axes, name: str, p: Position, need: Need, crowd: int) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """One member; his name stands above those of the `crowd` that are at the same place."""
+    from matplotlib.patches import Ellipse as Patch
+
+    colour, ellipse = COLOURS[need], ellipse95(p.xx_m2, p.xy_m2, p.yy_m2)
+    wide, high, turn = 2 * ellipse.major_m, 2 * ellipse.minor_m, math.degrees(ellipse.angle_rad)
+    axes.add_patch(Patch((p.x_m, p.y_m), wide, high, angle=turn, color=colour, fill=need is not Need.STALE, alpha=0.25))
+    axes.plot(p.x_m, p.y_m, "o", color=colour, markersize=6)
+    if p.heading_rad is not None:
+        c, s = math.cos(p.heading_rad), math.sin(p.heading_rad)
+        axes.annotate("", (p.x_m + c, p.y_m + s), (p.x_m, p.y_m), arrowprops={"arrowstyle": "->", "color": colour})
+    said = (name if need is Need.TRACKING else f"{name}: {need}").replace("$", r"\$")
+    axes.annotate(
+        said, (p.x_m, p.y_m), xytext=(8, 8 + 11 * crowd), textcoords="offset points", fontsize=8, color=colour
+    )

@@ -1,0 +1,174 @@
+"""Recorded barometers as phones have them: coarse steps, sensors that filter, silences, rows that repeat, storeys that nobody told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from echostep.arrays import Floats
+from echostep.barometer.altitude import Altitude, BarometerSettings, Pressures, noise_of
+from echostep.barometer.floor_record import find_storeys, noise_of_record, thinned
+from echostep.commands.floors import record_floors
+from echostep.errors import EchostepError
+from echostep.offline.pressure_csv import load_pressures
+
+STOREYS = np.array([0.0, 3.5, 7.0])
+METRE_PA = 11.7
+
+
+def walk(legs: list[tuple[float, float]], rate_hz: float) -> Floats:
+    """Heights: each leg goes evenly to a height in so many seconds, from where the one before ended; the first begins at its own height."""
+    found, at = [], legs[0][0]
+    for to, seconds in legs:
+        found.append(np.linspace(at, to, round(seconds * rate_hz)))
+        at = to
+    return np.concatenate(found)
+
+
+UP_AND_DOWN = [
+    (0.0, 40.0), (1.75, 6.3), (1.75, 1.5), (3.5, 6.3), (3.5, 30.0), (7.0, 14.0), (7.0, 60.0),
+    (3.5, 11.0), (3.5, 3.0), (0.0, 11.0), (0.0, 40.0),
+]  # fmt: skip
+
+
+def record(
+    heights_m: Floats, rate_hz: float, noise_pa: float = 2.0, step_pa: float = 0.01, drift_pa_h: float = 100.0
+) -> Pressures:
+    t = np.arange(len(heights_m)) / rate_hz
+    noise = noise_pa * np.random.default_rng(11).standard_normal(len(t))
+    pressure = 100_800.0 - METRE_PA * heights_m + drift_pa_h / 3600.0 * t + noise
+    return Pressures(t, step_pa * np.rint(pressure / step_pa))
+
+
+def right(samples: Pressures, heights_m: Floats, storeys_m: Floats, start: int | None = None) -> float:
+    """Share of samples on the right floor; within a quarter of a metre of the middle both are."""
+    away = np.abs(heights_m[:, None] - storeys_m)
+    found = record_floors(samples, storeys_m, start)
+    return float((away[np.arange(len(away)), found.floor] <= away.min(axis=1) + 0.5).mean())
+
+
+@pytest.mark.parametrize(("step_pa", "rate_hz"), [(4.0, 5.0), (10.0, 1.0), (10.0, 25.0)])
+def test_coarse_steps_are_no_floors(step_pa: float, rate_hz: float) -> None:
+    way = walk(UP_AND_DOWN, rate_hz)
+    samples = record(way, rate_hz, 0.3, step_pa)
+    few, _ = thinned(samples)
+    assert noise_of_record(samples, few) >= 0.5 * step_pa
+    assert right(samples, way, STOREYS) > 0.985
+    assert find_storeys(few, BarometerSettings(noise_of_record(samples, few)))[-1] == pytest.approx(7.0, abs=0.4)
+
+
+def test_a_sensor_that_filters_is_not_more_exact() -> None:
+    """Errors that last for a second are as bad as so many more of one sample."""
+    way = walk(UP_AND_DOWN, 10.0)
+    samples = record(way, 10.0, 0.0)
+    lasting = np.convolve(np.random.default_rng(5).standard_normal(len(way) + 9), np.full(10, 10**-0.5), mode="valid")
+    filtered = Pressures(samples.t_s, samples.pressure_pa + 3.0 * lasting)
+    assert noise_of(filtered.pressure_pa) < 2.0
+    assert noise_of_record(filtered, filtered) > 5.0
+    assert right(filtered, way, STOREYS) > 0.98
+
+
+def test_white_noise_is_what_it_is() -> None:
+    samples = record(walk(UP_AND_DOWN, 10.0), 10.0, 3.0)
+    assert noise_of_record(samples, samples) == pytest.approx(3.0, rel=0.25)
+
+
+def silent(samples: Pressures, heights_m: Floats, from_s: float, to_s: float) -> tuple[Pressures, Floats]:
+    kept = (samples.t_s < from_s) | (samples.t_s > to_s)
+    return Pressures(samples.t_s[kept], samples.pressure_pa[kept]), heights_m[kept]
+
+
+@pytest.mark.parametrize("start", [None, 0])
+def test_what_happened_in_a_silence_is_weighed(start: int | None) -> None:
+    """Two storeys up in 45 s that nobody saw: the pressure before and after tells, also where he began."""
+    way = walk(UP_AND_DOWN, 5.0)
+    samples, kept = silent(record(way, 5.0), way, 45.0, 100.0)
+    assert right(samples, kept, STOREYS, start) > 0.99
+
+
+def test_a_silence_moves_nobody() -> None:
+    way = np.full(5 * 900, 3.5)
+    samples, kept = silent(record(way, 5.0), way, 100.0, 700.0)
+    assert right(samples, kept, STOREYS, 1) == 1.0
+    heights = Altitude(BarometerSettings(2.0)).take(samples)
+    assert abs(heights.height_m[-1]) < 2.0
+    assert heights.variance_m2[-1] > 0.5
+
+
+def test_without_storeys_a_rise_in_a_silence_is_seen() -> None:
+    way = walk(UP_AND_DOWN, 5.0)
+    samples, _ = silent(record(way, 5.0), way, 45.0, 100.0)
+    heights = Altitude(BarometerSettings(2.0)).take(samples)
+    assert heights.height_m[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
+
+
+@pytest.mark.parametrize(("rate_hz", "noise_pa"), [(1.0, 6.0), (5.0, 2.0), (25.0, 10.0)])
+def test_unequal_storeys_are_found(rate_hz: float, noise_pa: float) -> None:
+    legs = [
+        (0.0, 40.0),
+        (5.0, 19.0),
+        (5.0, 40.0),
+        (8.3, 13.0),
+        (8.3, 40.0),
+        (14.9, 12.0),
+        (14.9, 40.0),
+        (0.0, 16.0),
+        (0.0, 40.0),
+    ]
+    samples = record(walk(legs, rate_hz), rate_hz, noise_pa)
+    few, _ = thinned(samples)
+    found = find_storeys(few, BarometerSettings(noise_of_record(samples, few)))
+    assert found == pytest.approx([0.0, 5.0, 8.3, 14.9], abs=0.5)
+
+
+def test_short_stays_are_storeys_too() -> None:
+    legs = [
+        (0.0, 10.0),
+        (3.5, 9.0),
+        (3.5, 6.0),
+        (7.0, 9.0),
+        (7.0, 6.0),
+        (10.5, 9.0),
+        (10.5, 6.0),
+        (0.0, 9.0),
+        (0.0, 10.0),
+    ]
+    found = find_storeys(record(walk(legs, 5.0), 5.0), BarometerSettings(2.0))
+    assert found == pytest.approx([0.0, 3.5, 7.0, 10.5], abs=0.4)
+
+
+def test_one_way_without_a_stay_has_two_ends() -> None:
+    found = find_storeys(record(walk([(20.0, 0.5), (0.0, 70.0)], 2.0), 2.0), BarometerSettings(2.0))
+    assert found == pytest.approx([0.0, 20.0], abs=1.5)
+
+
+def test_weather_lifts_no_storey() -> None:
+    """Half an hour on each floor while the pressure falls by 2 hPa an hour."""
+    legs = [(0.0, 1800.0), (3.5, 14.0), (3.5, 1800.0), (0.0, 12.0), (0.0, 900.0)]
+    found = find_storeys(record(walk(legs, 1.0), 1.0, drift_pa_h=-200.0), BarometerSettings(2.0))
+    assert found == pytest.approx([0.0, 3.5], abs=0.25)
+
+
+def test_a_building_under_pressure_is_no_storey() -> None:
+    samples = record(np.zeros(600), 1.0, 3.0, drift_pa_h=0.0)
+    samples.pressure_pa[100:400] -= 25.0
+    with pytest.raises(EchostepError, match="one storey only"):
+        find_storeys(samples, BarometerSettings(3.0))
+
+
+def test_a_storey_that_vanishes_is_told() -> None:
+    with pytest.raises(EchostepError, match="one storey only"):
+        find_storeys(record(walk([(0.0, 90.0), (1.5, 9.0), (1.5, 90.0)], 5.0), 5.0), BarometerSettings(2.0))
+
+
+def test_rows_with_the_time_of_the_row_before_are_skipped(tmp_path: Path) -> None:
+    """Loggers write the last pressure again when there is no new one."""
+    samples = record(walk(UP_AND_DOWN, 5.0), 5.0)
+    lines = [f"{t:.3f},{p:.2f}\n" for t, p in zip(samples.t_s.tolist(), samples.pressure_pa.tolist(), strict=True)]
+    source = tmp_path / "twice.csv"
+    source.write_text("t_s,pressure_pa\n" + "".join(line for line in lines for _ in range(3)))
+    found = load_pressures(source)
+    assert len(found.samples.t_s) == len(lines)
+    assert f"{2 * len(lines)} rows with the t_s of the row before" in found.notes[0]

@@ -1,0 +1,230 @@
+"""Live from two ports, recorded, replayed: the same estimates, bit for bit."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tty
+from pathlib import Path
+
+import pytest
+
+from board_runs import ROOT, needs_twin
+from echostep.ports.chunks import SerialPorts
+from echostep.recording.recorder import open_recording
+
+ECHOSTEP = [sys.executable, "-m", "echostep"]
+PLAN = ROOT / "host/echostep/plans/demo.json"
+
+
+def echostep(*arguments: object, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*ECHOSTEP, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False
+    )
+
+
+def sha_of(text: str) -> str:
+    found = re.search(r"sha256\s+([0-9a-f]{16})", text)
+    assert found, text
+    return found[1]
+
+
+@needs_twin
+@pytest.mark.parametrize("wears_mtx", [True, False])
+def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bool) -> None:
+    """With foot and board, and with the board alone."""
+    twin = subprocess.Popen(
+        [sys.executable, ROOT / "tools/twin/run.py", "--out", tmp_path], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert twin.stdout is not None
+        board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
+        live = echostep(
+            "live",
+            "--plan",
+            PLAN,
+            "--board",
+            board,
+            *(("--mtx", mtx) if wears_mtx else ()),
+            "--out",
+            tmp_path / "live",
+            "--headless",
+            "--seconds",
+            14 if wears_mtx else 18,
+        )
+    finally:
+        twin.send_signal(signal.SIGINT)
+        twin.wait(timeout=10)
+        assert twin.stdout is not None
+        twin.stdout.close()
+    assert live.returncode == 0, live.stderr
+    rows = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))
+    assert float(rows[-1]["t_s"]) > 8.0
+    again = echostep("replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--out", tmp_path / "again", "--headless")
+    assert again.returncode == 0, again.stderr
+    assert sha_of(again.stdout) == sha_of(live.stdout)
+    assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "live/track.csv").read_bytes()
+
+
+def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
+    runs = [
+        echostep("demo", "--headless", "--seed", seed, "--out", tmp_path / str(k)) for k, seed in enumerate((3, 3, 4))
+    ]
+    assert all(run.returncode == 0 for run in runs), runs[0].stderr
+    first, second, other = (sha_of(run.stdout) for run in runs)
+    assert first == second != other
+    tracks = [
+        (tmp_path / str(k) / name).read_bytes() for k in (0, 1) for name in ("track.csv", "walk.mcap", "truth.csv")
+    ]
+    assert tracks[:3] == tracks[3:]
+    replay = echostep("replay", tmp_path / "0/walk.mcap", "--plan", PLAN, "--headless", "--out", tmp_path / "r")
+    assert sha_of(replay.stdout) == first
+
+
+def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    port = os.ttyname(theirs)
+    live = subprocess.Popen(
+        [*ECHOSTEP, "live", "--plan", PLAN, "--board", port, "--mtx", port, "--out", tmp_path, "--headless"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        deadline = time.monotonic() + 30
+        while not (tmp_path / "walk.mcap").exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        time.sleep(0.5)
+        live.send_signal(signal.SIGINT)
+        out, err = live.communicate(timeout=20)
+    finally:
+        live.kill()
+        os.close(ours)
+        os.close(theirs)
+    assert live.returncode == 0, err
+    assert "Traceback" not in err
+    assert "No estimate" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["replay", "none.mcap", "--plan", PLAN], "none.mcap"),
+        (["replay", __file__, "--plan", PLAN], "test_live.py"),
+        (["live", "--plan", "none.json", "--board", "x", "--mtx", "y"], "none.json"),
+        (["live", "--plan", PLAN, "--board", "/dev/no-such-port", "--mtx", "y"], "/dev/no-such-port"),
+        (["live", "--plan", PLAN, "--board", "nonsense://x", "--mtx", "y"], "nonsense"),
+        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--start", "1,2"], "--start"),
+        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--start", "1,2,nan"], "--start"),
+        (["live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", "none.toml"], "none.toml"),
+        (["record", "--board", "/dev/no-such-port", "--mtx", "y"], "/dev/no-such-port"),
+        (["decode", "none.bin"], "none.bin"),
+        (["decode", __file__], "test_live.py"),
+        (["demo", "--headless", "--board-command", "/no/such/twin"], "/no/such/twin"),
+        (["demo", "--headless", "--board-command", "/bin/true"], "/bin/true"),
+        (["demo", "--headless", "--board-command", "/bin/echo hello"], "/bin/echo"),
+    ],
+)
+def test_a_mistake_ends_with_one_line_that_names_it(tmp_path: Path, arguments: list[object], named: str) -> None:
+    done = echostep(*arguments, *(["--out", tmp_path / "out"] if arguments[0] != "decode" else []))
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert named in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("[clud]\nsize = 3", "clud"),
+        ("[cloud]\nsizee = 3", "sizee"),
+        ("[cloud]\nsize = 'many'", "size"),
+        ("[cloud]\nsize = 1.5", "size"),
+        ("[cloud]\nsize = -4", "size"),
+        ("[cloud]\nstart_sd_m = nan", "start_sd_m"),
+        ("[echo]\nsd_m = 0", "sd_m"),
+        ("[mtx]\nrate_hz = 0", "rate_hz"),
+        ("cloud = 3", "cloud"),
+        ("[cloud", "settings.toml"),
+    ],
+)
+def test_a_wrong_setting_is_named(tmp_path: Path, text: str, named: str) -> None:
+    settings = tmp_path / "settings.toml"
+    settings.write_text(text)
+    done = echostep(
+        "live", "--plan", PLAN, "--board", "x", "--mtx", "y", "--settings", settings, "--out", tmp_path / "out"
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert named in done.stderr
+    assert "settings.toml" in done.stderr
+
+
+def test_help_lists_the_commands() -> None:
+    done = echostep("--help")
+    assert done.returncode == 0
+    assert all(name in done.stdout for name in ("demo", "live", "record", "replay", "decode"))
+
+
+def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
+    pairs = [os.openpty() for _ in range(2)]
+    for _, theirs in pairs:
+        tty.setraw(theirs)
+    names = [os.ttyname(theirs) for _, theirs in pairs]
+    recorder = subprocess.Popen(
+        [*ECHOSTEP, "record", "--board", names[0], "--mtx", names[1], "--out", tmp_path / "x.mcap", "--seconds", "4"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    sent = [b"", b""]
+    while recorder.poll() is None:
+        for k, (ours, _) in enumerate(pairs):
+            part = bytes([k + 1, len(sent[k]) % 256]) * 20
+            sent[k] += part
+            os.write(ours, part)
+        time.sleep(0.05)
+    out, err = recorder.communicate(timeout=20)
+    for pair in pairs:
+        for end in pair:
+            os.close(end)
+    assert recorder.returncode == 0, err
+    chunks = list(open_recording(tmp_path / "x.mcap").chunks())
+    for k, port in enumerate(("board", "mtx")):
+        kept = b"".join(c.data for c in chunks if c.port == port)
+        assert len(kept) > 500
+        assert kept in sent[k]
+    assert all(b.t_arrival_ns >= a.t_arrival_ns for a, b in zip(chunks, chunks[1:], strict=False))
+    assert "bytes from the board" in out
+
+
+def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
+    link = tmp_path / "port"
+    first, theirs = os.openpty()
+    tty.setraw(theirs)
+    name = Path(os.ttyname(theirs))
+    link.symlink_to(name)
+    ports = SerialPorts({"board": str(link)}, {"board": 115200})
+    found = b""
+    try:
+        os.write(first, b"before")
+        second, new = os.openpty()
+        tty.setraw(new)
+        deadline = time.monotonic() + 20
+        for chunk in ports.chunks():
+            found += chunk.data if chunk else b""
+            if found == b"before" and link.is_symlink() and link.readlink() == name:
+                link.unlink()
+                link.symlink_to(os.ttyname(new))
+                os.close(theirs)
+                os.close(first)
+            if "is back" in " ".join(ports.notices):
+                os.write(second, b" after")
+                ports.notices.clear()
+            if found.endswith(b"after") or time.monotonic() > deadline:
+                break
+    finally:
+        ports.close()
+        os.close(second)
+        os.close(new)
+    assert found == b"before after"

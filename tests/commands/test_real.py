@@ -1,0 +1,35 @@
+"""The real foot on the plan drawn around its path: the figure that `make real` prints."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import real_walk
+from board_runs import ROOT
+from echostep.recording.recorder import open_recording
+
+pytestmark = pytest.mark.skipif(
+    not (real_walk.data_folder() / "gx5_gcp").is_dir(),
+    reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)",
+)
+
+
+def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
+    command = [sys.executable, str(ROOT / "tools/real_walk.py"), "--out", str(tmp_path), "--seed", "3"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr  # 1 when the RMSE is above 0.30 m
+    assert "foot real" in done.stdout
+    assert "echoes simulated" in open_recording(tmp_path / "walk.mcap").about["note"]
+    assert (tmp_path / "track.png").stat().st_size > 10_000
+
+
+def test_the_footprints_are_the_surveyed_ones() -> None:
+    walk = real_walk.read_walk(real_walk.data_folder())
+    assert len(walk.print_m) == 48
+    stride = ((walk.print_m[1:] - walk.print_m[:-1]) ** 2).sum(1) ** 0.5
+    assert 60.0 < stride.sum() < 66.0
+    assert abs(walk.accel[:200, 2].mean() - 9.8) < 0.2  # z is up after mounting

@@ -1,0 +1,173 @@
+"""`echostep doctor`: against boards on pseudo terminals, ports that are none, and what the system says of ports."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from board_runs import needs_twin
+from echostep.board import messages as m
+from echostep.board.frames import encode
+from echostep.board.health import Severity
+from echostep.commissioning import serial_ports as ports
+from echostep.commissioning.doctor import examine
+from echostep.commissioning.probe import ProbeResult, drift_of
+from echostep.commissioning.serial_ports import PortSeen, Role
+from players import babbling_port, pseudo_terminal, python_board, twin_board
+
+
+def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "echostep", "doctor", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_board_that_is_well_gets_status_0() -> None:
+    with python_board() as port:
+        done = doctor("--board", port, "--seconds", 4)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0, done.stdout
+    assert "Everything is fine." in done.stdout
+    assert "firmware 0.0.0, schema" in done.stdout
+    assert "barometer: answers" in done.stdout
+    rates = dict(re.findall(r"(\w+) ([\d.]+)/s", done.stdout))
+    assert float(rates["gyros"]) == pytest.approx(200.0, rel=0.02)
+    assert "ppm" in done.stdout
+
+
+@needs_twin
+def test_what_is_wrong_is_said_in_words() -> None:
+    with twin_board("scp1000=no_eeprom", "compass=absent", "calf=no_self_test", "belt=absent") as port:
+        done = doctor("--board", port, "--seconds", 5)
+    assert done.returncode == 1, done.stdout
+    assert "Traceback" not in done.stderr
+    for words in (
+        "barometer: EEPROM check failed",
+        "power-cycle the board, check 3.3 V and the level shifter",
+        "compass: does not answer at I2C address 0x60",
+        "calf gyro: failed its self-test",
+        "belt gyro: does not answer",
+        "firmware 1.1.0",
+        "thigh gyro: answers, 20 degC, self-test passed",
+        "belt gyro: FAILS",
+    ):
+        assert words in done.stdout, (words, done.stdout)
+
+
+@needs_twin
+def test_the_real_firmware_is_well() -> None:
+    with twin_board() as port:
+        report = examine(port, None, 3.0)
+    said = [str(finding) for finding in report.findings if finding.severity > Severity.NOTE]
+    assert not [text for text in said if "clock" not in text and "gives" not in text], said  # quiet rows have no noise
+    assert any("self-test passed" in line for line in report.lines)
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [("/dev/no-such-port", "there is no such port"), (__file__, "is no serial port"), ("nonsense://x", "nonsense")],
+)
+def test_a_port_that_is_none_is_named(port: str, words: str) -> None:
+    done = doctor("--board", port)
+    assert done.returncode == 1
+    assert words in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        (b"", "is silent"),
+        (b"hello world\r\n" * 20, "bytes came from"),
+        (encode(m.Identity(0, 0x12345678, 1, 0, 0, 0), 0), "echostep flash"),
+    ],
+)
+def test_a_port_that_is_not_the_board_says_so(sent: bytes, words: str) -> None:
+    with babbling_port(b"\0" + sent if sent else b"") as port:
+        report = examine(port, None, 0.5)
+    assert any(words in str(finding) for finding in report.findings), report.findings
+    assert not report.fine
+
+
+def test_an_mtx_that_is_silent_is_a_finding() -> None:
+    with pseudo_terminal() as (_, port):
+        report = examine(None, port, 2.5)
+    assert any(f.subject == "MTx" and f.severity is Severity.FAULT for f in report.findings), report.findings
+
+
+def test_nothing_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echostep.commissioning.doctor.list_seen", list)
+    report = examine(None, None, 0.1)
+    assert "no sensor board is plugged in, nor anything else" in str(report.findings[0])
+    assert not report.fine
+
+
+def test_a_board_in_its_bootloader_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = [PortSeen("/dev/ttyACM9", Role.BOOTLOADER, "Arduino Leonardo")]
+    monkeypatch.setattr("echostep.commissioning.doctor.list_seen", lambda: seen)
+    report = examine(None, None, 0.1)
+    assert "echostep flash --port /dev/ttyACM9" in str(report.findings[0])
+
+
+def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pseudo_terminal() as (_, port):
+        (finding,) = ports.access_findings("board", port)
+    assert "usermod -aG" in finding.remedy
+
+
+def test_the_latency_of_the_adapter(tmp_path: Path) -> None:
+    timer = tmp_path / "bus/usb-serial/devices/ttyUSB7/latency_timer"
+    timer.parent.mkdir(parents=True)
+    timer.write_text("16\n")
+    (finding,) = ports.latency_findings("MTx", "/dev/ttyUSB7", tmp_path)
+    assert "16 ms" in finding.what
+    timer.write_text("1\n")
+    assert ports.latency_findings("MTx", "/dev/ttyUSB7", tmp_path) == []
+    timer.write_text("x")
+    assert ports.latency_findings("MTx", "/dev/ttyUSB7", tmp_path) == []
+
+
+def test_a_program_that_holds_the_port_is_named(tmp_path: Path) -> None:
+    (tmp_path / "77/fd").mkdir(parents=True)
+    (tmp_path / "77/comm").write_text("minicom\n")
+    (tmp_path / "port").touch()
+    (tmp_path / "77/fd/3").symlink_to(tmp_path / "port")
+    (finding,) = ports.holder_findings("board", str(tmp_path / "port"), tmp_path)
+    assert "minicom (process 77)" in finding.what
+
+
+def test_the_udev_rules_are_printed_and_recognised(tmp_path: Path) -> None:
+    done = doctor("--udev")
+    assert done.returncode == 0
+    for part in ('SYMLINK+="echostep"', 'SYMLINK+="echostep-mtx"', 'ATTR{latency_timer}="1"'):
+        assert part in done.stdout
+    assert len(ports.rules_findings((tmp_path,))) == 1
+    (tmp_path / ports.RULES).write_text(done.stdout)
+    assert ports.rules_findings((tmp_path,)) == []
+    (tmp_path / ports.RULES).write_text("# old")
+    assert "not this version's" in str(ports.rules_findings((tmp_path,))[0])
+
+
+def test_roles_by_usb_identifiers() -> None:
+    assert ports._role(0x1209, 1) is Role.BOARD
+    assert ports._role(0x2341, 0x0036) is Role.BOOTLOADER
+    assert ports._role(0x0403, 0xD388) is Role.MTX
+    assert ports._role(0x1A86, 0x7523) is Role.OTHER
+
+
+@pytest.mark.parametrize("ppm", [-300.0, 0.0, 40.0])
+def test_the_drift_is_found_through_slow_answers(ppm: float) -> None:
+    heard = ProbeResult()
+    for k in range(60):
+        sent_s = 0.2 * k
+        late_s = 0.001 + (0.03 if k % 5 == 0 else 0.0001 * (k % 3))
+        heard.replies.append((sent_s, sent_s + late_s, round((sent_s + 0.0005) * (1 + 1e-6 * ppm) * 2e6)))
+    drift = drift_of(heard)
+    assert drift is not None
+    assert drift.ppm == pytest.approx(ppm, abs=5.0)
+    assert drift.sd_ppm < 5.0

@@ -1,0 +1,130 @@
+"""The firmware's own C, compiled for this machine with its sanitizers: every golden vector, and hostile bytes.
+
+In: firmware/*.c, protocol/vectors.jsonl, tests/fuzz_codec.c. Out: pass or fail; skipped without a C compiler.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from echostep.board.frames import encode
+from echostep.board.messages import ClockQuery, Configure, Identify, Message
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = ROOT / "firmware"
+CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
+FUZZ = [ROOT / "tests" / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
+FLAGS = ["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE}", "-fno-sanitize-recover=all"]
+HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros")
+TIMEOUT_S = 60
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+
+PROLOGUE = """
+#include <stdio.h>
+#include <string.h>
+#include "frame.h"
+static int failures;
+static void hold(int line, int condition)
+{
+	if (!condition) {
+		printf("vector %d\\n", line);
+		failures++;
+	}
+}
+static void same(int line, const void *found, long found_length, const void *wanted, long wanted_length)
+{
+	hold(line, found_length == wanted_length && !memcmp(found, wanted, (size_t)wanted_length));
+}
+static unsigned char out[600], payload[600];
+"""
+
+
+def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+
+
+def build(program: Path, compiler: str, sources: list[Path], *flags: str) -> Path:
+    done = run(compiler, *FLAGS, *flags, "-o", program, *sources)
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+def array(hexadecimal: str) -> str:
+    return "(const unsigned char[]){" + ", ".join(str(b) for b in bytes.fromhex(hexadecimal) or b"\0") + "}"
+
+
+def cobs_case(line: int, vector: dict[str, Any]) -> str:
+    plain, encoded = vector["plain"], vector["encoded"]
+    return f"""
+	same({line}, out, cobs_encode(out, {array(plain)}, {len(plain) // 2}), {array(encoded)}, {len(encoded) // 2});
+	same({line}, out, cobs_decode(out, {array(encoded)}, {len(encoded) // 2}), {array(plain)}, {len(plain) // 2});"""
+
+
+def sent_case(line: int, name: str, vector: dict[str, Any]) -> str:
+    """A message of the board: packed, numbered, checksummed and stuffed."""
+    values = ", ".join(f".{field} = {value}" for field, value in vector["fields"].items())
+    return f"""
+	n = pack_{name}(payload + FRAME_HEAD_SIZE, &(struct msg_{name}){{ {values} }});
+	n = frame_encode(out, payload, MSG_{name.upper()}, {vector["sequence"]}, (unsigned char)n);
+	same({line}, out, n, {array(vector["frame"])}, {len(vector["frame"]) // 2});"""
+
+
+def received_case(line: int, name: str, vector: dict[str, Any]) -> str:
+    """A message of the host: unstuffed, checked and unpacked."""
+    length = len(vector["frame"]) // 2 - 1
+    code = f"""
+	memcpy(payload, {array(vector["frame"])}, {length});
+	n = frame_decode(payload, {length});
+	hold({line}, n == MSG_{name.upper()}_SIZE && payload[0] == MSG_{name.upper()});"""
+    if not vector["fields"]:
+        return code
+    fields = " ".join(f"hold({line}, m.{field} == {value});" for field, value in vector["fields"].items())
+    return f"""{code}
+	{{
+		struct msg_{name} m;
+		hold({line}, unpack_{name}(&m, payload + FRAME_HEAD_SIZE, (unsigned char)n));
+		{fields}
+	}}"""
+
+
+def case(line: int, vector: dict[str, Any]) -> str:
+    if "cobs" in vector:
+        return cobs_case(line, vector)
+    name = vector["message"]
+    return received_case(line, name, vector) if name in HOST_MESSAGES else sent_case(line, name, vector)
+
+
+def test_every_vector(tmp_path: Path) -> None:
+    lines = (ROOT / "protocol" / "vectors.jsonl").read_text().splitlines()
+    cases = [
+        case(number, json.loads(line)) for number, line in enumerate(lines, 1) if '"message": "beacon"' not in line
+    ]
+    source = tmp_path / "vectors.c"
+    source.write_text(f"{PROLOGUE}int main(void)\n{{\n\tlong n;{''.join(cases)}\n\treturn failures != 0;\n}}\n")
+    done = run(build(tmp_path / "vectors", "cc", [source, *CODEC], "-fsanitize=address,undefined"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(cases) > 80
+
+
+def test_seeded_hostile_bytes(tmp_path: Path) -> None:
+    done = run(build(tmp_path / "fuzz", "cc", FUZZ, "-fsanitize=address,undefined"), "1", "30000")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="no clang, so no libFuzzer")
+def test_coverage_guided_hostile_bytes(tmp_path: Path) -> None:
+    program = build(tmp_path / "fuzz", "clang", FUZZ, "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined")
+    corpus = tmp_path / "corpus"
+    corpus.mkdir()
+    messages: list[Message] = [Identify(), ClockQuery(0x1234), Configure(0xFF, 1, 200, 10, 0)]
+    for number, message in enumerate(messages):
+        (corpus / str(number)).write_bytes(encode(message, number))
+    done = run(program, "-seed=1", "-max_total_time=5", "-max_len=600", f"-artifact_prefix={tmp_path}/", corpus)
+    assert done.returncode == 0, done.stderr[-2000:]

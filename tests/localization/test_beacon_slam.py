@@ -1,0 +1,179 @@
+"""Beacons in the cloud: what a measurement does to particles and to what they believe of the beacon; moved beacons are noticed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from echostep.localization.beacon_slam import (
+    UNFIT_RUNS,
+    BeaconSettings,
+    Beliefs,
+    beacon_model,
+    hear,
+    inherit,
+    kick,
+    no_beliefs,
+    place,
+    unheard,
+    weigh,
+    wrapped,
+)
+from echostep.walls.echo_sources import Walls
+from echostep.walls.index import WallIndex
+
+MODEL = beacon_model(BeaconSettings())
+Floats = np.ndarray
+
+
+def walls(*rows: tuple[float, float, float, float]) -> WallIndex:
+    plan = Walls(np.array(rows, np.float64).reshape(-1, 4))
+    return plan.near(np.zeros(1), np.zeros(1), 20.0)
+
+
+OPEN = walls()
+
+
+def ring(n: int, radius_m: float) -> tuple[Floats, Floats]:
+    angle = np.linspace(-math.pi, math.pi, n, endpoint=False)
+    return radius_m * np.cos(angle), radius_m * np.sin(angle)
+
+
+def test_range_prefers_particles_at_that_distance() -> None:
+    x, y = np.linspace(1.0, 6.0, 51), np.zeros(51)
+    weight, beliefs = np.zeros(51), no_beliefs(51, 1)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    fit, size = weigh(x, y, weight, beliefs, 0, 3.0, math.nan, MODEL, OPEN)
+    assert abs(x[weight.argmax()] - 3.0) < 0.06
+    assert 0.0 < fit < 1.0
+    assert 1.0 < size < 51.0
+
+
+def test_bearing_prefers_particles_on_that_side() -> None:
+    x, y = ring(72, 3.0)
+    weight, beliefs = np.zeros(72), no_beliefs(72, 1)
+    place(beliefs, 0, 0.0, 0.0, math.radians(40.0), 0.0, 0.0)
+    weigh(x, y, weight, beliefs, 0, 3.0, math.radians(50.0), MODEL, OPEN)
+    assert abs(math.atan2(y[weight.argmax()], x[weight.argmax()]) - math.radians(90.0)) < 0.1
+
+
+def test_outlier_costs_no_particle_its_life() -> None:
+    x, y = np.full(10, 2.0), np.linspace(-0.5, 0.5, 10)
+    weight, beliefs = np.zeros(10), no_beliefs(10, 1)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    fit, size = weigh(x, y, weight, beliefs, 0, 9.0, math.nan, MODEL, OPEN)
+    assert 0.8 < fit < 0.9  # it may also have been moved
+    assert size > 9.9
+
+
+def test_wall_on_the_line_of_sight_makes_a_fitting_range_less_likely() -> None:
+    seen = []
+    for index in (OPEN, walls((1.0, -5.0, 1.0, 5.0))):
+        weight, beliefs = np.zeros(1), no_beliefs(1, 1)
+        place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        seen.append(weigh(np.full(1, 2.0), np.zeros(1), weight, beliefs, 0, 2.0, math.nan, MODEL, index)[0])
+    assert seen[1] < seen[0] - 0.005
+
+
+def test_place_and_axis_are_learnt_from_a_walk_around() -> None:
+    rng = np.random.default_rng(1)
+    n, true = 20, (1.0, -0.5, 0.7)
+    beliefs, weight = no_beliefs(n, 1), np.zeros(n)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
+    for angle in np.linspace(0.0, 2.0 * math.pi, 200):
+        x, y = true[0] + 3.0 * math.cos(angle), true[1] + 3.0 * math.sin(angle)
+        bearing = wrapped(angle - true[2] + math.radians(30.0) * rng.standard_normal())
+        weigh(
+            np.full(n, x), np.full(n, y), weight, beliefs, 0, 3.0 + 0.05 * rng.standard_normal(), bearing, MODEL, OPEN
+        )
+    place_off = beliefs.mean[:, 0, :2] - true[:2]
+    assert np.hypot(*place_off.T).max() < 0.15
+    assert np.abs(beliefs.mean[:, 0, 2] - true[2]).max() < 0.15
+    assert beliefs.cov[:, 0, 5].max() < 0.02
+
+
+def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
+    rng = np.random.default_rng(2)
+    n = 100
+    x, y = 0.05 * rng.standard_normal(n), 0.05 * rng.standard_normal(n)
+    turn, weight, health = np.zeros(n), np.zeros(n), unheard(3)
+    beliefs = no_beliefs(n, 3)
+    at = [(4.0, 0.0), (0.0, 4.0), (-4.0, 0.0)]
+    for k, (bx, by) in enumerate(at):
+        place(beliefs, k, bx, by, 0.0, 0.0, 0.0)
+    health.known[:] = True
+    for _ in range(60):
+        for k, range_m in enumerate((4.0, 4.0, 7.0)):  # the third lies 3 m further off than believed
+            hear(x, y, turn, weight, beliefs, health, k, range_m, math.nan, MODEL, 0.25, OPEN, rng)
+        chosen = rng.choice(n, n, p=np.exp(weight) / np.exp(weight).sum())
+        weight[:], x[:], y[:] = 0.0, x[chosen], y[chosen]
+        inherit(beliefs, chosen)
+    assert health.each[:2, UNFIT_RUNS].tolist() == [0.0, 0.0]
+    assert health.each[2, UNFIT_RUNS] >= 1.0
+    assert health.all[0] > 0.5
+    assert beliefs.doubt[:, 2].min() > 3.0
+    assert np.abs(beliefs.mean[:, 2, 0] + 4.0).max() < 0.1  # nobody learns from it
+    assert np.hypot(x.mean(), y.mean()) < 0.1
+
+
+def test_kick_prices_what_it_tries() -> None:
+    turn, weight = np.zeros(10_000), np.zeros(10_000)
+    kick(turn, weight, 0.2, MODEL, np.random.default_rng(3))
+    kicked = turn != 0.0
+    assert abs(kicked.mean() - 0.2 * MODEL.tries_per_m) < 0.02
+    assert np.allclose(weight[kicked], math.log(MODEL.kick_per_m / MODEL.tries_per_m))
+    assert (weight[~kicked] == 0.0).all()
+
+
+@given(
+    st.floats(0.0, 1e6), st.floats(-10.0, 10.0), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(0.0, 1e4), st.floats(0.0, 20.0)
+)  # fmt: skip
+def test_no_measurement_makes_a_belief_infinite(
+    range_m: float, bearing: float, x: float, y: float, place_var: float, axis_var: float
+) -> None:
+    beliefs, weight = no_beliefs(3, 1), np.zeros(3)
+    place(beliefs, 0, 0.0, 0.0, 0.0, place_var, axis_var)
+    for _ in range(3):
+        weigh(np.full(3, x), np.full(3, y), weight, beliefs, 0, range_m, bearing, MODEL, OPEN)
+    assert np.isfinite(weight).all()
+    assert all(np.isfinite(part).all() for part in beliefs)
+    assert (beliefs.cov[:, 0, (0, 3, 5)] >= -1e-9).all()
+
+
+def test_inherit_copies_what_the_chosen_believed() -> None:
+    mean, cov = np.arange(12.0).reshape(2, 2, 3), np.arange(24.0).reshape(2, 2, 6)
+    beliefs = Beliefs(mean.copy(), cov.copy(), np.arange(4.0).reshape(2, 2))
+    inherit(beliefs, np.array([1, 1]))
+    assert (beliefs.mean == mean[[1, 1]]).all()
+    assert (beliefs.cov == cov[[1, 1]]).all()
+    assert beliefs.doubt.tolist() == [[2.0, 3.0], [2.0, 3.0]]
+
+
+def test_beacon_that_was_moved_costs_no_more_than_a_moved_one_and_is_trusted_again() -> None:
+    """A particle that one beacon contradicts for long is left with the others' word; when it fits again it counts again."""
+    beliefs, weight = no_beliefs(1, 1), np.zeros(1)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    at = np.full(1, 4.0), np.zeros(1)
+    trust = [weigh(*at, weight, beliefs, 0, 8.0, math.nan, MODEL, OPEN)[0] for _ in range(20)]
+    assert trust[0] > 0.8
+    assert trust[-1] < 0.05
+    assert beliefs.doubt[0, 0] < 8.0
+    trust = [weigh(*at, weight, beliefs, 0, 4.0, math.nan, MODEL, OPEN)[0] for _ in range(10)]
+    assert trust[-1] > 0.95
+
+
+def test_first_bearing_ties_the_axis_to_the_place() -> None:
+    """The place is uncertain across the line of sight: whoever then learns that the beacon lies to the left learns that its axis is another."""
+    beliefs, weight = no_beliefs(1, 1), np.zeros(1)
+    place(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
+    weigh(np.full(1, 5.0), np.zeros(1), weight, beliefs, 0, 5.0, 0.3, MODEL, OPEN)
+    axis = beliefs.mean[0, 0, 2]
+    assert abs(axis + 0.3) < 0.1
+    for _ in range(20):
+        weigh(np.zeros(1), np.full(1, -5.0), weight, beliefs, 0, 6.0, math.nan, MODEL, OPEN)
+    assert abs(beliefs.mean[0, 0, 1] - 0.9) < 0.2
+    seen = math.atan2(-beliefs.mean[0, 0, 1], 5.0)
+    assert abs(beliefs.mean[0, 0, 2] - (seen - 0.3)) < 0.06

@@ -1,0 +1,144 @@
+"""The cloud and its likelihood: normalised mixtures, resampling, walls that kill, moves that scatter."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from echostep.localization.echo_likelihood import EchoSettings, echo_model, log_echo
+from echostep.localization.estimate import TrackStatus, ellipse95, estimate, trust
+from echostep.localization.particles import Cloud, CloudSettings, Move, PingBatch, effective_size, systematic
+from echostep.plan.model import Pose
+from echostep.walls.echo_sources import Walls
+from echostep.walls.visibility import CORNER, EDGE
+
+MODEL = echo_model(EchoSettings())
+BOX = Walls(np.array([[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 2.0], [6.0, 2.0, 0.0, 2.0], [0.0, 2.0, 0.0, 0.0]]))
+NOTHING = PingBatch(*(np.zeros(0) for _ in range(4)))
+Source = tuple[float, float, float]  # distance, degrees off the axis, kind
+
+
+def cloud(size: int = 1000, heading: float = 0.0) -> Cloud:
+    return Cloud(CloudSettings(size=size), Pose(1.0, 1.0, heading), 0.0, np.random.default_rng(1))
+
+
+def heard(axis_rad: float, range_m: float, count: int = 1, power: float = 0.3) -> PingBatch:
+    return PingBatch(np.full(count, 0.5), np.full(count, axis_rad), np.full(count, range_m), np.full(count, power))
+
+
+def log_p(range_m: float, sources: list[Source]) -> float:
+    rows = np.array(sources, dtype=float).reshape(-1, 3)
+    return log_echo(range_m, len(rows), rows[:, 0].copy(), np.radians(rows[:, 1]), rows[:, 2].copy(), MODEL)
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.3, 6.2), st.floats(0.0, 35.0), st.sampled_from([0.0, EDGE, CORNER])), max_size=8
+    ).map(sorted)
+)
+@settings(max_examples=25)
+def test_the_mixture_is_a_probability(sources: list[Source]) -> None:
+    """Summed over every range and no echo it is one; the normals' tails beyond the sensor's limits are all that may miss."""
+    z = np.arange(0.0025, 7.5, 0.005)
+    density = np.array([math.exp(log_p(float(r), sources)) for r in z])
+    inside = density[(z >= 0.15) & (z <= 6.3)].sum() * 0.005
+    assert 0.9 < inside + math.exp(log_p(0.0, sources)) < 1.1
+
+
+def test_an_echo_where_the_wall_is_is_likeliest() -> None:
+    wall = [(1.0, 0.0, 0.0)]
+    assert all(log_p(z, wall) < log_p(1.0, wall) for z in (0.5, 0.8, 1.2, 3.0, 0.0))
+
+
+def test_the_nearest_source_that_is_heard_answers() -> None:
+    """An edge is heard now and then; a wall at the rim is heard less than one ahead; the inside of a corner nearly like a wall."""
+    behind = (2.0, 0.0, 0.0)
+    weak, strong = [(1.0, 0.0, EDGE), behind], [(1.0, 0.0, CORNER), behind]
+    assert log_p(2.0, strong) < log_p(2.0, weak) < log_p(2.0, [behind])
+    assert log_p(1.0, [behind]) < log_p(1.0, weak) < log_p(1.0, strong) <= log_p(1.0, [(1.0, 0.0, 0.0)])
+    assert log_p(3.0, [(3.0, 33.0, 0.0)]) < log_p(3.0, [(3.0, 20.0, 0.0)]) < log_p(3.0, [(3.0, 0.0, 0.0)])
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=50), st.floats(0.0, 0.999), st.integers(1, 200))
+def test_systematic_resampling_keeps_the_shares(weights: list[float], draw: float, count: int) -> None:
+    weight = np.array(weights) + 1e-6
+    chosen = systematic(weight, draw, count)
+    expected = count * weight / weight.sum()
+    copies = np.bincount(chosen, minlength=len(weight))
+    assert copies.sum() == count
+    assert (np.abs(copies - expected) <= 1.0 + 1e-6).all()
+
+
+def test_the_effective_size() -> None:
+    assert effective_size(np.zeros(10)) == pytest.approx(10.0)
+    assert effective_size(np.array([0.0, -np.inf, -np.inf])) == pytest.approx(1.0)
+    assert effective_size(np.full(3, -np.inf)) == 0.0
+
+
+def test_walls_take_the_weight_and_the_rest_carries_on() -> None:
+    found = cloud()
+    found.follow(Move(0.0, 0.9, 0.1, 0.0), NOTHING, MODEL, BOX)  # up to the wall at y = 2
+    assert estimate(found, 0.0, 0.0, 0).y_m < 2.0
+    assert found.rescues == 0
+
+
+def test_a_move_through_a_wall_is_survived_wider() -> None:
+    found = cloud()
+    found.follow(Move(0.0, 3.0, 0.01, 0.0), NOTHING, MODEL, BOX)
+    assert found.rescues == 1
+    assert estimate(found, 0.0, 0.0, 0).ellipse95.major_m > 1.0
+
+
+def test_echoes_find_the_place_across_a_corridor() -> None:
+    found = cloud()
+    for _ in range(30):
+        for axis, range_m in ((math.pi / 2, 0.7), (-math.pi / 2, 1.3)):  # the left wall is 0.7 m away: y = 1.3
+            explained = found.follow(Move(0.0, 0.0, 0.0, 0.0), heard(axis, range_m), MODEL, BOX)
+    assert estimate(found, 0.0, 0.0, 0).y_m == pytest.approx(1.3, abs=0.05)
+    assert explained[0] > 1.0
+
+
+def test_pings_count_where_they_were_triggered() -> None:
+    """A wall end passed halfway: the same ranges in another order put the cloud elsewhere."""
+    gate = Walls(np.array([[0.0, 1.0, 3.0, 1.0], [3.0, 1.0, 3.0, 4.0]]))
+    place = Pose(2.0, 0.0, 0.0)
+    shares = np.linspace(0.05, 0.95, 10)
+    ends = {}
+    for name, ranges in (("passed", [1.0] * 5 + [0.0] * 5), ("not yet", [1.0] * 10)):
+        found = Cloud(CloudSettings(size=2000, start_sd_m=0.3), place, 0.0, np.random.default_rng(3))
+        pings = PingBatch(shares, np.full(10, math.pi / 2), np.array(ranges), np.ones(10))
+        found.follow(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)
+        ends[name] = estimate(found, 0.0, 0.0, 0).x_m
+    assert ends["passed"] > ends["not yet"] + 0.2
+
+
+def test_an_unwatched_move_grows_the_cloud_and_it_shrinks_again() -> None:
+    found = cloud(300)
+    found.scatter(Move(0.0, 0.0, 4.0, 3.0))
+    assert len(found.x_m) == CloudSettings().largest
+    assert estimate(found, 0.0, 0.0, 0).status == TrackStatus.LOST
+    found.x_m[:] = 1.0 + 0.02 * np.random.default_rng(3).standard_normal(len(found.y_m))
+    found.y_m[:] = 1.0 + 0.1 * np.random.default_rng(2).standard_normal(len(found.y_m))
+    found.turn_rad[:] = 0.0
+    for _ in range(60):
+        found.follow(Move(0.0, 0.0, 0.0, 0.0), heard(math.pi / 2, 1.0, power=1.0), MODEL, BOX)
+    assert len(found.x_m) < 1000
+
+
+def test_the_ellipse_holds_95_percent() -> None:
+    rng = np.random.default_rng(4)
+    covariance = np.array([[0.5, 0.3], [0.3, 0.4]])
+    points = rng.multivariate_normal([0, 0], covariance, 20_000)
+    ellipse = ellipse95(0.5, 0.3, 0.4)
+    c, s = math.cos(ellipse.angle_rad), math.sin(ellipse.angle_rad)
+    along, across = points @ [c, s], points @ [-s, c]
+    inside = (along / ellipse.major_m) ** 2 + (across / ellipse.minor_m) ** 2 <= 1.0
+    assert inside.mean() == pytest.approx(0.95, abs=0.01)
+
+
+def test_words_for_trust() -> None:
+    assert [trust(r) for r in (0.3, 2.0, 8.0, math.nan)] == ["tracking", "uncertain", "lost", "lost"]

@@ -1,0 +1,69 @@
+"""Slow, obviously right twin of the board's frame reader: one frame at a time, by the cobs library and Python's CRC."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from cobs import cobs
+
+from echostep.board.frames import MAX_ENCODED, FrameCounts, StaleFirmwareError, crc
+from echostep.board.messages import BY_ID, SCHEMA_HASH, Identify, Identity, Message
+
+
+@dataclass(slots=True)
+class BoardReader:
+    """Messages out of a byte stream; every malformed frame is counted, none raises."""
+
+    counts: FrameCounts = field(default_factory=FrameCounts)
+    _rest: bytes = b""
+    _sequence: int | None = None
+
+    def feed(self, received: bytes) -> list[Message]:
+        """Messages completed by these bytes; raises StaleFirmwareError when the board has another schema."""
+        pieces = (self._rest + received).split(b"\0")
+        self._rest = pieces.pop()[: MAX_ENCODED + 1]
+        return [m for piece in pieces if piece and (m := self._decode(piece)) is not None]
+
+    def _decode(self, piece: bytes) -> Message | None:
+        if not 6 <= len(piece) <= MAX_ENCODED:
+            self.counts.bad_length += 1
+            return None
+        try:
+            payload = cobs.decode(piece)
+        except cobs.DecodeError:
+            self.counts.bad_cobs += 1
+            return None
+        identifier, plain = payload[0], payload[:-2]
+        if crc(identifier, plain) != payload[-2] | payload[-1] << 8:
+            self.counts.bad_crc += 1
+            return None
+        return self._accept(identifier, plain)
+
+    def _accept(self, identifier: int, plain: bytes) -> Message | None:
+        kind = BY_ID.get(identifier)
+        try:
+            message = kind.unpack(plain[3:]) if kind else None
+        except ValueError:
+            message = None
+        if message is None:
+            self.counts.bad_message += 1
+            return None
+        if isinstance(message, Identity) and message.schema_hash != SCHEMA_HASH:
+            self._refuse()
+            return None
+        self._count_sequence(plain[1] | plain[2] << 8, message)
+        return message
+
+    def _refuse(self) -> None:
+        """Another schema: fatal, unless frames of our own schema prove this one to be noise."""
+        if self.counts.good:
+            self.counts.bad_message += 1
+            return
+        raise StaleFirmwareError
+
+    def _count_sequence(self, sequence: int, message: Message) -> None:
+        self.counts.good += 1
+        if self._sequence is not None and not isinstance(message, Identify):
+            gap = (sequence - self._sequence - 1) & 0xFFFF
+            self.counts.lost += gap if gap < 0x8000 else 0  # a step back is a board that restarted
+        self._sequence = sequence

@@ -1,0 +1,241 @@
+"""The intake: the chunks alone decide what comes out; what is late, lost or silent is counted or told."""
+
+from __future__ import annotations
+
+import heapq
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from board_runs import ROOT
+from echostep.board.calibration import RangerSettings, ranges
+from echostep.board.frames import encode
+from echostep.board.messages import ROWS, Outcome, Ping
+from echostep.foot.steps import FootSettings
+from echostep.foot.trunk_path import GaitSettings
+from echostep.odometry.front_end import FrontEnd
+from echostep.odometry.synchronizer import BLIND_S, MAX_WAITING, PING_AGE_S, SILENCE_S, Synchronizer
+from echostep.path import Dropout, MeasuredSegment, PathSegment
+from echostep.plan.model import load_plan
+from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.scenario import Scenario
+from echostep.timing.timeline import MtxTiming
+
+Told = list[tuple[object, ...]]
+PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+
+
+def recorded() -> list[Chunk]:
+    """A short walk whose foot is held up for a while and later falls silent, with damage on both ports and a port that nobody knows."""
+    rng = random.Random(8)
+    chunks = []
+    for n, chunk in enumerate(Scenario(PLAN, ((2.0, 7.5), (9.5, 7.5)), 5, PythonBoard(5)).chunks()):
+        if chunk.port == MTX and 6_000_000_000 < chunk.t_arrival_ns < 8_500_000_000:
+            continue
+        if chunk.port == MTX and 3_000_000_000 < chunk.t_arrival_ns < 5_000_000_000:
+            chunk = replace(chunk, t_arrival_ns=5_000_000_000)
+        damaged = bytearray(chunk.data)
+        if rng.random() < 0.01:
+            damaged[rng.randrange(len(damaged))] = rng.choice([0, 0xFA, 0xFF, 0x32])
+        chunks.append(replace(chunk, data=bytes(damaged)))
+        if n % 1000 == 0:
+            chunks.append(Chunk("kettle", chunk.t_arrival_ns, b"?"))
+    return sorted(chunks, key=lambda chunk: chunk.t_arrival_ns)
+
+
+CHUNKS = recorded()
+
+
+def intake() -> FrontEnd:
+    return FrontEnd(MtxTiming(), RangerSettings(), FootSettings(), GaitSettings())
+
+
+def told(pieces: list[MeasuredSegment | Dropout]) -> Told:
+    """Pieces as tuples, every bit of them."""
+    found: Told = []
+    for piece in pieces:
+        if isinstance(piece, MeasuredSegment):
+            found.append((piece.segment, piece.t_s.tobytes(), piece.ranger.tobytes(), piece.range_m.tobytes()))
+        else:
+            found.append((piece.t_s,))
+    return found
+
+
+def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...]]:
+    """What an intake tells of the chunks, in portions cut there, and what it counted."""
+    ours, found = intake(), []
+    edges = sorted({0, len(chunks), *(c % (len(chunks) + 1) for c in cuts)})
+    for a, b in zip(edges, edges[1:], strict=False):
+        found += told(ours.take(portion_of(chunks[a:b])))
+    return found, (
+        ours.counts,
+        ours.board.counts,
+        ours.mtx.counts,
+        ours.status,
+        ours.identity,
+        ours.timeline.synchronised,
+    )
+
+
+WHOLE = taken(CHUNKS, [])
+
+
+def test_the_recorded_walk_has_all_that_matters() -> None:
+    kinds = {len(piece) for piece in WHOLE[0]}
+    assert kinds == {1, 4}
+    ours = intake()
+    pieces = ours.take(portion_of(CHUNKS))
+    passages = [piece for piece in pieces if isinstance(piece, MeasuredSegment)]
+    assert sum(len(p.t_s) for p in passages) > 200
+    assert any(p.segment.unobserved for p in passages)
+    assert ours.counts.unknown_ports > 5
+    assert ours.board.counts.rejected > 10
+    assert ours.mtx.counts.bad_checksum > 5
+    assert ours.status is not None
+    assert ours.identity is not None
+
+
+@given(st.lists(st.integers(0, len(CHUNKS)), max_size=40))
+@settings(max_examples=25, deadline=None)
+def test_any_portions_tell_the_same(cuts: list[int]) -> None:
+    assert taken(CHUNKS, cuts) == WHOLE
+
+
+def test_chunk_by_chunk_tells_the_same() -> None:
+    assert taken(CHUNKS, list(range(len(CHUNKS)))) == WHOLE
+
+
+@given(st.integers(0, 1 << 32), st.lists(st.integers(0, 2 * len(CHUNKS)), max_size=10))
+@settings(max_examples=25, deadline=None)
+def test_bytes_that_arrived_together_may_be_cut_anywhere(seed: int, cuts: list[int]) -> None:
+    rng = random.Random(seed)
+    finer = []
+    for chunk in CHUNKS:
+        at = rng.randrange(len(chunk.data) + 1)
+        finer += (
+            [replace(chunk, data=part) for part in (chunk.data[:at], chunk.data[at:])]
+            if chunk.port != "kettle"
+            else [chunk]
+        )
+    assert taken(finer, cuts) == WHOLE
+
+
+def test_pings_without_a_foot_are_bounded_and_counted() -> None:
+    ours = intake()
+    sent = MAX_WAITING + 500
+    chunks = [
+        Chunk(BOARD, n * 10_000_000, encode(Ping(n * 20_000, n % 2, Outcome.ECHO, 5_000), n)) for n in range(sent)
+    ]
+    assert ours.take(portion_of(chunks)) == []
+    assert ours.counts.dropped_pings == 500
+
+
+def test_ranges_of_pings() -> None:
+    rows = [
+        (0, 0, Outcome.ECHO, 10_000),
+        (0, 1, Outcome.NO_ECHO, 0),
+        (0, 0, Outcome.ECHO, 0),
+        (0, 1, Outcome.NO_ECHO, 7),
+    ]
+    found = ranges(np.array(rows, ROWS[0x02]), RangerSettings(speed_of_sound_m_s=340.0))
+    assert found[0] == pytest.approx(1.7)
+    assert np.isnan(found[1:]).all()
+
+
+class NaiveWaiting:
+    """Slow, obviously right: a heap, and one message after the other."""
+
+    def __init__(self) -> None:
+        self.late = self.dropped = self._pushed = 0
+        self._pings: list[tuple[float, int, tuple[float, float, float]]] = []
+        self._legs: list[PathSegment] = []
+        self._gone_s, self._told_s, self._gone = 0.0, -math.inf, 0
+
+    def message(
+        self, pings: list[tuple[float, float, float]], legs: list[PathSegment], board_s: float, mtx_s: float
+    ) -> list[tuple[object, ...]]:
+        found: list[tuple[object, ...]] = []
+        for ping in pings:
+            self._push(ping)
+        self._legs += legs
+        complete = max(t for t in (board_s - PING_AGE_S, mtx_s - SILENCE_S, -math.inf) if not math.isnan(t))
+        while self._legs and self._legs[0].t1_s <= complete:
+            leg, heard = self._legs.pop(0), []
+            while self._pings and self._pings[0][0] <= leg.t1_s:
+                heard.append(heapq.heappop(self._pings)[2])
+            self._gone_s, self._gone = max(self._gone_s, leg.t1_s), self._gone + 1
+            found.append((leg, heard))
+        if self._gone and board_s - max(mtx_s, self._told_s) >= BLIND_S:
+            self._told_s = board_s
+            found.append((board_s,))
+        return found
+
+    def _push(self, ping: tuple[float, float, float]) -> None:
+        if ping[0] < self._gone_s:
+            self.late += 1
+            return
+        heapq.heappush(self._pings, (ping[0], self._pushed, ping))
+        self._pushed += 1
+        if len(self._pings) > MAX_WAITING:
+            heapq.heappop(self._pings)
+            self.dropped += 1
+
+
+def leg(t0_s: float, t1_s: float) -> PathSegment:
+    return PathSegment(t0_s, t1_s, 0.1, 0.0, 0.0, 0.0, 0.01, 0.001, 1)
+
+
+@given(st.integers(0, 1 << 32), st.lists(st.integers(0, 400), max_size=5), st.sampled_from([0.0, 0.2, 3.0]))
+@settings(max_examples=60, deadline=None)
+def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    naive, ours, end_s = NaiveWaiting(), Synchronizer(), 0.0
+    n = 400
+    board = np.where(np.arange(n) < 5, np.nan, np.cumsum(rng.exponential(0.05, n)))
+    mtx = np.where(
+        np.arange(n) < 9,
+        np.nan,
+        np.minimum(board + rng.normal(0.0, rng.choice([0.1, 1.0]), n), rng.choice([5.0, 99.0])),
+    )
+    pings: list[list[tuple[float, float, float]]] = []
+    legs: list[list[PathSegment]] = []
+    for k in range(n):
+        told_now = not np.isnan(board[k]) and rng.random() < 0.4
+        age = age_s * rng.random()
+        pings.append([(round(float(board[k] - age), 2), float(k % 2), float(rng.random()))] if told_now else [])
+        legs.append([])
+        if not np.isnan(mtx[k]) and mtx[k] > end_s + 0.3:
+            legs[-1].append(leg(end_s, float(mtx[k]) + 0.2))
+            end_s = float(mtx[k]) + 0.2
+    expected = [x for k in range(n) for x in naive.message(pings[k], legs[k], float(board[k]), float(mtx[k]))]
+    found: list[tuple[object, ...]] = []
+    edges = sorted({0, n, *cuts})
+    for a, b in zip(edges, edges[1:], strict=False):
+        at = [k - a for k in range(a, b) for _ in pings[k]]
+        ours.hear(np.array(at, np.int64), np.array([p for k in range(a, b) for p in pings[k]]).reshape(-1, 3))
+        for k in range(a, b):
+            ours.go(k - a, legs[k])
+        for piece in ours.release(board[a:b], mtx[a:b], mtx[a:b]):
+            if isinstance(piece, MeasuredSegment):
+                heard = zip(piece.t_s.tolist(), piece.ranger.tolist(), piece.range_m.tolist(), strict=True)
+                found.append((piece.segment, list(heard)))
+            else:
+                found.append((piece.t_s,))
+    assert found == expected
+    assert (ours.late, ours.dropped) == (naive.late, naive.dropped)
+
+
+def test_the_rangers_delay_moves_their_pings() -> None:
+    late = FrontEnd(MtxTiming(), RangerSettings(delay_s=0.01), FootSettings(), GaitSettings())
+    times = [
+        np.concatenate([piece.t_s for piece in ours.take(portion_of(CHUNKS)) if isinstance(piece, MeasuredSegment)])
+        for ours in (intake(), late)
+    ]
+    both = min(map(len, times)) - 10
+    assert np.allclose(times[1][:both] - times[0][:both], 0.01)

@@ -1,0 +1,118 @@
+"""Tracks for other programs: read again by others' libraries, they are what was estimated."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import pytest
+from pyarrow import parquet
+
+from echostep.commands.run import tracker_of
+from echostep.errors import EchostepError
+from echostep.localization.estimate import Estimate
+from echostep.output.track_files import export as write
+from echostep.plan.georeference import EarthTransform
+from echostep.plan.model import load_plan
+from echostep.recording.edit import info
+from echostep.recording.recorder import Recorder, open_recording
+from walks import DEMO, walk_chunks
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording, and a plan that lies by the Tay."""
+    folder = tmp_path_factory.mktemp("export")
+    with Recorder(folder / "walk.mcap", {"seed": "3", "note": "a test"}) as recorder:
+        for chunk in walk_chunks():
+            recorder.write(chunk)
+    tree = json.loads(DEMO.read_text())
+    tree["georeference"] = {"origin": [-2.978, 56.46], "rotation_deg": 30.0}
+    (folder / "plan.json").write_text(json.dumps(tree))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def estimates(folder: Path) -> list[Estimate]:
+    recording, plan = open_recording(folder / "walk.mcap"), load_plan(folder / "plan.json")
+    tracker = tracker_of(recording, plan, None, None, None)
+    return [e for portion in recording.portions() for e in tracker.take(portion)]
+
+
+def export(folder: Path, name: str, plan: Path | None = None) -> Path:
+    out = folder / name
+    said = write(
+        folder / "walk.mcap",
+        plan or folder / "plan.json",
+        out,
+        lambda recording, on: tracker_of(recording, on, None, None, None),
+    )
+    assert name in said
+    return out
+
+
+def test_csv_and_parquet_hold_every_bit(folder: Path, estimates: list[Estimate]) -> None:
+    with export(folder, "track.csv").open() as file:
+        written = list(csv.DictReader(file))
+    columns = parquet.read_table(export(folder, "track.parquet")).to_pydict()
+    for name in ("t_s", "x_m", "y_m", "xx_m2", "xy_m2", "yy_m2", "heading_rad", "z_m"):
+        expected = [getattr(e, name) for e in estimates]
+        assert [float(row[name]) for row in written] == expected
+        assert columns[name] == expected
+    assert [row["status"] for row in written] == columns["status"] == [e.status.value for e in estimates]
+    assert {f.name for f in dataclasses.fields(Estimate)} < columns.keys()
+
+
+def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: list[Estimate]) -> None:
+    georeference = load_plan(folder / "plan.json").georeference
+    assert georeference is not None
+    expected = EarthTransform(georeference).degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
+    frame = pyogrio.raw.read(export(folder, "track.gpkg"), layer="estimates")
+    points = np.array([np.frombuffer(wkb[5:21]) for wkb in frame[2]])
+    assert np.array_equal(points, expected)
+    assert frame[0]["crs"] == "EPSG:4326"
+    line = pyogrio.raw.read(folder / "track.gpkg", layer="track")[2][0]
+    assert np.array_equal(np.frombuffer(line[9:]).reshape(-1, 2), expected)
+    columns = parquet.read_table(export(folder, "track.parquet")).to_pydict()
+    assert np.array_equal(np.column_stack((columns["longitude_deg"], columns["latitude_deg"])), expected)
+    root = ET.parse(export(folder, "track.kml")).getroot()
+    text = root.findtext(".//{*}LineString/{*}coordinates") or ""
+    found = np.array([place.split(",") for place in text.split()], np.float64)
+    assert np.abs(found - expected).max() < 1e-9
+    assert pyogrio.read_info(folder / "track.kml", layer="estimates")["features"] == len(estimates)
+
+
+def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> None:
+    out = export(folder, "again.mcap")
+    assert tuple(open_recording(out).chunks()) == walk_chunks()
+    assert open_recording(out).about == {"seed": "3", "note": "a test"}
+    told = "\n".join(info(out))
+    assert "/estimate" in told
+    assert told.endswith("whole")
+
+
+@pytest.mark.parametrize(
+    ("name", "plan", "said"),
+    [("track.kml", DEMO, "georeference"), ("track.xls", DEMO, "unknown kind"), ("walk.mcap", DEMO, "another name")],
+)
+def test_what_cannot_be_written_is_named(folder: Path, name: str, plan: Path, said: str) -> None:
+    before = (folder / "walk.mcap").read_bytes()
+    with pytest.raises(EchostepError, match=said):
+        export(folder, name, plan)
+    assert (folder / "walk.mcap").read_bytes() == before
+
+
+def test_the_command_says_what_it_wrote(folder: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "echostep", "export", folder / "walk.mcap", "--plan", DEMO, "-o", folder / "by_command.csv"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "by_command.csv" in done.stdout.splitlines()[-1]

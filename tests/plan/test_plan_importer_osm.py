@@ -1,0 +1,165 @@
+"""Importing OpenStreetMap indoor data: XML and Overpass JSON give the same plan; tags; what a damaged file gets."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from echostep.errors import EchostepError
+from echostep.plan.check import check_plan
+from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.osm.levels import levels_of
+from echostep.plan.model import Plan
+
+LON, LAT = 8.85, 53.11
+EAST, NORTH = 1 / 66_945.0, 1 / 111_300.0  # degrees a metre there
+
+
+def node(key: int, x: float, y: float, **tags: str) -> dict[str, Any]:
+    return {"type": "node", "id": key, "lon": LON + x * EAST, "lat": LAT + y * NORTH, "tags": tags}
+
+
+def way(key: int, nodes: list[int], **tags: str) -> dict[str, Any]:
+    return {"type": "way", "id": key, "nodes": nodes, "tags": {k.replace("__", ":"): v for k, v in tags.items()}}
+
+
+HOUSE = [
+    node(1, 0, 0), node(2, 10, 0), node(3, 10, 8), node(4, 0, 8),
+    node(5, 6, 0), node(6, 6, 8), node(7, 6, 4, door="yes", width="1.2"), node(8, 0, 4, entrance="main", level="0"),
+    node(9, 2, 2), node(10, 4, 2), node(11, 8, 6, highway="elevator", level="0;1"), node(12, 6, 3),
+    way(20, [1, 5, 2, 3, 6, 4, 8, 1], building="yes", name="House"),
+    way(21, [5, 2, 3, 6, 7, 12, 5], indoor="room", level="0-1", name="Hall"),
+    way(22, [1, 5, 12, 7, 6, 4, 8, 1], indoor="corridor", level="0;1", name="Corridor"),
+    way(23, [9, 10], highway="steps", level="0;1", width="2"),
+]  # fmt: skip
+
+
+def xml(elements: list[dict[str, Any]]) -> str:
+    rows = []
+    for e in elements:
+        inner = "".join(f'<tag k="{k}" v="{v}"/>' for k, v in e["tags"].items()) + "".join(
+            f'<nd ref="{n}"/>' for n in e.get("nodes", [])
+        )
+        place = f' lon="{e["lon"]!r}" lat="{e["lat"]!r}"' if "lon" in e else ""
+        rows.append(f'<{e["type"]} id="{e["id"]}"{place}>{inner}</{e["type"]}>')
+    return '<?xml version="1.0" encoding="UTF-8"?><osm version="0.6">' + "".join(rows) + "</osm>"
+
+
+def imported(folder: Path, elements: Any, name: str = "house.json") -> Plan:
+    (folder / name).write_text(
+        json.dumps({"version": 0.6, "elements": elements}) if name.endswith("json") else xml(elements)
+    )
+    return import_plan(folder / name)
+
+
+def test_xml_and_json_are_one_plan(tmp_path: Path) -> None:
+    plan = imported(tmp_path, HOUSE)
+    assert plan.digest == imported(tmp_path, HOUSE, "house.osm").digest
+    assert (plan.name, [level.height_m for level in plan.levels]) == ("House", [0.0, 3.5])
+
+
+def test_what_becomes_of_a_house(tmp_path: Path) -> None:
+    plan = imported(tmp_path, HOUSE)
+    ground, upper = plan.levels
+    assert [room.name for room in ground.rooms] == ["Hall", "Corridor"]
+    length = np.hypot(*(ground.walls[:, 2:] - ground.walls[:, :2]).T).sum()
+    assert length == pytest.approx(36 + 8 - 1.2 - 0.9, abs=0.1)
+    assert len(ground.walls) == 7
+    assert sorted(door.width_m for door in ground.doors) == [pytest.approx(0.9, abs=0.01), pytest.approx(1.2, abs=0.01)]
+    assert len(upper.doors) == 1
+    assert {(c.kind, c.levels) for c in plan.connectors} == {("stairs", (0, 1)), ("lift", (0, 1))}
+    stairs = next(c for c in plan.connectors if c.kind == "stairs")
+    assert np.ptp(stairs.outline_m, axis=0) == pytest.approx([2, 2], abs=0.02)
+    assert check_plan(plan) == []
+    assert plan.georeference is not None
+    assert plan.georeference.latitude_deg == pytest.approx(LAT, abs=1e-4)
+
+
+def test_geometry_in_the_ways(tmp_path: Path) -> None:
+    """Overpass `out geom` has no nodes of its own."""
+    at = {e["id"]: {"lon": e["lon"], "lat": e["lat"]} for e in HOUSE if e["type"] == "node"}
+    ways = [e | {"geometry": [at[n] for n in e["nodes"]]} for e in HOUSE if e["type"] == "way"]
+    assert len(imported(tmp_path, ways).levels[0].walls) == 5
+
+
+def test_multipolygons_glass_and_locked_doors(tmp_path: Path) -> None:
+    members = [{"type": "way", "ref": 30, "role": "outer"}]
+    tags = {"type": "multipolygon", "indoor": "room", "level": "2"}
+    more = [
+        way(30, [1, 5, 12, 7, 6, 4, 8, 1]),
+        {"type": "relation", "id": 40, "members": members, "tags": tags},
+        node(13, 3, 5, door="hinged", locked="yes"), node(14, 3, 7), node(15, 3, 3),
+        way(31, [14, 13, 15], indoor="wall", level="0", material="glass"),
+    ]  # fmt: skip
+    plan = imported(tmp_path, [*HOUSE, *more])
+    assert [level.name for level in plan.levels] == ["level 0", "level 1", "level 2"]
+    assert len(plan.levels[0].windows) == 2
+    assert [door.state for door in plan.levels[0].doors].count("closed") == 1
+
+
+@pytest.mark.parametrize(
+    ("tags", "levels"),
+    [
+        ({"level": "0"}, [0]),
+        ({"level": "1;0"}, [0, 1]),
+        ({"level": "-2--1"}, [-2, -1]),
+        ({"level": "-1-1"}, [-1, 0, 1]),
+        ({"level": "0.5"}, [0.5]),
+        ({"level": "0", "repeat_on": "2-3"}, [0, 2, 3]),
+        ({"level": "ground"}, []),
+        ({"level": "nan;1e9"}, []),
+        ({}, []),
+    ],
+)
+def test_levels(tags: dict[str, str], levels: list[float]) -> None:
+    assert levels_of(tags) == levels
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ('{"elements": 3}', "elements: expected a list"),
+        ('{"elements": []}', "indoor"),
+        ('{"elements": [{"type": "node", "id": "a"}]}', "node 'a'"),
+        ('{"elements": [{"type": "node", "id": 7, "lon": 200, "lat": 0}]}', "node 7: lon"),
+        ('{"elements": [{"type": "node", "id": 7, "lon": NaN, "lat": 0}]}', "NaN"),
+        ('{"elements": [{"type": "way", "id": 7, "nodes": [true]}]}', "way 7"),
+        (
+            '{"elements": [{"type": "way", "id": 7, "nodes": [1, 2], "tags": {"indoor": "room", "level": "0"}}]}',
+            "indoor",
+        ),
+        (json.dumps({"elements": [*HOUSE, node(50, 4e6, 0)]}), "km apart"),
+        (
+            json.dumps({"elements": [*HOUSE, way(51, [1, 5], indoor="wall", level="0-9999999")]}),
+            "way 51|range of levels",
+        ),
+    ],
+)
+def test_wrong_json(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(EchostepError, match=named):
+        import_plan(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "not XML"),
+        ("<osm>", "not XML"),
+        ("<html/>", "<html> is not <osm>"),
+        ('<!DOCTYPE x [<!ENTITY a "aaaa">]><osm>&a;</osm>', "DTD"),
+        ('<osm><node id="x" lon="1" lat="1"/></osm>', "node 'x'"),
+        ('<osm><node id="1" lon="nan" lat="1"/></osm>', "node 1: lon"),
+        ('<osm><node id="1" lon="1"/></osm>', "node 1: lat"),
+        ("<osm>" + "<a>" * 100_000, "not XML"),
+    ],
+)
+def test_wrong_xml(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.osm").write_text(text)
+    with pytest.raises(EchostepError, match=named) as caught:
+        import_plan(tmp_path / "a.osm")
+    assert "\n" not in str(caught.value)

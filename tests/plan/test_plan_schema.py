@@ -1,0 +1,63 @@
+"""The published schema says what the reader does; the page of fields says what the schema does."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from jsonschema import Draft202012Validator
+
+from echostep.plan.model import Plan, parse_plan
+from echostep.plan.writer import plan_json
+from plan.test_plan_model import FULL, GOOD, PLANS, WRONG
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = json.loads((ROOT / "host/echostep/plans/plan.schema.json").read_text())
+VALID = Draft202012Validator(SCHEMA)
+BEYOND = {"without length", r"levels\[0\].doors\[0\].line", r"obstacles\[0\]"}  # what a schema cannot say
+NAMES = {"connectors", "start"}  # refer to levels, which a schema cannot follow
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "host/echostep/plans").glob("*.json")), ids=lambda path: path.name)
+def test_plans_of_the_package(path: Path) -> None:
+    if path.name != "plan.schema.json":
+        VALID.validate(json.loads(path.read_text()))
+        parse_plan(path.read_bytes())
+
+
+def test_good_plans() -> None:
+    VALID.validate(GOOD)
+    VALID.validate(FULL)
+
+
+@given(PLANS)
+@settings(max_examples=50, deadline=None)
+def test_what_is_saved_is_valid(plan: Plan) -> None:
+    VALID.validate(json.loads(plan_json(plan)))
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [case for case in WRONG if case[1] not in BEYOND and case[0].get("name") != "\ud800" and not set(case[0]) & NAMES],
+)
+def test_what_the_reader_refuses_is_invalid(change: dict[str, Any], named: str) -> None:
+    assert not VALID.is_valid(GOOD | change), named
+
+
+def test_each_field_is_explained() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "tools/plan_fields.py"), "--check"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    rows = [row.split("|") for row in (ROOT / "host/PLAN.md").read_text().splitlines() if row.startswith("| `")]
+    assert len(rows) > 30
+    assert all(len(cells) == 6 and cells[4].strip() for cells in rows)

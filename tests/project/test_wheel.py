@@ -1,0 +1,51 @@
+"""The wheel works on its own: nothing of the clone is needed. `make wheel` goes the whole way, with dependencies fetched and a demo."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import wheel as wheels
+from board_runs import ROOT
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """`bin` of an environment with the wheel in it, and surroundings without compilers."""
+    folder = tmp_path_factory.mktemp("wheel")
+    try:
+        built = wheels.build(folder)
+    except subprocess.CalledProcessError as error:
+        if "hatchling" in error.stderr:
+            pytest.skip("hatchling is not installed in this environment")
+        raise
+    programs = wheels.environment(folder / "fresh", built, borrow=True)
+    return programs, wheels.bare(programs, folder)
+
+
+def test_an_installed_wheel_decodes_and_looks_into_recordings(
+    fresh: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    programs, env = fresh
+    where = wheels.run([programs / "python", "-c", "import echostep; print(echostep.__file__)"], env, tmp_path)
+    assert str(programs.parent) in where
+    decoded = wheels.run([programs / "echostep", "decode", ROOT / "tests/captures/board.bin"], env, tmp_path)
+    expected = (ROOT / "tests/captures/board.jsonl").read_text().splitlines()
+    assert [json.loads(line) for line in decoded.splitlines()] == [json.loads(line) for line in expected]
+    told = wheels.run([programs / "echostep", "info", ROOT / "tests/captures/walk.mcap"], env, tmp_path)
+    assert told.rstrip().endswith("whole")
+
+
+def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
+    programs, env = fresh
+    code = (
+        "from importlib.resources import files, as_file\n"
+        "from echostep.plan.model import load_plan\n"
+        "from echostep.simulation.scenario import demo_scenario\n"
+        "with as_file(files('echostep') / 'plans' / 'demo.json') as path: print(len(load_plan(path).levels[0].walls))"
+    )
+    assert int(wheels.run([programs / "python", "-c", code], env, tmp_path)) > 10
+    assert "Track a simulated walk" in wheels.run([programs / "echostep", "demo", "--help"], env, tmp_path)

@@ -1,0 +1,218 @@
+"""One clock: wraps, restarts, jitter, SyncOut, and values that cannot be true."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from echostep.ports.chunks import BOARD, LATEST_NS, MTX
+from echostep.timing import sync_edges as sync
+from echostep.timing.device_clock import new_clock, now_s, read
+from echostep.timing.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline
+from naive import clocks as naive_clocks
+
+MS = 1_000_000
+Message = tuple[str, int, int, int]  # port, ticks or counter, arrival, kind
+
+
+class Clock:
+    """One device's clock, read value by value."""
+
+    def __init__(self, unit_s: float, modulus: int) -> None:
+        self.state = new_clock(unit_s, modulus)
+
+    def at(self, value: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
+        seconds = read(self.state, value, t_arrival_ns, restarted)
+        return None if np.isnan(seconds) else seconds
+
+
+def tell(timeline: Timeline, messages: list[Message]) -> list[float | None]:
+    """Times of messages in order of arrival, as one portion."""
+
+    def of(port: str) -> Arrivals:
+        rows = [(value, row, t_ns, kind) for row, (p, value, t_ns, kind) in enumerate(messages) if p == port]
+        return Arrivals(*np.array(rows, np.int64).reshape(-1, 4).T.copy())
+
+    times = timeline.times(of(BOARD), of(MTX))
+    found = np.empty(len(messages))
+    found[times.board_at], found[times.mtx_at] = times.board_s, times.mtx_s
+    return [None if np.isnan(t) else t for t in found.tolist()]
+
+
+def test_board_ticks_wrap() -> None:
+    clock = Clock(0.5e-6, 1 << 32)
+    first = (1 << 32) - 20_000
+    times = [clock.at((first + n * 2_000) % (1 << 32), n * MS) for n in range(30)]
+    assert all(t is not None for t in times)
+    assert np.allclose(np.diff(np.array(times, float)), 1e-3, atol=1e-9)
+
+
+def test_the_mtx_counter_wraps() -> None:
+    clock = Clock(0.01, 1 << 16)
+    times = [clock.at((65_500 + n) % 65_536, n * 10 * MS) for n in range(100)]
+    assert np.allclose(np.diff(np.array(times, float)), 0.01, atol=1e-9)
+
+
+def test_a_gap_longer_than_a_wrap_is_counted_by_arrival() -> None:
+    clock = Clock(0.01, 1 << 16)
+    clock.at(100, 0)
+    assert clock.at(200, 656_360 * MS) == pytest.approx(1.0 + 1.0 + 655.36)
+
+
+def test_older_messages_keep_their_time() -> None:
+    clock = Clock(0.5e-6, 1 << 32)
+    clock.at(200_000, 0)
+    clock.at(400_000, 100 * MS)
+    assert clock.at(270_000, 101 * MS) == pytest.approx(0.135)
+    assert now_s(clock.state) == pytest.approx(0.2)
+
+
+def test_a_restart_goes_on_by_arrival_time() -> None:
+    clock = Clock(0.5e-6, 1 << 32)
+    for n in range(2_000):
+        clock.at(n * 20_000, n * 10 * MS)
+    after = clock.at(4_000, 25_000 * MS, restarted=True)
+    assert after is not None
+    assert after == pytest.approx(25.0, abs=0.02)
+    assert clock.at(24_000, 25_010 * MS) == pytest.approx(after + 0.01)
+    assert clock.state["restarts"] == 1
+
+
+def test_one_impossible_value_is_dropped_three_are_a_restart() -> None:
+    clock = Clock(0.5e-6, 1 << 32)
+    for n in range(100):
+        clock.at(n * 20_000, n * 10 * MS)
+    assert clock.at(3_000_000_000, 1_000 * MS) is None
+    assert clock.at(100 * 20_000, 1_000 * MS) is not None
+    assert [clock.at(3_000_000_000 + n, (1_010 + n) * MS) is None for n in range(3)] == [True, True, False]
+    assert clock.state["jumps"] == 3
+
+
+def samples(n: int, drift_ppm: float, latency_ms: float, poll_ms: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """True board times of MTx samples and their arrival (ns), through an adapter that is polled."""
+    rng = np.random.default_rng(seed)
+    t = 0.5 + 0.01 * (1 + drift_ppm * 1e-6) * np.arange(n)
+    late = t + latency_ms * 1e-3 + rng.exponential(0.3e-3, n)
+    arrival = np.maximum.accumulate(np.ceil(late * 1e3 / poll_ms) * poll_ms)
+    return t, np.rint(arrival * 1e6).astype(np.int64)
+
+
+def plain(t_ns: int) -> Message:
+    return BOARD, t_ns // 500 % (1 << 32), t_ns + MS, PLAIN
+
+
+def edge(n: int, t_s: float) -> Message:
+    return BOARD, round(t_s * 2e6), int(t_s * 1e9) + MS, n & 0xFFFF
+
+
+def of_mtx(found: list[float | None], messages: list[Message]) -> np.ndarray:
+    return np.array([t for t, message in zip(found, messages, strict=True) if message[0] == MTX], float)
+
+
+@pytest.mark.parametrize("drift_ppm", [-100.0, 0.0, 100.0])
+@pytest.mark.parametrize("wired", [True, False])
+def test_mtx_samples_on_the_board_clock(drift_ppm: float, wired: bool) -> None:
+    timeline = Timeline(MtxTiming())
+    t, arrival = samples(3_000, drift_ppm, 7.1, 1.0, 3)
+    messages = []
+    board_ns = 0
+    for n in range(len(t)):
+        while board_ns + MS <= arrival[n]:
+            messages.append(plain(board_ns))
+            board_ns += 5 * MS
+        if wired:
+            messages.append(edge(n, t[n]))
+        messages.append((MTX, (65_000 + n) & 0xFFFF, int(arrival[n]), PLAIN))
+    found = of_mtx(tell(timeline, messages), messages)
+    assert timeline.synchronised == wired
+    assert np.abs((found - t)[1_000:]).max() <= (1e-6 if wired else 1.5e-3)
+    assert (np.diff(found) > 0).all()
+
+
+def test_lost_edges_are_bridged() -> None:
+    timeline = Timeline(MtxTiming())
+    t, arrival = samples(1_000, 50.0, 7.1, 1.0, 4)
+    messages = []
+    for n in range(len(t)):
+        seen = n % 7 != 3 and not 500 <= n < 540
+        messages.append(edge(n, t[n]) if seen else (BOARD, round(t[n] * 2e6), int(t[n] * 1e9) + MS, PLAIN))
+        messages.append((MTX, n & 0xFFFF, int(arrival[n]), PLAIN))
+    found = of_mtx(tell(timeline, messages), messages)
+    assert np.abs(found[100:] - t[100:]).max() <= 20e-6
+
+
+def test_without_a_board_the_counter_is_the_clock() -> None:
+    found = tell(Timeline(MtxTiming(rate_hz=200.0)), [(MTX, n, n * 5 * MS, PLAIN) for n in range(10)])
+    assert np.allclose(np.diff(np.array(found, float)), 0.005)
+
+
+def test_messages_without_a_time_have_none() -> None:
+    timeline = Timeline(MtxTiming())
+    assert tell(timeline, [(BOARD, 77, 0, SILENT), (BOARD, 20_000, MS, PLAIN)]) == [None, pytest.approx(0.01)]
+
+
+def naive_times(messages: list[Message]) -> list[float | None]:
+    timeline, found = naive_clocks.Timeline(MtxTiming()), []
+    for port, value, t_ns, kind in messages:
+        if port == MTX:
+            found.append(timeline.mtx_time(value, t_ns))
+            continue
+        t_s = None if kind == SILENT else timeline.board_time(value, t_ns, restarted=kind == FIRST_WORD)
+        if kind >= 0 and t_s is not None:
+            timeline.sync_edge(kind, t_s)
+        found.append(t_s)
+    return found
+
+
+@st.composite
+def streams(draw: st.DrawFn) -> list[Message]:
+    """A few seconds of both ports, wired or not, with late arrivals, lost messages, restarts and lies."""
+    rng = np.random.default_rng(draw(st.integers(0, 1 << 32)))
+    wired, first = draw(st.booleans()), draw(st.sampled_from([0, (1 << 32) - 100_000, 1 << 31]))
+    late = rng.exponential(draw(st.sampled_from([0.0, 1e-3, 5e-3, 10e-3, 50e-3])), 1_000)
+    restart, lies = draw(st.integers(0, 1_500)), draw(st.sampled_from([0.0, 0.02]))
+    edges, messages = int(rng.integers(0, 1 << 16)), []
+    for n in range(draw(st.integers(0, 500))):
+        t_ns = n * 10 * MS
+        ticks = (first + n * 20_000 + int(rng.integers(0, 3))) & 0xFFFFFFFF if n < restart else (n - restart) * 20_000
+        arrival_ns = t_ns + int(1e9 * late[n]) + MS
+        if rng.random() < 0.1 * lies:
+            arrival_ns = int(rng.choice([0, LATEST_NS, int(rng.integers(0, LATEST_NS))]))
+        if rng.random() < 0.9:
+            kind = FIRST_WORD if n == restart else (edges + n) & 0xFFFF if wired else int(rng.choice([PLAIN, SILENT]))
+            messages.append((BOARD, ticks, arrival_ns, kind))
+        if rng.random() < 0.9:
+            messages.append((MTX, (65_300 + n) & 0xFFFF, arrival_ns + 7 * MS, PLAIN))
+        if rng.random() < lies:
+            messages.append((BOARD, int(rng.integers(0, 1 << 32)), arrival_ns, int(rng.integers(-1, 1 << 16))))
+        if rng.random() < lies:
+            messages.append((MTX, int(rng.integers(0, 1 << 16)), arrival_ns, PLAIN))
+    return messages
+
+
+@given(streams(), st.lists(st.integers(0, 1_500), max_size=6))
+@settings(max_examples=100, deadline=None)
+def test_bit_for_bit_like_the_naive_twin_in_any_portions(messages: list[Message], cuts: list[int]) -> None:
+    expected = naive_times(messages)
+    timeline = Timeline(MtxTiming())
+    edges = sorted({0, len(messages), *(min(c, len(messages)) for c in cuts)})
+    found = [t for a, b in zip(edges, edges[1:], strict=False) for t in tell(timeline, messages[a:b])]
+    assert found == expected
+
+
+@given(st.integers(0, 1 << 32), st.floats(0.0, 20e-3))
+@settings(max_examples=100, deadline=None)
+def test_the_vote_is_like_its_naive_twin(seed: int, jitter_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    edges, naive, first = sync.new_edges(0.01), naive_clocks.SyncEdges(0.01), int(rng.integers(0, 1 << 16))
+    for n in range(300):
+        if rng.random() < 0.95:
+            sync.add(edges, (first + n) & 0xFFFF, 0.01 * n)
+            naive.add((first + n) & 0xFFFF, 0.01 * n)
+        by_arrival_s = float(0.01 * n + jitter_s * rng.standard_normal())
+        expected = naive.time_of(n & 0xFFFF, by_arrival_s)
+        found = sync.time_of(edges, n & 0xFFFF, by_arrival_s)
+        assert np.isnan(found) if expected is None else found == expected
+        assert bool(edges["locked"]) == naive.locked

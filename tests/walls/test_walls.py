@@ -1,0 +1,199 @@
+"""The wall index and the reflectors against slow twins, and by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.papers.girard2011_rays import POSES, lambda_ray_ranges
+from echostep.walls.echo_sources import CORNER, EDGE, MOST_SOURCES, WALL, Walls, echo_sources
+from echostep.walls.index import WallIndex, build_index, crosses_wall
+from naive import walls as naive
+
+Sources = list[tuple[float, float, float]]
+
+
+@st.composite
+def plans(draw: st.DrawFn) -> tuple[Floats, np.random.Generator]:
+    """Walls at random, on a grid (so that they join, overlap and run through each other), square to it, or nearly so."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    count, style = draw(st.integers(1, 30)), draw(st.sampled_from(["free", "grid", "square", "sloppy"]))
+    start, way = rng.uniform(0, 8, (count, 2)), rng.uniform(-3, 3, (count, 2))
+    if style != "free":
+        start, way = np.round(start), np.round(way)
+    if style in ("square", "sloppy"):
+        way[np.arange(count), rng.integers(0, 2, count)] = 0.0
+    walls = np.hstack([start, start + way])
+    if style == "sloppy":
+        walls += rng.uniform(-0.003, 0.003, walls.shape)
+    return walls[np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > 0.1], rng
+
+
+def heard(x: float, y: float, axis_rad: float, index: WallIndex) -> Sources:
+    """The sources as rows."""
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    count = echo_sources(x, y, axis_rad, index, distance_m, off_axis_rad, kind)
+    rows = np.column_stack([distance_m, off_axis_rad, kind])[:count].tolist()
+    return [(row[0], row[1], row[2]) for row in rows]
+
+
+def by_kind(sources: Sources) -> list[tuple[float, float]]:
+    """Of sources at one distance the order is open."""
+    return sorted((round(distance_m, 8), kind) for distance_m, _, kind in sources)
+
+
+@settings(max_examples=60, deadline=None)
+@given(plans(), st.floats(-2, 1.5))
+def test_crossing_agrees_with_shapely(plan: tuple[Floats, np.random.Generator], log_length: float) -> None:
+    walls, rng = plan
+    index = build_index(walls)
+    for _ in range(20):
+        a = rng.uniform(-9, 17, 2)
+        b = a + rng.uniform(-1, 1, 2) * 10**log_length
+        assert crosses_wall(a[0], a[1], b[0], b[1], index) == naive.crosses(a[0], a[1], b[0], b[1], walls)
+
+
+@settings(max_examples=100, deadline=None)
+@given(plans(), st.booleans(), st.booleans())
+def test_sources_agree_with_the_slow_twin(
+    plan: tuple[Floats, np.random.Generator], looked: bool, slanted: bool
+) -> None:
+    walls, rng = plan
+    owner = Walls(walls, math.radians(4.0) if slanted else 0.0)
+    for _ in range(6):
+        (x, y), axis = rng.uniform(-2, 10, 2), rng.uniform(-4, 4)
+        index = owner.near(np.array([x]), np.array([y])) if looked else owner.near(np.zeros(0), np.zeros(0))
+        found, expected = heard(x, y, axis, index), naive.echo_sources(x, y, axis, walls)[:MOST_SOURCES]
+        assert [s[0] for s in found] == pytest.approx([s[0] for s in expected], abs=1e-9)
+        assert by_kind(found) == by_kind(expected)
+        assert sorted(s[1] for s in found) == pytest.approx(sorted(s[1] for s in expected), abs=1e-7)
+
+
+@settings(max_examples=150, deadline=None)
+@given(plans(), st.sampled_from([7, 7, 7, 1, 3, 20]), st.sampled_from([0.0, 0.5, 1.0, 2.0]))
+def test_cone_readings_agree_with_plain_rays(
+    plan: tuple[Floats, np.random.Generator], rays: int, prepared: float
+) -> None:
+    walls, rng = plan
+    aperture = math.radians(55.0)
+    owner = Walls(walls, prepared * 0.5 * aperture / rays)
+    x, y, heading = rng.uniform(-2, 10, 12), rng.uniform(-2, 10, 12), rng.uniform(-4, 4, 12)
+    index = owner.near(x[:9], y[:9])
+    found = lambda_ray_ranges(x, y, heading, index, rays, aperture, 6.0)
+    for i, row in enumerate(found):
+        for axis, reading in zip((math.pi / 2, -math.pi / 2), row, strict=True):
+            expected = naive.cone_reading(x[i], y[i], heading[i] + axis, walls, rays, aperture, 6.0)
+            assert reading == pytest.approx(expected, abs=1e-9)
+
+
+def test_many_poses_read_what_each_would_alone() -> None:
+    """More in a tile than are taken at a time, in no order, some nowhere; a few go another way."""
+    rng = np.random.default_rng(5)
+    walls = rng.uniform(0.0, 6.0, (20, 4))
+    owner = Walls(walls, 0.5 * math.radians(55.0) / 7)
+    x, y, heading = rng.uniform(2.0, 4.0, 3 * POSES), rng.uniform(2.0, 3.0, 3 * POSES), rng.uniform(-4, 4, 3 * POSES)
+    x[::50], heading[7::50] = np.nan, np.inf
+    index = owner.near(x, y)
+    found = lambda_ray_ranges(x, y, heading, index)
+    alone = [lambda_ray_ranges(x[i : i + 1], y[i : i + 1], heading[i : i + 1], index)[0] for i in range(len(x))]
+    assert found == pytest.approx(np.array(alone), abs=1e-9)
+    assert (found[::50] == 6.0).all()
+    assert (found[7::50] == 6.0).all()
+    assert len(np.unique(found)) > POSES
+
+
+def test_a_wall_end_is_an_edge() -> None:
+    index = build_index(np.array([[1.0, 2.0, 5.0, 2.0]]))
+    (found,) = heard(0.0, 0.0, math.atan2(2.0, 1.0), index)
+    assert found == pytest.approx((math.hypot(1.0, 2.0), 0.0, EDGE), abs=1e-7)
+
+
+def test_a_wall_hides_what_is_behind_it() -> None:
+    slanted = [-1.0, 0.5, 1.0, 1.5]
+    index = build_index(np.array([[-5.0, 3.0, 5.0, 3.0], slanted]))
+    first, second = heard(0.0, 0.0, math.pi / 2, index)
+    assert first[0] == pytest.approx(2.0 / math.sqrt(5.0))  # the slanted wall's own perpendicular, 26.6 degrees off
+    assert second == pytest.approx((math.hypot(1.0, 1.5), math.atan2(1.0, 1.5), EDGE))
+    assert heard(3.0, 0.0, math.pi / 2, index)[0] == pytest.approx((3.0, 0.0, WALL), abs=1e-7)
+
+
+CORNER_OF_TWO = np.array([[0.0, 0.0, 4.0, 0.0], [0.0, 0.0, 0.0, 4.0]])
+
+
+@pytest.mark.parametrize(("x", "y", "kind"), [(1.0, 1.0, CORNER), (-1.0, -1.0, EDGE)])
+def test_a_corner_is_strong_from_inside(x: float, y: float, kind: float) -> None:
+    index = build_index(CORNER_OF_TWO)
+    assert (round(math.sqrt(2.0), 8), kind) in by_kind(heard(x, y, math.atan2(-y, -x), index))
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.004, -0.004])
+def test_walls_that_continue_each_other_have_no_edge(gap: float) -> None:
+    index = build_index(np.array([[-5.0, 2.0, 0.0, 2.0], [gap, 2.0, 5.0, 2.0]]))
+    assert all(kind == WALL for _, _, kind in heard(0.1, 0.0, math.pi / 2, index))
+
+
+@pytest.mark.parametrize("overshoot", [0.0, 0.004, -0.004])
+def test_a_wall_that_ends_on_another_is_heard_from_its_side_alone(overshoot: float) -> None:
+    index = build_index(np.array([[-5.0, 2.0, 5.0, 2.0], [0.0, 6.0, 0.0, 2.0 - overshoot]]))
+    assert [kind for _, _, kind in heard(0.3, 0.0, math.pi / 2, index)] == [WALL]
+    assert CORNER in [kind for _, _, kind in heard(0.5, 4.0, -math.pi / 2, index)]
+
+
+OFF_THE_PLAN = [(1e9, 0.0), (math.nan, 0.0), (0.0, math.inf), (-1e300, 1e300), (math.nan, math.nan)]
+
+
+@pytest.mark.parametrize("point", OFF_THE_PLAN)
+def test_places_off_the_plan_hear_nothing(point: tuple[float, float]) -> None:
+    walls = Walls(CORNER_OF_TWO)
+    index = walls.near(np.array([point[0]]), np.array([point[1]]))
+    assert heard(*point, 0.0, index) == []
+    if abs(point[0]) < 1e10:
+        assert not crosses_wall(*point, 2.0, 1.0, index)
+        assert not crosses_wall(2.0, 1.0, *point, index)
+    assert heard(1.0, 1.0, math.nan, index) == []
+
+
+def test_walls_without_length_change_nothing() -> None:
+    points = np.array([[1.0, 0.5, 1.0, 0.5], [math.nan, 0.0, 1.0, 1.0], [0.0, 0.0, math.inf, 0.0]])
+    index, plain = build_index(np.vstack([CORNER_OF_TWO, points])), build_index(CORNER_OF_TWO)
+    assert heard(1.0, 1.0, -math.pi / 2, index) == heard(1.0, 1.0, -math.pi / 2, plain) != []
+    assert not crosses_wall(1.0, 0.2, 1.0, 0.8, index)
+
+
+def test_no_walls() -> None:
+    index = Walls(np.zeros((0, 4))).near(np.zeros(1), np.zeros(1))
+    assert heard(0.0, 0.0, 0.0, index) == []
+    assert not crosses_wall(0.0, 0.0, 5.0, 5.0, index)
+
+
+def test_tables_of_many_tiles_stay_right() -> None:
+    rng = np.random.default_rng(5)
+    walls = np.hstack([(start := rng.uniform(0, 20, (60, 2))), start + rng.uniform(-3, 3, (60, 2))])
+    owner = Walls(walls)
+    for _ in range(20):
+        x, y = rng.uniform(0, 20, (2, 10))
+        index = owner.near(x, y, 0.7)
+    fresh = build_index(walls)
+    for x, y, axis in zip(*rng.uniform(0, 20, (2, 300)), rng.uniform(-3, 3, 300), strict=True):
+        assert heard(x, y, axis, index) == heard(x, y, axis, fresh)
+
+
+def test_an_index_given_out_before_stays_right() -> None:
+    rng = np.random.default_rng(6)
+    walls = np.hstack([(start := rng.uniform(0, 20, (60, 2))), start + rng.uniform(-3, 3, (60, 2))])
+    owner, fresh = Walls(walls), build_index(walls)
+    old = owner.near(np.array([3.0]), np.array([3.0]))
+    owner.near(*rng.uniform(0, 20, (2, 200)))
+    for x, y, axis in zip(*rng.uniform(0, 20, (2, 100)), rng.uniform(-3, 3, 100), strict=True):
+        assert heard(x, y, axis, old) == heard(x, y, axis, fresh)
+
+
+def test_a_plan_in_millimetres_is_refused() -> None:
+    with pytest.raises(EchostepError, match="metres"):
+        build_index(np.array([[0.0, 0.0, 90_000.0, 0.0], [0.0, 0.0, 0.0, 90_000.0]]))

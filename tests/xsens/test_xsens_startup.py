@@ -1,0 +1,119 @@
+"""`echostep live` and `record` with a simulated MTx on a pseudo terminal: set up from any state, explained when it cannot be."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from board_runs import ROOT
+from echostep.recording.recorder import open_recording
+from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
+from echostep.xsens import PROJECT, MtSample, MtxReader, OutputFormat
+
+PLAN = ROOT / "host/echostep/plans/demo.json"
+SAMPLE = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.5, 0.0, -0.875), (1.0, 0.0, 0.0, 0.0))
+
+
+@contextlib.contextmanager
+def on_a_terminal(device: MtxDevice) -> Iterator[str]:
+    """A device that measures at its rate and answers, on a pseudo terminal; gives the port's name."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    os.set_blocking(ours, False)
+    stop = threading.Event()
+
+    def live() -> None:
+        counter, due_s = 0, time.monotonic()
+        while not stop.is_set():
+            received = b""
+            with contextlib.suppress(BlockingIOError):
+                received = os.read(ours, 4096)
+            sent = device.feed(received, time.monotonic())
+            if time.monotonic() >= due_s:
+                due_s += 1.0 / device.rate_hz
+                counter += 1
+                sent += device.measure(SAMPLE._replace(counter=counter))
+            with contextlib.suppress(BlockingIOError):
+                os.write(ours, sent)
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=live)
+    thread.start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        stop.set()
+        thread.join()
+        os.close(ours)
+        os.close(theirs)
+
+
+@contextlib.contextmanager
+def mute_port() -> Iterator[str]:
+    """A board that says nothing."""
+    ours, theirs = os.openpty()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def echostep(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "echostep", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("output", [FACTORY, PROJECT])
+def test_record_sets_the_device_up_and_keeps_every_byte(tmp_path: Path, output: OutputFormat) -> None:
+    device = MtxDevice(output)
+    device.period = 2304
+    with on_a_terminal(device) as mtx, mute_port() as board:
+        done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", 2.5)
+    assert done.returncode == 0, done.stderr
+    assert "MTx: configured" in done.stdout
+    assert (device.output, device.rate_hz, device.pulses) == (PROJECT, 100.0, True)
+    stream = b"".join(c.data for c in open_recording(tmp_path / "r.mcap").chunks() if c.port == "mtx")
+    reader = MtxReader()
+    assert len(reader.feed_batch(stream).counter) > 20
+    assert reader.counts.bad_checksum == 0
+    assert bytes.fromhex("faff3100d0") in stream  # the acknowledgements are in the recording, too
+
+
+def test_live_stops_at_a_device_that_is_set_wrongly_and_does_not_listen(tmp_path: Path) -> None:
+    with on_a_terminal(MtxDevice(FACTORY, deaf=True)) as mtx, mute_port() as board:
+        done = echostep(
+            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--out", tmp_path, "--headless", "--seconds", 20
+        )
+    assert done.returncode == 2
+    assert "MTData of 18 bytes instead of 54" in done.stderr
+    assert "MT Manager" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "walk.mcap").stat().st_size > 1_000
+
+
+@pytest.mark.parametrize("output", [PROJECT, None])
+def test_record_goes_on_with_a_device_that_is_right_or_silent(tmp_path: Path, output: OutputFormat | None) -> None:
+    with on_a_terminal(MtxDevice(output, deaf=True)) if output else mute_port() as mtx, mute_port() as board:
+        done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", 2)
+    assert done.returncode == 0, done.stderr
+    assert ("does not answer, but streams what is wanted" if output else "MTx: silent") in done.stdout
+
+
+def test_a_rate_that_the_device_cannot_have_is_named(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text("[mtx]\nrate_hz = 99.9\n")
+    with mute_port() as mtx, mute_port() as board:
+        done = echostep(
+            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--out", tmp_path, "--settings", tmp_path / "s.toml", "--headless"
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert "rate_hz" in done.stderr
