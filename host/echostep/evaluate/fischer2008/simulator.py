@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.jit import allocating_kernel, kernel
+from echostep.jit import kernel
 from echostep.localization.beacon_slam import (
     BeaconModel,
     BeaconSettings,
@@ -332,7 +332,7 @@ def fuse(w: _Walker, beacon: Floats, range_m: float, bearing: float, threshold_m
     w.believed_x, w.believed_y = x, y
 
 
-@allocating_kernel
+@kernel
 def _start(cloud: _Cloud, x: float, y: float, rng: np.random.Generator) -> None:
     """He stands at a known place and looks in a known direction."""
     cloud.x[:], cloud.y[:] = x + 0.15 * _normals(rng, len(cloud.x)), y + 0.15 * _normals(rng, len(cloud.x))
