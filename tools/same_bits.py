@@ -32,7 +32,9 @@ def run(*words: object) -> str:
     """Standard output of a command of this checkout; raises CalledProcessError with its stderr printed."""
     done = subprocess.run([str(word) for word in words], cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise SystemExit(f"{' '.join(str(word) for word in words)}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+        raise SystemExit(
+            f"{' '.join(str(word) for word in words)}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+        )
     return done.stdout
 
 
@@ -53,7 +55,9 @@ def demo(out: Path) -> Iterator[tuple[str, str]]:
         return
     for seed in (1, 2, 3):
         folder = out / f"demo{seed}"
-        said = echostep("demo", "--headless", "--no-page", "--seed", seed, "--out", folder, "--board-command", f"{TWIN} --elf {ELF}")
+        said = echostep(
+            "demo", "--headless", "--no-page", "--seed", seed, "--out", folder, "--board-command", f"{TWIN} --elf {ELF}"
+        )
         yield f"demo/{seed}/estimates", said.split("sha256 ")[1].split()[0].rstrip(";")
         yield f"demo/{seed}/track", sha256((folder / "track.csv").read_bytes())
 
@@ -92,27 +96,41 @@ def foot(_: Path) -> Iterator[tuple[str, str]]:
         yield f"foot/{group}/{name.replace(' ', '_')}", digest
 
 
-def studies(out: Path, runs: int) -> Iterator[tuple[str, str]]:
-    """Rows of the first runs of every study, without measured times."""
-    for study in STUDIES:
+def studies(out: Path, runs: int, chosen: list[str] | None) -> Iterator[tuple[str, str]]:
+    """Rows of the first runs of every study, or of the chosen ones, without measured times."""
+    for study in chosen or STUDIES:
         folder = out / study
         words = [] if study in WITHOUT_RUNS else ["--runs", runs]
         words += ["--data", DATA] if study in WITH_DATA else []
         echostep("evaluate", study, *words, "--out", folder, "--json", folder / "rows.json")
         rows = json.loads((folder / "rows.json").read_text())["rows"]
-        kept = [{k: v for k, v in row.items() if not TIMING.search(k)} for row in rows if not TIMING.search(str(row.get("metric")))]
+        kept = [
+            {k: v for k, v in row.items() if not TIMING.search(k)}
+            for row in rows
+            if not TIMING.search(str(row.get("metric")))
+        ]
         for k, row in enumerate(kept):
-            yield f"study/{study}/{k}", sha256(json.dumps(row, sort_keys=True))[:16] + " " + json.dumps(row, sort_keys=True)
+            yield (
+                f"study/{study}/{k}",
+                sha256(json.dumps(row, sort_keys=True))[:16] + " " + json.dumps(row, sort_keys=True),
+            )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--runs", type=int, default=5, help="runs of each study")
     parser.add_argument("--only", choices=("demo", "real", "captures", "foot", "studies"), action="append")
+    parser.add_argument("--study", choices=STUDIES, action="append", help="only this study")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        parts = {"captures": captures, "demo": demo, "real": real, "foot": foot, "studies": lambda o: studies(o, options.runs)}
+        parts = {
+            "captures": captures,
+            "demo": demo,
+            "real": real,
+            "foot": foot,
+            "studies": lambda o: studies(o, options.runs, options.study),
+        }
         for name, part in parts.items():
             if options.only and name not in options.only:
                 continue
