@@ -1,8 +1,9 @@
-"""Digests of everything that a refactoring must not change (`make bits`), to be compared between two checkouts.
+"""Digests of everything that a refactoring must not change, to be compared between two checkouts.
 
-In: the recordings' folder ($ECHOSTEP_DATA or ../shared/data), the twin when it is built. Out: one line `name sha256` per result on stdout: estimates of
-the demo (seeds 1-3, real firmware in the twin) and of `make real`, decodes of the captures, the foot's track of each public recording, and the rows
-of the first runs of every study. Owns nothing. Digests depend on the machine's floating point: compare runs of one machine only.
+In: the recordings' folder ($ECHOSTEP_DATA or ../shared/data), the twin when it is built. Out: one line `name sha256` per result on stdout:
+estimates of the demo (seeds 1-3, real firmware in the twin) and of `make real`, decodes of the captures, the foot's track of each public
+recording, and
+the rows of the first runs of every study. Owns nothing. Digests depend on the machine's floating point: compare runs of one machine only.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def real(out: Path) -> Iterator[tuple[str, str]]:
     yield "real/estimates", said.split("sha256 ")[1].split()[0]
 
 
-def captures(_: Path) -> Iterator[tuple[str, str]]:
+def captures() -> Iterator[tuple[str, str]]:
     """JSON lines of the captures that the tests ship."""
     for path in sorted((ROOT / "tests/captures").glob("*.bin")) + sorted((ROOT / "tests/captures").glob("*.mcap")):
         yield f"decode/{path.name}", sha256(echostep("decode", path))
@@ -89,7 +90,7 @@ for r in read_recordings(Path(sys.argv[1]))[0]:
 """
 
 
-def foot(_: Path) -> Iterator[tuple[str, str]]:
+def foot() -> Iterator[tuple[str, str]]:
     """Positions of the foot on each public recording."""
     for line in run(sys.executable, "-c", FOOT, DATA).splitlines():
         group, name, digest = line.split("\t")
@@ -124,17 +125,17 @@ def main() -> int:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        parts = {
-            "captures": captures,
-            "demo": demo,
-            "real": real,
-            "foot": foot,
-            "studies": lambda o: studies(o, options.runs, options.study),
+        parts: dict[str, Iterator[tuple[str, str]]] = {
+            "captures": captures(),
+            "demo": demo(out),
+            "real": real(out),
+            "foot": foot(),
+            "studies": studies(out, options.runs, options.study),
         }
-        for name, part in parts.items():
+        for name, rows in parts.items():
             if options.only and name not in options.only:
                 continue
-            for row, digest in part(out):
+            for row, digest in rows:
                 print(row, digest, flush=True)
     return 0
 
