@@ -30,7 +30,7 @@ from echostep.page.server import STATIC, STOP_S, Address, listen
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
 
-PAGE = Path(__file__).parent / "page" / "edit"
+PAGE = Path(__file__).parent / "edit"
 SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # of the live page
 MOST_BODY = 8_000_000  # a browser draws so much without stumbling
 MOST_PICTURE = 32_000_000
