@@ -135,13 +135,21 @@ def enums_of(messages: list[Message]) -> dict[str, tuple[tuple[str, ...], bool]]
     return found
 
 
+def invalid_markers(message: Message) -> dict[str, int]:
+    """Constant name -> value that says "not measured": one for all fields of a message that share it, else one per field."""
+    marked = [f for f in message.fields if f.invalid is not None]
+    if len(marked) > 1 and len({f.invalid for f in marked}) == 1:
+        return {f"{message.name}_invalid".upper(): marked[0].invalid or 0}
+    return {f"{message.name}_{f.name}_invalid".upper(): f.invalid or 0 for f in marked}
+
+
 def python_code(messages: list[Message]) -> str:
     value = schema_hash(messages)
     lines = [
         f'"""Messages of the board link. {NOTICE}',
         "",
-        "In: the body of a frame. Out: named tuples of raw integers; units stand beside each field. `ROWS` are the same bodies as numpy dtypes,",
-        "for many at once. Owns nothing.",
+        "In: the body of a frame. Out: named tuples of raw integers; units stand beside each field. `..._INVALID` is what a field holds",
+        "when nothing was measured. `ROWS` are the same bodies as numpy dtypes, for many at once. Owns nothing.",
         '"""',
         "",
         "from __future__ import annotations",
@@ -207,7 +215,9 @@ def wrap_union(text: str) -> str:
 
 def python_message(message: Message) -> list[str]:
     codec = f"_{message.name.upper()}"
-    lines = ["", f'{codec} = struct.Struct("{message.format}")', "", "", f"class {message.class_name}(NamedTuple):"]
+    lines = ["", f'{codec} = struct.Struct("{message.format}")']
+    lines += [f"{name} = {value}" for name, value in invalid_markers(message).items()]
+    lines += ["", "", f"class {message.class_name}(NamedTuple):"]
     lines += [f'    """{first_sentence(message.doc)}"""', ""]
     for field in message.fields:
         notes = [n for n in (field.unit, "" if field.invalid is None else f"{field.invalid} = invalid") if n]

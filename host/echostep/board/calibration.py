@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
-from echostep.board.messages import Outcome
+from echostep.board.messages import GYROS_INVALID, PING_TIME_OF_FLIGHT_US_INVALID, Outcome
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
-ABSENT = -32768
 ADIS16100_RAD_S = math.radians(0.2439)  # per count [ADIS16100 datasheet, sensitivity]
 
 
@@ -52,14 +51,15 @@ class GyroSettings:
 def ranges(pings: NDArray[np.void], settings: RangerSettings) -> Floats:
     """Ranges (n,) of pings (n,) by the schema's dtype: half the way of the sound; NaN when nothing was heard."""
     range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
-    range_m[(pings["outcome"] != Outcome.ECHO) | (pings["time_of_flight_us"] == 0)] = np.nan
+    unmeasured = pings["time_of_flight_us"] == PING_TIME_OF_FLIGHT_US_INVALID
+    range_m[(pings["outcome"] != Outcome.ECHO) | unmeasured] = np.nan
     return range_m
 
 
 def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> Floats:
     """Rates (n, 3) of thigh, calf and belt in rad/s of gyro samples (n,) by the schema's dtype; NaN where a gyro is absent or tests itself."""
     counts = np.column_stack([samples[name] for name in GYROS]).astype(np.float64)
-    counts[counts == ABSENT] = np.nan
+    counts[counts == GYROS_INVALID] = np.nan
     found: Floats = counts * ADIS16100_RAD_S - [
         settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s
     ]  # fmt: skip

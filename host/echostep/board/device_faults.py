@@ -19,9 +19,8 @@ from echostep.board.findings import (
     has_failed,
     of,
 )
-from echostep.board.messages import Fault, Gyro, GyroHealth, Healthy, SelfTest, Status
+from echostep.board.messages import GYRO_HEALTH_INVALID, Fault, Gyro, GyroHealth, Healthy, SelfTest, Status
 
-INVALID = -32768
 TEMPERATURE_C = (-20.0, 60.0)  # what a gyro on a person can be
 UNMOVED_COUNTS = 12
 
@@ -138,7 +137,7 @@ def _unmoved(said: GyroHealth) -> bool:
 
 
 def _temperature(name: str, said: GyroHealth) -> list[Finding]:
-    if said.temperature == INVALID:
+    if said.temperature == GYRO_HEALTH_INVALID:
         what = "answers, but not with its temperature: its MISO may be held low"
         return [Finding(Severity.FAULT, name, what, "check its SPI cable for a short to ground")]
     if TEMPERATURE_C[0] <= gyro_celsius(said) <= TEMPERATURE_C[1]:
@@ -148,7 +147,8 @@ def _temperature(name: str, said: GyroHealth) -> list[Finding]:
 
 
 def _responses(said: GyroHealth) -> str:
-    if said.self_test not in (SelfTest.FAILED, SelfTest.MOVED) or INVALID in (said.response_st1, said.response_st2):
+    unmeasured = GYRO_HEALTH_INVALID in (said.response_st1, said.response_st2)
+    if said.self_test not in (SelfTest.FAILED, SelfTest.MOVED) or unmeasured:
         return ""
     return f" (responses {said.response_st1} and {said.response_st2} counts; proper are -121 to -376 and 121 to 376)"
 

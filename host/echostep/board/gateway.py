@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from echostep.board.frames import BoardReader, StaleFirmwareError
-from echostep.board.messages import BY_ID, Beacon
+from echostep.board.messages import BEACON_BEARING_INVALID, BEACON_RANGE_MM_INVALID, BY_ID, Beacon
 
 MOST_BEACONS = 64
 NEAREST_M, FURTHEST_M = 0.0, 30.0  # beyond it no ultrasound is heard
@@ -20,7 +20,6 @@ OLDEST_S = 1.0
 GAP_S = 0.045  # a beacon that speaks more often than 20 times a second floods
 CLOCK_S = 1.0  # a gateway's clock may wander so far from the tracker's between two words
 SETTLED = 10  # words in a row that agree on a new clock
-NO_RANGE, NO_BEARING = 65535, -32768
 _BEACON = next(identifier for identifier, kind in BY_ID.items() if kind is Beacon)
 
 
@@ -107,10 +106,10 @@ class Gateway:
             counts.early += 1
             return None
         range_m, bearing = 1e-3 * beacon.range_mm, 1e-2 * beacon.bearing
-        if beacon.range_mm == NO_RANGE or not NEAREST_M < range_m <= FURTHEST_M:
+        if beacon.range_mm == BEACON_RANGE_MM_INVALID or not NEAREST_M < range_m <= FURTHEST_M:
             counts.impossible_ranges += 1
             return None
-        if beacon.bearing == NO_BEARING:
+        if beacon.bearing == BEACON_BEARING_INVALID:
             bearing = math.nan
         elif abs(bearing) > 180.0:
             counts.impossible_bearings += 1

@@ -18,7 +18,7 @@ from echostep.board.health import (
     gyro_celsius,
     rate_findings,
 )
-from echostep.board.messages import SCHEMA_HASH, Gyro, Healthy, Outcome, Ranger, SelfTest
+from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Outcome, Ranger, SelfTest
 from echostep.commissioning.probe import Drift, ProbeResult, drift_of
 from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import MtxTiming
@@ -114,7 +114,7 @@ def _stream_findings(heard: ProbeResult) -> list[Finding]:
 def _gyro_findings(heard: ProbeResult) -> list[Finding]:
     found = []
     for device in SELECTS:
-        rates = [v for g in heard.gyros if (v := getattr(g, (device.name or "").lower())) != -32768]
+        rates = [v for g in heard.gyros if (v := getattr(g, (device.name or "").lower())) != GYROS_INVALID]
         last = rates[-CONSTANT_SAMPLES:]
         if len(last) == CONSTANT_SAMPLES and len(set(last)) == 1:
             what = f"gives {last[0]} counts for seconds, without any noise"

@@ -10,7 +10,8 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.board.calibration import ABSENT, ADIS16100_RAD_S, GYROS, GyroSettings
+from echostep.board.calibration import ADIS16100_RAD_S, GYROS, GyroSettings
+from echostep.board.messages import GYROS_INVALID
 from echostep.commissioning.probe import TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
 from echostep.legs.heading import compass_heading, fit_compass_errors
@@ -36,7 +37,7 @@ def gyro_rates(heard: ProbeResult, settings: GyroSettings | None = None) -> tupl
     known = settings or GyroSettings()
     t_s = np.array(heard.ticks.get("Gyros", []), float) / TICKS_PER_S
     counts = np.array([g[1:] for g in heard.gyros], float).reshape(-1, len(GYROS))
-    counts[counts == ABSENT] = np.nan
+    counts[counts == GYROS_INVALID] = np.nan
     return t_s, ADIS16100_RAD_S * counts - np.array(
         [known.thigh_bias_rad_s, known.calf_bias_rad_s, known.belt_bias_rad_s]
     )

@@ -14,7 +14,15 @@ import numpy as np
 
 from echostep.board.calibration import ranges
 from echostep.board.frames import BoardReader, Frames
-from echostep.board.messages import BY_ID, Ping, Pressure, Ranger, Status
+from echostep.board.messages import (
+    BY_ID,
+    PRESSURE_PRESSURE_INVALID,
+    PRESSURE_TEMPERATURE_INVALID,
+    Ping,
+    Pressure,
+    Ranger,
+    Status,
+)
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.output.foxglove import (
@@ -44,7 +52,6 @@ from echostep.recording.recorder import Note, Topic
 from echostep.tracker import Tracker
 
 PRESSURE_PA, TEMPERATURE_C = 0.25, 0.05  # a count
-NO_TEMPERATURE = -32768
 ELLIPSE_POINTS = 17
 TRACK_PIECE = 40  # points of the track that are drawn as one
 BEAM_S = 1.0  # an older echo is not drawn any more
@@ -230,10 +237,10 @@ def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
     at, rows = frames.rows(_IDS[Pressure])
     notes = []
     for k, row in zip(at.tolist(), rows, strict=True):
-        if not row["pressure"]:
+        if row["pressure"] == PRESSURE_PRESSURE_INVALID:
             continue
         body: dict[str, Any] = {"ticks": int(row["ticks"]), "pressure_pa": PRESSURE_PA * int(row["pressure"])}
-        if row["temperature"] != NO_TEMPERATURE:
+        if row["temperature"] != PRESSURE_TEMPERATURE_INVALID:
             body["temperature_c"] = round(TEMPERATURE_C * int(row["temperature"]), 3)
         notes.append(Note(PRESSURE, int(t_ns[k]), body))
     return notes

@@ -51,7 +51,6 @@ KNOWN_S = 2.0  # of standing on the floor where the walk begins: its pressure is
 COLUMNS = {
     "name": "", "ending_m": "ending", "ending_max_m": "worst", "mean_m": "mean", "distance_error_percent": "way %", "floor_right": "floor right",
 }  # fmt: skip
-INVALID = -32768
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,10 +203,13 @@ def _read(received: bytes) -> Measured:
     place = np.minimum(np.searchsorted(t_s, at[good]), len(t_s) - 1)
     heading[place] = _wrapped(0.5 * math.pi - np.radians(0.1 * compass["bearing"][good]))
     thigh, calf, belt = (
-        np.where(gyros[name] == INVALID, np.nan, gyros[name] * ADIS16100_RAD_S) for name in ("thigh", "calf", "belt")
+        np.where(gyros[name] == m.GYROS_INVALID, np.nan, gyros[name] * ADIS16100_RAD_S)
+        for name in ("thigh", "calf", "belt")
     )
     pressure_s, pressure = _timed(frames, m.Pressure)
-    table = np.column_stack([pressure_s, 0.25 * pressure["pressure"]])[pressure["pressure"] > 0]
+    table = np.column_stack([pressure_s, 0.25 * pressure["pressure"]])[
+        pressure["pressure"] != m.PRESSURE_PRESSURE_INVALID
+    ]
     whole = np.isfinite(t_s) & np.isfinite(thigh) & np.isfinite(calf) & np.isfinite(belt)
     samples = LegSamples(t_s[whole], thigh[whole], calf[whole], belt[whole], heading[whole])
     return Measured(samples, table, LegLengths())

@@ -28,7 +28,6 @@ from echostep.simulation.stimulus import NO_SYNC, ROW
 Sent = list[tuple[int, bytes]]
 TIMEOUT_S = 60.0
 ALL_SENSORS = 0xFF
-ABSENT = -32768
 GYROS = ("thigh", "calf", "belt")
 SELF_TEST_US = 560_000  # after the start the gyros test themselves and give no rates
 GYRO_COUNTS_PER_DEGREE, GYRO_RESPONSE = 6.88, 221  # [ADIS16100 data sheet]
@@ -154,7 +153,7 @@ class PythonBoard:
         found: list[tuple[int, m.Message]] = []
         for us, row in self._due(rows, 1e6 / c.gyro_rate_hz) if any(on) else ():
             rates = [
-                int(row[name]) if there and us >= SELF_TEST_US else ABSENT
+                int(row[name]) if there and us >= SELF_TEST_US else m.GYROS_INVALID
                 for name, there in zip(GYROS, on, strict=True)
             ]
             found.append((us, m.Gyros(_ticks(us), *rates)))
