@@ -1,5 +1,6 @@
-/* What the portable firmware asks of the board. `avr/` implements it for the ATmega32U4; a test may implement it in memory.
- * Nothing here blocks for longer than its comment says. Everything is called from the main loop, never from an interrupt. */
+/* The functions that the portable firmware needs from the board. `avr/` implements them for the ATmega32U4; a test may implement them in
+ * memory. The prefix of a name is its file in `avr/`. None blocks longer than its comment says. All are called from the main loop,
+ * never from an interrupt. */
 #ifndef ECHOSTEP_BOARD_H
 #define ECHOSTEP_BOARD_H
 
@@ -12,7 +13,7 @@
 
 uint32_t clock_now(void);
 
-/* Whether `now` is at or after `due`; right while the two are less than 17.9 minutes apart. */
+/* Whether `now` is at or after `due`; correct while the two are less than 17.9 minutes apart. */
 static inline bool ticks_reached(uint32_t now, uint32_t due)
 {
 	return (int32_t)(now - due) >= 0;
@@ -22,7 +23,7 @@ static inline bool ticks_reached(uint32_t now, uint32_t due)
 struct clock_edge {
 	uint32_t ticks;  /* captured by the timer itself */
 	uint16_t edge;   /* edges since the start */
-	uint16_t missed; /* edges since the previous call that were overwritten by this one */
+	uint16_t missed; /* edges since the previous call that this one has overwritten */
 };
 bool clock_take_edge(struct clock_edge *out); /* false: no edge since the last call */
 
@@ -33,42 +34,42 @@ struct twi_transfer {
 	uint8_t address;        /* 7 bits */
 	uint8_t write_length;   /* 0-4 bytes to write */
 	uint8_t read_length;    /* 0-4 bytes to read after a repeated start */
-	uint8_t bytes[4];       /* in: what to write; out: what was read */
+	uint8_t bytes[4];       /* in: the bytes to write; out: the bytes read */
 	volatile uint8_t state; /* enum twi_state */
 	uint32_t ticks;         /* of the stop condition */
 };
-/* Starts a transfer; false: the bus is in use. The caller leaves the transfer alone until its state is no longer TWI_BUSY. */
+/* Starts a transfer; false: the bus is in use. The caller must not touch the transfer while its state is TWI_BUSY. */
 bool twi_begin(struct twi_transfer *transfer);
 enum twi_state twi_state(const struct twi_transfer *transfer);
-/* Ends a transfer that takes longer than 5 ms as TWI_FAILED and frees the bus (0.2 ms); true: that happened. */
+/* Ends a transfer that has taken longer than 5 ms as TWI_FAILED and frees the bus (0.2 ms); true: it did so. */
 bool twi_watch(uint32_t now);
 
-/* SPI: full duplex bytes between select and release; each chip has its own clock rate and mode. */
+/* SPI: bytes in both directions between select and release; each chip has its own clock rate and mode. */
 enum chip { CHIP_THIGH, CHIP_CALF, CHIP_BELT, CHIP_PRESSURE };
 void spi_select(enum chip chip);
 uint8_t spi_exchange(uint8_t out);
 void spi_release(void);
-bool pressure_ready(void); /* level of the SCP1000's DRDY */
+bool spi_pressure_ready(void); /* level of the SCP1000's DRDY */
 
-/* The self-test inputs, common to the three gyros. */
+/* Self-test inputs of the gyros; one pin drives the input of all three. */
 enum excitation { EXCITE_NONE, EXCITE_ST1, EXCITE_ST2 };
-void gyro_excite(enum excitation excitation);
+void spi_excite_gyros(enum excitation excitation);
 
 /* USB CDC-ACM. */
-#define USB_ROOM 1023u /* bytes that can wait for the host */
+#define USB_ROOM 1023u /* size of the send buffer, bytes */
 
 void usb_run(void);                                   /* moves bytes and answers the host's requests */
-bool usb_open(void);                                  /* a host program holds the port (DTR) */
-bool usb_opened(void);                                /* true once after each opening, which empties the buffers */
-bool usb_write(const uint8_t *bytes, uint8_t length); /* all of them or, without room, none and false */
+bool usb_is_open(void);                               /* whether a host program has the port open (DTR) */
+bool usb_take_opening(void);                          /* true once after each opening, which empties the buffers */
+bool usb_write(const uint8_t *bytes, uint8_t length); /* all bytes; false: no room, none was taken */
 int16_t usb_read(void);                               /* one byte, or -1 */
-bool usb_bootloader_wanted(void);                     /* the port was closed at 1200 Bd */
+bool usb_bootloader_wanted(void);                     /* whether the port was closed at 1200 Bd */
 
 /* Power and start. */
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
-void board_sleep(uint32_t wake_ticks); /* until then or until an interrupt has news; feeds the watchdog */
+void board_sleep(uint32_t wake_ticks); /* until then, or until an interrupt needs the main loop; restarts the watchdog */
 uint8_t board_reset_cause(void);       /* RESET_CAUSE_* flags */
-uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack so far */
-void board_bootloader(void);           /* resets into the bootloader; does not return */
+uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack since the start */
+void board_bootloader(void);           /* resets the processor into the bootloader; does not return */
 
 #endif

@@ -1,27 +1,27 @@
 #include "cobs.h"
 
-#define FULL_BLOCK 0xFFu
+#define FULL_BLOCK 0xFFu /* code of a block of 254 bytes that no zero follows */
 
 uint16_t cobs_encode(uint8_t *out, const uint8_t *in, uint16_t length)
 {
-	uint16_t code_at = 0, end = 1;
+	uint16_t code_index = 0, end = 1;
 	uint8_t code = 1;
 	for (uint16_t i = 0; i < length; i++) {
 		if (code == FULL_BLOCK) {
-			out[code_at] = code;
-			code_at = end++;
+			out[code_index] = code;
+			code_index = end++;
 			code = 1;
 		}
 		if (in[i]) {
 			out[end++] = in[i];
 			code++;
 		} else {
-			out[code_at] = code;
-			code_at = end++;
+			out[code_index] = code;
+			code_index = end++;
 			code = 1;
 		}
 	}
-	out[code_at] = code;
+	out[code_index] = code;
 	return end;
 }
 

@@ -1,22 +1,21 @@
 #include "compass.h"
-#include "board.h"
-#include "configuration.h"
-#include "link.h"
-#include "ranger.h"
-#include "status.h"
+#include "board.h"         /* twi_* */
+#include "configuration.h" /* rate, whether it is enabled */
+#include "link.h"          /* sending the messages */
+#include "ranger.h"        /* ranger_quiet: the bus is kept free for triggers */
+#include "status.h"        /* error counter */
 
-/* [Devantech CMPS10] bearing in 0.1 degrees, big-endian, in registers 2 and 3. */
+/* Bearing in 0.1 degrees, big-endian, in registers 2 and 3 [Devantech CMPS10 documentation]. */
 #define ADDRESS 0x60u
 #define REGISTER_BEARING 2u
 #define BEARING_MAX 3599u
-#define INVALID 0xFFFFu
 
 #define RETRY_TICKS TICKS_PER_MS
 
 static struct twi_transfer transfer;
-static bool reading;
-static uint32_t due;
-static uint32_t period;
+static bool reading;    /* a transfer is under way */
+static uint32_t due;    /* next reading, ticks */
+static uint32_t period; /* between readings, ticks */
 
 void compass_start(uint32_t now)
 {
@@ -27,7 +26,7 @@ void compass_start(uint32_t now)
 static void report(uint32_t ticks, uint16_t bearing)
 {
 	struct msg_compass m = { ticks, bearing };
-	link_send(MSG_COMPASS, pack_compass(link_body(), &m));
+	link_send(MSG_COMPASS, msg_pack_compass(link_body(), &m));
 }
 
 static void finish(enum twi_state state, uint32_t now)
@@ -39,10 +38,11 @@ static void finish(enum twi_state state, uint32_t now)
 		report(transfer.ticks, bearing);
 	} else {
 		status_failed(DEVICE_COMPASS, state == TWI_DONE ? FAULT_BAD_VALUE : state == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK);
-		report(now, INVALID);
+		report(now, MSG_COMPASS_BEARING_INVALID);
 	}
 }
 
+/* Starts a transfer if the bus is free, and then sets the time of the next one. */
 static void begin(uint32_t now)
 {
 	transfer.address = ADDRESS;

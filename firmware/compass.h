@@ -1,13 +1,16 @@
-/* The compass (Devantech CMPS03/CMPS10 class): `compass` messages at the configured rate. */
+/* Devantech CMPS10 (CMPS03 class): the compass. `compass` messages at the configured rate. */
 #ifndef ECHOSTEP_COMPASS_H
 #define ECHOSTEP_COMPASS_H
 
 #include <stdint.h>
 
-/* Takes the configured rate; the first reading is due at once. */
+#define COMPASS_RATE_MIN_HZ 1u
+#define COMPASS_RATE_MAX_HZ 20u
+
+/* Applies the configured rate; the first reading is due at once. */
 void compass_start(uint32_t now);
 
-/* Reads when it is due and no ranger is about to fire; returns when to call again, unless an interrupt calls earlier. */
+/* Reads when a reading is due and no ranger trigger is near; returns the time of the next call, unless an interrupt comes earlier. */
 uint32_t compass_run(uint32_t now);
 
 #endif

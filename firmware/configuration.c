@@ -1,9 +1,11 @@
 #include "configuration.h"
+#include "compass.h" /* limits of its rate */
+#include "gyros.h"   /* limits of their rate */
 
 struct msg_configure configuration = {
 	.sensors = 0xFF,
 	.schedule = SCHEDULE_CONCURRENT,
-	.gyro_rate_hz = GYRO_RATE_MAX_HZ,
+	.gyro_rate_hz = GYROS_RATE_MAX_HZ,
 	.compass_rate_hz = 10,
 	.pressure_mode = PRESSURE_MODE_HIGH_SPEED,
 };
@@ -19,7 +21,7 @@ void configuration_set(const struct msg_configure *wanted)
 {
 	configuration = *wanted;
 	configuration.schedule = clamp(wanted->schedule, SCHEDULE_CONCURRENT, SCHEDULE_SEQUENTIAL);
-	configuration.gyro_rate_hz = clamp(wanted->gyro_rate_hz, GYRO_RATE_MIN_HZ, GYRO_RATE_MAX_HZ);
+	configuration.gyro_rate_hz = clamp(wanted->gyro_rate_hz, GYROS_RATE_MIN_HZ, GYROS_RATE_MAX_HZ);
 	configuration.compass_rate_hz = clamp(wanted->compass_rate_hz, COMPASS_RATE_MIN_HZ, COMPASS_RATE_MAX_HZ);
 	configuration.pressure_mode = clamp(wanted->pressure_mode, PRESSURE_MODE_HIGH_SPEED, PRESSURE_MODE_HIGH_RESOLUTION);
 }

@@ -1,19 +1,14 @@
-/* The settings in force. They start at the defaults and last until the next reset. */
+/* The settings in force: the defaults after a reset, then what the host's last `configure` set. */
 #ifndef ECHOSTEP_CONFIGURATION_H
 #define ECHOSTEP_CONFIGURATION_H
 
 #include <stdbool.h>
-#include "messages.h"
+#include "messages.h" /* struct msg_configure */
 
-#define GYRO_RATE_MIN_HZ 10u
-#define GYRO_RATE_MAX_HZ 200u
-#define COMPASS_RATE_MIN_HZ 1u
-#define COMPASS_RATE_MAX_HZ 20u
-
-/* All sensors, concurrent pings, gyros at 200 Hz, compass at 10 Hz, fast pressure; written by configuration_set alone. */
+/* Defaults: all sensors, concurrent pings, gyros at 200 Hz, compass at 10 Hz, fast pressure. Only configuration_set writes it. */
 extern struct msg_configure configuration;
 
-/* Takes the wanted settings, every value clamped into its range. */
+/* Puts the wanted settings into force, each value clamped to its range. */
 void configuration_set(const struct msg_configure *wanted);
 
 /* Whether any of these sensors (SENSORS_* flags) is to be read. */

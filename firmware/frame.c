@@ -1,6 +1,6 @@
 #include "frame.h"
 
-/* One byte of CRC-16/XMODEM without a table and without a loop over bits: 256 iterations less per frame. */
+/* Adds one byte to a CRC-16/XMODEM, without a table and without a loop over its bits. */
 static uint16_t crc_byte(uint16_t crc, uint8_t byte)
 {
 	crc = (uint16_t)((crc >> 8) | (crc << 8));

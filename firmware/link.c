@@ -1,22 +1,23 @@
 #include "link.h"
-#include "board.h"
-#include "status.h"
+#include "board.h"  /* usb_* */
+#include "status.h" /* drop counters */
 
-/* The longest frame a host has reason to send is `configure`; anything longer is bad before its end is seen. */
+/* `configure` is the longest frame from a host; a longer one is bad. */
 #define RECEIVE_MAX COBS_ENCODED_MAX(FRAME_OVERHEAD + (unsigned)MSG_CONFIGURE_SIZE)
 
-#define BYTES_PER_CALL 64u /* a host that floods the board must not hold up the sensors */
+#define BYTES_PER_CALL 64u /* limit, so that a flood of bytes from the host does not delay the sensors */
 
 static uint8_t payload[FRAME_PAYLOAD_MAX];
 static uint16_t sequence;
 static uint8_t received[RECEIVE_MAX];
-static uint8_t received_length; /* RECEIVE_MAX + 1: too long, wait for the zero */
+static uint8_t received_length; /* RECEIVE_MAX + 1: the frame is too long, its rest is skipped */
 
 uint8_t *link_body(void)
 {
 	return payload + FRAME_HEAD_SIZE;
 }
 
+/* Drop counter of a message. */
 static uint16_t *dropped(uint8_t id)
 {
 	switch (id) {
@@ -38,7 +39,7 @@ static uint16_t *dropped(uint8_t id)
 void link_send(uint8_t id, uint8_t body_length)
 {
 	uint8_t encoded[FRAME_ENCODED_MAX];
-	if (!usb_open())
+	if (!usb_is_open())
 		return;
 	uint8_t length = frame_encode(encoded, payload, id, sequence++, body_length);
 	if (!usb_write(encoded, length))
@@ -49,10 +50,10 @@ void link_open(void)
 {
 	static const uint8_t zero = 0;
 	received_length = 0;
-	(void)usb_write(&zero, 1); /* the port was just emptied: there is room */
+	(void)usb_write(&zero, 1); /* the buffer was just emptied: there is room */
 }
 
-/* What the bytes before a zero amount to; true: `out` holds a command. */
+/* Decodes the bytes received before a zero; true: `out` holds a command. */
 static bool close_frame(struct link_command *out)
 {
 	uint8_t length = received_length;

@@ -1,27 +1,27 @@
-/* The sensor board's main loop: every sensor gets its turn, the host's commands are obeyed, and the processor sleeps until the
- * earliest time somebody asked for. Interrupts only latch; everything that takes time happens here. */
-#include "adis16100.h"
-#include "board.h"
-#include "compass.h"
-#include "configuration.h"
-#include "link.h"
-#include "ranger.h"
-#include "scp1000.h"
-#include "selftest.h"
-#include "status.h"
+/* Main loop of the sensor board: moves USB bytes, carries out the host's commands, runs each sensor, then sleeps until the earliest time
+ * that a sensor returned, or until an interrupt. Interrupts only latch; everything that takes time happens here. */
+#include "board.h"         /* start, clock, USB, sleep */
+#include "compass.h"       /* sensor */
+#include "configuration.h" /* carries out `configure` */
+#include "gyros.h"         /* sensor */
+#include "link.h"          /* messages to and from the host */
+#include "pressure.h"      /* sensor */
+#include "ranger.h"        /* sensor */
+#include "selftest.h"      /* carries out `check_gyros` */
+#include "status.h"        /* sent once a second */
 
 #define VERSION_MAJOR 1
 #define VERSION_MINOR 1
 #define VERSION_PATCH 0
 
-#define NAP_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed no later than that */
+#define SLEEP_MAX_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed within this time */
 
 static void send_identity(void)
 {
 	struct msg_identity m = {
 		clock_now(), SCHEMA_HASH, VERSION_MAJOR, VERSION_MINOR, VERSION_PATCH, board_reset_cause(),
 	};
-	link_send(MSG_IDENTITY, pack_identity(link_body(), &m));
+	link_send(MSG_IDENTITY, msg_pack_identity(link_body(), &m));
 }
 
 static void send_configuration(void)
@@ -34,28 +34,29 @@ static void send_configuration(void)
 		configuration.compass_rate_hz,
 		configuration.pressure_mode,
 	};
-	link_send(MSG_CONFIGURATION, pack_configuration(link_body(), &m));
+	link_send(MSG_CONFIGURATION, msg_pack_configuration(link_body(), &m));
 }
 
 static void send_clock_reply(uint32_t ticks, uint16_t token)
 {
 	struct msg_clock_reply m = { ticks, token };
-	link_send(MSG_CLOCK_REPLY, pack_clock_reply(link_body(), &m));
+	link_send(MSG_CLOCK_REPLY, msg_pack_clock_reply(link_body(), &m));
 }
 
 static void send_status(void)
 {
 	status.ticks = clock_now();
 	status.memory_used = board_memory_used();
-	link_send(MSG_STATUS, pack_status(link_body(), &status));
+	link_send(MSG_STATUS, msg_pack_status(link_body(), &status));
 }
 
-static void introduce(void)
+static void send_identity_and_configuration(void)
 {
 	send_identity();
 	send_configuration();
 }
 
+/* At the start, and when the configuration changes. */
 static void start_sensors(void)
 {
 	uint32_t now = clock_now();
@@ -65,19 +66,19 @@ static void start_sensors(void)
 	pressure_start(now);
 }
 
-static bool obey_clock_query(const struct link_command *command, uint32_t ticks)
+static bool handle_clock_query(const struct link_command *command, uint32_t ticks)
 {
 	struct msg_clock_query m;
-	if (!unpack_clock_query(&m, command->body, command->length))
+	if (!msg_unpack_clock_query(&m, command->body, command->length))
 		return false;
 	send_clock_reply(ticks, m.token);
 	return true;
 }
 
-static bool obey_configure(const struct link_command *command)
+static bool handle_configure(const struct link_command *command)
 {
 	struct msg_configure m;
-	if (!unpack_configure(&m, command->body, command->length))
+	if (!msg_unpack_configure(&m, command->body, command->length))
 		return false;
 	configuration_set(&m);
 	start_sensors();
@@ -85,15 +86,15 @@ static bool obey_configure(const struct link_command *command)
 	return true;
 }
 
-static bool obey_identify(const struct link_command *command)
+static bool handle_identify(const struct link_command *command)
 {
 	if (command->length != MSG_IDENTIFY_SIZE)
 		return false;
-	introduce();
+	send_identity_and_configuration();
 	return true;
 }
 
-static bool obey_check_gyros(const struct link_command *command)
+static bool handle_check_gyros(const struct link_command *command)
 {
 	if (command->length != MSG_CHECK_GYROS_SIZE)
 		return false;
@@ -101,50 +102,52 @@ static bool obey_check_gyros(const struct link_command *command)
 	return true;
 }
 
-static bool obey(const struct link_command *command)
+/* Carries out a command; false: unknown id or wrong length. */
+static bool handle_command(const struct link_command *command)
 {
 	switch (command->id) {
 	case MSG_IDENTIFY:
-		return obey_identify(command);
+		return handle_identify(command);
 	case MSG_CLOCK_QUERY:
-		return obey_clock_query(command, clock_now());
+		return handle_clock_query(command, clock_now());
 	case MSG_CONFIGURE:
-		return obey_configure(command);
+		return handle_configure(command);
 	case MSG_CHECK_GYROS:
-		return obey_check_gyros(command);
+		return handle_check_gyros(command);
 	default:
 		return false;
 	}
 }
 
-static void greet_new_host(void)
+static void handle_port_opening(void)
 {
-	if (!usb_opened())
+	if (!usb_take_opening())
 		return;
 	link_open();
-	introduce();
+	send_identity_and_configuration();
 }
 
-static void listen(void)
+static void receive_commands(void)
 {
 	struct link_command command;
-	if (link_receive(&command) && !obey(&command))
+	if (link_receive(&command) && !handle_command(&command))
 		status.bad_frames++;
 	if (usb_bootloader_wanted())
 		board_bootloader();
 }
 
-static void report_edge(void)
+static void send_edge(void)
 {
 	struct clock_edge e;
 	if (!clock_take_edge(&e) || !configuration_reads(SENSORS_SYNC))
 		return;
 	status.dropped_sync = (uint16_t)(status.dropped_sync + e.missed);
 	struct msg_sync m = { e.ticks, e.edge };
-	link_send(MSG_SYNC, pack_sync(link_body(), &m));
+	link_send(MSG_SYNC, msg_pack_sync(link_body(), &m));
 }
 
-static uint32_t report_each_second(uint32_t now)
+/* Sends identity and status when due; returns the time of the next call. */
+static uint32_t send_each_second(uint32_t now)
 {
 	static uint32_t due;
 	if (!ticks_reached(now, due))
@@ -155,37 +158,39 @@ static uint32_t report_each_second(uint32_t now)
 	return due;
 }
 
+/* The earlier of two times, which are less than 17.9 minutes apart. */
 static uint32_t earlier(uint32_t a, uint32_t b)
 {
 	return ticks_reached(a, b) ? b : a;
 }
 
+/* Runs what is due; returns the earliest time at which something is due next. */
 static uint32_t run_sensors(void)
 {
 	uint32_t now = clock_now();
-	uint32_t wake = now + NAP_TICKS;
+	uint32_t wake = now + SLEEP_MAX_TICKS;
 	if (twi_watch(now))
 		status.bus_recoveries++;
 	wake = earlier(wake, ranger_run(now));
 	wake = earlier(wake, gyros_run(now));
 	wake = earlier(wake, compass_run(now));
 	wake = earlier(wake, pressure_run(now));
-	return earlier(wake, report_each_second(now));
+	return earlier(wake, send_each_second(now));
 }
 
 int main(void)
 {
 	board_start();
 	start_sensors();
-	if (!(board_reset_cause() & RESET_CAUSE_WATCHDOG)) /* that one comes in mid-walk */
+	if (!(board_reset_cause() & RESET_CAUSE_WATCHDOG)) /* a watchdog reset happens during a walk: no test then */
 		selftest_begin();
 	for (;;) {
-		usb_run(); /* what came in */
-		greet_new_host();
-		listen();
-		report_edge();
+		usb_run(); /* received bytes */
+		handle_port_opening();
+		receive_commands();
+		send_edge();
 		uint32_t wake = run_sensors();
-		usb_run(); /* what goes out */
+		usb_run(); /* the messages just made */
 		board_sleep(wake);
 	}
 }

@@ -22,7 +22,7 @@ static uint16_t get16(const uint8_t *in)
 	return (uint16_t)(in[0] | (uint16_t)(in[1] << 8));
 }
 
-uint8_t pack_identity(uint8_t *out, const struct msg_identity *m)
+uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -34,7 +34,7 @@ uint8_t pack_identity(uint8_t *out, const struct msg_identity *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_ping(uint8_t *out, const struct msg_ping *m)
+uint8_t msg_pack_ping(uint8_t *out, const struct msg_ping *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -44,7 +44,7 @@ uint8_t pack_ping(uint8_t *out, const struct msg_ping *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_gyros(uint8_t *out, const struct msg_gyros *m)
+uint8_t msg_pack_gyros(uint8_t *out, const struct msg_gyros *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -54,7 +54,7 @@ uint8_t pack_gyros(uint8_t *out, const struct msg_gyros *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_pressure(uint8_t *out, const struct msg_pressure *m)
+uint8_t msg_pack_pressure(uint8_t *out, const struct msg_pressure *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -63,7 +63,7 @@ uint8_t pack_pressure(uint8_t *out, const struct msg_pressure *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_compass(uint8_t *out, const struct msg_compass *m)
+uint8_t msg_pack_compass(uint8_t *out, const struct msg_compass *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -71,7 +71,7 @@ uint8_t pack_compass(uint8_t *out, const struct msg_compass *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_sync(uint8_t *out, const struct msg_sync *m)
+uint8_t msg_pack_sync(uint8_t *out, const struct msg_sync *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -79,7 +79,7 @@ uint8_t pack_sync(uint8_t *out, const struct msg_sync *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_status(uint8_t *out, const struct msg_status *m)
+uint8_t msg_pack_status(uint8_t *out, const struct msg_status *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -110,7 +110,7 @@ uint8_t pack_status(uint8_t *out, const struct msg_status *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m)
+uint8_t msg_pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -118,7 +118,7 @@ uint8_t pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_configuration(uint8_t *out, const struct msg_configuration *m)
+uint8_t msg_pack_configuration(uint8_t *out, const struct msg_configuration *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -130,7 +130,7 @@ uint8_t pack_configuration(uint8_t *out, const struct msg_configuration *m)
 	return (uint8_t)(end - out);
 }
 
-uint8_t pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m)
+uint8_t msg_pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m)
 {
 	uint8_t *end = out;
 	end = put32(end, m->ticks);
@@ -142,7 +142,7 @@ uint8_t pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m)
 	return (uint8_t)(end - out);
 }
 
-bool unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
+bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)
 		return false;
@@ -150,7 +150,7 @@ bool unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t le
 	return true;
 }
 
-bool unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length)
+bool msg_unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CONFIGURE_SIZE)
 		return false;

@@ -10,6 +10,14 @@
 #define IDENTITY_SEED 0xFFFFu
 #define MSG_MAX_SIZE 44u /* longest body */
 
+/* What a field holds when nothing was measured. */
+#define MSG_PING_TIME_OF_FLIGHT_US_INVALID ((uint16_t)0)
+#define MSG_GYROS_INVALID ((int16_t)-32768)
+#define MSG_PRESSURE_PRESSURE_INVALID ((uint32_t)0)
+#define MSG_PRESSURE_TEMPERATURE_INVALID ((int16_t)-32768)
+#define MSG_COMPASS_BEARING_INVALID ((uint16_t)65535)
+#define MSG_GYRO_HEALTH_INVALID ((int16_t)-32768)
+
 enum {
 	MSG_IDENTITY = 0x01,
 	MSG_PING = 0x02,
@@ -132,7 +140,7 @@ struct msg_identity {
 	uint8_t version_patch;
 	uint8_t reset_cause;
 };
-uint8_t pack_identity(uint8_t *out, const struct msg_identity *m);
+uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m);
 
 /* One ping of one ranger, sent when its ranging cycle is over. */
 struct msg_ping {
@@ -141,7 +149,7 @@ struct msg_ping {
 	uint8_t outcome;
 	uint16_t time_of_flight_us; /* us, 0: invalid */
 };
-uint8_t pack_ping(uint8_t *out, const struct msg_ping *m);
+uint8_t msg_pack_ping(uint8_t *out, const struct msg_ping *m);
 
 /* Thigh, calf and belt rate gyros (ADIS16100), one instant. */
 struct msg_gyros {
@@ -150,7 +158,7 @@ struct msg_gyros {
 	int16_t calf; /* 0.2439 deg/s, -32768: invalid */
 	int16_t belt; /* 0.2439 deg/s, -32768: invalid */
 };
-uint8_t pack_gyros(uint8_t *out, const struct msg_gyros *m);
+uint8_t msg_pack_gyros(uint8_t *out, const struct msg_gyros *m);
 
 /* Barometer (SCP1000). */
 struct msg_pressure {
@@ -158,21 +166,21 @@ struct msg_pressure {
 	uint32_t pressure; /* 0.25 Pa, 0: invalid */
 	int16_t temperature; /* 0.05 degC, -32768: invalid */
 };
-uint8_t pack_pressure(uint8_t *out, const struct msg_pressure *m);
+uint8_t msg_pack_pressure(uint8_t *out, const struct msg_pressure *m);
 
 /* Compass bearing (CMPS03/CMPS10 class). */
 struct msg_compass {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t bearing; /* 0.1 deg, 65535: invalid */
 };
-uint8_t pack_compass(uint8_t *out, const struct msg_compass *m);
+uint8_t msg_pack_compass(uint8_t *out, const struct msg_compass *m);
 
 /* Rising edge of the MTx SyncOut pulse, captured by the timer. */
 struct msg_sync {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t edge;
 };
-uint8_t pack_sync(uint8_t *out, const struct msg_sync *m);
+uint8_t msg_pack_sync(uint8_t *out, const struct msg_sync *m);
 
 /* Once a second: what was lost and what is wrong. All counters run from the board's start and wrap. */
 struct msg_status {
@@ -202,14 +210,14 @@ struct msg_status {
 	uint8_t healthy;
 	uint16_t memory_used; /* byte */
 };
-uint8_t pack_status(uint8_t *out, const struct msg_status *m);
+uint8_t msg_pack_status(uint8_t *out, const struct msg_status *m);
 
 /* Answer to clock_query. */
 struct msg_clock_reply {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t token;
 };
-uint8_t pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m);
+uint8_t msg_pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m);
 
 /* The settings now in force: the answer to configure, and sent with identity when the port opens. */
 struct msg_configuration {
@@ -220,7 +228,7 @@ struct msg_configuration {
 	uint8_t compass_rate_hz; /* Hz */
 	uint8_t pressure_mode;
 };
-uint8_t pack_configuration(uint8_t *out, const struct msg_configuration *m);
+uint8_t msg_pack_configuration(uint8_t *out, const struct msg_configuration *m);
 
 /* Once a second for each gyro: its temperature and how its last self-test ended. While a test runs `gyros` holds no values. */
 struct msg_gyro_health {
@@ -231,7 +239,7 @@ struct msg_gyro_health {
 	int16_t response_st1; /* 0.2439 deg/s, -32768: invalid */
 	int16_t response_st2; /* 0.2439 deg/s, -32768: invalid */
 };
-uint8_t pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m);
+uint8_t msg_pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m);
 
 /* Ask for identity and configuration. Like identity, it always carries the fixed seed. */
 /* identify has no fields. */
@@ -240,7 +248,7 @@ uint8_t pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m);
 struct msg_clock_query {
 	uint16_t token;
 };
-bool unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length);
+bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length);
 
 /* Set what is measured. Values out of range are clamped; the answer, configuration, shows what is in force. */
 struct msg_configure {
@@ -250,7 +258,7 @@ struct msg_configure {
 	uint8_t compass_rate_hz; /* Hz */
 	uint8_t pressure_mode;
 };
-bool unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length);
+bool msg_unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length);
 
 /* Run the self-test of the gyros: half a second without rates, then its outcome in gyro_health. Stand still meanwhile. */
 /* check_gyros has no fields. */

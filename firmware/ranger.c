@@ -1,14 +1,14 @@
 #include "ranger.h"
-#include "board.h"
-#include "configuration.h"
-#include "link.h"
-#include "status.h"
+#include "board.h"         /* twi_* */
+#include "configuration.h" /* schedule, enabled rangers */
+#include "link.h"          /* sending the messages */
+#include "status.h"        /* error counters */
 
-/* SRF02 [Devantech, SRF02 technical specification]: it does not answer while ranging, up to 65 ms, in practice about 61. */
+/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: at most 65 ms, in practice about 61 ms. */
 #define COMMAND_RANGE_US 0x52u
 #define REGISTER_COMMAND 0u
 #define REGISTER_REVISION 0u
-#define REVISION_BUSY 0xFFu /* what some of them answer while ranging instead of staying silent */
+#define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
 #define RANGING_MIN_TICKS (60u * TICKS_PER_MS)
 #define RANGING_MAX_TICKS (72u * TICKS_PER_MS)
 #define POLL_TICKS (TICKS_PER_MS / 2u)
@@ -16,12 +16,14 @@
 #define TRIGGER_TRIES 3u
 #define RETRY_TICKS TICKS_PER_MS
 #define QUIET_TICKS TICKS_PER_MS
-#define START_TICKS (100u * TICKS_PER_MS) /* whatever was ranging before a reset is over by then */
+#define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
 #define IDLE_TICKS (30u * TICKS_PER_MS)
 
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
-#define CONCURRENT_JITTER_MASK 0x1FFFu /* up to 4.1 ms */
-#define JITTER_STEPS 13u
+#define CONCURRENT_JITTER_MASK 0x1FFFu /* ticks: up to 4.1 ms */
+#define JITTER_STEPS 13u        /* bits of the mask: every bit of a delay is new */
+#define LFSR_TAPS 0xB400u       /* 16-bit Galois register of maximal length */
+#define LFSR_START 0xACE1u      /* any value but 0 */
 #define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
 
 enum stage { WAITING, TRIGGERING, RANGING, READING };
@@ -31,9 +33,9 @@ static struct ranger {
 	enum stage stage;
 	uint8_t index; /* RANGER_LEFT, RANGER_RIGHT */
 	uint8_t tries;
-	uint32_t slot;    /* on the grid */
-	uint32_t due;     /* when to trigger or to ask for the result */
-	uint32_t trigger; /* when it was triggered */
+	uint32_t slot;    /* grid time of this ping, without the delay */
+	uint32_t due;     /* time of the trigger, or of the next request for the result */
+	uint32_t trigger; /* time of the trigger */
 } rangers[2];
 
 static const struct {
@@ -51,14 +53,14 @@ static uint32_t half_period(void)
 	return configuration.schedule == SCHEDULE_SEQUENTIAL ? SEQUENTIAL_HALF_TICKS : CONCURRENT_HALF_TICKS;
 }
 
-/* A 16-bit Galois shift register of maximal length: the same delays after every start. One step a draw would make each delay about
- * half of the one before. */
+/* Pseudo-random delay in ticks, 0 when sequential; the same sequence after every start. With one shift per delay, each delay would be
+ * about half of the previous one. */
 static uint16_t jitter(void)
 {
 	if (configuration.schedule == SCHEDULE_SEQUENTIAL)
 		return 0;
 	for (uint8_t n = 0; n < JITTER_STEPS; n++)
-		lfsr = (uint16_t)((lfsr >> 1) ^ ((lfsr & 1u) ? 0xB400u : 0u));
+		lfsr = (uint16_t)((lfsr >> 1) ^ ((lfsr & 1u) ? LFSR_TAPS : 0u));
 	return lfsr & CONCURRENT_JITTER_MASK;
 }
 
@@ -67,12 +69,13 @@ static bool blocked_by_other(const struct ranger *r)
 	return configuration.schedule == SCHEDULE_SEQUENTIAL && rangers[!r->index].stage != WAITING;
 }
 
-static bool wants_to_fire(const struct ranger *r)
+static bool may_trigger(const struct ranger *r)
 {
 	return r->stage == WAITING && configuration_reads(devices[r->index].sensor) && !blocked_by_other(r);
 }
 
-/* A ranger that lags by less than half a period fires late, one that lags more gives up slots: the grid stays. */
+/* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips slots. The grid does
+ * not move. */
 static void schedule_next(struct ranger *r, uint32_t now)
 {
 	do
@@ -86,7 +89,7 @@ static void schedule_next(struct ranger *r, uint32_t now)
 static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_flight_us)
 {
 	struct msg_ping ping = { r->trigger, r->index, outcome, time_of_flight_us };
-	link_send(MSG_PING, pack_ping(link_body(), &ping));
+	link_send(MSG_PING, msg_pack_ping(link_body(), &ping));
 }
 
 static void fail(struct ranger *r, uint32_t now, uint8_t fault)
@@ -135,8 +138,8 @@ static void check_trigger(struct ranger *r, uint32_t now)
 	}
 }
 
-/* Reads from the revision on, to tell a result from the 0xFF of a ranger that is still at it. */
-static void ask(struct ranger *r)
+/* Reads revision and result in one transfer: a revision of REVISION_BUSY means that the ranging is not over. */
+static void request_result(struct ranger *r)
 {
 	r->transfer.write_length = 1;
 	r->transfer.read_length = 4;
@@ -144,7 +147,7 @@ static void ask(struct ranger *r)
 	begin(r, READING);
 }
 
-static void check_answer(struct ranger *r, uint32_t now)
+static void check_result(struct ranger *r, uint32_t now)
 {
 	enum twi_state state = twi_state(&r->transfer);
 	if (state == TWI_BUSY)
@@ -164,19 +167,19 @@ static void advance(struct ranger *r, uint32_t now)
 	if (r->stage == TRIGGERING)
 		check_trigger(r, now);
 	else if (r->stage == READING)
-		check_answer(r, now);
+		check_result(r, now);
 	if (!ticks_reached(now, r->due))
 		return;
-	if (wants_to_fire(r))
+	if (may_trigger(r))
 		trigger(r, now);
 	else if (r->stage == RANGING && ranger_quiet(now))
-		ask(r);
+		request_result(r);
 }
 
-/* The end of a transfer interrupts the sleep, so only times need to be told. */
+/* Time of the next call. The end of a transfer needs none: its interrupt ends the sleep. */
 static uint32_t wake_time(const struct ranger *r, uint32_t now)
 {
-	bool timed = r->stage == RANGING || wants_to_fire(r);
+	bool timed = r->stage == RANGING || may_trigger(r);
 	if (!timed)
 		return now + IDLE_TICKS;
 	return ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
@@ -194,7 +197,7 @@ static void start_one(uint8_t index, uint32_t slot)
 
 void ranger_start(uint32_t now)
 {
-	lfsr = 0xACE1u;
+	lfsr = LFSR_START;
 	start_one(RANGER_LEFT, now + START_TICKS);
 	start_one(RANGER_RIGHT, now + START_TICKS + half_period());
 }
@@ -210,7 +213,7 @@ uint32_t ranger_run(uint32_t now)
 bool ranger_quiet(uint32_t now)
 {
 	for (uint8_t i = 0; i < 2; i++)
-		if (wants_to_fire(&rangers[i]) && ticks_reached(now + QUIET_TICKS, rangers[i].due))
+		if (may_trigger(&rangers[i]) && ticks_reached(now + QUIET_TICKS, rangers[i].due))
 			return false;
 	return true;
 }

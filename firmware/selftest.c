@@ -1,35 +1,37 @@
 #include "selftest.h"
-#include "board.h"
-#include "messages.h"
+#include "board.h"    /* spi_excite_gyros */
+#include "messages.h" /* SELF_TEST_* */
 
-/* 0.48 s: at rest, ST1, ST2, at rest again; in each part 60 ms pass for the 40 Hz filter to settle, then 16 samples are averaged. */
+/* Four parts, 0.56 s in all: at rest, ST1, ST2, at rest again. Each part waits 60 ms for the 40 Hz filter, then averages 16 samples. */
 #define SETTLE_SAMPLES 12u
 #define WINDOW_SHIFT 4u
 #define WINDOW_SAMPLES (1u << WINDOW_SHIFT)
 #define PART_SAMPLES (SETTLE_SAMPLES + WINDOW_SAMPLES)
 
-/* [ADXRS300 data sheet: 150, 270, 450 mV] through the ADIS16100's converter of 4096 counts for 5 V, a little widened. */
+/* Response in counts: 150 to 450 mV [ADXRS300 data sheet; typical 270 mV] through the ADIS16100's converter, 4096 counts for 5 V, with
+ * a margin of about 2 counts at the lower end and 7 at the upper one. */
 #define RESPONSE_MIN 121
 #define RESPONSE_MAX 376
-#define STILL_MAX 30     /* counts, 7 deg/s: a wider spread within a window is motion */
-#define SYMMETRY_MAX 80  /* counts: responses that differ by more mean that the rate itself changed */
+#define STILL_MAX 30    /* counts, 7 deg/s: a wider spread within a window is motion */
+#define SYMMETRY_MAX 80 /* counts: a larger sum of the two responses means that the rate itself changed */
 
-#define UNKNOWN INT16_MIN
-
-enum part { REST, DOWN, UP, RECOVERY, IDLE };
+enum part { REST, DOWN, UP, RECOVERY, IDLE }; /* DOWN: ST1 lowers the rate; UP: ST2 raises it */
 
 static enum part part = IDLE;
-static uint8_t taken; /* samples of this part */
+static uint8_t samples; /* of this part */
+
+#define NOT_RUN { SELF_TEST_NOT_RUN, { MSG_GYRO_HEALTH_INVALID, MSG_GYRO_HEALTH_INVALID } }
 
 static struct gyro {
 	int32_t sum;
-	int16_t least, greatest, rest;
+	int16_t least, greatest; /* of the window */
+	int16_t rest;            /* mean rate without excitation */
 	bool moved, answered;
-	struct verdict verdict;
+	struct selftest_result result;
 } gyros[GYROS] = {
-	{ .verdict = { SELF_TEST_NOT_RUN, { UNKNOWN, UNKNOWN } } },
-	{ .verdict = { SELF_TEST_NOT_RUN, { UNKNOWN, UNKNOWN } } },
-	{ .verdict = { SELF_TEST_NOT_RUN, { UNKNOWN, UNKNOWN } } },
+	{ .result = NOT_RUN },
+	{ .result = NOT_RUN },
+	{ .result = NOT_RUN },
 };
 
 static void clear_window(struct gyro *g)
@@ -42,10 +44,10 @@ static void clear_window(struct gyro *g)
 static void enter(enum part next)
 {
 	part = next;
-	taken = 0;
+	samples = 0;
 	for (uint8_t k = 0; k < GYROS; k++)
 		clear_window(&gyros[k]);
-	gyro_excite(next == DOWN ? EXCITE_ST1 : next == UP ? EXCITE_ST2 : EXCITE_NONE);
+	spi_excite_gyros(next == DOWN ? EXCITE_ST1 : next == UP ? EXCITE_ST2 : EXCITE_NONE);
 }
 
 void selftest_begin(void)
@@ -54,8 +56,8 @@ void selftest_begin(void)
 		struct gyro *g = &gyros[k];
 		g->moved = false;
 		g->answered = true;
-		g->verdict.outcome = SELF_TEST_RUNNING;
-		g->verdict.response[0] = g->verdict.response[1] = UNKNOWN;
+		g->result.outcome = SELF_TEST_RUNNING;
+		g->result.response[0] = g->result.response[1] = MSG_GYRO_HEALTH_INVALID;
 	}
 	enter(REST);
 }
@@ -67,7 +69,7 @@ bool selftest_running(void)
 
 static void add(struct gyro *g, int16_t rate)
 {
-	if (rate == UNKNOWN) {
+	if (rate == MSG_GYROS_INVALID) {
 		g->answered = false;
 		return;
 	}
@@ -88,28 +90,28 @@ static void close_window(struct gyro *g)
 	if (part == REST)
 		g->rest = mean;
 	else if (part != RECOVERY)
-		g->verdict.response[part - DOWN] = (int16_t)(mean - g->rest);
+		g->result.response[part - DOWN] = (int16_t)(mean - g->rest);
 }
 
-static bool proper(int16_t response)
+static bool is_proper(int16_t response)
 {
 	return response >= RESPONSE_MIN && response <= RESPONSE_MAX;
 }
 
-static uint8_t judge(const struct gyro *g)
+static uint8_t outcome_of(const struct gyro *g)
 {
-	int16_t down = g->verdict.response[0], up = g->verdict.response[1];
+	int16_t down = g->result.response[0], up = g->result.response[1];
 	int16_t difference = (int16_t)(up + down);
 	if (!g->answered)
 		return SELF_TEST_NO_ANSWER;
 	if (g->moved || difference > SYMMETRY_MAX || difference < -SYMMETRY_MAX)
 		return SELF_TEST_MOVED;
-	return proper((int16_t)-down) && proper(up) ? SELF_TEST_PASSED : SELF_TEST_FAILED;
+	return is_proper((int16_t)-down) && is_proper(up) ? SELF_TEST_PASSED : SELF_TEST_FAILED;
 }
 
-void selftest_take(const int16_t rate[GYROS])
+void selftest_add_rates(const int16_t rate[GYROS])
 {
-	bool settled = ++taken > SETTLE_SAMPLES, last = taken >= PART_SAMPLES;
+	bool settled = ++samples > SETTLE_SAMPLES, last = samples >= PART_SAMPLES;
 	for (uint8_t k = 0; k < GYROS && settled; k++)
 		add(&gyros[k], rate[k]);
 	if (!last)
@@ -117,12 +119,12 @@ void selftest_take(const int16_t rate[GYROS])
 	for (uint8_t k = 0; k < GYROS; k++) {
 		close_window(&gyros[k]);
 		if (part == RECOVERY)
-			gyros[k].verdict.outcome = judge(&gyros[k]);
+			gyros[k].result.outcome = outcome_of(&gyros[k]);
 	}
 	enter((enum part)(part + 1));
 }
 
-const struct verdict *selftest_verdict(uint8_t gyro)
+const struct selftest_result *selftest_result(uint8_t gyro)
 {
-	return &gyros[gyro].verdict;
+	return &gyros[gyro].result;
 }

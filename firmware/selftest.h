@@ -1,26 +1,25 @@
-/* Self-test of the three gyros: their inputs ST1 and ST2 push the vibrating mass one way, then the other; the rate must follow. */
+/* Self-test of the three gyros: inputs ST1 and ST2 deflect the vibrating mass, first one way, then the other; the rate must follow. */
 #ifndef ECHOSTEP_SELFTEST_H
 #define ECHOSTEP_SELFTEST_H
 
 #include <stdbool.h>
 #include <stdint.h>
+#include "gyros.h" /* GYROS */
 
-#define GYROS 3u
-
-/* How a gyro's last test ended. */
-struct verdict {
-	uint8_t outcome;                /* SELF_TEST_* */
-	int16_t response[2];            /* to ST1 and ST2, counts; INT16_MIN: not known */
+/* Result of one gyro's last test. */
+struct selftest_result {
+	uint8_t outcome;     /* SELF_TEST_* */
+	int16_t response[2]; /* to ST1 and ST2, counts; MSG_GYRO_HEALTH_INVALID: not measured */
 };
 
-/* Starts a test, or starts it anew. */
+/* Starts a test; a running one starts again. */
 void selftest_begin(void);
 
 bool selftest_running(void);
 
-/* One sample of all three gyros while it runs, every 5 ms; INT16_MIN: no answer. The last one ends the test. */
-void selftest_take(const int16_t rate[GYROS]);
+/* Adds one sample of the three gyros (counts; MSG_GYROS_INVALID: no answer) to the running test, every 5 ms. The last one ends it. */
+void selftest_add_rates(const int16_t rate[GYROS]);
 
-const struct verdict *selftest_verdict(uint8_t gyro);
+const struct selftest_result *selftest_result(uint8_t gyro);
 
 #endif

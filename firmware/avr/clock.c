@@ -1,13 +1,13 @@
-/* The 32-bit clock: Timer1 at 2 MHz extended by an overflow count, SyncOut edges on its input capture (PD4), and the alarm that
- * ends a sleep. */
-#include <avr/interrupt.h>
-#include <avr/io.h>
-#include <util/atomic.h>
+/* The 32-bit clock: Timer1 at 2 MHz extended by an overflow count; SyncOut edges on its input capture (PD4); and the alarm that ends a
+ * sleep. */
+#include <avr/interrupt.h> /* ISR */
+#include <avr/io.h>        /* registers */
+#include <util/atomic.h>   /* ATOMIC_BLOCK */
 #include "shared.h"
 
 static volatile uint16_t overflows;
-static struct clock_edge edge;
-static bool edge_waiting;
+static struct clock_edge edge; /* shared with the capture interrupt: read with interrupts off */
+static bool edge_waiting;      /* as above */
 
 void clock_start(void)
 {
@@ -16,7 +16,8 @@ void clock_start(void)
 	TIMSK1 = BIT(ICIE1) | BIT(OCIE1A) | BIT(TOIE1);
 }
 
-/* Interrupts are off: an overflow that nobody counted yet belongs to a small timer value, not to a large one. */
+/* Extends a timer value to 32 bits; call with interrupts off. An overflow that is flagged but not counted yet has happened before a small
+ * timer value, and after a large one. */
 static uint32_t extend(uint16_t low)
 {
 	uint16_t high = overflows;
@@ -60,7 +61,7 @@ ISR(TIMER1_OVF_vect)
 
 ISR(TIMER1_COMPA_vect)
 {
-	awake = true;
+	board_awake = true;
 }
 
 ISR(TIMER1_CAPT_vect)
@@ -70,5 +71,5 @@ ISR(TIMER1_CAPT_vect)
 	if (edge_waiting)
 		edge.missed++;
 	edge_waiting = true;
-	awake = true;
+	board_awake = true;
 }

@@ -1,9 +1,10 @@
-/* SPI master: polled bytes to one of four chips, each with its own mode and rate. SCK PB1, MOSI PB2, MISO PB3; chip selects
- * PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7, ST2 on PF6. */
-#include <avr/io.h>
+/* SPI master: polled bytes to one of four chips, each with its own mode and rate; and the other pins of these chips. SCK PB1, MOSI PB2,
+ * MISO PB3; chip selects PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7,
+ * ST2 on PF6. */
+#include <avr/io.h> /* registers */
 #include "shared.h"
 
-#define SS BIT(PB0) /* an output, or a low level there would end master mode */
+#define SS BIT(PB0) /* must be an output: as an input, a low level would end master mode */
 #define SCK BIT(PB1)
 #define MOSI BIT(PB2)
 #define MISO BIT(PB3)
@@ -16,7 +17,7 @@
 #define MASTER (BIT(SPE) | BIT(MSTR))
 #define GYRO_MODE (MASTER | BIT(CPOL) | BIT(SPR0)) /* mode 2; with SPI2X 16 MHz / 8 = 2 MHz */
 #define PRESSURE_MODE (MASTER | BIT(SPR1))         /* mode 0; 16 MHz / 64 = 250 kHz */
-#define EXCHANGE_TRIES 255u                        /* over 1000 cycles; a byte takes at most 512 */
+#define EXCHANGE_TRIES 255u                        /* more than 1000 cycles; a byte takes at most 512 */
 
 void spi_start(void)
 {
@@ -54,12 +55,12 @@ void spi_release(void)
 	PORTD |= PRESSURE_SELECT;
 }
 
-bool pressure_ready(void)
+bool spi_pressure_ready(void)
 {
 	return PINE & DRDY;
 }
 
-void gyro_excite(enum excitation excitation)
+void spi_excite_gyros(enum excitation excitation)
 {
 	PORTF = excitation == EXCITE_ST1 ? ST1 : excitation == EXCITE_ST2 ? ST2 : 0;
 }

@@ -1,9 +1,9 @@
-/* I2C master: interrupts carry out one transfer at a time; the main loop frees a bus that got stuck. SCL is PD0, SDA is PD1. */
-#include <avr/interrupt.h>
-#include <avr/io.h>
-#include <util/atomic.h>
-#include <util/delay.h>
-#include <util/twi.h>
+/* I2C master: interrupts carry out one transfer at a time; the main loop frees a stuck bus. SCL is PD0, SDA is PD1. */
+#include <avr/interrupt.h> /* ISR */
+#include <avr/io.h>        /* registers */
+#include <util/atomic.h>   /* ATOMIC_BLOCK */
+#include <util/delay.h>    /* clocking the lines by hand */
+#include <util/twi.h>      /* status codes */
 #include "shared.h"
 
 #define SCL BIT(PD0)
@@ -11,19 +11,19 @@
 #define BIT_RATE 72u                       /* 16 MHz / (16 + 2 * 72) = 100 kHz */
 #define STOP_TICKS 20u                     /* from the request to the stop condition: one bit */
 #define TRANSFER_MAX_TICKS (5u * TICKS_PER_MS)
-#define STOP_TRIES 100u                    /* 40 us: four times what a stop condition takes */
+#define STOP_TRIES 100u                    /* 40 us: four times the duration of a stop condition */
 #define HALF_BIT_US 5
-#define RECOVERY_PULSES 9u                 /* a slave holds SDA for at most eight bits and an acknowledge */
+#define RECOVERY_PULSES 9u                 /* a device holds SDA for at most eight bits and an acknowledge */
 
 #define GO (BIT(TWINT) | BIT(TWEN) | BIT(TWIE))
 
-static struct twi_transfer *volatile current;
-static uint8_t at; /* next byte of the transfer */
-static uint32_t started;
+static struct twi_transfer *volatile current; /* 0: the bus is free */
+static uint8_t byte_index;                    /* next byte of the transfer */
+static uint32_t started;                      /* ticks */
 
 void twi_start(void)
 {
-	PORTD |= SCL | SDA; /* without a single device the lines must still be high */
+	PORTD |= SCL | SDA; /* pull-ups: without any device the lines must still be high */
 	TWSR = 0;
 	TWBR = BIT_RATE;
 }
@@ -38,8 +38,8 @@ bool twi_begin(struct twi_transfer *transfer)
 {
 	if (current)
 		return false;
-	await_stop(); /* one that never ends makes this transfer time out */
-	at = 0;
+	await_stop(); /* if the stop never ends, this transfer times out */
+	byte_index = 0;
 	transfer->state = TWI_BUSY;
 	started = clock_now();
 	current = transfer;
@@ -50,7 +50,7 @@ bool twi_begin(struct twi_transfer *transfer)
 enum twi_state twi_state(const struct twi_transfer *transfer)
 {
 	enum twi_state state = transfer->state;
-	__asm__ volatile("" ::: "memory"); /* bytes and ticks were written by the interrupt before the state */
+	__asm__ volatile("" ::: "memory"); /* the interrupt writes bytes and ticks before the state: the caller must read them after it */
 	return state;
 }
 
@@ -59,10 +59,11 @@ static void finish(enum twi_state state)
 	current->ticks = clock_now() + STOP_TICKS;
 	current->state = state;
 	current = 0;
-	awake = true;
+	board_awake = true;
 }
 
-/* SCL is held low until TWCR is written, so the clock read right after it dates the stop condition however late we are. */
+/* SCL is held low until TWCR is written. So the clock, read right after it, gives the time of the stop condition however late this
+ * interrupt is. */
 static void stop(enum twi_state state)
 {
 	TWCR = BIT(TWINT) | BIT(TWEN) | BIT(TWSTO);
@@ -71,8 +72,8 @@ static void stop(enum twi_state state)
 
 static void write_next(void)
 {
-	if (at < current->write_length) {
-		TWDR = current->bytes[at++];
+	if (byte_index < current->write_length) {
+		TWDR = current->bytes[byte_index++];
 		TWCR = GO;
 	} else if (current->read_length) {
 		TWCR = GO | BIT(TWSTA);
@@ -83,12 +84,12 @@ static void write_next(void)
 
 static void read_next(void)
 {
-	TWCR = at + 1 < current->read_length ? GO | BIT(TWEA) : GO;
+	TWCR = byte_index + 1 < current->read_length ? GO | BIT(TWEA) : GO;
 }
 
 ISR(TWI_vect)
 {
-	if (!current) { /* given up by twi_watch */
+	if (!current) { /* twi_watch has ended the transfer */
 		TWCR = BIT(TWEN);
 		return;
 	}
@@ -100,21 +101,21 @@ ISR(TWI_vect)
 	case TW_REP_START:
 		TWDR = (uint8_t)(current->address << 1 | TW_READ);
 		TWCR = GO;
-		at = 0;
+		byte_index = 0;
 		break;
 	case TW_MT_SLA_ACK:
 	case TW_MT_DATA_ACK:
 		write_next();
 		break;
 	case TW_MR_DATA_ACK:
-		current->bytes[at++] = TWDR;
+		current->bytes[byte_index++] = TWDR;
 		read_next();
 		break;
 	case TW_MR_SLA_ACK:
 		read_next();
 		break;
 	case TW_MR_DATA_NACK:
-		current->bytes[at] = TWDR;
+		current->bytes[byte_index] = TWDR;
 		stop(TWI_DONE);
 		break;
 	case TW_MT_SLA_NACK:
@@ -122,7 +123,7 @@ ISR(TWI_vect)
 	case TW_MR_SLA_NACK:
 		stop(TWI_NACK);
 		break;
-	case TW_MT_ARB_LOST: /* somebody pulls the lines: no stop condition can be sent */
+	case TW_MT_ARB_LOST: /* a device holds a line low: no stop condition can be sent */
 		TWCR = BIT(TWINT) | BIT(TWEN);
 		finish(TWI_FAILED);
 		break;
@@ -131,32 +132,32 @@ ISR(TWI_vect)
 	}
 }
 
-/* The lines are driven low or let go, never driven high. */
-static void pull(uint8_t line)
+/* The lines are driven low or released, never driven high. */
+static void drive_low(uint8_t line)
 {
 	DDRD |= line;
 	_delay_us(HALF_BIT_US);
 }
 
-static void let_go(uint8_t line)
+static void release(uint8_t line)
 {
 	DDRD &= (uint8_t)~line;
 	_delay_us(HALF_BIT_US);
 }
 
-/* Clocks a slave through the byte it believes to be sending, then ends it with a stop condition [I2C specification, 3.1.16]. */
-static void clock_free(void)
+/* Frees a bus whose SDA a device holds low: clocks the device through its byte, then sends a stop condition [I2C specification, 3.1.16]. */
+static void free_bus(void)
 {
 	TWCR = 0;
 	PORTD &= (uint8_t)~(SCL | SDA);
 	for (uint8_t n = 0; n < RECOVERY_PULSES; n++) {
-		pull(SCL);
-		let_go(SCL);
+		drive_low(SCL);
+		release(SCL);
 	}
-	pull(SCL);
-	pull(SDA);
-	let_go(SCL);
-	let_go(SDA);
+	drive_low(SCL);
+	drive_low(SDA);
+	release(SCL);
+	release(SDA);
 	PORTD |= SCL | SDA;
 }
 
@@ -172,6 +173,6 @@ bool twi_watch(uint32_t now)
 		}
 	}
 	if (stuck)
-		clock_free();
+		free_bus();
 	return stuck;
 }

@@ -1,11 +1,11 @@
 /* USB device controller of the ATmega32U4 [datasheet, chapters 21 and 22]: attach, bus reset, and the port's two bulk endpoints.
- * Interrupts only silence themselves and wake the main loop; usb_run does the work and arms them again. */
-#include <avr/interrupt.h>
-#include <avr/io.h>
+ * An interrupt only disables itself and wakes the main loop; usb_run does the work and enables it again. */
+#include <avr/interrupt.h> /* ISR */
+#include <avr/io.h>        /* registers */
 #include "shared.h"
 #include "usb.h"
 
-#define PLL_TRIES 60000u /* 15 ms; it locks within 0.1 ms */
+#define PLL_TRIES 60000u /* 15 ms; the PLL locks within 0.1 ms */
 
 #define TYPE_BULK_OUT (BIT(EPTYPE1))
 #define TYPE_BULK_IN (BIT(EPTYPE1) | BIT(EPDIR))
@@ -13,23 +13,23 @@
 #define MEMORY_16 (BIT(EPSIZE0) | BIT(ALLOC))
 #define MEMORY_64_DOUBLE (BIT(EPSIZE1) | BIT(EPSIZE0) | BIT(EPBK0) | BIT(ALLOC))
 
-/* Hands a bank over by clearing FIFOCON and its flag. A one leaves a flag alone, but where IN endpoints have RXOUTI it would
- * take back the bank just sent (KILLBK), so that bit stays zero. */
+/* Values of UEINTX that hand over a bank: FIFOCON and the flag of the bank are written as zero, which clears them. A one leaves a flag as
+ * it is; but on an IN endpoint, a one in the bit of RXOUTI (there KILLBK) would take back the bank just sent, so that bit is zero. */
 #define RELEASE_IN (BIT(NAKOUTI) | BIT(RXSTPI) | BIT(STALLEDI) | BIT(RWAL))
 #define RELEASE_OUT (BIT(NAKINI) | BIT(RXSTPI) | BIT(STALLEDI) | BIT(RWAL) | BIT(TXINI))
 
-/* A bank is never filled: every packet is short, and the host passes a short packet on at once. */
+/* A bank is never filled completely: every packet is short, and the host delivers a short packet at once. */
 #define PACKET_MAX (EP_SIZE - 1u)
 
 #define RING_SIZE (USB_ROOM + 1u)
 
 static volatile bool bus_was_reset;
-static uint8_t ring[RING_SIZE];
-static uint16_t head, tail;
+static uint8_t ring[RING_SIZE]; /* send buffer; empty when head == tail */
+static uint16_t head, tail;     /* indices of the next byte to write and to send */
 
 void usb_start(void)
 {
-	USBCON = 0; /* the bootloader may have left it running */
+	USBCON = 0; /* the bootloader may have left the controller on */
 	UHWCON = BIT(UVREGE);
 	USBCON = BIT(USBE) | BIT(FRZCLK);
 	PLLCSR = BIT(PINDIV) | BIT(PLLE);
@@ -45,9 +45,10 @@ ISR(USB_GEN_vect)
 	if (UDINT & BIT(EORSTI))
 		bus_was_reset = true;
 	UDINT = 0;
-	awake = true;
+	board_awake = true;
 }
 
+/* Disables the interrupts of each endpoint that raised one. */
 ISR(USB_COM_vect)
 {
 	uint8_t selected = UENUM, waiting = UEINT;
@@ -58,7 +59,7 @@ ISR(USB_COM_vect)
 		}
 	}
 	UENUM = selected;
-	awake = true;
+	board_awake = true;
 }
 
 void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory)
@@ -89,9 +90,9 @@ void usb_empty_port(void)
 	reset_endpoints(BIT(EP_IN));
 }
 
-static uint16_t ring_next(uint16_t at)
+static uint16_t ring_next(uint16_t index)
 {
-	return (uint16_t)((at + 1u) & (RING_SIZE - 1u));
+	return (uint16_t)((index + 1u) & (RING_SIZE - 1u));
 }
 
 static uint16_t ring_room(void)
@@ -119,7 +120,7 @@ static void send_packet(void)
 	UEINTX = RELEASE_IN;
 }
 
-static void send_waiting(void)
+static void send_packets(void)
 {
 	UENUM = EP_IN;
 	while (tail != head && (UEINTX & BIT(RWAL)))
@@ -127,7 +128,7 @@ static void send_waiting(void)
 	UEIENX = tail != head ? BIT(TXINE) : 0;
 }
 
-static void listen_for_more(void)
+static void enable_receive_interrupt(void)
 {
 	UENUM = EP_OUT;
 	UEIENX = BIT(RXOUTE);
@@ -135,7 +136,7 @@ static void listen_for_more(void)
 
 int16_t usb_read(void)
 {
-	if (!control_configured())
+	if (!usb_control_is_configured())
 		return -1;
 	UENUM = EP_OUT;
 	if (!(UEINTX & BIT(RXOUTI)))
@@ -146,9 +147,9 @@ int16_t usb_read(void)
 	return byte;
 }
 
-bool usb_open(void)
+bool usb_is_open(void)
 {
-	return control_configured() && control_port_open();
+	return usb_control_is_configured() && usb_control_port_is_open();
 }
 
 static bool cable_pulled(void)
@@ -160,11 +161,11 @@ void usb_run(void)
 {
 	if (bus_was_reset || cable_pulled()) {
 		bus_was_reset = false;
-		control_start();
+		usb_control_start();
 	}
-	control_run();
-	if (!control_configured())
+	usb_control_run();
+	if (!usb_control_is_configured())
 		return;
-	listen_for_more();
-	send_waiting();
+	enable_receive_interrupt();
+	send_packets();
 }

@@ -1,5 +1,5 @@
-/* What the parts of the USB driver share: usb.c moves the bytes of the port, usb_control.c answers the host's requests, with
- * usb_descriptors.c. */
+/* Shared by the parts of the USB driver: usb.c moves the bytes of the port, usb_control.c answers the host's requests, usb_descriptors.c
+ * holds the descriptors. */
 #ifndef ECHOSTEP_AVR_USB_H
 #define ECHOSTEP_AVR_USB_H
 
@@ -12,17 +12,17 @@ enum { EP_CONTROL, EP_NOTIFY, EP_OUT, EP_IN };
 #define NOTIFY_SIZE 16u
 
 /* usb.c */
-void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory); /* UECFG0X and UECFG1X; selects the endpoint */
-void usb_start_port(void);                                       /* the host chose our configuration */
-void usb_empty_port(void);                                       /* nothing that waited reaches the next host program */
+void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory); /* `type` for UECFG0X, `memory` for UECFG1X; selects the endpoint */
+void usb_start_port(void);                                       /* enables the port's endpoints when the host sets the configuration */
+void usb_empty_port(void);                                       /* drops the bytes that wait for the host */
 
 /* usb_descriptors.c */
-const uint8_t *usb_descriptor(uint16_t value, uint8_t *length); /* wValue of the request; in flash; 0: there is none */
+const uint8_t *usb_descriptor(uint16_t value, uint8_t *length); /* by the request's wValue; in flash; 0: there is none */
 
 /* usb_control.c */
-void control_start(void); /* after a bus reset, and when the cable is pulled: no address, no configuration, port closed */
-void control_run(void);
-bool control_configured(void);
-bool control_port_open(void);
+void usb_control_start(void); /* after a bus reset and while unplugged: no configuration, port closed */
+void usb_control_run(void);   /* does the next step of the request under way */
+bool usb_control_is_configured(void);
+bool usb_control_port_is_open(void); /* DTR */
 
 #endif

@@ -1,7 +1,7 @@
-/* USB control endpoint: standard requests [USB 2.0, chapter 9] and those of the CDC-ACM class [PSTN120, 6.3]. Never waits: each
- * call does what the controller is ready for, and asks for an interrupt at the next step. */
-#include <avr/io.h>
-#include <avr/pgmspace.h>
+/* USB control endpoint: standard requests [USB 2.0, chapter 9] and those of the CDC-ACM class [PSTN120, 6.3]. Never waits: each call of
+ * usb_control_run does what the controller is ready for, and enables the interrupt of the next step. */
+#include <avr/io.h>       /* registers */
+#include <avr/pgmspace.h> /* descriptors in flash */
 #include "shared.h"
 #include "usb.h"
 
@@ -41,14 +41,15 @@ struct setup {
 	uint16_t value, index, length;
 };
 
+/* Of the request under way. ACKNOWLEDGING: the empty packet of the status stage. ADDRESSING: after it, the new address takes effect. */
 enum stage { IDLE, REPLYING, RECEIVING_LINE_CODING, ACKNOWLEDGING, ADDRESSING };
 
 static enum stage stage;
 static uint8_t configured; /* bConfigurationValue */
 static uint8_t address;
 static bool dtr;
-static uint8_t line_coding[LINE_CODING_SIZE] = { 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }; /* 115200 8N1; of no effect */
-static bool opened;
+static uint8_t line_coding[LINE_CODING_SIZE] = { 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }; /* 115200 8N1; has no effect */
+static bool opened; /* since the last call of usb_take_opening */
 static bool bootloader_wanted;
 static struct {
 	const uint8_t *next;
@@ -57,7 +58,7 @@ static struct {
 } reply;
 static uint8_t answer[2];
 
-void control_start(void)
+void usb_control_start(void)
 {
 	stage = IDLE;
 	configured = 0;
@@ -65,17 +66,17 @@ void control_start(void)
 	usb_enable(EP_CONTROL, 0, MEMORY_64);
 }
 
-bool control_configured(void)
+bool usb_control_is_configured(void)
 {
 	return configured != 0;
 }
 
-bool control_port_open(void)
+bool usb_control_port_is_open(void)
 {
 	return dtr;
 }
 
-bool usb_opened(void)
+bool usb_take_opening(void)
 {
 	bool was = opened;
 	opened = false;
@@ -84,7 +85,7 @@ bool usb_opened(void)
 
 bool usb_bootloader_wanted(void)
 {
-	return bootloader_wanted && stage == IDLE; /* the host gets its acknowledge first */
+	return bootloader_wanted && stage == IDLE; /* only after the host has its acknowledge */
 }
 
 static bool send(const uint8_t *bytes, uint8_t length, uint16_t wanted, bool in_flash)
@@ -144,7 +145,7 @@ static bool set_line_state(bool new_dtr)
 	return acknowledge();
 }
 
-/* Selects an endpoint other than the control endpoint for the halt requests; false: there is no such endpoint. */
+/* Selects the endpoint of a halt request, which may not be the control endpoint; false: there is no such endpoint. */
 static bool select_endpoint(const struct setup *s)
 {
 	uint8_t endpoint = s->index & 0x7Fu;
@@ -168,7 +169,8 @@ static bool send_halt(const struct setup *s)
 	return send_answer(halted, 2, s->length);
 }
 
-static bool obey(const struct setup *s)
+/* Answers a request; false: not supported, the endpoint stalls. */
+static bool handle_request(const struct setup *s)
 {
 	switch (REQUEST(s->type, s->request)) {
 	case REQUEST(FROM_DEVICE, GET_DESCRIPTOR):
@@ -211,7 +213,7 @@ static uint16_t read16(void)
 	return (uint16_t)(low | (uint16_t)(UEDATX << 8));
 }
 
-static void take_setup(void)
+static void receive_setup(void)
 {
 	struct setup s;
 	s.type = UEDATX;
@@ -222,15 +224,15 @@ static void take_setup(void)
 	UEINTX = (uint8_t)~(BIT(RXSTPI) | BIT(RXOUTI));
 	stage = IDLE;
 	address = UDADDR & 0x7Fu;
-	if (obey(&s))
+	if (handle_request(&s))
 		return;
 	stage = IDLE;
 	UENUM = EP_CONTROL;
 	UECONX = BIT(STALLRQ) | BIT(EPEN);
 }
 
-/* Either the line coding, or the empty packet by which the host ends or aborts what it reads. */
-static void take_packet(void)
+/* Receives either a line coding, or the empty packet with which the host ends or aborts a read. */
+static void receive_packet(void)
 {
 	if (stage == RECEIVING_LINE_CODING) {
 		for (uint8_t n = 0; n < LINE_CODING_SIZE; n++)
@@ -249,12 +251,12 @@ static void send_part(void)
 		UEDATX = reply.in_flash ? pgm_read_byte(reply.next) : *reply.next;
 		reply.next++;
 	}
-	if (!reply.left) /* no descriptor is a multiple of EP_SIZE long, so the last packet is always short or the last wanted */
+	if (!reply.left) /* no descriptor's length is a multiple of EP_SIZE: the last packet is short, or has the last byte wanted */
 		stage = IDLE;
 	UEINTX = (uint8_t)~BIT(TXINI);
 }
 
-/* The bank for answers is free. The new address holds from the end of the transfer that brought it. */
+/* Sends the next packet; the bank for answers is free. A new address takes effect after the transfer that set it. */
 static void send_next(void)
 {
 	switch (stage) {
@@ -274,14 +276,14 @@ static void send_next(void)
 	}
 }
 
-void control_run(void)
+void usb_control_run(void)
 {
 	UENUM = EP_CONTROL;
 	if (UEINTX & BIT(RXSTPI))
-		take_setup();
+		receive_setup();
 	UENUM = EP_CONTROL;
 	if (UEINTX & BIT(RXOUTI))
-		take_packet();
+		receive_packet();
 	if (UEINTX & BIT(TXINI))
 		send_next();
 	bool sending = stage == REPLYING || stage == ACKNOWLEDGING || stage == ADDRESSING;

@@ -1,8 +1,8 @@
 /* USB descriptors: one CDC-ACM port [USB 2.0, chapter 9; CDC120; PSTN120]. All in flash. */
-#include <avr/pgmspace.h>
+#include <avr/pgmspace.h> /* PROGMEM */
 #include "usb.h"
 
-/* 0x1209:0x0001 is the identifier pid.codes reserves for testing. */
+/* pid.codes reserves 0x1209:0x0001 for tests. */
 static const uint8_t device_descriptor[] PROGMEM = {
 	18, 1, 0x00, 0x02, 0x02, 0, 0, EP_SIZE, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 0, 1,
 };
@@ -15,8 +15,8 @@ static const uint8_t configuration_descriptor[] PROGMEM = {
 	5, 0x24, 1, 0, 1,                                    /* no call management */
 	4, 0x24, 2, 2,                                       /* line coding and line state */
 	5, 0x24, 6, 0, 1,                                    /* union of interfaces 0 and 1 */
-	7, 5, EP_NOTIFY | 0x80, 3, NOTIFY_SIZE, 0, 64,       /* never used, but asked for by the class */
-	9, 4, 1, 0, 2, 0x0A, 0, 0, 0,                        /* bytes interface */
+	7, 5, EP_NOTIFY | 0x80, 3, NOTIFY_SIZE, 0, 64,       /* unused, but required by the class */
+	9, 4, 1, 0, 2, 0x0A, 0, 0, 0,                        /* data interface */
 	7, 5, EP_OUT, 2, EP_SIZE, 0, 0,
 	7, 5, EP_IN | 0x80, 2, EP_SIZE, 0, 0,
 };

@@ -1,6 +1,6 @@
 """The firmware's own C, compiled for this machine with its sanitizers: every golden vector, and hostile bytes.
 
-In: firmware/*.c, protocol/vectors.jsonl, tests/fuzz_codec.c. Out: pass or fail; skipped without a C compiler.
+In: firmware/*.c, protocol/vectors.jsonl, tests/firmware/fuzz_codec.c. Out: pass or fail; skipped without a C compiler.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from echostep.board.messages import ClockQuery, Configure, Identify, Message
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
-FUZZ = [ROOT / "tests" / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
+FUZZ = [Path(__file__).parent / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
 FLAGS = ["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE}", "-fno-sanitize-recover=all"]
 HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros")
 TIMEOUT_S = 60
@@ -71,7 +71,7 @@ def sent_case(line: int, name: str, vector: dict[str, Any]) -> str:
     """A message of the board: packed, numbered, checksummed and stuffed."""
     values = ", ".join(f".{field} = {value}" for field, value in vector["fields"].items())
     return f"""
-	n = pack_{name}(payload + FRAME_HEAD_SIZE, &(struct msg_{name}){{ {values} }});
+	n = msg_pack_{name}(payload + FRAME_HEAD_SIZE, &(struct msg_{name}){{ {values} }});
 	n = frame_encode(out, payload, MSG_{name.upper()}, {vector["sequence"]}, (unsigned char)n);
 	same({line}, out, n, {array(vector["frame"])}, {len(vector["frame"]) // 2});"""
 
@@ -89,7 +89,7 @@ def received_case(line: int, name: str, vector: dict[str, Any]) -> str:
     return f"""{code}
 	{{
 		struct msg_{name} m;
-		hold({line}, unpack_{name}(&m, payload + FRAME_HEAD_SIZE, (unsigned char)n));
+		hold({line}, msg_unpack_{name}(&m, payload + FRAME_HEAD_SIZE, (unsigned char)n));
 		{fields}
 	}}"""
 

@@ -1,16 +1,16 @@
-#include "scp1000.h"
-#include "board.h"
-#include "configuration.h"
-#include "link.h"
-#include "status.h"
+#include "pressure.h"
+#include "board.h"         /* spi_* */
+#include "configuration.h" /* mode, whether it is enabled */
+#include "link.h"          /* sending the messages */
+#include "status.h"        /* error counter */
 
-/* Registers and the start-up sequence [SCP1000-D01 datasheet]. */
+/* Registers and start-up sequence [SCP1000-D01 datasheet]. */
 #define REGISTER_REVISION 0x00u /* never all zeros or ones */
 #define REGISTER_OPERATION 0x03u
 #define REGISTER_RESET 0x06u
 #define REGISTER_STATUS 0x07u
-#define REGISTER_DATARD8 0x1Fu  /* after the start: EEPROM check; then pressure, bits 18:16 */
-#define REGISTER_DATARD16 0x20u /* pressure, bits 15:0; reading it takes DRDY back */
+#define REGISTER_DATARD8 0x1Fu  /* after a reset: result of the EEPROM check; then pressure, bits 18:16 */
+#define REGISTER_DATARD16 0x20u /* pressure, bits 15:0; reading it clears DRDY */
 #define REGISTER_TEMPOUT 0x21u
 #define WRITE_FLAG 0x02u
 #define STATUS_STARTING 0x01u
@@ -19,8 +19,8 @@
 #define OPERATION_HIGH_SPEED 0x09u
 #define OPERATION_HIGH_RESOLUTION 0x0Au
 #define PRESSURE_HIGH_MASK 0x07u
-#define NOBODY 0xFFu /* what an empty bus reads */
-#define HELD_LOW 0x00u
+#define NO_REPLY 0xFFu /* MISO is pulled up: an absent chip reads as ones */
+#define HELD_LOW 0x00u /* MISO is held low, or the chip has no supply */
 #define TEMPERATURE_MASK 0x3FFFu
 #define TEMPERATURE_SIGN 0x2000
 
@@ -28,16 +28,17 @@
 #define STARTING_MAX_TICKS (150u * TICKS_PER_MS)
 #define STARTING_POLL_TICKS (10u * TICKS_PER_MS)
 #define READY_POLL_TICKS (5u * TICKS_PER_MS)
-#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS)    /* the fast mode gives one in 110 ms: DRDY before that is a stuck line */
-#define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)   /* the slow mode gives one in 560 ms */
+#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 110 ms per sample: an earlier DRDY is a stuck line */
+#define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)   /* the slow mode needs 560 ms per sample */
 #define RETRY_TICKS TICKS_PER_S
 
 enum stage { STARTING, MEASURING, FAILED };
 
 static enum stage stage;
-static uint32_t due;
-static uint32_t earliest; /* a sample before that cannot be one */
-static uint32_t deadline; /* by which the chip must have started, or given the next sample */
+/* Times in ticks of the board's clock. */
+static uint32_t due;      /* next step */
+static uint32_t earliest; /* DRDY before this time is an error */
+static uint32_t deadline; /* of the start, or of the next sample */
 
 static uint8_t read8(uint8_t address)
 {
@@ -71,6 +72,7 @@ static void wait(enum stage next, uint32_t until)
 	due = until;
 }
 
+/* Counts the failure; the chip is reset again after RETRY_TICKS. */
 static void fail(uint32_t now, uint8_t fault)
 {
 	status_failed(DEVICE_PRESSURE, fault);
@@ -79,7 +81,7 @@ static void fail(uint32_t now, uint8_t fault)
 
 void pressure_start(uint32_t now)
 {
-	write8(REGISTER_OPERATION, OPERATION_STOP); /* a board that restarts may find it measuring */
+	write8(REGISTER_OPERATION, OPERATION_STOP); /* after a reset of the board alone the chip is still measuring */
 	write8(REGISTER_RESET, 1);
 	deadline = now + RESET_TICKS + STARTING_MAX_TICKS;
 	wait(STARTING, now + RESET_TICKS);
@@ -99,10 +101,11 @@ static void measure(uint32_t now)
 	await_sample(now);
 }
 
+/* Polls the start: a chip that answers has left STARTING and passed its EEPROM check before it may measure. */
 static void check_start(uint32_t now)
 {
 	uint8_t revision = read8(REGISTER_REVISION);
-	if (revision == NOBODY || revision == HELD_LOW) {
+	if (revision == NO_REPLY || revision == HELD_LOW) {
 		fail(now, FAULT_NO_ANSWER);
 	} else if (!(read8(REGISTER_STATUS) & STATUS_STARTING)) {
 		if (read8(REGISTER_DATARD8) & EEPROM_OK)
@@ -123,22 +126,22 @@ static void sample(uint32_t now)
 	uint8_t high = read8(REGISTER_DATARD8);
 	m.pressure = (uint32_t)(high & PRESSURE_HIGH_MASK) << 16 | read16(REGISTER_DATARD16);
 	m.temperature = (int16_t)((int16_t)(temperature ^ TEMPERATURE_SIGN) - TEMPERATURE_SIGN);
-	if (high == NOBODY) {
+	if (high == NO_REPLY) {
 		fail(now, FAULT_NO_ANSWER);
 		return;
 	}
-	if (m.pressure == 0) {
+	if (m.pressure == MSG_PRESSURE_PRESSURE_INVALID) {
 		fail(now, FAULT_BAD_VALUE);
 		return;
 	}
 	status_ok(DEVICE_PRESSURE);
-	link_send(MSG_PRESSURE, pack_pressure(link_body(), &m));
+	link_send(MSG_PRESSURE, msg_pack_pressure(link_body(), &m));
 	await_sample(now);
 }
 
 static void check_sample(uint32_t now)
 {
-	bool ready = pressure_ready();
+	bool ready = spi_pressure_ready();
 	if (ready && ticks_reached(now, earliest))
 		sample(now);
 	else if (ready || ticks_reached(now, deadline))

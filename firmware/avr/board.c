@@ -1,21 +1,21 @@
-/* Start, sleep, watchdog, and what they can tell: why the board started and how much memory it has used. */
-#include <avr/interrupt.h>
-#include <avr/io.h>
-#include <avr/power.h>
-#include <avr/sleep.h>
-#include <avr/wdt.h>
+/* Start, sleep and watchdog of the processor; its reset cause and memory use. */
+#include <avr/interrupt.h> /* cli, sei */
+#include <avr/io.h>        /* registers */
+#include <avr/power.h>     /* switching off unused parts */
+#include <avr/sleep.h>     /* sleep_cpu */
+#include <avr/wdt.h>       /* watchdog */
 #include "shared.h"
 
-#define PAINT 0xC5u
-#define UNTOUCHED_MAX 64u     /* more than the largest array on the stack, which nobody has to fill */
+#define PAINT 0xC5u           /* free memory is filled with this byte at the start */
+#define UNTOUCHED_MAX 64u     /* bytes: more than the largest array on the stack, which may stay partly unwritten */
 #define ALARM_MARGIN_TICKS 4u /* too close for the alarm to be set in time */
 
-/* Where the Caterina bootloaders, old and new, look for the wish to stay in the bootloader after a watchdog reset. */
+/* Caterina stays in the bootloader after a watchdog reset when this key is in RAM; old and new versions look at different addresses. */
 #define BOOTLOADER_KEY 0x7777u
 #define BOOTLOADER_KEY_OLD ((volatile uint16_t *)0x0800)
 #define BOOTLOADER_KEY_NEW ((volatile uint16_t *)(RAMEND - 1))
 
-volatile bool awake;
+volatile bool board_awake;
 
 static uint8_t reset_cause;
 extern uint8_t _end; /* linker: first byte after the static variables */
@@ -30,7 +30,7 @@ void board_start(void)
 {
 	reset_cause = MCUSR;
 	MCUSR = 0;
-	wdt_disable(); /* after a reset of its own it still runs, at its shortest time */
+	wdt_disable(); /* after a watchdog reset it still runs, with its shortest period */
 	paint_free_memory();
 	power_adc_disable();
 	power_timer0_disable();
@@ -51,14 +51,14 @@ void board_sleep(uint32_t wake_ticks)
 	wdt_reset();
 	cli();
 	clock_alarm(wake_ticks);
-	while (!awake && !ticks_reached(clock_now() + ALARM_MARGIN_TICKS, wake_ticks)) {
+	while (!board_awake && !ticks_reached(clock_now() + ALARM_MARGIN_TICKS, wake_ticks)) {
 		sleep_enable();
-		sei(); /* takes effect after the next instruction: no interrupt slips in between */
+		sei(); /* takes effect after the next instruction: no interrupt can come before the sleep */
 		sleep_cpu();
 		sleep_disable();
 		cli();
 	}
-	awake = false;
+	board_awake = false;
 	sei();
 }
 
@@ -67,7 +67,8 @@ uint8_t board_reset_cause(void)
 	return reset_cause;
 }
 
-/* Goes down from the deepest byte known so far until enough untouched ones follow each other: the whole way would take 0.7 ms. */
+/* Searches downwards from the deepest byte known so far, until UNTOUCHED_MAX painted bytes follow each other. A search of the whole memory
+ * would take 0.7 ms. */
 uint16_t board_memory_used(void)
 {
 	static const uint8_t *deepest = (const uint8_t *)(RAMEND + 1);

@@ -1,0 +1,46 @@
+"""protocol/README.md: one byte table per message, between the page's two marks.
+
+In: the messages, and the page as it is. Out: the page with fresh tables. Owns the words for sender and "not measured".
+"""
+
+from __future__ import annotations
+
+from generator.schema import Field, Message, crc_seed, schema_hash
+
+BEGIN, END = "<!-- tables -->\n", "<!-- end of tables -->\n"
+SENDERS = {"board": "board to host", "host": "host to board", "gateway": "beacon gateway to host"}
+
+
+def readme(messages: list[Message], page: str) -> str:
+    """The page with its tables replaced; the text around them stays."""
+    head, _, rest = page.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    return f"{head}{BEGIN}{_tables(messages)}{END}{tail}"
+
+
+def _tables(messages: list[Message]) -> str:
+    value = schema_hash(messages)
+    lines = [f"Schema hash `0x{value:08X}`, CRC seed `0x{crc_seed(value):04X}`.", ""]
+    for message in messages:
+        lines += _table(message)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _table(message: Message) -> list[str]:
+    title = f"### `0x{message.id:02X}` {message.name} ({SENDERS[message.direction]}, body {message.size} B)"
+    lines = [title, "", message.doc, ""]
+    if not message.fields:
+        return lines
+    lines += ["| offset | field | type | unit | meaning |", "|---|---|---|---|---|"]
+    for field, offset in zip(message.fields, message.offsets, strict=True):
+        lines.append(f"| {offset} | `{field.name}` | {field.type} | {field.unit or '-'} | {_meaning(field)} |")
+    return [*lines, ""]
+
+
+def _meaning(field: Field) -> str:
+    text = field.doc
+    if field.enum:
+        text += "; " + ", ".join(f"{k} = {name}" for k, name in enumerate(field.enum))
+    if field.flags:
+        text += "; bits: " + ", ".join(f"{k} = {name}" for k, name in enumerate(field.flags))
+    return text if field.invalid is None else f"{text}; {field.invalid} = not measured"

@@ -1,0 +1,117 @@
+"""firmware/messages.h and messages.c: structs, packers of the board's messages, unpackers of the host's.
+
+In: the messages between board and host. Out: C11 source. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from generator.schema import FIXED_SEED, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
+
+
+def c_header(messages: list[Message]) -> str:
+    """firmware/messages.h."""
+    lines = _constants(messages)
+    lines += ["", "enum {", *(f"\tMSG_{m.name.upper()} = 0x{m.id:02X}," for m in messages), "};"]
+    lines += ["", "enum {", *(f"\tMSG_{m.name.upper()}_SIZE = {m.size}," for m in messages), "};"]
+    for name, (members, _) in enumerations(messages).items():
+        lines += ["", "enum {", *(f"\t{name.upper()}_{m.upper()} = {value}," for m, value in members.items()), "};"]
+    for message in messages:
+        lines += _declaration(message)
+    return "\n".join([*lines, "", "#endif"]) + "\n"
+
+
+def _constants(messages: list[Message]) -> list[str]:
+    value = schema_hash(messages)
+    markers = {name: marker for m in messages for name, marker in m.invalid_markers.items()}
+    return [
+        f"/* Messages of the board link: structs, packers, unpackers. {NOTICE} */",
+        "#ifndef ECHOSTEP_MESSAGES_H",
+        "#define ECHOSTEP_MESSAGES_H",
+        "",
+        "#include <stdbool.h>",
+        "#include <stdint.h>",
+        "",
+        f"#define SCHEMA_HASH 0x{value:08X}ul",
+        f"#define SCHEMA_SEED 0x{crc_seed(value):04X}u",
+        f"#define IDENTITY_SEED 0x{FIXED_SEED:04X}u",
+        f"#define MSG_MAX_SIZE {max(m.size for m in messages)}u /* longest body */",
+        "",
+        "/* What a field holds when nothing was measured. */",
+        *(f"#define MSG_{name} (({field.wire.c_name}){invalid})" for name, (field, invalid) in markers.items()),
+    ]
+
+
+def _declaration(message: Message) -> list[str]:
+    """Struct and function of one message."""
+    lines = ["", f"/* {message.doc} */"]
+    if not message.fields:
+        return [*lines, f"/* {message.name} has no fields. */"]
+    lines += [f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]
+    return [*lines, f"{_signature(message)};"]
+
+
+def _member(field: Field) -> str:
+    notes = ", ".join(n for n in (field.unit, "" if field.invalid is None else f"{field.invalid}: invalid") if n)
+    return f"\t{field.wire.c_name} {field.name};" + (f" /* {notes} */" if notes else "")
+
+
+def _signature(message: Message) -> str:
+    name = message.name
+    if message.direction == "board":
+        return f"uint8_t msg_pack_{name}(uint8_t *out, const struct msg_{name} *m)"
+    return f"bool msg_unpack_{name}(struct msg_{name} *m, const uint8_t *in, uint8_t length)"
+
+
+PUT = """
+static uint8_t *put8(uint8_t *out, uint8_t v)
+{
+	*out++ = v;
+	return out;
+}
+
+static uint8_t *put16(uint8_t *out, uint16_t v)
+{
+	return put8(put8(out, (uint8_t)(v & 0xFFu)), (uint8_t)(v >> 8));
+}
+
+static uint8_t *put32(uint8_t *out, uint32_t v)
+{
+	return put16(put16(out, (uint16_t)(v & 0xFFFFu)), (uint16_t)(v >> 16));
+}
+"""
+GET16 = """
+static uint16_t get16(const uint8_t *in)
+{
+	return (uint16_t)(in[0] | (uint16_t)(in[1] << 8));
+}
+"""
+
+
+def c_code(messages: list[Message]) -> str:
+    """firmware/messages.c."""
+    reads_16_bits = any(f.size == 2 for m in messages if m.direction == "host" for f in m.fields)
+    text = f'/* {NOTICE} */\n#include "messages.h"\n' + PUT + (GET16 if reads_16_bits else "")
+    for message in (m for m in messages if m.fields):
+        body = _pack(message) if message.direction == "board" else _unpack(message)
+        text += "\n".join(["", _signature(message), "{", *body, "}"]) + "\n"
+    return text
+
+
+def _pack(message: Message) -> list[str]:
+    lines = ["\tuint8_t *end = out;"]
+    for field in message.fields:
+        value = f"(uint16_t)m->{field.name}" if field.wire.signed else f"m->{field.name}"
+        lines.append(f"\tend = put{8 * field.size}(end, {value});")
+    return [*lines, "\treturn (uint8_t)(end - out);"]
+
+
+def _unpack(message: Message) -> list[str]:
+    lines = [f"\tif (length != MSG_{message.name.upper()}_SIZE)", "\t\treturn false;"]
+    for field, offset in zip(message.fields, message.offsets, strict=True):
+        if field.type == "u8":
+            lines.append(f"\tm->{field.name} = in[{offset}];")
+        elif field.type == "u16":
+            lines.append(f"\tm->{field.name} = get16(in + {offset});")
+        else:
+            raise ValueError(f"messages.toml: {message.name}.{field.name}: host messages hold u8 and u16 only")
+    return [*lines, "\treturn true;"]
