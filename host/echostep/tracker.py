@@ -15,6 +15,7 @@ import numpy as np
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
 from echostep.legs.heading import CompassErrors
+from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.estimate import Estimate, estimate, unobserved
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles import CloudSettings, Move, systematic
@@ -24,6 +25,7 @@ from echostep.plan.model import Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
 from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
 from echostep.settings import Settings
+from echostep.tracker_state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MOST_WORDS = 4096  # of beacons that wait for the foot; older ones are forgotten
@@ -78,6 +80,60 @@ class Tracker:
     def lost_at_start(self) -> bool:
         """Whether nobody has said yet where the walk begins."""
         return self.start is None and self._said is None
+
+    @property
+    def state(self) -> TrackerState:
+        """Estimate, path and filter after the newest chunk."""
+        return TrackerState(
+            estimate=self._last,
+            last_segment=self.leg,
+            pending_segments=self.intake.ahead,
+            waits_for_start=self.lost_at_start,
+            check_ins=self.check_ins,
+            bad_check_ins=self.bad_check_ins,
+            particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
+            plan_explained=math.nan if self.filter is None else self.filter.explained,
+            beacon_numbers=tuple(self.gateway.numbers),
+            beacon_heard_s=None if self.filter is None else self.filter.crumbs.heard_s,
+        )
+
+    @property
+    def streams(self) -> StreamState:
+        """Counts of the input streams and reports of the board after the newest chunk."""
+        front_end, reports = self.intake, self.intake.words
+        return StreamState(
+            board=front_end.board.counts,
+            mtx=front_end.mtx.counts,
+            gateway=replace(self.gateway.counts),
+            front_end=front_end.counts,
+            pings=front_end.pings,
+            synchronised=front_end.timeline.synchronised,
+            board_restarts=front_end.timeline.board_restarts,
+            status=front_end.status,
+            identity=front_end.identity,
+            reports=replace(reports, gyros=dict(reports.gyros)),
+        )
+
+    def particles(self, most: int) -> Particles | None:
+        """A copy of at most `most` particles, evenly thinned; None before the first segment."""
+        if self.filter is None:
+            return None
+        cloud = self.filter.cloud
+        every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
+        return Particles(
+            x_m=cloud.map_x_m[every].copy(),
+            y_m=cloud.y_m[every].copy(),
+            level=cloud.level[every].copy(),
+            log_weight=cloud.log_weight[every].copy(),
+        )
+
+    def beacon_places(self, t_s: float) -> list[BeaconPlace]:
+        """Every beacon with a known place, as the particles believe it at `t_s`."""
+        return [] if self.filter is None else self.filter.crumbs.places(self.filter.cloud, t_s)
+
+    def arrival_ns(self, t_s: float) -> int:
+        """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""
+        return self.intake.timeline.arrival_ns(t_s)
 
     def feed(self, chunk: Chunk) -> list[Estimate]:
         """Take one chunk; estimates come at the middle of each stance, and twice a second while standing."""

@@ -459,11 +459,7 @@ def _finish(
     trouble = None
     try:
         write_track(out / "track.csv", estimates)
-        places = (
-            tracker.filter.crumbs.places(tracker.filter.cloud, estimates[-1].t_s)
-            if tracker.filter and estimates
-            else []
-        )
+        places = tracker.beacon_places(estimates[-1].t_s) if estimates else []
         draw_track(out / "track.png", tracker.plan, estimates, truth, title, guided.route if guided else None, places)
         if guided:
             guided.write(out / "cues.csv")

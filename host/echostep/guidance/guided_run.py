@@ -88,8 +88,7 @@ class GuidedRun:
         if self._guide is None:
             self.cues.append(Cue(e.t_s, CueKind.STOP, NO_WAY, None, "" if self.cues else f"{NO_WAY}."))
             return
-        crumbs = self._tracker.filter.crumbs if self._tracker.filter else None
-        self.cues.append(self._guide.cue(e, crumbs.heard_s if crumbs else None))
+        self.cues.append(self._guide.cue(e, self._tracker.state.beacon_heard_s))
 
     def _lay(self, e: Estimate) -> None:
         """Lay the way from a first estimate; a place from which no way leads is asked again at the next."""

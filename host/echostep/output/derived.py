@@ -102,7 +102,7 @@ class Derived:
 
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
-        tracker.intake.timeline.arrival_ns(0.0)  # compiled before anything is in a hurry
+        tracker.arrival_ns(0.0)  # compiled before anything is in a hurry
         self._earth = earth_of(tracker.plan)
         self._board = BoardReader()
         self._drawn = False
@@ -137,16 +137,16 @@ class Derived:
 
     def _status(self, frames: Frames, t_ns: Any) -> list[Note]:
         at, rows = frames.rows(_IDS[Status])
-        intake, cloud = self._tracker.intake, self._tracker.filter
+        streams = self._tracker.streams
         own = {
-            "frames": intake.board.counts.good,
-            "frames_rejected": intake.board.counts.rejected,
-            "frames_lost": intake.board.counts.lost,
-            "mtx_samples": intake.mtx.counts.good,
-            "late_pings": intake.counts.late_pings,
-            "bad_times": intake.counts.bad_times,
-            "synchronised": intake.timeline.synchronised,
-            "particles": 0 if cloud is None else len(cloud.cloud.x_m),
+            "frames": streams.board.good,
+            "frames_rejected": streams.board.rejected,
+            "frames_lost": streams.board.lost,
+            "mtx_samples": streams.mtx.good,
+            "late_pings": streams.front_end.late_pings,
+            "bad_times": streams.front_end.bad_times,
+            "synchronised": streams.synchronised,
+            "particles": self._tracker.state.particle_count,
         }
         return [
             Note(STATUS, int(t_ns[k]), {**Status.unpack(row.tobytes())._asdict(), **own})
@@ -157,7 +157,7 @@ class Derived:
         numbers = {k: v for k, v in dataclasses.asdict(e).items() if not isinstance(v, float) or math.isfinite(v)}
         if not {"t_s", "x_m", "y_m", "heading_rad"} <= numbers.keys():
             return []
-        t_ns = self._tracker.intake.timeline.arrival_ns(e.t_s)
+        t_ns = self._tracker.arrival_ns(e.t_s)
         ellipse = e.ellipse95
         body = {
             **numbers,

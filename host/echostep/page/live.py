@@ -157,8 +157,8 @@ class LivePage:
             self._last, self._check_ins = told, tracker.check_ins
             self._stage.trail.add(told.x_m, told.y_m, told.level)
         shown, heard = self._scene.specks, self._scene.beams
-        if passage is not None and tracker.filter is not None:
-            shown = specks(tracker.filter.cloud, MOST_KEPT if self._replay else MOST_SHOWN)
+        if passage is not None and (particles := tracker.particles(MOST_KEPT if self._replay else MOST_SHOWN)):
+            shown = specks(particles)
             sheet = tracker.laid_out
             new = beams(passage, told, told.level * sheet.storeys.pitch_m, sheet.walls.index, self._model)
             heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)

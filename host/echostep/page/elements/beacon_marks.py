@@ -32,12 +32,13 @@ class Mark:
 
 def marks(tracker: Tracker, t_s: float) -> tuple[Mark, ...]:
     """All beacons whose place is known at a moment."""
-    if tracker.filter is None or not tracker.gateway.numbers:
+    numbers = tracker.state.beacon_numbers
+    if not numbers:
         return ()
     return tuple(
         Mark(
-            tracker.gateway.numbers[b.slot], b.x_m, b.y_m, math.sqrt(CHI2_95) * b.sd_m, b.level, b.state.value,
+            numbers[b.slot], b.x_m, b.y_m, math.sqrt(CHI2_95) * b.sd_m, b.level, b.state.value,
             t_s - b.heard_s < HEARD_S,
         )
-        for b in tracker.filter.crumbs.places(tracker.filter.cloud, t_s)
+        for b in tracker.beacon_places(t_s)
     )  # fmt: skip

@@ -5,7 +5,6 @@ In: a tracker, in the tracker's thread. Out: `PageScene`s that any thread may re
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +12,11 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Octets
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles import Cloud
 from echostep.page.elements.beacon_marks import Mark
 from echostep.page.elements.echo_lines import Beam
 from echostep.page.elements.guidance import Guidance
 from echostep.page.elements.stream_rates import StreamRates
+from echostep.tracker_state import Particles
 
 KNOWN_HEADING_RAD = 1.0  # beyond this standard deviation the arrow is a circle
 MOST_SHOWN = 10_000
@@ -56,13 +55,12 @@ class PageScene:
     guidance: Guidance | None = None
 
 
-def specks(cloud: Cloud, most: int = MOST_SHOWN) -> Specks:
-    """A copy of a cloud; of a larger one every so many-th particle."""
-    every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
-    weight = np.exp(cloud.log_weight[every])
+def specks(particles: Particles) -> Specks:
+    """Particles as they are drawn."""
+    weight = np.exp(particles.log_weight)
     shown = (255.0 * weight / max(float(weight.max()), 1e-300)).astype(np.uint8)
-    x_m, y_m = cloud.map_x_m[every].astype(np.float32), cloud.y_m[every].astype(np.float32)
-    return Specks(x_m, y_m, shown, np.minimum(cloud.level[every], 255).astype(np.uint8))
+    x_m, y_m = particles.x_m.astype(np.float32), particles.y_m.astype(np.float32)
+    return Specks(x_m, y_m, shown, np.minimum(particles.level, 255).astype(np.uint8))
 
 
 def words(told: Estimate | None, *, waits: bool = False, taps: bool = True) -> str:
