@@ -60,7 +60,7 @@ _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 _SHAPES: dict[str, Shape] = {
     "float": NUMBER,
     "int": WHOLE,
-    "Status": TEXT,
+    "TrackStatus": TEXT,
     "str": TEXT,
     "bool": TRUTH,
     "tuple[float, ...]": array(NUMBER),
