@@ -57,8 +57,6 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
-	$(BIN)/python tools/plan_fields.py --check
-	$(BIN)/python tools/team_schema.py --check
 	$(BIN)/python tools/docs.py --check
 	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
@@ -80,10 +78,8 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 wheel: $(READY) ## build the wheel, install it in a fresh environment without compiler, run the demo in there, and pipx
 	$(BIN)/python tools/wheel.py
 
-docs: $(READY) ## make all pages anew that come from the code: messages, plan, teams, commands, settings, recordings
+docs: $(READY) ## make the pages anew that come from the code
 	$(BIN)/python protocol/generate.py
-	$(BIN)/python tools/plan_fields.py
-	$(BIN)/python tools/team_schema.py
 	$(BIN)/python tools/docs.py
 
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording

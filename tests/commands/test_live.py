@@ -15,17 +15,11 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT, needs_twin
+from command_line import PROGRAM, echostep
 from echostep.ports.chunks import SerialPorts
 from echostep.recording.recorder import open_recording
 
-ECHOSTEP = [sys.executable, "-m", "echostep"]
 PLAN = ROOT / "host/echostep/plans/demo.json"
-
-
-def echostep(*arguments: object, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*ECHOSTEP, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False
-    )
 
 
 def sha_of(text: str) -> str:
@@ -90,7 +84,7 @@ def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     port = os.ttyname(theirs)
     live = subprocess.Popen(
-        [*ECHOSTEP, "live", "--plan", PLAN, "--board", port, "--mtx", port, "--out", tmp_path, "--headless"],
+        [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--mtx", port, "--out", tmp_path, "--headless"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
@@ -174,7 +168,7 @@ def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
         tty.setraw(theirs)
     names = [os.ttyname(theirs) for _, theirs in pairs]
     recorder = subprocess.Popen(
-        [*ECHOSTEP, "record", "--board", names[0], "--mtx", names[1], "--out", tmp_path / "x.mcap", "--seconds", "4"],
+        [*PROGRAM, "record", "--board", names[0], "--mtx", names[1], "--out", tmp_path / "x.mcap", "--seconds", "4"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     sent = [b"", b""]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.calibration import GyroSettings, gyro_rates
 from echostep.commissioning.fitting import find_compass, find_gyros, find_legs, find_mounting, still_bias
@@ -28,8 +28,7 @@ COUNT_RAD_S = math.radians(0.2439)
 
 
 def calibrate(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "echostep", "calibrate", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, stdin=subprocess.DEVNULL)
+    return echostep("calibrate", *arguments)
 
 
 def heard(belt: NDArray[Any], bearing: NDArray[Any] | None = None) -> ProbeResult:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from board_runs import needs_twin
+from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.health import Severity
@@ -22,8 +22,7 @@ from players import babbling_port, pseudo_terminal, python_board, twin_board
 
 
 def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "echostep", "doctor", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return echostep("doctor", *arguments)
 
 
 def test_a_board_that_is_well_gets_status_0() -> None:

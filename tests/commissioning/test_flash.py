@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import subprocess
-import sys
 import termios
 import threading
 import time
@@ -16,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from board_runs import ELF, ROOT
+from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.commissioning.flash import check_hex
@@ -36,9 +36,7 @@ DEAF = 'echo "avrdude: butterfly_recv(): programmer is not responding" >&2; exit
 
 
 def flash(*arguments: object, path: str | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "echostep", "flash", *map(str, arguments)]
-    environment = dict(os.environ) | ({} if path is None else {"PATH": path})
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=environment)
+    return echostep("flash", *arguments, env=dict(os.environ) | ({} if path is None else {"PATH": path}))
 
 
 def fake_avrdude(folder: Path, body: str) -> tuple[str, Path]:

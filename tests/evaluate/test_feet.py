@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from command_line import echostep
 from echostep.evaluate.feet import leave_one_out
 from echostep.evaluate.feet.datasets import FootRecording
 from echostep.evaluate.feet.metrics import Figure, align, places, rmse
@@ -29,8 +29,7 @@ needs_recordings = pytest.mark.skipif(
 
 
 def run(*options: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "echostep", "evaluate", "feet", *map(str, options)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+    return echostep("evaluate", "feet", *options)
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from command_line import echostep
 from echostep.evaluate.fischer2008.simulator import _WALKER, OURS, PAPER, PDR, fuse, guided_return
 from echostep.evaluate.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95
 from echostep.simulation.world.beacon_ground import OUTLIER_M, disturb, ground, hears, measured
@@ -101,10 +100,7 @@ def test_every_row_has_its_share_of_returns() -> None:
 
 
 def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "echostep",
+    arguments = [
         "evaluate",
         "fischer2008",
         "--runs",
@@ -114,15 +110,7 @@ def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:
         "--out",
         "out",
     ]
-    run = subprocess.run(
-        command,
-        cwd=tmp_path,
-        env=os.environ | {"COLUMNS": "200"},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    run = echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "200"})
     assert run.returncode == 0, run.stderr
     rows = json.loads((tmp_path / "rows.json").read_text())["rows"]
     assert all(set(row) == {"name", "success", "low95", "high95", "runs"} for row in rows)

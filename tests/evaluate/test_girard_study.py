@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from shapely import LineString, MultiLineString
 
+from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.evaluate import girard2011 as study
 from echostep.evaluate.echoes.study import evaluate_echoes
@@ -75,10 +75,7 @@ def test_the_rows_of_one_run() -> None:
 
 
 def test_the_command_writes_json_parquet_and_the_picture(tmp_path: Path) -> None:
-    found = subprocess.run(
-        [ECHOSTEP, "evaluate", "girard2011", "--runs", "2", "--json", "g.json", "--out", "out"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+    found = echostep("evaluate", "girard2011", "--runs", "2", "--json", "g.json", "--out", "out", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     written = json.loads((tmp_path / "g.json").read_text())
     assert (written["study"], written["runs"], written["seed"]) == ("girard2011", 2, 1)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import heapq
 import math
 import random
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.resources import files
 from operator import attrgetter
@@ -15,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.guidance.guided_run import GuidedRun, destination
 from echostep.localization.beacon_slam import Beliefs, moments
@@ -177,10 +176,7 @@ def test_destinations_are_rooms_or_places() -> None:
 def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, tmp_path: Path) -> None:
     np.savetxt(tmp_path / "truth.csv", walk.truth[:200], delimiter=",", header="t_s,x,y,heading_rad,z", comments="")
     plan = Path(str(files("echostep") / "plans" / "demo.json"))
-    command = [
-        sys.executable,
-        "-m",
-        "echostep",
+    arguments = [
         "beacons",
         "simulate",
         "--plan",
@@ -190,13 +186,9 @@ def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, t
         "--pace",
         "100",
     ]
-    run = subprocess.run(
-        [*command, "--to", "udp://127.0.0.1:9"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
-    )
+    run = echostep(*arguments, "--to", "udp://127.0.0.1:9", cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     assert "bytes sent" in run.stdout
-    run = subprocess.run(
-        [*command, "--to", "/dev/nowhere"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
-    )
+    run = echostep(*arguments, "--to", "/dev/nowhere", cwd=tmp_path)
     assert run.returncode == 2
     assert run.stderr.startswith("echostep: /dev/nowhere")

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_line import echostep
 from echostep import cli
 from echostep.errors import EchostepError
 from echostep.offline.imu_csv import load_imu
@@ -41,9 +42,8 @@ def write(folder: Path, table: np.ndarray, header: str = HEADER) -> Path:
 
 
 def run(path: Path, *options: object) -> subprocess.CompletedProcess[str]:
-    """The command, in a process of its own."""
-    command = [sys.executable, "-m", "echostep", "foot", str(path), "--out", str(path.with_name("track.csv"))]
-    return subprocess.run(command + [str(o) for o in options], capture_output=True, text=True, timeout=120, check=False)
+    """The command on a file; the track lands beside it."""
+    return echostep("foot", path, "--out", path.with_name("track.csv"), *options)
 
 
 @dataclass

@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -15,6 +13,7 @@ import pyogrio
 import pytest
 from pyarrow import parquet
 
+from command_line import echostep
 from echostep.commands.run import tracker_of
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
@@ -110,9 +109,6 @@ def test_what_cannot_be_written_is_named(folder: Path, name: str, plan: Path, sa
 
 
 def test_the_command_says_what_it_wrote(folder: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "echostep", "export", folder / "walk.mcap", "--plan", DEMO, "-o", folder / "by_command.csv"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = echostep("export", folder / "walk.mcap", "--plan", DEMO, "-o", folder / "by_command.csv")
     assert (done.returncode, done.stderr) == (0, "")
     assert "by_command.csv" in done.stdout.splitlines()[-1]

@@ -68,7 +68,7 @@ def test_the_readme_counts_right(westport: Plan) -> None:
         sum(len(getattr(level, kind)) for level in westport.levels) for kind in ("walls", "windows", "doors")
     )
     said = f"{walls} walls, {windows} windows, {doors} doors and {len(westport.connectors)} stairs and lifts"
-    assert said in (Path(__file__).parents[2] / "host/README.md").read_text()
+    assert said in (Path(__file__).parents[2] / "host/docs/plan.md").read_text()
 
 
 def test_what_is_saved_has_the_digest(westport: Plan, tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
-"""The pages say what is so: generated ones are fresh, the tutorial's commands run, all others can be typed as they stand."""
+"""The pages are true: generated ones are fresh, links lead somewhere, commands run or exist, examples work."""
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -12,12 +13,30 @@ import pytest
 
 import docs
 from board_runs import ROOT
+from command_line import echostep
 from echostep.cli import app
 from echostep.plan.model import load_plan
+from pages import commands, python, teams
+from team.team_broker import Broker, needs_broker
 
-PAGES = sorted((ROOT / "host/docs").glob("*.md"))
-TUTORIAL = ROOT / "host/docs/tutorial.md"
-CONSOLES = [ROOT / "README.md", ROOT / "host/README.md", *PAGES]
+MANUAL = sorted((ROOT / "host/docs").glob("*.md"))
+PAGES = [
+    *(ROOT / name for name in ("README.md", "host/README.md", "host/DESIGN.md", "host/CHANGELOG.md")),
+    *(ROOT / name for name in ("protocol/README.md", "firmware/README.md", "tools/twin/README.md")),
+    *MANUAL,
+]
+PROGRAMS = (
+    "python3",
+    ".",
+    ".venv/bin/pip",
+    "pip",
+    "pipx",
+    "sudo",
+)  # that console blocks may call besides echostep and make
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -25,71 +44,127 @@ def blocks(page: Path, language: str) -> list[str]:
 
 
 def test_the_generated_pages_are_fresh() -> None:
-    """`make docs` after a command, a setting or a derived message has changed."""
-    for name, text in docs.pages().items():
-        assert (ROOT / "host/docs" / name).read_text() == text, f"host/docs/{name} is stale: make docs"
+    """`make docs` after a command, a setting, a public docstring, a report or a derived message has changed."""
+    for path, text in docs.pages().items():
+        assert path.read_text() == text, f"{path} is stale: make docs"
 
 
-def test_every_command_has_its_section() -> None:
-    text = (ROOT / "host/docs/commands.md").read_text()
-    usage = subprocess.run(
-        [sys.executable, "-m", "echostep", "cut", "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={"COLUMNS": "200"},
-    ).stdout
-    section = text.split("## echostep cut\n")[1].split("\n## ")[0]
-    options = set(re.findall(r"`(--[a-z-]+)`", section))
-    assert options == {"--out", "--from", "--to"}
-    assert all(option in usage for option in options)
-    assert [name for name, _ in docs.commands("echostep", app)][:3] == [
-        "echostep demo",
-        "echostep live",
-        "echostep record",
-    ]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
         if not target.startswith("http"):
             assert (page.parent / target).exists(), target
 
 
+def test_the_manual_lists_every_page() -> None:
+    listed = (ROOT / "host/docs/README.md").read_text()
+    assert [page.name for page in MANUAL if f"({page.name})" not in listed] == ["README.md"]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.parent != ROOT / "protocol"], ids=name_of)
+def test_a_named_file_of_the_project_exists(page: Path) -> None:
+    """`foot/ins.py` and the like in the text."""
+    roots = (ROOT, ROOT / "host/echostep", page.parent)
+    for path in re.findall(r"`((?:[\w.-]+/)+[\w-]+\.(?:py|c|h|toml|js|md))`", page.read_text()):
+        assert any((root / path).exists() for root in roots), path
+
+
+def test_every_make_target_that_is_named_exists() -> None:
+    listed = subprocess.run(["make", "-s", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    targets = {line.split()[0] for line in listed.splitlines()}
+    assert {"setup", "firmware", "twin", "demo", "test", "check", "size", "bench", "flash", "clean", "help"} <= targets
+    assert {m for page in PAGES for m in re.findall(r"`make ([a-z-]+)", page.read_text())} <= targets
+
+
+def test_the_readme_has_exactly_two_commands() -> None:
+    assert [block.strip() for block in blocks(ROOT / "README.md", "sh")] == ["make demo", "make test"]
+
+
+def test_every_command_and_option_has_its_row() -> None:
+    text = (ROOT / "host/docs/commands.md").read_text()
+    usage = echostep("cut", "--help", env={"COLUMNS": "200"}).stdout
+    section = text.split("## echostep cut\n")[1].split("\n## ")[0]
+    options = set(re.findall(r"`(--[a-z-]+)`", section))
+    assert options == {"--out", "--from", "--to"}
+    assert all(option in usage for option in options)
+    assert [name for name, _ in commands.commands("echostep", app)][:3] == [
+        "echostep demo",
+        "echostep live",
+        "echostep record",
+    ]
+
+
+def test_every_public_name_has_its_docstring() -> None:
+    page = (ROOT / "host/docs/python.md").read_text()
+    for name in python.public_names():
+        assert f"## {name}" in page or f"### {name.rsplit('.', 1)[1]}" in page or name == "echostep.messages", name
+
+
+def test_every_field_of_plan_and_report_is_explained() -> None:
+    plan = [row.split("|") for row in (ROOT / "host/docs/plan.md").read_text().splitlines() if row.startswith("| `")]
+    fields = [cells for cells in plan if len(cells) == 6]
+    assert len(fields) > 30
+    assert all(cells[4].strip() for cells in fields)
+    rows = re.findall(r"^\| `[a-z0-9_]+` \|.*$", teams.tables(teams.tree()), flags=re.M)
+    assert len(rows) > 40
+    assert all(row.rstrip("| ").count("|") >= 4 for row in rows), "a field without a meaning"
+
+
+def test_the_example_in_python_runs(tmp_path: Path) -> None:
+    (example,) = blocks(ROOT / "host/README.md", "python")
+    (tmp_path / "board.bin").write_bytes((ROOT / "tests/captures/board.bin").read_bytes())
+    done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) > 40
+
+
+@pytest.mark.parametrize(("page", "walls"), [("plan", 5), ("tutorial", 10)])
+def test_the_plans_of_the_manual_load(tmp_path: Path, page: str, walls: int) -> None:
+    (example,) = blocks(ROOT / f"host/docs/{page}.md", "json")
+    (tmp_path / "plan.json").write_text(example)
+    plan = load_plan(tmp_path / "plan.json")
+    assert plan.start is not None
+    assert len(plan.levels[0].walls) == walls
+
+
 def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
+    tutorial = ROOT / "host/docs/tutorial.md"
     (tmp_path / "host").symlink_to(ROOT / "host")
-    (plan,) = blocks(TUTORIAL, "json")
+    (plan,) = blocks(tutorial, "json")
     (tmp_path / "plan.json").write_text(plan)
-    said: dict[str, str] = {}
-    for line in "".join(blocks(TUTORIAL, "sh")).splitlines():
+    printed: dict[str, str] = {}
+    for line in "".join(blocks(tutorial, "sh")).splitlines():
         program, *arguments = shlex.split(line)
         assert program == "echostep"
-        done = subprocess.run(
-            [sys.executable, "-m", "echostep", *arguments],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=300,
-        )
+        done = echostep(*arguments, cwd=tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
-        said[arguments[0]] = said.get(arguments[0], "") + done.stdout
-    assert set(said) == {"demo", "info", "replay", "cut", "export", "plan"}
-    assert "/estimate" in said["info"]
+        printed[arguments[0]] = printed.get(arguments[0], "") + done.stdout
+    assert set(printed) == {"demo", "info", "replay", "cut", "export", "plan"}
+    assert "/estimate" in printed["info"]
     sha = re.compile(r"sha256 (\w{16})")
-    assert sha.findall(said["demo"])[0] == sha.findall(said["replay"])[0]
+    assert sha.findall(printed["demo"])[0] == sha.findall(printed["replay"])[0]
     for name in ("first/track.png", "first/walk.mcap", "piece/track.csv", "track.parquet", "view.mcap", "plan.png"):
         assert (tmp_path / "out" / name).stat().st_size > 1000
 
 
-def test_the_tutorials_plan_loads(tmp_path: Path) -> None:
-    (plan,) = blocks(TUTORIAL, "json")
-    (tmp_path / "plan.json").write_text(plan)
-    assert len(load_plan(tmp_path / "plan.json").levels[0].walls) == 10
+@needs_broker
+def test_the_commands_for_a_team_run(tmp_path: Path) -> None:
+    (block,) = blocks(ROOT / "host/docs/teams.md", "sh")
+    broker_line, *lines = block.strip().splitlines()
+    assert broker_line == "mosquitto -p 18830 &"
+    (tmp_path / "host").symlink_to(ROOT / "host")
+    printed = ""
+    with Broker(tmp_path) as broker:
+        for line in lines:
+            program, *arguments = shlex.split(line.replace("18830", str(broker.port)))
+            assert program == "echostep"
+            done = echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "120"})
+            assert done.returncode == 0, done.stderr
+            printed += done.stdout
+    assert re.search(r"red/anna +ended", printed)
+    assert (tmp_path / "team.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("page", CONSOLES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "host/README.md", *MANUAL], ids=name_of)
 def test_what_needs_hardware_can_be_typed_as_it_stands(page: Path) -> None:
     """Its commands and options exist, and its make targets."""
     listed = (ROOT / "host/docs/commands.md").read_text()
@@ -104,4 +179,4 @@ def test_what_needs_hardware_can_be_typed_as_it_stands(page: Path) -> None:
             for option in (a for a in arguments if a.startswith("-")):
                 assert f"`{option}`" in section, line
         else:
-            assert program in ("python3", ".", ".venv/bin/pip", "pip", "pipx", "sudo"), line
+            assert program in PROGRAMS, line

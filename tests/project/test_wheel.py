@@ -49,3 +49,12 @@ def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str,
     )
     assert int(wheels.run([programs / "python", "-c", code], env, tmp_path)) > 10
     assert "Track a simulated walk" in wheels.run([programs / "echostep", "demo", "--help"], env, tmp_path)
+
+
+def test_an_installed_wheel_holds_its_data_and_nothing_else(fresh: tuple[Path, dict[str, str]]) -> None:
+    programs, _ = fresh
+    (package,) = programs.parent.glob("lib/python*/site-packages/echostep")
+    for name in ("plans/demo.json", "firmware/echostep.hex", "firmware/99-echostep.rules", "page/static/index.html"):
+        assert (package / name).stat().st_size > 100, name
+    record = next(package.parent.glob("echostep-*.dist-info/RECORD")).read_text()
+    assert "tests/" not in record

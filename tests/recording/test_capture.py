@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
+import command_line
 import echostep
 from echostep.errors import EchostepError
 from echostep.recording.capture import Decoder, as_json, read_capture
@@ -28,8 +27,7 @@ def test_a_capture_decodes_to_its_golden_text(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_command_prints_the_same(name: str) -> None:
-    command = [sys.executable, "-m", "echostep", "decode", str(CAPTURES / name)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    done = command_line.echostep("decode", CAPTURES / name)
     assert done.stdout == (CAPTURES / name).with_suffix(".jsonl").read_text()
 
 

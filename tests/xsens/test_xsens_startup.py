@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import subprocess
-import sys
 import threading
 import time
 import tty
@@ -15,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT
+from command_line import echostep
 from echostep.recording.recorder import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT, MtSample, MtxReader, OutputFormat
@@ -66,11 +65,6 @@ def mute_port() -> Iterator[str]:
     finally:
         os.close(ours)
         os.close(theirs)
-
-
-def echostep(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "echostep", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
 @pytest.mark.parametrize("output", [FACTORY, PROJECT])

@@ -1,42 +1,30 @@
-"""host/PLAN.md: every field of plan.json, out of the schema.
+"""host/docs/plan.md: its table of every field of plan.json, from the schema.
 
-In: host/echostep/plans/plan.schema.json. Out: the page, printed or written. `--check` compares and says what to do.
+In: host/echostep/plans/plan.schema.json. Out: the page with its tables made anew. Owns nothing.
 """
 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-HOST = Path(__file__).parents[1] / "host"
+from pages import DOCS, HOST, between_marks
+
 SCHEMA = HOST / "echostep/plans/plan.schema.json"
-PAGE = HOST / "PLAN.md"
-HEAD = """# plan.json, field by field
-Made from [plan.schema.json](echostep/plans/plan.schema.json) by `tools/plan_fields.py`; do not edit. {description}
-Metres lie within 100 km of the origin. Fields that are not listed are ignored. `echostep plan check` tells what the schema cannot.
-
-| field | type | needed | meaning |
-|---|---|---|---|
-"""
-TYPES = """
-
-| type | meaning |
-|---|---|
-"""
+FIELDS = "| field | type | needed | meaning |\n|---|---|---|---|\n"
+TYPES = "\n| type | meaning |\n|---|---|\n"
 
 
 def page() -> str:
-    """The whole page."""
+    """The page as it is, with its tables made anew."""
     schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
     rows = [
-        f"| `{name}` | {kind} | {'yes' if needed else ''} | {meaning} |"
+        f"| `{name}` | {kind} | {'yes' if needed else ''} | {meaning} |\n"
         for name, kind, needed, meaning in fields(schema, schema, "")
     ]
-    types = [f"| {name} | {node['description']} |" for name, node in schema["$defs"].items()]
-    return HEAD.format(description=schema["description"]) + "\n".join(rows) + TYPES + "\n".join(types) + "\n"
+    types = [f"| {name} | {node['description']} |\n" for name, node in schema["$defs"].items()]
+    return between_marks((DOCS / "plan.md").read_text(), FIELDS + "".join(rows) + TYPES + "".join(types))
 
 
 def fields(schema: dict[str, Any], node: dict[str, Any], path: str) -> Iterator[tuple[str, str, bool, str]]:
@@ -74,18 +62,3 @@ def kind(schema: dict[str, Any], node: dict[str, Any]) -> str:
     if found == "array" and isinstance(node.get("items"), dict):
         return f"list of {kind(schema, node['items'])}"
     return {"object": "object", "array": "list"}.get(found, found)
-
-
-def main() -> int:
-    """Write the page, or check it."""
-    if "--check" not in sys.argv:
-        PAGE.write_text(page(), encoding="utf-8")
-        return 0
-    if PAGE.read_text(encoding="utf-8") == page():
-        return 0
-    print(f"{PAGE} is not what {SCHEMA} says: run tools/plan_fields.py", file=sys.stderr)
-    return 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

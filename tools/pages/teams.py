@@ -1,21 +1,17 @@
-"""The published form of a report: JSON Schema and the tables of host/TEAMS.md, made from the dataclasses that the host checks with.
+"""host/docs/teams.md: its tables of every field of a report, and the report's JSON Schema, from the dataclasses that the host checks with.
 
-In: `echostep.team.report`. Out: host/echostep/team/report.schema.json, and the part of host/TEAMS.md between its marks; with --check nothing is
-written and the status is 1 when they are stale.
+In: `echostep.team.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
 """
 
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 from typing import Any
 
 from echostep.team.report import schema
+from pages import DOCS, HOST, between_marks
 
-ROOT = Path(__file__).resolve().parent.parent
-SCHEMA, TEAMS = ROOT / "host/echostep/team/report.schema.json", ROOT / "host/TEAMS.md"
-BEGIN, END = "<!-- made by tools/team_schema.py -->\n", "<!-- end -->\n"
+SCHEMA = HOST / "echostep/team/report.schema.json"
 
 
 def tables(tree: dict[str, Any]) -> str:
@@ -71,22 +67,6 @@ def tree() -> dict[str, Any]:
     return found
 
 
-def documented(text: str) -> str:
-    """TEAMS.md with fresh tables."""
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return before + BEGIN + tables(tree()) + END + after
-
-
-def main() -> None:
-    """Write, or check."""
-    fresh = {SCHEMA: schema(), TEAMS: documented(TEAMS.read_text())}
-    stale = [path for path, text in fresh.items() if not path.exists() or path.read_text() != text]
-    if "--check" in sys.argv:
-        sys.exit("\n".join(f"{path} is stale: run tools/team_schema.py" for path in stale) or 0)
-    for path in stale:
-        path.write_text(fresh[path])
-
-
-if __name__ == "__main__":
-    main()
+def page() -> str:
+    """The page as it is, with its tables made anew."""
+    return between_marks((DOCS / "teams.md").read_text(), tables(tree()))
