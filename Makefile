@@ -7,7 +7,7 @@ ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
-TEST_PACKAGES := mosquitto
+TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -19,9 +19,6 @@ $(READY): host/pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]'
 	touch $@
-
-tools-apt:
-	@tools/apt.sh $(APT_PACKAGES)
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
 	$(MAKE) -C firmware
@@ -46,10 +43,10 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python tools/real_walk.py --out out/real
 
 test: $(READY) ## run every test
-	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools and Mosquitto: tests that need them are skipped."
+	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools, Mosquitto, Chromium and clang: tests that need them are skipped and named."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 	$(MAKE) --quiet check
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n auto --dist loadfile
 
 check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/ruff check .
@@ -70,6 +67,10 @@ measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmwar
 
 bench: $(VENV)/peers ## speed of the host as ratios against others, in the same run
 	$(BIN)/python tools/bench.py
+
+page-speed: $(READY) ## latency and frame rate of the live page in Chromium
+	@tools/apt.sh chromium || echo "Chromium is not installed."
+	$(BIN)/python tools/page_speed.py
 
 $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
@@ -98,4 +99,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup tools-apt firmware twin demo real test check size measure bench wheel kill docs flash clean
+.PHONY: help setup  firmware twin demo real test check size measure bench page-speed wheel kill docs flash clean
