@@ -92,7 +92,7 @@ def test_a_silence_moves_nobody() -> None:
     way = np.full(5 * 900, 3.5)
     samples, kept = silent(record(way, 5.0), way, 100.0, 700.0)
     assert right(samples, kept, STOREYS, 1) == 1.0
-    heights = Altitude(BarometerSettings(2.0)).take(samples)
+    heights = Altitude(BarometerSettings(2.0)).feed(samples)
     assert abs(heights.height_m[-1]) < 2.0
     assert heights.variance_m2[-1] > 0.5
 
@@ -100,7 +100,7 @@ def test_a_silence_moves_nobody() -> None:
 def test_without_storeys_a_rise_in_a_silence_is_seen() -> None:
     way = walk(UP_AND_DOWN, 5.0)
     samples, _ = silent(record(way, 5.0), way, 45.0, 100.0)
-    heights = Altitude(BarometerSettings(2.0)).take(samples)
+    heights = Altitude(BarometerSettings(2.0)).feed(samples)
     assert heights.height_m[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
 
 

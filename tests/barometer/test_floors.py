@@ -58,14 +58,14 @@ def known(floor: int, count: int = 3) -> Floats:
 
 def test_standing_keeps_the_height_under_the_weather() -> None:
     t = np.arange(10_800) / 9.0
-    heights = Altitude().take(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))  # 2.8 m of weather
+    heights = Altitude().feed(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))  # 2.8 m of weather
     assert abs(heights.height_m[-1]) < 1.0
     assert (heights.moving < 0.5).mean() > 0.99
 
 
 def test_stairs_are_climbed_and_told_while_they_are() -> None:
     way = stairs_up()
-    heights = Altitude().take(record(way))
+    heights = Altitude().feed(record(way))
     rise, variance = heights.change(300, len(way) - 1)
     assert rise == pytest.approx(3.5, abs=3.0 * variance**0.5)
     assert variance**0.5 < 0.5
@@ -81,15 +81,15 @@ def test_a_door_moves_nobody(size_pa: float, held_s: float) -> None:
     t = np.arange(n) / 9.0
     pulse = size_pa * ((t > 60.0) & (t < 60.0 + held_s))
     samples = record(np.full(n, 3.5), extra_pa=pulse)
-    found = FloorFilter(STOREYS, prior=known(1)).take(samples)
+    found = FloorFilter(STOREYS, prior=known(1)).feed(samples)
     assert (found.floor == 1).all()
-    assert abs(Altitude().take(samples).height_m[-1]) < 0.5
+    assert abs(Altitude().feed(samples).height_m[-1]) < 0.5
 
 
 def test_a_building_under_pressure_for_good_moves_nobody() -> None:
     n = 1200
     step = -25.0 * (np.arange(n) > 600)
-    found = FloorFilter(STOREYS, prior=known(1)).take(record(np.full(n, 3.5), extra_pa=step))
+    found = FloorFilter(STOREYS, prior=known(1)).feed(record(np.full(n, 3.5), extra_pa=step))
     assert (found.floor == 1).all()
 
 
@@ -97,7 +97,7 @@ def test_spikes_are_no_heights() -> None:
     way = stairs_up()
     samples = record(way)
     samples.pressure_pa[::97] += 400.0
-    found = FloorFilter(STOREYS, prior=known(0)).take(samples)
+    found = FloorFilter(STOREYS, prior=known(0)).feed(samples)
     right = found.floor == np.abs(way[:, None] - STOREYS).argmin(axis=1)
     assert right.mean() > 0.98
     assert found.floor[-1] == 1
@@ -108,28 +108,28 @@ def test_spikes_are_no_heights() -> None:
 def test_portions_change_nothing(cuts: list[int]) -> None:
     way = np.concatenate([np.zeros(150), np.linspace(0.0, 3.5, 100), np.full(150, 3.5)])
     samples = record(way)
-    whole_floors, whole_heights = FloorFilter(STOREYS).take(samples), Altitude().take(samples)
+    whole_floors, whole_heights = FloorFilter(STOREYS).feed(samples), Altitude().feed(samples)
     floors, altitude = FloorFilter(STOREYS), Altitude()
     edges = [0, *sorted(cuts), 400]
     parts = [Pressures(samples.t_s[a:b], samples.pressure_pa[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
-    assert np.array_equal(np.concatenate([floors.take(part).probability for part in parts]), whole_floors.probability)
-    assert np.array_equal(np.concatenate([altitude.take(part).height_m for part in parts]), whole_heights.height_m)
+    assert np.array_equal(np.concatenate([floors.feed(part).probability for part in parts]), whole_floors.probability)
+    assert np.array_equal(np.concatenate([altitude.feed(part).height_m for part in parts]), whole_heights.height_m)
 
 
 def test_an_unknown_start_is_uniform_until_the_heights_tell() -> None:
     uneven = np.array([0.0, 5.0, 8.5])
     way = np.concatenate([np.zeros(400), np.linspace(0.0, 5.0, 150), np.full(400, 5.0)])
-    found = FloorFilter(uneven).take(record(way))
+    found = FloorFilter(uneven).feed(record(way))
     assert found.probability[300] == pytest.approx(np.full(3, 1 / 3), abs=0.05)
     assert found.floor[-1] == 1
     assert found.probability[-1, 1] > 0.9
-    back = FloorFilter(uneven).look_back(record(way))
+    back = FloorFilter(uneven).smooth(record(way))
     assert (back.floor[:390] == 0).all()
 
 
 def test_the_range_of_floors_excludes_starts() -> None:
     way = np.concatenate([np.zeros(400), np.linspace(0.0, 7.0, 240), np.full(400, 7.0)])
-    back = FloorFilter(STOREYS).look_back(record(way))
+    back = FloorFilter(STOREYS).smooth(record(way))
     assert back.probability[100, 0] > 0.9
     assert back.probability[-1, 2] > 0.9
 
@@ -141,7 +141,7 @@ def test_gait_tells_a_lift_from_a_gust() -> None:
     up = []
     for gait in (vertical.STILL, vertical.WALKING):
         seen = Pressures(samples.t_s, samples.pressure_pa, gait=np.full(len(rise), gait, np.int8))
-        up.append(float(FloorFilter(STOREYS, prior=known(0)).take(seen).probability[-1, 1]))
+        up.append(float(FloorFilter(STOREYS, prior=known(0)).feed(seen).probability[-1, 1]))
     assert up[0] > 0.5
     assert 1.0 - up[1] > 4.0 * (1.0 - up[0])
 
@@ -151,7 +151,7 @@ def test_nobody_climbs_where_the_plan_has_no_stairs() -> None:
     slow = 30.0 * np.clip((np.arange(n) - 450) / 90.0, 0.0, 1.0)  # a fan: 2.5 m in 10 s
     samples = record(np.full(n, 3.5), extra_pa=-slow)
     outside = Pressures(samples.t_s, samples.pressure_pa, place=np.full(n, vertical.OUTSIDE, np.int8))
-    found = FloorFilter(STOREYS, prior=known(1)).take(outside)
+    found = FloorFilter(STOREYS, prior=known(1)).feed(outside)
     assert (found.floor == 1).all()
     assert (found.up + found.down).max() < 0.2
 
@@ -161,7 +161,7 @@ def test_the_foot_on_stairs_narrows_the_height() -> None:
     samples = record(way)
     rate = np.gradient(way, samples.t_s)
     aided = Pressures(samples.t_s, samples.pressure_pa, foot_m_s=rate, foot_sd_m_s=np.full(len(way), 0.03))
-    alone, helped = Altitude().take(samples), Altitude().take(aided)
+    alone, helped = Altitude().feed(samples), Altitude().feed(aided)
     assert abs(helped.height_m[-1] - 3.5) < 0.3
     middle = 60 * 9 + 50
     assert helped.variance_m2[middle] < alone.variance_m2[middle]
@@ -173,7 +173,7 @@ def test_a_lift_is_ridden_though_the_foot_stands() -> None:
     still = Pressures(
         samples.t_s, samples.pressure_pa, foot_m_s=np.zeros(len(ride)), foot_sd_m_s=np.full(len(ride), 0.03)
     )
-    assert Altitude().take(still).height_m[-1] == pytest.approx(7.0, abs=0.5)
+    assert Altitude().feed(still).height_m[-1] == pytest.approx(7.0, abs=0.5)
 
 
 def test_samples_that_are_none_are_left_out() -> None:
@@ -183,22 +183,22 @@ def test_samples_that_are_none_are_left_out() -> None:
     t = samples.t_s.copy()
     t[70] = t[69]
     t[90] = np.nan
-    found = Altitude().take(Pressures(t, bad))
+    found = Altitude().feed(Pressures(t, bad))
     assert len(found.t_s) == len(t) - 5
     assert np.isfinite(found.height_m).all()
     assert np.isfinite(found.variance_m2).all()
 
 
 def test_an_empty_portion_is_no_sample() -> None:
-    assert len(Altitude().take(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
-    assert len(FloorFilter(STOREYS).look_back(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
+    assert len(Altitude().feed(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
+    assert len(FloorFilter(STOREYS).smooth(Pressures(np.zeros(0), np.zeros(0))).t_s) == 0
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.01, 60.0), st.floats(20_000.0, 120_000.0)), min_size=1, max_size=30))
 def test_any_pressures_have_finite_heights_and_probabilities(rows: list[tuple[float, float]]) -> None:
     samples = Pressures(np.cumsum([r[0] for r in rows]), np.array([r[1] for r in rows]))
-    heights, floors = Altitude().take(samples), FloorFilter(STOREYS).look_back(samples)
+    heights, floors = Altitude().feed(samples), FloorFilter(STOREYS).smooth(samples)
     assert np.isfinite(heights.height_m).all()
     assert (heights.variance_m2 >= 0.0).all()
     assert floors.probability.sum(axis=1) == pytest.approx(np.ones(len(floors.t_s)), abs=1e-6)
@@ -224,7 +224,7 @@ def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
         way.t_s[at], air[at] + 3.0 * rng.standard_normal(len(at)), device_temperatures(way.t_s[at], 21.0, rng)
     )
     away = np.abs(way.height_m[at][:, None] - heights)
-    found = FloorFilter(heights, prior=known(int(away[0].argmin()), 5)).look_back(samples)
+    found = FloorFilter(heights, prior=known(int(away[0].argmin()), 5)).smooth(samples)
     score = judge(found, away)
     assert score["floor_right"] > 0.99
     assert score["longest_wrong_s"] < 10.0
@@ -385,7 +385,7 @@ def climbed(path: Path) -> float:
     table = np.array(rows, float)
     t_s = np.arange(len(table)) * (t1 - t0).total_seconds() / len(table)
     pressure, temperature = table[:, 1] / 10.0, table[:, 2] / 1000.0
-    found = Altitude(BarometerSettings(noise_of(pressure))).look_back(Pressures(t_s, pressure, temperature))
+    found = Altitude(BarometerSettings(noise_of(pressure))).smooth(Pressures(t_s, pressure, temperature))
     return float(found.height_m[-1] - found.height_m[0])
 
 

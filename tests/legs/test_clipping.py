@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.legs.clipping import Unclipped, ends_of_range, unclipped
-from echostep.legs.strides import Legs, LegsSettings
+from echostep.legs.clipping import ClippingRepair, find_clipping_limits, repair_clipping
+from echostep.legs.strides import StrideEstimator, StrideSettings
 from echostep.simulation.people.joint_gait import FAST, draw_stroller, stroll
 
 LIMIT = math.radians(300.0)
@@ -27,7 +27,7 @@ def swings(seed: int = 0, noise: float = 0.01) -> tuple[Floats, Floats, Floats]:
 def test_a_cut_off_swing_keeps_its_angle() -> None:
     t, true, clipped = swings()
     lost = float(np.abs((true - clipped).sum(axis=0) * 0.01).max())
-    left = float(np.abs((true - unclipped(t, clipped)).sum(axis=0) * 0.01).max())
+    left = float(np.abs((true - repair_clipping(t, clipped)).sum(axis=0) * 0.01).max())
     assert lost > 0.3
     assert left < 0.15 * lost
 
@@ -36,10 +36,10 @@ def test_the_way_is_that_of_a_better_sensor() -> None:
     t, true, clipped = swings(noise=0.0)
 
     def way(rates: Floats) -> float:
-        legs = Legs(LegsSettings())
+        legs = StrideEstimator(StrideSettings())
         return sum(s.length_m for s in (*legs.feed(t, *rates.T), *legs.finish()))
 
-    assert way(unclipped(t, clipped)) == pytest.approx(way(true), rel=0.01)
+    assert way(repair_clipping(t, clipped)) == pytest.approx(way(true), rel=0.01)
 
 
 def test_portions_do_not_matter() -> None:
@@ -47,7 +47,7 @@ def test_portions_do_not_matter() -> None:
     low, high = np.full(2, -LIMIT), np.full(2, LIMIT)
 
     def told(size: int) -> Floats:
-        one = Unclipped(low, high)
+        one = ClippingRepair(low, high)
         parts: list[Floats] = []
         for k in range(0, len(t), size):
             parts.append(np.column_stack(one.feed(t[k : k + size], clipped[k : k + size])))
@@ -61,13 +61,13 @@ def test_portions_do_not_matter() -> None:
 def test_a_sensor_within_its_range_is_left_alone() -> None:
     t, _, _ = swings()
     rates = np.random.default_rng(1).standard_normal((len(t), 2))
-    assert not np.isfinite(ends_of_range(rates)).any()
-    assert np.array_equal(unclipped(t, rates), rates)
+    assert not np.isfinite(find_clipping_limits(rates)).any()
+    assert np.array_equal(repair_clipping(t, rates), rates)
 
 
 def test_a_sensor_stuck_at_its_end_is_passed_on() -> None:
     t: Floats = np.arange(1000.0) * 0.01
     stuck = np.full((1000, 2), LIMIT)
-    one = Unclipped(np.full(2, -LIMIT), np.full(2, LIMIT))
+    one = ClippingRepair(np.full(2, -LIMIT), np.full(2, LIMIT))
     gone = sum(len(one.feed(t[k : k + 20], stuck[k : k + 20])[0]) for k in range(0, 1000, 20))
     assert gone > 800

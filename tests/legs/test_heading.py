@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.legs.heading import CompassErrors, Heading, HeadingSettings, fit_compass_errors, wrap
+from echostep.angles import wrap
+from echostep.legs.heading import CompassErrors, Heading, HeadingSettings, fit_compass_errors
 
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
 

@@ -13,7 +13,7 @@ from echostep.arrays import Floats
 from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Flag, Legs, LegsSettings, Stride, distance_sd_m
+from echostep.legs.strides import Flag, Stride, StrideEstimator, StrideSettings, distance_sd_m
 from echostep.offline.leg_csv import LegSamples, describe_legs, load_legs, track_default, track_lee2010
 from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, Manner, draw_stroller, stroll
 from echostep.simulation.people.leg_angles import LegDimensions
@@ -23,7 +23,7 @@ STANDARD = LegLengths(0.43, 0.43)
 
 
 def _strides(t_s: Floats, thigh: Floats, shank: Floats, segments: LegLengths = STANDARD) -> list[Stride]:
-    legs = Legs(LegsSettings(segments))
+    legs = StrideEstimator(StrideSettings(segments))
     return [*legs.feed(t_s, thigh, shank), *legs.finish()]
 
 
@@ -94,7 +94,7 @@ def test_any_sign(thigh_sign: float, shank_sign: float) -> None:
 
 def test_portions_do_not_matter() -> None:
     t, thigh, shank = _walked([(0.0, 0.0), (9.0, 0.0, 2.0), (9.0, 6.0)])
-    legs, found = Legs(), []
+    legs, found = StrideEstimator(), []
     for a, b in ((0, 1), (1, 333), (333, 900), (900, len(t))):
         found += legs.feed(t[a:b], thigh[a:b], shank[a:b])
     assert [*found, *legs.finish()] == _strides(t, thigh, shank, LegLengths())
@@ -156,7 +156,7 @@ def test_nobody_knows_what_was_done_in_a_long_gap() -> None:
     assert any(Flag.GAP in s.flags and s.length_m == 0.0 and s.length_sd_m > 10.0 for s in strides)
     for method in (track_default, track_lee2010):
         nothing = np.full(len(t), np.nan)
-        rows = method(LegSamples(later, thigh, shank, nothing, nothing), LegsSettings(STANDARD)).rows
+        rows = method(LegSamples(later, thigh, shank, nothing, nothing), StrideSettings(STANDARD)).rows
         assert rows[-1, 1] < 25.0
 
 
@@ -168,21 +168,21 @@ def test_noise_is_no_walk(size: float, seed: int) -> None:
     thigh, shank = size * rng.standard_normal((2, 3000))
     t: Floats = np.arange(3000.0) * 0.01
     samples = LegSamples(t, thigh, shank, nothing, nothing)
-    found = describe_legs(track_default(samples, LegsSettings()))
+    found = describe_legs(track_default(samples, StrideSettings()))
     assert "do not trust" in found or "no step was seen" in found or "exchanged" in found
 
 
 def test_exchanged_columns_are_guessed() -> None:
     t, thigh, shank = _walked([(0.0, 0.0), (20.0, 0.0)])
     nothing = np.full(len(t), np.nan)
-    assert "exchanged" in describe_legs(track_default(LegSamples(t, shank, thigh, nothing, nothing), LegsSettings()))
+    assert "exchanged" in describe_legs(track_default(LegSamples(t, shank, thigh, nothing, nothing), StrideSettings()))
 
 
 def test_nonsense_is_counted() -> None:
     t, thigh, shank = _walked([(0.0, 0.0), (8.0, 0.0)])
     bad = thigh.copy()
     bad[::50], bad[25::50] = math.nan, 1e9
-    legs = Legs()
+    legs = StrideEstimator()
     found = [*legs.feed(t, bad, shank), *legs.finish()]
     assert legs.counts.impossible == len(bad[::50]) + len(bad[25::50])
     assert _total(found) == pytest.approx(8.0, rel=0.08)
@@ -209,7 +209,7 @@ def _samples(seed: int = 3) -> LegSamples:
 
 @pytest.mark.parametrize("method", [track_default, track_lee2010])
 def test_the_track_turns_the_corner(method: type) -> None:
-    rows = method(_samples(), LegsSettings(STANDARD)).rows
+    rows = method(_samples(), StrideSettings(STANDARD)).rows
     assert rows.shape[1] == 6
     assert np.hypot(rows[-1, 4] - 15.0, rows[-1, 5] - 10.0) < 2.5
     assert rows[-1, 1] == pytest.approx(25.0, rel=0.1)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rest_of, turned
+from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.localization.estimate import Estimate, TrackStatus, digest
 from echostep.odometry.foot_legs_handover import KEPT_S, FootLegsHandover
 from echostep.path import PathSegment
@@ -62,15 +62,15 @@ def lying_block(k: int) -> GyroBlock:
 
 def test_the_rest_of_a_leg_and_what_went_before_are_the_leg() -> None:
     whole = PathSegment(1.0, 3.0, 1.0, 0.4, 0.0, 0.6, 0.1, 0.02, 1, 0.04, 0.3, 0.01)
-    rest = rest_of(whole, 1.5)
+    rest = segment_after(whole, 1.5)
     assert (rest.t0_s, rest.t1_s) == (1.5, 3.0)
     assert (rest.dx_m, rest.dy_m, rest.rise_m) == pytest.approx((0.75, 0.3, 0.225))
     assert rest.heading0_rad == pytest.approx(0.15)
-    assert rest_of(whole, 0.5) is whole
+    assert segment_after(whole, 0.5) is whole
 
 
 def test_a_turned_leg_leads_elsewhere() -> None:
-    other = turned(leg(0.0, 1.0), math.pi / 2, 1.1)
+    other = rotated_segment(leg(0.0, 1.0), math.pi / 2, 1.1)
     assert (other.dx_m, other.dy_m) == pytest.approx((0.0, 1.1), abs=1e-12)
     assert other.heading1_rad == pytest.approx(math.pi / 2)
 

@@ -74,7 +74,7 @@ class Heights:
         return rise, own + RESOLUTION_M**2 + (SCALE_SD * rise) ** 2
 
 
-class Column:
+class AirColumn:
     """The column of air between the samples: turns pressures into claimed heights, and samples into rows for the kernel."""
 
     def __init__(self, settings: BarometerSettings, lowest_m: float = -math.inf, highest_m: float = math.inf) -> None:
@@ -101,22 +101,22 @@ class Column:
 
 
 class Altitude:
-    """Heights of one barometer, of any storeys; `take` in any portions gives the same heights."""
+    """Heights of one barometer, of any storeys; `feed` in any portions gives the same heights."""
 
     def __init__(self, settings: BarometerSettings | None = None) -> None:
-        self._column = Column(settings or BarometerSettings())
+        self._column = AirColumn(settings or BarometerSettings())
         self._hypotheses = Hypotheses(np.zeros(1), np.ones(1), free=True)
 
-    def take(self, samples: Pressures) -> Heights:
+    def feed(self, samples: Pressures) -> Heights:
         """Heights at the samples that could be used; what is no pressure, or not later than the sample before, is left out."""
         seen, used = self._column.rows(samples)
         found = self._hypotheses.follow(seen)
         return _heights(samples.t_s[used], found, found[:, :, 0])
 
-    def look_back(self, samples: Pressures) -> Heights:
+    def smooth(self, samples: Pressures) -> Heights:
         """Heights at the samples of a whole record: whether he moved is judged by all of it; once for an `Altitude`."""
         seen, used = self._column.rows(samples)
-        return _heights(samples.t_s[used], *self._hypotheses.look_back(seen))
+        return _heights(samples.t_s[used], *self._hypotheses.smooth(seen))
 
 
 def noise_of(pressure_pa: Floats) -> float:

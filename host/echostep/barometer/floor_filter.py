@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.barometer import vertical_kernels as vertical
-from echostep.barometer.altitude import BarometerSettings, Column, Pressures
+from echostep.barometer.altitude import AirColumn, BarometerSettings, Pressures
 from echostep.barometer.vertical_filter import Hypotheses
 from echostep.errors import EchostepError
 
@@ -39,7 +39,7 @@ class Floors:
 
 
 class FloorFilter:
-    """Floors of one barometer, live; `take` in any portions gives the same floors."""
+    """Floors of one barometer, live; `feed` in any portions gives the same floors."""
 
     def __init__(
         self, heights_m: Floats, settings: BarometerSettings | None = None, prior: Floats | None = None
@@ -47,19 +47,19 @@ class FloorFilter:
         """`heights_m` (k,) ascending; `prior` (k,) of the floor at the start, uniform by default. Raises EchostepError for impossible heights."""
         self.heights_m = checked_heights(heights_m)
         prior = np.ones(len(self.heights_m)) if prior is None else np.asarray(prior, float)
-        self._column = Column(settings or BarometerSettings(), float(self.heights_m[0]), float(self.heights_m[-1]))
+        self._column = AirColumn(settings or BarometerSettings(), float(self.heights_m[0]), float(self.heights_m[-1]))
         self._hypotheses = Hypotheses(self.heights_m, prior, free=False)
 
-    def take(self, samples: Pressures) -> Floors:
+    def feed(self, samples: Pressures) -> Floors:
         """Floors at the samples that could be used, each by what was known then."""
         seen, used = self._column.rows(samples)
         found = self._hypotheses.follow(seen)
         return _floors(samples.t_s[used], self.heights_m, found, found[:, :, 0])
 
-    def look_back(self, samples: Pressures) -> Floors:
+    def smooth(self, samples: Pressures) -> Floors:
         """Floors at the samples of a whole record, each by all of it; a filter can do so once."""
         seen, used = self._column.rows(samples)
-        found, weight = self._hypotheses.look_back(seen)
+        found, weight = self._hypotheses.smooth(seen)
         return _floors(samples.t_s[used], self.heights_m, found, weight)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.barometer.altitude import Altitude, BarometerSettings, Column, Heights, Pressures, noise_of
+from echostep.barometer.altitude import AirColumn, Altitude, BarometerSettings, Heights, Pressures, noise_of
 from echostep.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
 from echostep.barometer.vertical_kernels import CLAIMED
 from echostep.errors import EchostepError
@@ -76,12 +76,12 @@ def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
     Each way between two stays leads to a storey that is known by its height, or to a new one; the heights are then those that fit all ways best.
     With these storeys the stays are found anew, and the heights by what pressure says at both ends of each way, until nothing changes.
     """
-    ways = _first_ways(_rises(Altitude(settings).look_back(samples)))
+    ways = _first_ways(_rises(Altitude(settings).smooth(samples)))
     heights = _apart(_fitted(ways, np.zeros(len({name for way in ways for name in way[:2]}) or 1)))
-    claimed, used = Column(settings).rows(samples)
+    claimed, used = AirColumn(settings).rows(samples)
     for _ in range(MOST_ROUNDS if len(heights) > 1 else 0):
         before = heights
-        visited = stays(FloorFilter(heights, settings).look_back(samples), PASSED_S, PASSED_P)
+        visited = stays(FloorFilter(heights, settings).smooth(samples), PASSED_S, PASSED_P)
         heights = _apart(_fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]), before))
         if before[-1] - heights[-1] > SHIFTS_M:  # stays that he had are lost
             heights = before

@@ -26,7 +26,7 @@ class Hypotheses:
         """(n, 15 k, 5): weight by what was known at each sample, h, v, d and the variance of h."""
         return self._follow(seen, joint=False)[0]
 
-    def look_back(self, seen: Floats) -> tuple[Floats, Floats]:
+    def smooth(self, seen: Floats) -> tuple[Floats, Floats]:
         """As `follow`, and the weights (n, 15 k) by all samples of the record; nothing can follow on it."""
         found = np.zeros((len(seen), len(self._heights_m) * vertical.MODES, 5))
         states = []

@@ -45,7 +45,7 @@ def record_floors(samples: Pressures, heights_m: Floats, start: int | None = Non
     """Floors at all samples of a record, each by all of it; its own noise is measured, ten samples a second are looked at."""
     few, group = thinned(samples)
     prior = np.ones(len(heights_m)) if start is None else np.eye(len(heights_m))[start]
-    found = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).look_back(few)
+    found = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).smooth(few)
     return Floors(
         samples.t_s, found.heights_m, found.floor[group], found.probability[group], found.height_m[group], found.up[group], found.down[group]
     )  # fmt: skip

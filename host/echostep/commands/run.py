@@ -33,7 +33,7 @@ from echostep.foot.alignment import aligned
 from echostep.foot.steps import Track, walk_track
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_run import GuidedRun, destination
-from echostep.legs.strides import LegsSettings
+from echostep.legs.strides import StrideSettings
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.metrics import Truth, errors, load_truth
 from echostep.localization.particles import ANY_LEVEL
@@ -256,7 +256,7 @@ def legs(
         console.print(f"{path.name}: {note}")
     if lengths.measured_to_floor and profile == "default":
         console.print(f"--shank {shank_m:g} is taken as knee to floor: {lengths.to_ankle_m:.3f} m to the ankle")
-    track = leg_file.PROFILES[profile](samples, LegsSettings(lengths, calibrated=scale is not None))
+    track = leg_file.PROFILES[profile](samples, StrideSettings(lengths, calibrated=scale is not None))
     leg_file.write_leg_track(out, track)
     console.print(f"{path.name}: {leg_file.describe_legs(track)}")
     if walked_m is not None:

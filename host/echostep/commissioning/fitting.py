@@ -16,7 +16,7 @@ from echostep.commissioning.probe import TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
 from echostep.legs.heading import compass_heading, fit_compass_errors
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Legs, LegsSettings
+from echostep.legs.strides import StrideEstimator, StrideSettings
 from echostep.offline.leg_csv import calibrated_scale
 
 Values = dict[str, float | bool]
@@ -148,7 +148,7 @@ def find_legs(heard: ProbeResult, settings: GyroSettings, segments: LegLengths, 
         raise EchostepError(
             "the thigh turns faster than the calf: are the two gyros swapped? swap them, and do it again"
         )
-    legs = Legs(LegsSettings(segments))
+    legs = StrideEstimator(StrideSettings(segments))
     strides = (*legs.feed(t_s[there], thigh, calf), *legs.finish())
     distance_m = sum(stride.length_m for stride in strides)
     if distance_m < 0.3 * walked_m or distance_m > 3.0 * walked_m:

@@ -93,7 +93,7 @@ def _row(name: str, scene: FloorScene, seed: int) -> Row:
     true = away.argmin(axis=1)
     prior = np.eye(len(heights))[true[0]] if scene.known_start else None
     filter_ = FloorFilter(heights, BarometerSettings(PRESSURE_NOISE_PA[scene.mode]), prior)
-    found = filter_.look_back(samples) if scene.whole else filter_.take(samples)
+    found = filter_.smooth(samples) if scene.whole else filter_.feed(samples)
     return {"name": name, "seed": seed, **judge(found, away)}
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.evaluate.study import Row, Study, console, print_table, write_json, write_parquet
-from echostep.legs.clipping import unclipped
+from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Legs, LegsSettings
+from echostep.legs.strides import StrideEstimator, StrideSettings
 from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, Gait, Manner, Stroller, draw_stroller, stroll
 
 PACES = {"slow": SLOW, "natural": NATURAL, "fast": FAST}
@@ -97,8 +97,8 @@ def measured_m(gait: Gait, person: Stroller, sensors: LegSensors, seed: int) -> 
     rates = math.cos(sensors.aslant_rad) * rng.choice([-1.0, 1.0], 2) * true
     rates += sensors.bias_rad_s * rng.standard_normal(2) + sensors.noise_rad_s * rng.standard_normal(rates.shape)
     rates = np.clip(rates, -sensors.range_rad_s, sensors.range_rad_s)
-    legs = Legs(LegsSettings(LegLengths(person.leg.thigh_m, person.leg.shank_m)))
-    thigh, shank = unclipped(t_s, rates).T
+    legs = StrideEstimator(StrideSettings(LegLengths(person.leg.thigh_m, person.leg.shank_m)))
+    thigh, shank = repair_clipping(t_s, rates).T
     return sum(s.length_m for s in (*legs.feed(t_s, thigh, shank), *legs.finish()))
 
 

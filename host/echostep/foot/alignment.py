@@ -1,7 +1,8 @@
-"""The walk frame with its x to the toe, in any mounting: the one place where the sensor's place on the foot is turned into the project's frames.
+"""The walk frame turned so that its x axis points to the toe, whatever the mounting of the sensor.
 
-In: a foot's events, each step with what is known of the toe. Out: the same events in a walk frame whose yaw zero is the toe's direction when the foot
-was levelled. Owns the first steps until the toe is known, and then its angle.
+In: `Step` and `Stance` in the walk frame of `foot.steps`; each step carries the toe's direction as estimated so far (`toe_rad`).
+Out: the same events in a walk frame whose yaw zero is the direction of the toe when the foot was levelled.
+Owns the events that wait until the toe's direction is known, and then that direction.
 """
 
 from __future__ import annotations
@@ -14,20 +15,25 @@ import numpy as np
 
 from echostep.foot.steps import Stance, Step, Track
 
-SURE_RAD = math.radians(20.0)  # the toe is found to within this; who has put x to the toe knows better
-PATIENCE_STEPS, PATIENCE_S = 3, 4.0
+SURE_RAD = math.radians(
+    20.0
+)  # by reason: error bound of the estimate; below it the wearer's x-to-toe mounting is trusted
+PATIENCE_STEPS, PATIENCE_S = (
+    3,
+    4.0,
+)  # by reason: the estimate needs two steps as a rule; output must not wait much longer
 
 
 class Alignment:
-    """Live: holds the events of the first steps, two as a rule, until the toe is known.
+    """Live alignment: the events of the first steps, two as a rule, wait until the toe's direction is known.
 
-    A foot that does not tip by PATIENCE_STEPS or PATIENCE_S is taken to have x to the toe for the time being; steps do not wait any longer.
+    If it is still unknown after PATIENCE_STEPS or PATIENCE_S, x is assumed to point to the toe until an estimate exists, and no event waits.
     """
 
     def __init__(self) -> None:
         self.toe_rad: float | None = None
         self._held: list[Step | Stance] = []
-        self._impatient = False
+        self._timed_out = False
 
     @property
     def waiting(self) -> bool:
@@ -35,30 +41,30 @@ class Alignment:
         return bool(self._held)
 
     def feed(self, events: Iterable[Step | Stance], now_s: float) -> list[Step | Stance]:
-        """Events up to `now_s` with the toe on x; none before it is known."""
+        """Aligned events that are ready at `now_s`; empty while the toe's direction is awaited."""
         self._held += events
         steps = [event for event in self._held if isinstance(event, Step)]
         if self.toe_rad is None:
             self.toe_rad = _known(steps)
-        if self.toe_rad is None and not self._impatient:
+        if self.toe_rad is None and not self._timed_out:
             since_s = self._held[0].t_end_s if self._held else now_s
-            self._impatient = len(steps) >= PATIENCE_STEPS or now_s - since_s > PATIENCE_S
-            if not self._impatient:
+            self._timed_out = len(steps) >= PATIENCE_STEPS or now_s - since_s > PATIENCE_S
+            if not self._timed_out:
                 return []
-        told, self._held = self._held, []
-        return [turned(event, self.toe_rad or 0.0) for event in told]
+        ready, self._held = self._held, []
+        return [rotated_event(event, self.toe_rad or 0.0) for event in ready]
 
 
 def _known(steps: list[Step]) -> float | None:
-    """The toe as the last of these steps knows it; who has put x to the toe is believed."""
+    """Toe direction (rad) by the newest step that has one; 0 if it is within SURE_RAD of x; None if no step has one."""
     toes = [step.toe_rad for step in steps if step.toe_rad is not None]
     if not toes:
         return None
     return toes[-1] if abs(toes[-1]) > SURE_RAD else 0.0
 
 
-def turned(event: Step | Stance, toe_rad: float) -> Step | Stance:
-    """The event in the walk frame whose x was at `toe_rad`; yaw counts from there, so it stays."""
+def rotated_event(event: Step | Stance, toe_rad: float) -> Step | Stance:
+    """The event in the walk frame turned about z by `toe_rad`; headings count from the toe's direction, so they keep their values."""
     if isinstance(event, Stance) or toe_rad == 0.0:
         return event
     r = _about_z(-toe_rad)
@@ -68,16 +74,17 @@ def turned(event: Step | Stance, toe_rad: float) -> Step | Stance:
 
 
 def aligned(track: Track) -> Track:
-    """A whole walk with the toe on x, as its last steps know it."""
+    """A whole track with x to the toe, by the last step that has an estimate of its direction."""
     toes = [step.toe_rad for step in track.steps if step.toe_rad is not None]
     if not toes:
         return track
     position = track.position_m @ _about_z(-toes[-1]).T
     return replace(
-        track, position_m=position, events=[turned(event, toes[-1]) for event in track.events], toe_known=True
+        track, position_m=position, events=[rotated_event(event, toes[-1]) for event in track.events], toe_known=True
     )
 
 
 def _about_z(angle_rad: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Rotation matrix about z."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -95,10 +95,10 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class FootEvents:
-    """What samples (n,) told: `events`, `told` (k,) = the sample that told each, and the foot after each sample: `heading_rad`, `stance` (n,)."""
+    """Events of samples (n,): `sample_index` (k,) of the sample after which each event was known; `heading_rad`, `stance` (n,) after each sample."""
 
     events: list[Step | Stance]
-    told: Ints
+    sample_index: Ints
     heading_rad: Floats
     stance: Bools
 
@@ -147,7 +147,7 @@ class Foot:
         """
         return self._run(t_s, accel, gyro, mag, np.empty((0, footsteps.ROW_SIZE)))
 
-    def follow(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:
+    def track(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:
         """The same, and when each event was told."""
         rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
         events = self._run(t_s, accel, gyro, mag, rows)

@@ -45,7 +45,7 @@ class TrunkPath:
         self._toe = ToeAngle()
         self.steps = 0
 
-    def stand(self, t_s: Floats, foot_heading_rad: Floats) -> list[tuple[int, PathSegment]]:
+    def add_standing(self, t_s: Floats, foot_heading_rad: Floats) -> list[tuple[int, PathSegment]]:
         """The foot is still at all of `t_s` (n,): what becomes known of the trunk, and at which of them."""
         if self._anchor is None and len(t_s):
             self._stance_begin_s = float(t_s[0])
@@ -60,7 +60,7 @@ class TrunkPath:
             found.append((at, self._stay(float(until[at]))))
         return found
 
-    def stance(self, stance: Stance) -> list[PathSegment]:
+    def add_stance(self, stance: Stance) -> list[PathSegment]:
         """A stance is over."""
         legs = []
         until = stance.t_end_s - self._half_s()
@@ -71,7 +71,7 @@ class TrunkPath:
             self._halves.append(0.5 * length)
         return legs
 
-    def step(self, step: Step) -> list[PathSegment]:
+    def add_step(self, step: Step) -> list[PathSegment]:
         """The foot has landed."""
         self.steps += 1
         self._toe.learn(step)

@@ -19,7 +19,7 @@ SAME_PAIRS = 3  # of equal neighbours at an extreme, which a sensor within its r
 FASTEST_WITHIN_RAD_S = 2.0
 
 
-class Unclipped:
+class ClippingRepair:
     """Feed it blocks; the samples come back in order, `EDGE` samples late, those of a top when it is over."""
 
     def __init__(self, low: Floats, high: Floats) -> None:
@@ -81,7 +81,7 @@ def _draw_tops(t_s: Floats, rate: Floats, at: Bools, limit: float) -> None:
         rate[begin:end] = way * np.clip(way * cubic, way * rate[begin:end], HIGHEST * abs(limit))
 
 
-def ends_of_range(rates: Floats) -> tuple[Floats, Floats]:
+def find_clipping_limits(rates: Floats) -> tuple[Floats, Floats]:
     """Where the sensors (n, k) end, by stretches of equal readings at their extremes; infinite for those that do not show it."""
     low, high = np.full(rates.shape[1], -np.inf), np.full(rates.shape[1], np.inf)
     for k, column in enumerate(rates.T):
@@ -92,9 +92,9 @@ def ends_of_range(rates: Floats) -> tuple[Floats, Floats]:
     return low, high
 
 
-def unclipped(t_s: Floats, rates: Floats) -> Floats:
+def repair_clipping(t_s: Floats, rates: Floats) -> Floats:
     """A whole record (n, k), mended."""
-    whole = Unclipped(*ends_of_range(rates))
+    whole = ClippingRepair(*find_clipping_limits(rates))
     _, first = whole.feed(t_s, rates)
     _, rest = whole.finish()
     return np.vstack([first, rest])

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
 
 HEADING, BIAS, IRON = 0, 1, 2  # places in the state
@@ -262,11 +263,6 @@ def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> 
 def compass_heading(bearing_rad: Floats) -> Floats:
     """Map heading, counter-clockwise from x, of bearings clockwise from north."""
     return 0.5 * math.pi - bearing_rad
-
-
-def wrap(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def _harmonics(heading_rad: float | Floats) -> Floats:

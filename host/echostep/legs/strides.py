@@ -108,7 +108,7 @@ class Stride:
 
 
 @dataclass(frozen=True, slots=True)
-class LegsSettings:
+class StrideSettings:
     """The wearer's `segments`; `calibrated`: their scale was found by a walk of known length."""
 
     segments: LegLengths = field(default_factory=LegLengths)
@@ -116,7 +116,7 @@ class LegsSettings:
 
 
 @dataclass(slots=True)
-class LegsCounts:
+class LegCounts:
     """Samples that came; `impossible` (not finite or beyond any leg) and `not_later` ones were skipped."""
 
     samples: int = 0
@@ -158,12 +158,12 @@ class _Bout:
     blind: Flag = Flag.NONE  # of the newest stride
 
 
-class Legs:
+class StrideEstimator:
     """Feed it samples; it returns strides as they become certain, equal however the samples are cut into portions."""
 
-    def __init__(self, settings: LegsSettings | None = None) -> None:
-        self.settings = settings or LegsSettings()
-        self.counts = LegsCounts()
+    def __init__(self, settings: StrideSettings | None = None) -> None:
+        self.settings = settings or StrideSettings()
+        self.counts = LegCounts()
         self.swings = Swings()
         self.bias = (_Bias(), _Bias())
         self._last: tuple[float, float, float] | None = None  # t, thigh, shank of the newest sample

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.legs.clipping import Unclipped
+from echostep.legs.clipping import ClippingRepair
 from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Flag, Legs, LegsSettings, Stride
+from echostep.legs.strides import Flag, Stride, StrideEstimator, StrideSettings
 from echostep.path import STANDING_PIECE_S, PathSegment
 
 TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes away again
@@ -65,8 +65,8 @@ class LegPath:
     def __init__(self, settings: WearerSettings, iron: CompassErrors | None = None) -> None:
         """`iron`: the compass', when it was calibrated."""
         segments = LegLengths(settings.thigh_m, settings.shank_m, settings.leg_scale)
-        self._legs = Legs(LegsSettings(segments, calibrated=settings.leg_scale != 1.0))
-        self._unclipped = Unclipped(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
+        self._legs = StrideEstimator(StrideSettings(segments, calibrated=settings.leg_scale != 1.0))
+        self._unclipped = ClippingRepair(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
         self._left_m = settings.leg_left_m
         self._heading = Heading(HeadingSettings(iron=iron, first_sd_rad=FRAME_SD_RAD))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
@@ -138,7 +138,7 @@ class LegPath:
         return float(np.cos(within).mean() / twist), float(np.sin(within).mean() / twist)
 
 
-def rest_of(leg: PathSegment, from_s: float) -> PathSegment:
+def segment_after(leg: PathSegment, from_s: float) -> PathSegment:
     """What is left of a leg from a time on."""
     if from_s <= leg.t0_s:
         return leg
@@ -150,8 +150,8 @@ def rest_of(leg: PathSegment, from_s: float) -> PathSegment:
     )  # fmt: skip
 
 
-def turned(leg: PathSegment, angle_rad: float, scale: float = 1.0) -> PathSegment:
-    """The same leg in a walk frame that is turned by an angle against its own, and longer."""
+def rotated_segment(leg: PathSegment, angle_rad: float, scale: float = 1.0) -> PathSegment:
+    """The same leg in a walk frame that is rotated_segment by an angle against its own, and longer."""
     if angle_rad == 0.0 and scale == 1.0:
         return leg
     c, s = scale * math.cos(angle_rad), scale * math.sin(angle_rad)

@@ -5,7 +5,7 @@ of the two carries on, and what turns and scales the one into the frame of the o
 
 The foot is several times as exact, so it carries while it lives. The last half minute of leg samples is kept; when the foot falls silent they are
 gone through: as far as both know the way, the foot's tells how long these legs' strides are and where their heading points, and whether they are worn
-at all. Then they carry. When the foot is back, it takes over where its path meets theirs, turned to their heading.
+at all. Then they carry. When the foot is back, it takes over where its path meets theirs, rotated_segment to their heading.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from echostep.angles import wrap
 from echostep.legs.heading import CompassErrors
-from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rest_of, turned
+from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.path import UNOBSERVED_SD_M, PathSegment
 
 SILENT_S = 0.5  # a foot that is this far behind the board does not tell
@@ -104,7 +104,9 @@ class FootLegsHandover:
 
     def _carried(self, told: list[PathSegment]) -> list[PathSegment]:
         return [
-            self._on(turned(leg, self._leg_turn, self._leg_scale), 0.0) for leg in told if leg.t1_s > self._covered_s
+            self._on(rotated_segment(leg, self._leg_turn, self._leg_scale), 0.0)
+            for leg in told
+            if leg.t1_s > self._covered_s
         ]
 
     def _rejoined(self) -> list[PathSegment]:
@@ -149,7 +151,7 @@ class FootLegsHandover:
         if self._step_base is None:
             self._step_base = self._step + 1 - leg.step
         self._step = leg.step + self._step_base
-        leg = turned(rest_of(leg, self._covered_s), turn_rad)
+        leg = rotated_segment(segment_after(leg, self._covered_s), turn_rad)
         self._covered_s = max(self._covered_s, leg.t1_s)
         return leg if leg.step == self._step else replace(leg, step=self._step)
 

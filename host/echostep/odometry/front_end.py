@@ -185,12 +185,12 @@ class FrontEnd:
         if not len(kept):
             return found
         t_s, at = times.mtx_s[kept], times.mtx_at[kept]
-        fall = self.foot.follow(t_s, batch.accel[kept], batch.gyro[kept], batch.mag[kept])
+        fall = self.foot.track(t_s, batch.accel[kept], batch.gyro[kept], batch.mag[kept])
         begin = 0
-        for event, told in zip(fall.events, fall.told.tolist(), strict=True):
+        for event, told in zip(fall.events, fall.sample_index.tolist(), strict=True):
             found += self._stand(fall, t_s, at, begin, told)
             for known in self.alignment.feed([event], float(t_s[told])):
-                legs = self.path.step(known) if isinstance(known, Step) else self.path.stance(known)
+                legs = self.path.add_step(known) if isinstance(known, Step) else self.path.add_stance(known)
                 found.append((int(at[told]), legs))
             begin = told
         return found + self._stand(fall, t_s, at, begin, len(t_s))
@@ -202,7 +202,7 @@ class FrontEnd:
         if self.alignment.waiting:
             return []
         still = begin + np.flatnonzero(fall.stance[begin:end])
-        return [(int(at[still[k]]), [leg]) for k, leg in self.path.stand(t_s[still], fall.heading_rad[still])]
+        return [(int(at[still[k]]), [leg]) for k, leg in self.path.add_standing(t_s[still], fall.heading_rad[still])]
 
 
 class GyroBlocks:

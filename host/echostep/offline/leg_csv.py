@@ -18,10 +18,10 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
 from echostep.legs import swing_detection as leg_swings
-from echostep.legs.clipping import ends_of_range, unclipped
+from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.heading import Heading
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Flag, Legs, LegsCounts, LegsSettings, Stride, distance_sd_m
+from echostep.legs.strides import Flag, LegCounts, Stride, StrideEstimator, StrideSettings, distance_sd_m
 from echostep.offline.imu_checks import RATE_RANGE_HZ, sorted_by_time
 from echostep.papers import lee2010
 
@@ -56,7 +56,7 @@ class LegTrack:
 
     rows: Floats
     strides: tuple[Stride, ...]
-    counts: LegsCounts | None
+    counts: LegCounts | None
     source: str
     heading_sd_rad: float
     notes: tuple[str, ...] = ()
@@ -193,7 +193,7 @@ def _notes(table: Floats) -> tuple[str, ...]:
     missing = 1.0 - len(forward) * float(np.median(forward)) / float(forward.sum())
     if missing > 0.02:
         found.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
-    for name, *ends in zip(COLUMNS[1:], *ends_of_range(table[:, 1:3]), strict=True):
+    for name, *ends in zip(COLUMNS[1:], *find_clipping_limits(table[:, 1:3]), strict=True):
         if reached := [abs(end) for end in ends if math.isfinite(end)]:
             found.append(
                 f"{name} is cut off at {min(reached):.3g} rad/s, the sensor's range is too small: tops are drawn in"
@@ -201,10 +201,10 @@ def _notes(table: Floats) -> tuple[str, ...]:
     return tuple(found)
 
 
-def track_default(samples: LegSamples, settings: LegsSettings, heading_rad: float | None = None) -> LegTrack:
+def track_default(samples: LegSamples, settings: StrideSettings, heading_rad: float | None = None) -> LegTrack:
     """Ours: strides by both segments, heading by gyro and compass; `heading_rad` at the beginning, when it is known."""
-    legs = Legs(settings)
-    thigh, shank = unclipped(samples.t_s, np.column_stack([samples.thigh, samples.shank])).T
+    legs = StrideEstimator(settings)
+    thigh, shank = repair_clipping(samples.t_s, np.column_stack([samples.thigh, samples.shank])).T
     strides = (*legs.feed(samples.t_s, thigh, shank), *legs.finish())
     sign, how = belt_sign(samples)
     heading = Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD)
@@ -245,7 +245,7 @@ def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tup
 TURNING_RAD_S = math.radians(25.0)
 
 
-def track_lee2010(samples: LegSamples, settings: LegsSettings) -> LegTrack:
+def track_lee2010(samples: LegSamples, settings: StrideSettings) -> LegTrack:
     """The paper's: 10 Hz, each sign found as ours is."""
     rates = np.column_stack([samples.thigh, samples.shank])
     swings = leg_swings.Swings()

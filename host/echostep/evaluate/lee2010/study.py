@@ -23,7 +23,7 @@ from echostep.board.calibration import ADIS16100_RAD_S
 from echostep.board.frames import BoardReader, Frames, encode
 from echostep.evaluate.study import Row, Study, console, print_table, write_json, write_parquet
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import LegsSettings
+from echostep.legs.strides import StrideSettings
 from echostep.legs.trunk_path import WearerSettings
 from echostep.offline.leg_csv import LegSamples, track_default
 from echostep.papers import lee2010
@@ -245,7 +245,7 @@ def by_lee(measured: Measured, start: tuple[float, float, float]) -> Found:
 
 def by_default(measured: Measured, start: tuple[float, float, float]) -> Found:
     """Ours."""
-    rows = track_default(measured.samples, LegsSettings(measured.segments), start[2]).rows[::20]
+    rows = track_default(measured.samples, StrideSettings(measured.segments), start[2]).rows[::20]
     return Found(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
 
 
@@ -253,7 +253,7 @@ def scale_of(segments: LegLengths, seed: int) -> float:
     """What `echostep calibrate` finds of this person on 10 m straight on."""
     walked = walk(((0.0, 0.0), (CALIBRATION_M, 0.0)), person_of(seed), np.random.default_rng([seed, 36]))
     measured = measure(chunks_of(walked, storeys()[:1], seed), seed)
-    return CALIBRATION_M / float(track_default(measured.samples, LegsSettings(segments), 0.0).rows[-1, 1])
+    return CALIBRATION_M / float(track_default(measured.samples, StrideSettings(segments), 0.0).rows[-1, 1])
 
 
 def with_plan(
