@@ -131,7 +131,8 @@ enum {
 	SELF_TEST_NO_ANSWER = 5,
 };
 
-/* Who is speaking. Sent when the port opens, when asked, and once a second. Layout and CRC seed of this message never change, so that any host can name any firmware's schema. */
+/* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
+ * never change, so that any host can read the schema hash of any firmware. */
 struct msg_identity {
 	uint32_t ticks; /* 0.5 us */
 	uint32_t schema_hash;
@@ -142,7 +143,7 @@ struct msg_identity {
 };
 uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m);
 
-/* One ping of one ranger, sent when its ranging cycle is over. */
+/* One ping of one ranger, sent at the end of its ranging cycle. */
 struct msg_ping {
 	uint32_t ticks; /* 0.5 us */
 	uint8_t ranger;
@@ -151,7 +152,7 @@ struct msg_ping {
 };
 uint8_t msg_pack_ping(uint8_t *out, const struct msg_ping *m);
 
-/* Thigh, calf and belt rate gyros (ADIS16100), one instant. */
+/* Rates of the thigh, calf and belt gyros (ADIS16100) at one instant. */
 struct msg_gyros {
 	uint32_t ticks; /* 0.5 us */
 	int16_t thigh; /* 0.2439 deg/s, -32768: invalid */
@@ -160,7 +161,7 @@ struct msg_gyros {
 };
 uint8_t msg_pack_gyros(uint8_t *out, const struct msg_gyros *m);
 
-/* Barometer (SCP1000). */
+/* Pressure and temperature of the barometer (SCP1000). */
 struct msg_pressure {
 	uint32_t ticks; /* 0.5 us */
 	uint32_t pressure; /* 0.25 Pa, 0: invalid */
@@ -168,21 +169,21 @@ struct msg_pressure {
 };
 uint8_t msg_pack_pressure(uint8_t *out, const struct msg_pressure *m);
 
-/* Compass bearing (CMPS03/CMPS10 class). */
+/* Bearing of the compass (CMPS03/CMPS10 class). */
 struct msg_compass {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t bearing; /* 0.1 deg, 65535: invalid */
 };
 uint8_t msg_pack_compass(uint8_t *out, const struct msg_compass *m);
 
-/* Rising edge of the MTx SyncOut pulse, captured by the timer. */
+/* Rising edge of the MTx's SyncOut pulse, captured by the timer. */
 struct msg_sync {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t edge;
 };
 uint8_t msg_pack_sync(uint8_t *out, const struct msg_sync *m);
 
-/* Once a second: what was lost and what is wrong. All counters run from the board's start and wrap. */
+/* Lost frames and failures, once a second. All counters run from the start of the board and wrap. */
 struct msg_status {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t dropped_ping;
@@ -219,7 +220,7 @@ struct msg_clock_reply {
 };
 uint8_t msg_pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m);
 
-/* The settings now in force: the answer to configure, and sent with identity when the port opens. */
+/* The settings in force. Sent in answer to configure, and after identity when the port opens or on identify. */
 struct msg_configuration {
 	uint32_t ticks; /* 0.5 us */
 	uint8_t sensors;
@@ -230,7 +231,8 @@ struct msg_configuration {
 };
 uint8_t msg_pack_configuration(uint8_t *out, const struct msg_configuration *m);
 
-/* Once a second for each gyro: its temperature and how its last self-test ended. While a test runs `gyros` holds no values. */
+/* Temperature of one gyro and the result of its last self-test; once a second for each gyro. While a test runs, `gyros` holds no
+ * values. */
 struct msg_gyro_health {
 	uint32_t ticks; /* 0.5 us */
 	uint8_t gyro;
@@ -241,16 +243,16 @@ struct msg_gyro_health {
 };
 uint8_t msg_pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m);
 
-/* Ask for identity and configuration. Like identity, it always carries the fixed seed. */
+/* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */
 
-/* Ask for the board's clock. */
+/* Request for the board's clock. */
 struct msg_clock_query {
 	uint16_t token;
 };
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length);
 
-/* Set what is measured. Values out of range are clamped; the answer, configuration, shows what is in force. */
+/* New settings. Values out of range are clamped; the answer, configuration, holds the settings in force. */
 struct msg_configure {
 	uint8_t sensors;
 	uint8_t schedule;
@@ -260,7 +262,8 @@ struct msg_configure {
 };
 bool msg_unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length);
 
-/* Run the self-test of the gyros: half a second without rates, then its outcome in gyro_health. Stand still meanwhile. */
+/* Start of the gyros' self-test: 0.56 s without rates, then the result in gyro_health. The wearer must stand still during the
+ * test. */
 /* check_gyros has no fields. */
 
 #endif

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Flash, static RAM and an upper bound of the stack of the firmware, each against its limit.
 
-In: the ELF, and beside it the compiler's stack usage files (-fstack-usage). Out: a table; exit status 1 when a limit is
-missed. The bound walks the call graph of the disassembly: the deepest chain from main plus the deepest interrupt (they
-do not nest).
+In: the ELF, and the compiler's stack usage files (-fstack-usage) in the same folder. Out: a table; exit status 1 when a
+limit is exceeded. The bound comes from the call graph of the disassembly: the deepest chain of calls from main plus the
+deepest interrupt (interrupts do not nest). Owns nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ CALL = re.compile(r"\s(?:r?call|r?jmp)\s.*;\s*0x([0-9a-f]+)")
 ABSOLUTE_CALL = re.compile(r"\s(?:call|jmp)\s+0x([0-9a-f]+)")
 INDIRECT = re.compile(r"\s(?:icall|eicall|ijmp|eijmp)\b")
 INTERRUPT = re.compile(r"__vector_\d+$")
-RETURN_ADDRESS = 2
+RETURN_ADDRESS = 2  # bytes on the stack
 
 
 def output_of(*command: str) -> str:
@@ -26,18 +26,18 @@ def output_of(*command: str) -> str:
 
 
 def frames(folder: Path) -> dict[str, int]:
-    """Function name -> stack bytes with its return address; of functions of the same name the largest."""
+    """Function name -> stack bytes, return address included; the largest if several functions have this name."""
     found: dict[str, int] = {}
     for path in folder.rglob("*.su"):
         for line in path.read_text().splitlines():
-            place, size, _ = line.split("\t")
-            name = place.rsplit(":", 1)[1]
+            location, size, _ = line.split("\t")
+            name = location.rsplit(":", 1)[1]
             found[name] = max(found.get(name, 0), int(size))
     return found
 
 
 def call_graph(elf: Path) -> tuple[dict[int, str], dict[int, set[int]], dict[int, int]]:
-    """Address -> name, address -> addresses called or jumped to, address -> bytes pushed."""
+    """Per function address: its name, the addresses that it calls or jumps to, and the bytes that it pushes."""
     names: dict[int, str] = {}
     calls: dict[int, set[int]] = {}
     pushed: dict[int, int] = {}
@@ -56,19 +56,19 @@ def call_graph(elf: Path) -> tuple[dict[int, str], dict[int, set[int]], dict[int
 
 
 def deepest(elf: Path) -> int:
-    """Bytes of the deepest chain from main plus the deepest interrupt; a recursion is an error."""
+    """Stack bytes of the deepest chain of calls from main plus the deepest interrupt; a recursion is an error."""
     names, calls, pushed = call_graph(elf)
     known = frames(elf.parent)
 
-    def depth(at: int, above: tuple[int, ...]) -> int:
-        if at in above:
-            raise SystemExit(f"{elf}: {names[at]} calls itself: its stack cannot be bounded")
-        own = known.get(names[at], RETURN_ADDRESS + pushed[at])
-        inner = (depth(to, (*above, at)) for to in calls[at] if to in names and to != at)
+    def depth(address: int, callers: tuple[int, ...]) -> int:
+        if address in callers:
+            raise SystemExit(f"{elf}: {names[address]} calls itself: its stack cannot be bounded")
+        own = known.get(names[address], RETURN_ADDRESS + pushed[address])
+        inner = (depth(to, (*callers, address)) for to in calls[address] if to in names and to != address)
         return own + max(inner, default=0)
 
-    main = next(at for at, name in names.items() if name == "main")
-    interrupts = (depth(at, ()) for at, name in names.items() if INTERRUPT.match(name))
+    main = next(address for address, name in names.items() if name == "main")
+    interrupts = (depth(address, ()) for address, name in names.items() if INTERRUPT.match(name))
     return depth(main, ()) + max(interrupts, default=0)
 
 

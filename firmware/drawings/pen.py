@@ -1,4 +1,7 @@
-"""A small pen for SVG: boxes with pins, wires with corners, words. In: places in pixels. Out: the text of a file. Owns the strokes so far."""
+"""A minimal SVG writer: boxes, discs, wires, paths and lines of text.
+
+In: coordinates in pixels, x to the right, y down. Out: the text of an SVG file. Owns the elements drawn so far.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +12,16 @@ FONT = "font-family='DejaVu Sans, Helvetica, Arial, sans-serif'"
 
 
 class Pen:
-    """Collects strokes; later ones lie on top."""
+    """Collects SVG elements; later ones lie on top."""
 
     def __init__(self, width: int, height: int, title: str) -> None:
-        self._strokes = [
+        self._elements = [
             f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width} {height}' width='{width}' height='{height}' role='img'>",
             f"<title>{escape(title)}</title>",
             f"<rect width='{width}' height='{height}' fill='{PAPER}'/>",
         ]
 
-    def words(
+    def label(
         self,
         x: float,
         y: float,
@@ -29,42 +32,42 @@ class Pen:
         *,
         bold: bool = False,
     ) -> None:
-        """A line of text; (x, y) is on its base line."""
+        """Write a line of text; (x, y) is on its base line, at its start, middle or end by `anchor`."""
         weight = " font-weight='bold'" if bold else ""
-        self._strokes.append(
+        self._elements.append(
             f"<text x='{x:g}' y='{y:g}' font-size='{size}' text-anchor='{anchor}' fill='{ink}' {FONT}{weight}>{escape(text)}</text>"
         )
 
     def box(self, x: float, y: float, width: float, height: float, fill: str = "#f3f5f8", ink: str = INK) -> None:
-        """A device."""
-        self._strokes.append(
+        """Draw a rectangle with round corners, (x, y) its upper left one."""
+        self._elements.append(
             f"<rect x='{x:g}' y='{y:g}' width='{width:g}' height='{height:g}' rx='6' fill='{fill}' stroke='{ink}' stroke-width='1.6'/>"
         )
 
     def wire(self, points: list[tuple[float, float]], ink: str, width: float = 2.0, dash: str = "") -> None:
-        """A line through these points."""
+        """Draw a line through these points."""
         path = " ".join(f"{x:g},{y:g}" for x, y in points)
         dashed = f" stroke-dasharray='{dash}'" if dash else ""
-        self._strokes.append(
+        self._elements.append(
             f"<polyline points='{path}' fill='none' stroke='{ink}' stroke-width='{width:g}' stroke-linejoin='round' stroke-linecap='round'{dashed}/>"
         )
 
     def dot(self, x: float, y: float, ink: str) -> None:
-        """Where wires meet."""
-        self._strokes.append(f"<circle cx='{x:g}' cy='{y:g}' r='4' fill='{ink}'/>")
+        """Draw a joint of wires."""
+        self._elements.append(f"<circle cx='{x:g}' cy='{y:g}' r='4' fill='{ink}'/>")
 
     def disc(self, x: float, y: float, radius: float, fill: str, ink: str = INK) -> None:
-        """A circle."""
-        self._strokes.append(
+        """Draw a circle."""
+        self._elements.append(
             f"<circle cx='{x:g}' cy='{y:g}' r='{radius:g}' fill='{fill}' stroke='{ink}' stroke-width='1.6'/>"
         )
 
     def shape(self, path: str, fill: str, ink: str = "none", width: float = 1.6) -> None:
-        """A path in SVG's own words."""
-        self._strokes.append(
+        """Draw a path, given in the syntax of the attribute `d`."""
+        self._elements.append(
             f"<path d='{path}' fill='{fill}' stroke='{ink}' stroke-width='{width:g}' stroke-linejoin='round'/>"
         )
 
-    def text(self) -> str:
-        """The file."""
-        return "\n".join([*self._strokes, "</svg>"]) + "\n"
+    def svg(self) -> str:
+        """The text of the file."""
+        return "\n".join([*self._elements, "</svg>"]) + "\n"

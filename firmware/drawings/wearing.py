@@ -1,4 +1,7 @@
-"""How the system is worn: python firmware/drawings/wearing.py > firmware/drawings/wearing.svg"""
+"""Drawing of where each device is worn: python firmware/drawings/wearing.py > firmware/drawings/wearing.svg
+
+In: nothing. Out: SVG on standard output. Owns the places and the notes.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,8 @@ MTX, GYRO, BELT, RANGER, CABLE, HOST = "#be185d", "#c2410c", "#0b62d6", "#15803d
 
 def main() -> None:
     pen = Pen(1170, 750, "How the system is worn")
-    pen.words(30, 40, "How the system is worn", 22, bold=True)
-    pen.words(
+    pen.label(30, 40, "How the system is worn", 22, bold=True)
+    pen.label(
         30,
         62,
         "Right leg shown; the left one is as good (settings: foot_left_m). Axes are those printed on the devices.",
@@ -22,7 +25,7 @@ def main() -> None:
     )
     _side(pen, 250)
     _behind(pen, 850)
-    sys.stdout.write(pen.text())
+    sys.stdout.write(pen.svg())
 
 
 def _limb(pen: Pen, points: list[tuple[float, float]], width: float, ink: str) -> None:
@@ -34,9 +37,9 @@ def _device(pen: Pen, x: float, y: float, width: float, height: float, ink: str)
 
 
 def _label(pen: Pen, x: float, y: float, lines: tuple[str, ...], ink: str, anchor: str = "start") -> None:
-    pen.words(x, y, lines[0], 14, anchor, ink, bold=True)
+    pen.label(x, y, lines[0], 14, anchor, ink, bold=True)
     for k, line in enumerate(lines[1:]):
-        pen.words(x, y + 18 * (k + 1), line, 12, anchor, SOFT)
+        pen.label(x, y + 18 * (k + 1), line, 12, anchor, SOFT)
 
 
 def _arrow(pen: Pen, x0: float, y0: float, x1: float, y1: float, ink: str) -> None:
@@ -49,8 +52,8 @@ def _arrow(pen: Pen, x0: float, y0: float, x1: float, y1: float, ink: str) -> No
 
 
 def _side(pen: Pen, x: float) -> None:
-    """Seen from the right; he looks to the right of the paper."""
-    pen.words(x, 100, "from the right", 14, "middle", SOFT)
+    """The wearer from the right side, facing the right of the page; `x` is the middle of the trunk."""
+    pen.label(x, 100, "from the right", 14, "middle", SOFT)
     _limb(pen, [(x - 8, 420), (x - 22, 540), (x - 52, 672)], 40, "#eef0f3")  # the other leg
     _limb(pen, [(x - 52, 690), (x - 20, 698)], 22, "#eef0f3")
     pen.disc(x, 160, 36, SKIN, SKIN)
@@ -68,7 +71,7 @@ def _side(pen: Pen, x: float) -> None:
     _device(pen, x + 32, 604, 16, 30, GYRO)
     _device(pen, x + 40, 690, 34, 16, MTX)
     _arrow(pen, x + 40, 690, x + 96, 697, MTX)
-    pen.words(x + 100, 702, "x, to the toe", 12, ink=MTX)
+    pen.label(x + 100, 702, "x, to the toe", 12, ink=MTX)
     _label(pen, x + 80, 470, ("thigh gyro", "outer side, half-way up the thigh;", "its axis across the body"), GYRO)
     _label(
         pen, x + 80, 592, ("calf gyro", "outer side of the shank, below the knee;", "its axis across the body"), GYRO
@@ -95,7 +98,8 @@ def _side(pen: Pen, x: float) -> None:
 
 
 def _behind(pen: Pen, x: float) -> None:
-    pen.words(x, 100, "from behind", 14, "middle", SOFT)
+    """The wearer from behind; `x` is the middle of the trunk."""
+    pen.label(x, 100, "from behind", 14, "middle", SOFT)
     pen.disc(x, 160, 36, SKIN, SKIN)
     for side in (-1, 1):
         _limb(pen, [(x + side * 60, 236), (x + side * 72, 318)], 24, SKIN)
@@ -124,7 +128,7 @@ def _behind(pen: Pen, x: float) -> None:
     _label(pen, x + 110, 500, ("55 degrees wide", "keep arms, bag and jacket", "out of both cones"), RANGER)
     _label(pen, x - 250, 600, ("barometer", "a hole in the box, foam", "over it against wind"), BELT)
     _arrow(pen, x, 384, x, 318, BELT)
-    pen.words(x, 306, "axis of the belt gyro", 12, "middle", BELT)
+    pen.label(x, 306, "axis of the belt gyro", 12, "middle", BELT)
 
 
 if __name__ == "__main__":

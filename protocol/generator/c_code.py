@@ -5,7 +5,11 @@ In: the messages between board and host. Out: C11 source. Owns nothing.
 
 from __future__ import annotations
 
+import textwrap
+
 from generator.schema import FIXED_SEED, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
+
+COMMENT_WIDTH = 130  # as in the hand-written C
 
 
 def c_header(messages: list[Message]) -> str:
@@ -43,7 +47,7 @@ def _constants(messages: list[Message]) -> list[str]:
 
 def _declaration(message: Message) -> list[str]:
     """Struct and function of one message."""
-    lines = ["", f"/* {message.doc} */"]
+    lines = ["", *textwrap.wrap(f"/* {message.doc} */", COMMENT_WIDTH, subsequent_indent=" * ")]
     if not message.fields:
         return [*lines, f"/* {message.name} has no fields. */"]
     lines += [f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]

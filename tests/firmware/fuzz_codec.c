@@ -1,5 +1,5 @@
-/* Throws bytes at the firmware's codec: as a USB stream into link_receive, as a payload through COBS and back, and as a frame of its
- * own into a send buffer of any size. Under libFuzzer (clang -fsanitize=fuzzer -DLIBFUZZER), or by itself: ./fuzz SEED COUNT. */
+/* Feeds bytes to the firmware's codec: as a USB stream into link_receive, as a payload through COBS and back, and as a message into a send
+ * buffer of any size. With libFuzzer (clang -fsanitize=fuzzer -DLIBFUZZER), or alone: ./fuzz SEED COUNT. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -14,7 +14,7 @@
 #define MUST(condition) ((condition) ? (void)0 : broken(#condition, __LINE__))
 
 static const uint8_t *incoming;
-static size_t incoming_length, incoming_at;
+static size_t incoming_length, incoming_index;
 static uint8_t sent[FRAME_ENCODED_MAX];
 static uint8_t sent_length, room;
 
@@ -24,7 +24,7 @@ static void broken(const char *condition, int line)
 	abort();
 }
 
-/* The board: a port that gives these bytes and takes as many as `room`. */
+/* The board: a port that returns the bytes of `incoming` and accepts at most `room` bytes. */
 bool usb_is_open(void)
 {
 	return true;
@@ -40,7 +40,7 @@ bool usb_write(const uint8_t *bytes, uint8_t length)
 
 int16_t usb_read(void)
 {
-	return incoming_at < incoming_length ? (int16_t)incoming[incoming_at++] : (int16_t)-1;
+	return incoming_index < incoming_length ? (int16_t)incoming[incoming_index++] : (int16_t)-1;
 }
 
 static void check_receive(const uint8_t *bytes, size_t length)
@@ -52,14 +52,14 @@ static void check_receive(const uint8_t *bytes, size_t length)
 		zeros += bytes[i] == 0;
 	incoming = bytes;
 	incoming_length = length;
-	incoming_at = 0;
+	incoming_index = 0;
 	link_open();
-	while (incoming_at < incoming_length) {
+	while (incoming_index < incoming_length) {
 		if (!link_receive(&command))
 			continue;
 		uint8_t copy[MSG_MAX_SIZE];
 		MUST(command.length <= MSG_CONFIGURE_SIZE);
-		memcpy(copy, command.body, command.length); /* the sanitizer sees a read outside */
+		memcpy(copy, command.body, command.length); /* the sanitizer detects a read outside */
 		commands++;
 	}
 	MUST(commands + (uint16_t)(status.bad_frames - bad) <= zeros);
@@ -75,7 +75,7 @@ static void check_cobs(const uint8_t *bytes, uint16_t length)
 	MUST(cobs_decode(decoded, bytes, length) < length || length == 0);
 }
 
-/* Either the whole frame is sent or nothing, and what is sent can be read back. */
+/* Either the whole frame is sent or nothing, and a sent frame can be decoded. */
 static void check_send(uint8_t id, const uint8_t *body, uint8_t length, uint8_t free_bytes)
 {
 	uint16_t other = status.dropped_other, ping = status.dropped_ping;

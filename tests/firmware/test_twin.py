@@ -169,7 +169,7 @@ def test_a_gyro_that_fails_says_so(bench: Bench, name: str, kind: str) -> None:
 
 
 def gyro_health(found_all: list[m.Message]) -> dict[int, m.GyroHealth]:
-    """The newest word of each gyro."""
+    """The newest `gyro_health` of each gyro."""
     return {x.gyro: x for x in found_all if isinstance(x, m.GyroHealth)}
 
 

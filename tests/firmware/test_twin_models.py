@@ -28,7 +28,7 @@ STAMP_STEP_TICKS = 2
 
 
 def probe(folder: Path, mode: int) -> BoardProcess:
-    """The twin with the probe program that asks one question."""
+    """The twin with the probe program, one case."""
     if not shutil.which("avr-gcc"):
         pytest.skip("avr-gcc is missing")
     elf = folder / "probe.elf"
@@ -119,7 +119,7 @@ def test_mistakes_are_named(arguments: list[str], sent: bytes, reason: str) -> N
 
 
 def test_rangers_keep_power_when_the_processor_is_reset() -> None:
-    """A ping under way goes on: its ranger answers nobody until the ranging is over."""
+    """A ping under way goes on: its ranger does not answer until the ranging is over."""
     bench = Bench()
     bench.run(1_000)
     bench.fault("reset=external")
@@ -158,7 +158,7 @@ def test_nothing_is_read_through_a_stuck_line() -> None:
 
 
 class PtyTwin:
-    """The twin with a pseudo terminal, and somebody who gives it time."""
+    """The twin with a pseudo terminal, whose time passes by `run`."""
 
     def __init__(self) -> None:
         pipe = subprocess.PIPE

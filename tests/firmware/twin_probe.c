@@ -1,5 +1,5 @@
-/* A program for the twin's own test, with faults that the real firmware does not have. What it finds out it tells through the bus: a
- * left trigger means yes, a right one no. MODE chooses the question. */
+/* A program for the tests of the twin, with faults that the real firmware does not have. MODE chooses the case. The result is a trigger on
+ * the bus: of the left ranger for yes, of the right one for no. */
 #include <avr/io.h>
 #include <avr/interrupt.h>
 #include <avr/sleep.h>
@@ -43,7 +43,7 @@ static void answer(uint8_t yes)
 		;
 }
 
-/* A start condition, and the watchdog bites before the stop: after it, the first start must be a first start again. */
+/* A start condition, and a watchdog reset before the stop: after the reset the next start must not be a repeated start. */
 static void twi_after_reset(uint8_t cause)
 {
 	if (cause & _BV(WDRF))
@@ -71,7 +71,7 @@ static void spi_wrong(void)
 		;
 }
 
-/* SyncOut is driven low 3 ms after the start: neither its pull-up nor a write to a neighbour makes it high. */
+/* SyncOut is driven low 3 ms after the start: neither its pull-up nor a write to another pin of its port makes it high. */
 static void pulled_up(void)
 {
 	_delay_ms(3);

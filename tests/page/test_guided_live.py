@@ -84,7 +84,7 @@ def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
         gateway = threading.Thread(target=simulate_gateway, args=(PLAN, truth, beacons, 2.0, 1.0, SEED), daemon=True)
 
         def walk() -> None:
-            run.wait_for_listener(board, mtx)
+            run.wait_for_opening(board, mtx)
             gateway.start()
             run.play(scenario, board, mtx)
 

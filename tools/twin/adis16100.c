@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Three ADIS16100 rate gyros [data sheet, and public drivers where it is silent].
+ * Three ADIS16100 rate gyros [data sheet; public drivers for what it does not state].
  *
  * 16-bit frames; the answer to a frame comes with the next one: channel in bits 13:12, value in 11:0. Bit 15 writes the control register:
  * channel 11:10 (rate, temperature, AIN1, AIN2), power 9:8 (11 = on), coding bit 4 (1 = offset binary).
  *
- * ST1 (PF7) and ST2 (PF6), wired to all three, push the rate down or up by 221 counts, with a tenth of spread from part to part, through the
- * 40 Hz filter. The temperature is the board's [row], 6.88 counts a degree from 25 degC. */
+ * ST1 (PF7) and ST2 (PF6), wired to all three, change the rate by -221 and +221 counts, through the 40 Hz filter; the response varies by
+ * a tenth from part to part. The temperature is the row's, 6.88 counts per degree from 25 degC. */
 #include <math.h>
 #include <string.h>
 
@@ -30,16 +30,17 @@ static struct gyro {
 	const char *name;
 	int channel_of_row;
 	enum fault fault;
-	int stuck_at;
-	double excited; /* counts by ST1 and ST2, at `excited_at` */
-	int response;   /* of this part */
+	int stuck_rate;
+	double excited; /* counts added by ST1 and ST2 at the time `excited_at` */
+	int response;   /* of this part to ST1 or ST2, counts */
 	uint16_t control, answer, incoming, count;
-	bool garbled; /* the processor's edges are not the chip's */
+	bool garbled; /* the processor uses the wrong clock edge or a too fast clock */
 } gyros[3] = { { .name = "thigh", .channel_of_row = 0 }, { .name = "calf", .channel_of_row = 1 }, { .name = "belt", .channel_of_row = 2 } };
 
 static bool inputs[2]; /* ST1, ST2 */
 static avr_cycle_count_t excited_at;
 
+/* Counts that the self-test inputs add once the filter has settled. */
 static double target(const struct gyro *g)
 {
 	double response = g->fault == WEAK ? g->response * 0.1 : g->response;
@@ -50,9 +51,9 @@ static double target(const struct gyro *g)
 /* Counts that the self-test inputs add now. */
 static double excitation(const struct gyro *g)
 {
-	double passed_s = (double)(avr->cycle - excited_at) / 16e6;
+	double elapsed_s = (double)(avr->cycle - excited_at) / 16e6;
 
-	return target(g) + (g->excited - target(g)) * exp(-passed_s / FILTER_S);
+	return target(g) + (g->excited - target(g)) * exp(-elapsed_s / FILTER_S);
 }
 
 static void input_changed(struct avr_irq_t *irq, uint32_t level, void *param)
@@ -82,7 +83,7 @@ static uint16_t convert(const struct gyro *g)
 	int value = channel == 0 ? rate_of(g) : channel == 1 ? temperature() : 0;
 
 	if (g->fault == STUCK && channel == 0)
-		value = g->stuck_at;
+		value = g->stuck_rate;
 
 	if ((g->control & 0x0300u) != 0x0300u)
 		return 0; /* powered down */
@@ -117,7 +118,7 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 	struct gyro *g = (struct gyro *)self;
 	uint8_t in = (uint8_t)(g->count == 0 ? g->answer >> 8 : g->answer);
 
-	if (g->garbled) { /* everything is a bit late */
+	if (g->garbled) { /* all bits arrive one bit late */
 		in = (uint8_t)(in >> 1);
 		out = (uint8_t)(out >> 1);
 	}
@@ -149,7 +150,7 @@ void adis16100_power(void)
 	}
 }
 
-/* The processor was reset: its pins are inputs, and the chips pull ST1 and ST2 low. */
+/* After a reset of the processor: its pins are inputs, and the chips pull ST1 and ST2 low. */
 void adis16100_resume(void)
 {
 	memset(inputs, 0, sizeof inputs);
@@ -162,7 +163,7 @@ bool adis16100_fault(const char *name, const char *value)
 		if (!strcmp(name, gyros[k].name)) {
 			for (int f = 0; f < FAULTS; f++)
 				if (!strcmp(value, fault_names[f])) {
-					gyros[k].stuck_at = row.rate[gyros[k].channel_of_row];
+					gyros[k].stuck_rate = row.rate[gyros[k].channel_of_row];
 					gyros[k].fault = (enum fault)f;
 					return true;
 				}

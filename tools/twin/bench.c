@@ -22,16 +22,16 @@ static int out_fd;
 
 static void flush(void)
 {
-	unsigned at = 0;
+	unsigned written = 0;
 
-	while (at < out_length) {
-		ssize_t n = write(out_fd, out_buffer + at, out_length - at);
+	while (written < out_length) {
+		ssize_t n = write(out_fd, out_buffer + written, out_length - written);
 
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n <= 0)
-			fail("nobody reads: %s", strerror(errno));
-		at += (unsigned)n;
+			fail("cannot write the output: %s", strerror(errno));
+		written += (unsigned)n;
 	}
 	out_length = 0;
 }
@@ -77,24 +77,24 @@ void bench_trace(const char *format, ...)
 	put_record('T', text, (unsigned)length < sizeof text ? (unsigned)length : sizeof text - 1);
 }
 
-/* Exactly so many bytes; false at the end of the input before the first of them. */
+/* Reads exactly `length` bytes; false: the input ended before the first of them. */
 static bool read_all(int fd, void *into, size_t length)
 {
-	size_t at = 0;
+	size_t done = 0;
 
-	while (at < length) {
-		ssize_t n = read(fd, (char *)into + at, length - at);
+	while (done < length) {
+		ssize_t n = read(fd, (char *)into + done, length - done);
 
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n < 0)
 			fail("cannot read the input: %s", strerror(errno));
 		if (n == 0) {
-			if (at == 0)
+			if (done == 0)
 				return false;
 			fail("the input ends in the middle of a record");
 		}
-		at += (size_t)n;
+		done += (size_t)n;
 	}
 	return true;
 }
@@ -104,7 +104,7 @@ static void set_sync(bool level)
 	drive_pin('D', 4, level);
 }
 
-/* The pulse under way is cut short: its timer is gone. */
+/* Ends the SyncOut pulse under way, whose timer the reset has removed. */
 void bench_reset(void)
 {
 	set_sync(false);
@@ -145,14 +145,15 @@ static void run_millisecond(avr_cycle_count_t end)
 	}
 }
 
+/* Runs one millisecond per row. */
 static void advance(const uint8_t *rows, uint32_t length)
 {
 	static avr_cycle_count_t end;
 
 	if (length % ROW_SIZE)
 		fail("a record of rows has %u bytes, not a multiple of %zu", length, ROW_SIZE);
-	for (uint32_t at = 0; at < length; at += ROW_SIZE) {
-		memcpy(&row, rows + at, ROW_SIZE);
+	for (uint32_t offset = 0; offset < length; offset += ROW_SIZE) {
+		memcpy(&row, rows + offset, ROW_SIZE);
 		end += CYCLES_PER_MS;
 		run_millisecond(end);
 		if (pty_wanted())
@@ -162,6 +163,7 @@ static void advance(const uint8_t *rows, uint32_t length)
 	flush();
 }
 
+/* Switches that are no device's; false: no such switch. */
 static bool board_fault(const char *name, const char *value)
 {
 	if (!strcmp(name, "usb")) {

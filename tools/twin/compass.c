@@ -10,8 +10,8 @@
 static struct twi_device twi;
 static enum fault { GOOD, ABSENT, NACK, STRETCH, BAD_VALUE, FAULTS } fault;
 static const char *const fault_names[FAULTS] = { "ok", "absent", "nack", "stretch", "bad_value" };
-static bool fresh;
-static uint8_t pointer;
+static bool fresh;      /* the next byte written is a register's number */
+static uint8_t pointer; /* register of the next read */
 
 static bool on_start(struct twi_device *self, bool read)
 {

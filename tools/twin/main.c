@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * echostep-twin: runs the firmware's ELF on a board that is fed by the bench protocol on standard input. */
+ * echostep-twin: runs the firmware's ELF on a simulated board; the bench protocol on standard input is the board's input. */
 #include <elf.h>
 #include <getopt.h>
 #include <signal.h>
@@ -65,10 +65,14 @@ avr_int_vector_t *vector(int number)
 	fail("this simavr has no interrupt vector %d", number);
 }
 
-/* simavr forgets what drives a pin as soon as the program writes to its port with the pull-up on, unless it is told that way too. */
+/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. */
 void drive_pin(char port, uint8_t pin, bool level)
 {
-	avr_ioport_external_t outside = { .name = (unsigned)port & 0x7Fu, .mask = (uint8_t)(1u << pin), .value = (uint8_t)((unsigned)level << pin) };
+	avr_ioport_external_t outside = {
+		.name = (unsigned)port & 0x7Fu,
+		.mask = (uint8_t)(1u << pin),
+		.value = (uint8_t)((unsigned)level << pin),
+	};
 
 	avr_ioctl(avr, (uint32_t)AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &outside);
 	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
@@ -96,13 +100,13 @@ static void power_devices(void)
 	compass_power();
 }
 
-/* RAM holds nothing in particular. */
+/* The content of RAM after power-up is undefined. */
 static void scramble_memory(void)
 {
 	memset(avr->data + avr->ioend + 1, 0xA5, (size_t)(avr->ramend - avr->ioend));
 }
 
-/* What follows every reset, whoever caused it: simavr has forgotten all timers. */
+/* Called by simavr after every reset, whatever its cause; simavr has lost all timers. */
 static void after_reset(avr_t *a)
 {
 	a->data[MCUSR] = next_cause;
@@ -116,7 +120,7 @@ static void after_reset(avr_t *a)
 	else
 		scp1000_resume();
 	adis16100_resume();
-	next_cause = WATCHDOG; /* the only one that nobody announces */
+	next_cause = WATCHDOG; /* every other cause is set before its reset */
 	usb_host_start();
 }
 
@@ -145,7 +149,7 @@ bool board_has_power(void)
 	return powered;
 }
 
-/* What goes wrong is told once, by `fail`. */
+/* simavr's messages are not printed; errors are reported by `fail`. */
 static void no_log(avr_t *a, const int level, const char *format, va_list arguments)
 {
 	(void)a;
@@ -157,11 +161,11 @@ static void no_log(avr_t *a, const int level, const char *format, va_list argume
 static void no_sleep(avr_t *a, avr_cycle_count_t cycles)
 {
 	(void)a;
-	(void)cycles; /* simulated time jumps, nobody waits */
+	(void)cycles; /* simulated time jumps over the sleep */
 }
 
 /* Entering an interrupt takes 4 cycles on the chip and none in simavr. */
-static void entered(struct avr_irq_t *irq, uint32_t running, void *param)
+static void add_entry_cycles(struct avr_irq_t *irq, uint32_t running, void *param)
 {
 	(void)irq;
 	(void)param;
@@ -169,7 +173,7 @@ static void entered(struct avr_irq_t *irq, uint32_t running, void *param)
 		avr->cycle += 4;
 }
 
-/* simavr loads anything that it can open. */
+/* Needed because simavr loads any file that it can open. */
 static void check_elf(const char *path)
 {
 	Elf32_Ehdr head = { .e_machine = EM_NONE };
@@ -204,9 +208,9 @@ static void make_board(const char *path)
 	twi_init();
 	spi_init();
 	for (int i = 0; i < avr->interrupts.vector_count; i++)
-		avr_irq_register_notify(avr->interrupts.vector[i]->irq + AVR_INT_IRQ_RUNNING, entered, NULL);
+		avr_irq_register_notify(avr->interrupts.vector[i]->irq + AVR_INT_IRQ_RUNNING, add_entry_cycles, NULL);
 	for (uint8_t i = 0; i < EXTERNAL_INTERRUPTS; i++)
-		avr_extint_set_strict_lvl_trig(avr, i, 0); /* else simavr looks at a low pin on every cycle, wanted or not */
+		avr_extint_set_strict_lvl_trig(avr, i, 0); /* otherwise simavr polls low pins on every cycle */
 	avr->reset = after_reset;
 	after_reset(avr);
 }
@@ -247,10 +251,10 @@ int main(int argc, char **argv)
 	if (optind < argc)
 		fail("'%s' is not an option; see --help", argv[optind]);
 	if (!elf)
-		fail("say which firmware: --elf firmware/build/echostep.elf");
+		fail("no firmware given: use --elf firmware/build/echostep.elf");
 	signal(SIGPIPE, SIG_IGN);
 
-	int out = dup(STDOUT_FILENO); /* simavr prints on stdout: that must not get into the protocol */
+	int out = dup(STDOUT_FILENO); /* simavr prints on stdout: its text must not get into the protocol */
 
 	if (out < 0 || !freopen("/dev/null", "w", stdout))
 		fail("cannot set up the output");

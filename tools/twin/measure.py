@@ -1,6 +1,6 @@
-"""What the real firmware does in the twin, in figures: rates, stamp errors, losses, memory, speed. Each with its limit and PASS or FAIL.
+"""Figures of the real firmware in the twin: rates, errors of time stamps, losses, memory, speed; each with its limit and PASS or FAIL.
 
-In: the ELF and the twin (`make measure` builds both). Out: a table; exit status 1 when a limit is missed. Simulated hardware, real firmware.
+In: the ELF and the twin (`make measure` builds both). Out: a table; exit status 1 when a limit is missed. Owns the limits.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from echostep.simulation.stimulus import NO_SYNC, ROW
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
-SETTLED_S = 2.0  # enumeration and start-up are over
+SETTLED_S = 2.0  # enumeration and start-up take less
 TICK_US = 0.5
 
 
 @dataclass
-class Seen:
-    """What came out of one run."""
+class RunResult:
+    """Messages and losses of one run; `triggers` (per ranger) and `syncs` are time stamps in ticks of 0.5 us."""
 
     seconds: float = 0.0
     wall_s: float = 0.0
@@ -42,7 +42,7 @@ class Seen:
 
 
 def rows() -> np.ndarray:
-    """A second of a quiet corridor: echoes from both sides, some cross echoes, SyncOut at 100 Hz."""
+    """Rows of one second: an echo on both sides, a cross echo at the left, constant rates, SyncOut at 100 Hz."""
     table = np.zeros(1000, ROW)
     table["own_us"], table["cross_us"] = [5831, 6123], [9000, 0]
     table["thigh"], table["calf"], table["belt"] = 41, -82, 5
@@ -52,36 +52,36 @@ def rows() -> np.ndarray:
     return table
 
 
-def run(seconds: int, schedule: m.Schedule, title: str) -> tuple[Seen, list[tuple[int, str]]]:
-    """Run the firmware for so long; what the host saw and what happened on the buses."""
-    board, reader, seen, second = BoardProcess(TWIN), BoardReader(), Seen(), rows()
+def run(seconds: int, schedule: m.Schedule, title: str) -> tuple[RunResult, list[tuple[int, str]]]:
+    """Run the firmware for `seconds`; the messages received, and the trace of the buses as (ns, text)."""
+    board, reader, result, second = BoardProcess(TWIN), BoardReader(), RunResult(), rows()
     began = time.perf_counter()
     for k in track(range(seconds), title):
         if k == 1:
             board.send(encode(m.Configure(0xFF, schedule, 200, 10, m.PressureMode.HIGH_SPEED), 0))
         for t_ns, sent in board.advance(second):
             for message in reader.feed(sent):
-                note(seen, message, t_ns)
-    seen.wall_s, seen.seconds, seen.lost = time.perf_counter() - began, float(seconds), reader.counts.lost
+                add_message(result, message, t_ns)
+    result.wall_s, result.seconds, result.lost = time.perf_counter() - began, float(seconds), reader.counts.lost
     board.close()
-    return seen, board.trace
+    return result, board.trace
 
 
-def note(seen: Seen, message: m.Message, t_ns: int) -> None:
-    """Keep what the figures need."""
+def add_message(result: RunResult, message: m.Message, t_ns: int) -> None:
+    """Add a message to the result; before SETTLED_S only the status."""
     if isinstance(message, m.Status):
-        seen.status = message
+        result.status = message
     if t_ns < SETTLED_S * 1e9:
         return
-    seen.counts[type(message).__name__] += 1
+    result.counts[type(message).__name__] += 1
     if isinstance(message, m.Ping):
-        seen.triggers[message.ranger].append(message.ticks)
+        result.triggers[message.ranger].append(message.ticks)
     elif isinstance(message, m.Sync):
-        seen.syncs.append(message.ticks)
+        result.syncs.append(message.ticks)
 
 
 def stamp_errors(stamps: list[int], truth_ns: list[int]) -> tuple[float, float]:
-    """Worst and sd of stamp minus truth (us), after the constant offset; each stamp is held against the nearest event."""
+    """Largest absolute value and sd of stamp minus truth (us), without its median; each stamp is compared with the nearest event."""
     events = np.array(truth_ns) / 1e3
     found = np.array(stamps) * TICK_US
     after = np.clip(np.searchsorted(events, found), 1, len(events) - 1)
@@ -93,16 +93,16 @@ def stamp_errors(stamps: list[int], truth_ns: list[int]) -> tuple[float, float]:
 
 def figures(seconds: int) -> list[tuple[str, str, str, bool]]:
     """(what, measured, limit, passed) for every figure."""
-    seen, trace = run(seconds, m.Schedule.CONCURRENT, "both rangers at once")
-    slow, _ = run(min(seconds, 30), m.Schedule.SEQUENTIAL, "in turn, the paper's way")
-    span, slow_span = seen.seconds - SETTLED_S, slow.seconds - SETTLED_S
-    assert seen.status is not None
-    dropped = {k: v for k, v in seen.status._asdict().items() if k.startswith("dropped_") and v}
-    pings, gyros = seen.counts["Ping"] / span, seen.counts["Gyros"] / span
+    result, trace = run(seconds, m.Schedule.CONCURRENT, "both rangers at once")
+    slow, _ = run(min(seconds, 30), m.Schedule.SEQUENTIAL, "in turn, as in the paper")
+    span, slow_span = result.seconds - SETTLED_S, slow.seconds - SETTLED_S
+    assert result.status is not None
+    dropped = {k: v for k, v in result.status._asdict().items() if k.startswith("dropped_") and v}
+    pings, gyros = result.counts["Ping"] / span, result.counts["Gyros"] / span
     truth = {side: [t for t, text in trace if text == f"trigger {side}"] for side in ("left", "right")}
-    worst = [stamp_errors(seen.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
-    sync_worst, sync_sd = stamp_errors(seen.syncs, [t for t, text in trace if text == "sync"])
-    speed = seen.seconds / seen.wall_s
+    worst = [stamp_errors(result.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
+    sync_worst, sync_sd = stamp_errors(result.syncs, [t for t, text in trace if text == "sync"])
+    speed = result.seconds / result.wall_s
     trigger = max(w for w, _ in worst)
     return [
         ("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
@@ -115,9 +115,14 @@ def figures(seconds: int) -> list[tuple[str, str, str, bool]]:
         ("gyro samples/s", f"{gyros:.1f}", "200", abs(gyros - 200.0) < 1.0),
         ("worst trigger stamp", f"{trigger:.1f} us (sd {max(s for _, s in worst):.2f})", "<= 20 us", trigger <= 20.0),
         ("worst SyncOut stamp", f"{sync_worst:.1f} us (sd {sync_sd:.2f})", "<= 20 us", sync_worst <= 20.0),
-        (f"frames lost in {seconds / 60:.0f} min", str(seen.lost), "0", seen.lost == 0),
+        (f"frames lost in {seconds / 60:.0f} min", str(result.lost), "0", result.lost == 0),
         ("drops by stream", str(dropped or 0), "0", not dropped),
-        ("static RAM and deepest stack", f"{seen.status.memory_used} B", "< 2200 B", seen.status.memory_used < 2200),
+        (
+            "static RAM and deepest stack",
+            f"{result.status.memory_used} B",
+            "< 2200 B",
+            result.status.memory_used < 2200,
+        ),
         ("speed", f"{speed:.0f} x real time", ">= 20 x", speed >= 20.0),
     ]
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The board's port as a pseudo terminal that pyserial opens. DTR is up while somebody has it open; unplugged, it is gone. */
+ * The board's port as a pseudo terminal that pyserial can open. DTR is on while a program has it open. Unplugging removes the terminal. */
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -15,7 +15,7 @@
 
 static int master = -1;
 static bool wanted;
-static uint8_t waiting[PACKET_MAX]; /* the rest of a packet for which there was no room */
+static uint8_t waiting[PACKET_MAX]; /* the rest of a packet that the terminal had no room for */
 static unsigned waiting_length;
 
 bool pty_wanted(void)
@@ -32,7 +32,7 @@ static void make_raw(const char *name)
 		fail("cannot set up the pseudo terminal: %s", strerror(errno));
 	cfmakeraw(&settings);
 	tcsetattr(slave, TCSANOW, &settings);
-	close(slave); /* from now on a hang-up on the master means that nobody has it open */
+	close(slave); /* from now on a hang-up on the master means that no program has it open */
 }
 
 void pty_open(void)
@@ -67,7 +67,7 @@ void pty_write(const uint8_t *bytes, unsigned length)
 	memmove(waiting, bytes + done, waiting_length);
 }
 
-static void take_bytes(void)
+static void forward_bytes(void)
 {
 	uint8_t bytes[256];
 	ssize_t n = read(master, bytes, sizeof bytes);
@@ -90,7 +90,7 @@ void pty_poll(void)
 	if (!open)
 		waiting_length = 0;
 	if (p.revents & POLLIN)
-		take_bytes();
+		forward_bytes();
 	if (waiting_length)
 		pty_write(waiting, waiting_length);
 }

@@ -1,8 +1,8 @@
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
-In: the ELF and the twin; the MTx begins as it is sold, and answers its configuration. Out: two ports that
-`echostep live` opens, and the truth in out/twin/truth.csv; the walk begins when the board's port is opened, and starts anew when it is over,
-until Ctrl-C. With `--beacons udp://127.0.0.1:9000` a gateway tells there what beacons along the walk hear. Simulated hardware, real firmware.
+In: the ELF and the twin; the MTx begins with its factory settings and accepts its configuration. Out: two ports for `echostep live`, and the
+true path in out/twin/truth.csv. The walk begins when the board's port is opened, and is repeated until Ctrl-C. With
+`--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. Owns both pseudo terminals.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from echostep.xsens.reader import warm_up
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]
 BLOCK_MS, IDLE_MS = 10, 50
-LATE_S = 0.5  # a machine that is this far behind is told so
+LATE_S = 0.5  # a delay behind real time that is reported
 
 
 class PtyBoard:
-    """The twin with its port on a pseudo terminal: rows go in, bytes go to whoever has the port open."""
+    """The twin with its port on a pseudo terminal: rows in, the firmware's bytes to the program that has the port open."""
 
     def __init__(self) -> None:
         self._child = subprocess.Popen(TWIN, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -57,7 +57,7 @@ class PtyBoard:
         self.t_s = 0.0  # board time
 
     def advance(self, rows: object) -> Sent:
-        """Let the milliseconds of these rows pass."""
+        """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""
         body = rows.tobytes()  # type: ignore[attr-defined]
         self._in.write(b"R" + len(body).to_bytes(4, "little") + body)
         self._in.flush()
@@ -73,14 +73,14 @@ class PtyBoard:
                 return []
 
     def send(self, sent: bytes) -> None:
-        """Nothing: the host writes to the port itself."""
+        """Does nothing: the host writes to the port itself."""
 
     def fault(self, text: str) -> None:
-        """A fault switch."""
+        """Set a fault switch, `name=value`."""
         self._in.write(b"F" + len(text).to_bytes(4, "little") + text.encode())
 
     def close(self) -> None:
-        """End the twin."""
+        """Stop the twin."""
         self._child.kill()
         self._child.wait()
         for pipe in (self._in, self._out, self._child.stderr):
@@ -90,7 +90,7 @@ class PtyBoard:
 
 
 class PtyMtx:
-    """An MTx on a pseudo terminal, which answers."""
+    """A simulated MTx on a pseudo terminal, which answers the host's requests."""
 
     def __init__(self) -> None:
         self._ours, theirs = os.openpty()
@@ -100,36 +100,36 @@ class PtyMtx:
         self.device = MtxDevice()
         warm_up()
 
-    def listen(self) -> None:
-        """Answer what the host asked."""
+    def answer_requests(self) -> None:
+        """Read the host's requests and send the answers."""
         received = b""
         with contextlib.suppress(BlockingIOError):
             received = os.read(self._ours, 4096)
         self._write(self.device.feed(received, time.monotonic()))
 
     def measure(self, frame: bytes) -> None:
-        """Send a measurement, given as a frame in the project's format, as the device is set."""
+        """Send a measurement, given as a frame in the project's format, in the format that the device is set to."""
         for sample in MtxReader().feed(frame):
             self._write(self.device.measure(sample))
 
     def _write(self, sent: bytes) -> None:
-        with contextlib.suppress(BlockingIOError):  # nobody reads: as with a cable that leads nowhere
+        with contextlib.suppress(BlockingIOError):  # no program reads: the bytes are lost, as on a cable without a host
             if sent:
                 os.write(self._ours, sent)
 
 
-def wait_for_listener(board: PtyBoard, mtx: PtyMtx) -> None:
-    """Let the board idle, at the pace of the wall clock, until somebody opens its port."""
+def wait_for_opening(board: PtyBoard, mtx: PtyMtx) -> None:
+    """Run the board with empty rows, in real time, until a program opens its port."""
     idle = np.zeros(IDLE_MS, ROW)
     idle["sync_us"] = NO_SYNC
     while not board.is_open:
         board.advance(idle)
-        mtx.listen()
+        mtx.answer_requests()
         time.sleep(IDLE_MS * 1e-3)
 
 
 def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
-    """One walk at the pace of the wall clock."""
+    """Play one walk in real time."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
     began = time.monotonic()
@@ -138,7 +138,7 @@ def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
         if not mtx.device.pulses:
             rows["sync_us"] = NO_SYNC
         board.advance(rows)
-        mtx.listen()
+        mtx.answer_requests()
         now_s = (start + BLOCK_MS) * 1e-3
         while waiting is not None and waiting[0] <= now_s:
             mtx.measure(waiting[1])
@@ -147,7 +147,7 @@ def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
         if ahead > 0:
             time.sleep(ahead)
         elif ahead < -LATE_S:
-            print(f"this machine is {-ahead:.1f} s behind real time", file=sys.stderr)
+            print(f"the simulation is {-ahead:.1f} s behind real time", file=sys.stderr)
             began = time.monotonic() - now_s
 
 
@@ -156,7 +156,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--once", action="store_true", help="end after one walk")
     parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
-    parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway there, in step with the walk")
+    parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
     options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
@@ -171,12 +171,12 @@ def main() -> int:
     try:
         while True:
             scenario = demo_scenario(plan, options.seed, board)
-            wait_for_listener(board, mtx)
+            wait_for_opening(board, mtx)
             truth = options.out / "truth.csv"
             scenario.write_truth(truth, board.t_s)
             if options.beacons:
-                told = (path, truth, options.beacons, SPACING_M, 1.0, options.seed)
-                threading.Thread(target=simulate_gateway, args=told, daemon=True).start()
+                arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed)
+                threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
             play(scenario, board, mtx)
             if options.once:
                 break

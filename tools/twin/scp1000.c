@@ -2,7 +2,7 @@
  * SCP1000-D01 barometer on SPI [SCP1000 product family specification]: mode 0, at most 500 kHz, frames of address << 2 | write << 1.
  *
  * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and falls when
- * DATARD16 is read. Writing 1 to RSTR starts it anew. DRDY is wired to PE6. */
+ * DATARD16 is read. Writing 1 to RSTR restarts it. DRDY is wired to PE6. */
 #include <string.h>
 
 #include <simavr/sim_cycle_timers.h>
@@ -77,10 +77,10 @@ static void on_select(struct spi_device *self, bool on)
 		bench_trace("scp1000 wrong mode");
 }
 
-static void plan_sample(avr_cycle_count_t at)
+static void plan_sample(avr_cycle_count_t when)
 {
-	sample_at = at;
-	avr_cycle_timer_register(avr, at - avr->cycle, sample, NULL);
+	sample_at = when;
+	avr_cycle_timer_register(avr, when - avr->cycle, sample, NULL);
 }
 
 static void restart(void)
@@ -118,7 +118,7 @@ static uint8_t exchange(uint8_t out)
 static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 {
 	(void)self;
-	return garbled ? (uint8_t)(exchange((uint8_t)(out >> 1)) >> 1) : exchange(out); /* everything is a bit late */
+	return garbled ? (uint8_t)(exchange((uint8_t)(out >> 1)) >> 1) : exchange(out); /* all bits arrive one bit late */
 }
 
 void scp1000_power(void)
@@ -131,7 +131,7 @@ void scp1000_power(void)
 	restart();
 }
 
-/* The processor was reset, the chip was not. */
+/* After a reset of the processor: the chip keeps its state; DRDY and the timer are set again. */
 void scp1000_resume(void)
 {
 	bool level = ready;

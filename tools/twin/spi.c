@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * SPI master with the clock of SPCR and SPSR (simavr takes 100 us a byte), and chip selects on port pins. */
+ * SPI master with the clock of SPCR and SPSR (in simavr a byte takes 100 us), and chip selects on port pins. */
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_spi.h>
 #include <simavr/sim_cycle_timers.h>
@@ -35,7 +35,7 @@ unsigned spi_mode(void)
 
 static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 {
-	uint8_t answer = 0xFF; /* nobody drives MISO */
+	uint8_t answer = 0xFF; /* MISO is pulled up */
 
 	(void)a;
 	(void)when;
@@ -47,9 +47,9 @@ static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 	return 0;
 }
 
-static void write_byte(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+static void write_byte(avr_t *a, avr_io_addr_t address, uint8_t value, void *param)
 {
-	(void)at;
+	(void)address;
 	(void)param;
 	if ((a->data[SPCR] & (SPE | MSTR)) != (SPE | MSTR))
 		return;
@@ -78,7 +78,7 @@ void spi_init(void)
 void spi_reset(void)
 {
 	for (struct spi_device *d = devices; d; d = d->next)
-		select_changed(NULL, 1, d); /* the pins are inputs now, and the chips pull them up */
+		select_changed(NULL, 1, d); /* the pins are inputs after a reset, and the chips pull them up */
 }
 
 void spi_add(struct spi_device *device)

@@ -1,24 +1,38 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Two SRF02 ultrasonic rangers on the I2C bus [SRF02 technical specification].
  *
- * Ranging takes 61 ms and up to 1 ms more; meanwhile the device does not answer its address. The echo that arrives first after the
- * ring-down and within the listening window wins: the own one, or that of the other ranger's ping. */
+ * Ranging takes 61 to 62 ms; during this time the device does not acknowledge its address. The result is the first echo after the
+ * ring-down and within the listening window: of its own ping, or of the other ranger's ping. */
 #include <string.h>
 
 #include "twin.h"
 
 enum { COMMAND, RANGE_HIGH = 2, RANGE_LOW, MINIMUM_HIGH, MINIMUM_LOW };
+enum { /* commands; the units follow each other: inches, cm, us */
+	REAL_FIRST = 0x50,
+	REAL_LAST = 0x52,
+	FAKE_FIRST = 0x56, /* ranging without a burst */
+	FAKE_LAST = 0x58,
+	BURST = 0x5C, /* without ranging */
+	ADDRESS_1 = 0xA0,
+	ADDRESS_2 = 0xAA,
+	ADDRESS_3 = 0xA5,
+	ADDRESS_LOWEST = 0xE0,
+};
+enum { INCHES, CENTIMETRES, MICROSECONDS };
 #define REVISION 6
 #define UNUSED 0x80
 #define RANGING_US 61000u
-#define SPREAD_US 1000u
+#define SPREAD_US 1000u /* random part of a ranging's duration */
 #define RING_DOWN_US 875u /* 15 cm, out and back */
 #define WINDOW_US 35000u  /* 600 cm */
+#define US_PER_CM 58u     /* out and back */
+#define US_PER_INCH 148u
 #define STRETCH US(500)
-#define PINGS 4
+#define PINGS 4 /* kept for cross echoes */
 
 struct ping {
-	avr_cycle_count_t at;
+	avr_cycle_count_t emitted_at;
 	uint16_t cross_us; /* when it reaches the other ranger, 0: never */
 };
 
@@ -27,16 +41,18 @@ static struct ranger {
 	const char *name;
 	int side;
 	bool absent, refuses, stretches, mute, deaf;
-	uint8_t pointer, written[2], count, sequence; /* of an address change */
+	uint8_t pointer;           /* register of the next read */
+	uint8_t written[2], count; /* bytes of the write under way */
+	uint8_t sequence;          /* commands of an address change so far */
 	avr_cycle_count_t busy_until, began;
-	bool emitted, listening;
-	uint8_t unit;
+	bool emitted, listening; /* of the ranging under way: has an own ping; not finished */
+	uint8_t unit;            /* of the result */
 	uint16_t own_us, result;
 	struct ping pings[PINGS];
 	unsigned next_ping;
 } rangers[2] = { { .name = "left", .side = 0 }, { .name = "right", .side = 1 } };
 
-/* Earliest audible arrival at this ranger, in us after its own trigger; 0 for none. */
+/* Earliest arrival at this ranger within its window, in us after its trigger; 0: none. */
 static uint16_t earliest(const struct ranger *r)
 {
 	const struct ranger *other = &rangers[1 - r->side];
@@ -44,7 +60,7 @@ static uint16_t earliest(const struct ranger *r)
 
 	for (int k = 0; k < PINGS; k++) {
 		const struct ping *p = &other->pings[k];
-		int64_t arrival = ((int64_t)p->at - (int64_t)r->began) / 16 + p->cross_us;
+		int64_t arrival = ((int64_t)p->emitted_at - (int64_t)r->began) / 16 + p->cross_us;
 
 		if (p->cross_us && arrival >= RING_DOWN_US && arrival < best)
 			best = arrival;
@@ -59,26 +75,26 @@ static void finish(struct ranger *r)
 	r->listening = false;
 	if (r->deaf)
 		us = 0;
-	r->result = r->unit == 2 ? us : (uint16_t)(us / (r->unit == 1 ? 58u : 148u));
+	r->result = r->unit == MICROSECONDS ? us : (uint16_t)(us / (r->unit == CENTIMETRES ? US_PER_CM : US_PER_INCH));
 }
 
 static void begin(struct ranger *r, uint8_t command)
 {
 	struct ranger *other = &rangers[1 - r->side];
-	bool burst = command != 0x56 && command != 0x57 && command != 0x58;
+	bool burst = command < FAKE_FIRST || command > FAKE_LAST;
 
 	if (other->listening && avr->cycle >= other->busy_until)
-		finish(other); /* before it forgets the pings that it heard */
+		finish(other); /* this ping may overwrite one that the other ranger's result needs */
 	if (burst) {
 		r->pings[r->next_ping++ % PINGS] = (struct ping){ avr->cycle, row.cross_us[1 - r->side] };
 		bench_trace("trigger %s", r->name);
 	}
-	if (command == 0x5C)
+	if (command == BURST)
 		return;
 	r->began = avr->cycle;
 	r->emitted = burst;
 	r->own_us = row.own_us[r->side];
-	r->unit = (uint8_t)((command - 0x50) % 6);
+	r->unit = (uint8_t)((command - REAL_FIRST) % (FAKE_FIRST - REAL_FIRST));
 	r->listening = true;
 	r->busy_until = avr->cycle + US(RANGING_US + random_below(SPREAD_US));
 }
@@ -116,23 +132,28 @@ static uint8_t on_read(struct twi_device *self)
 	return registers[r->pointer++ % 6];
 }
 
-static uint8_t next_in_sequence(uint8_t sequence, uint8_t command)
+static bool is_ping_command(uint8_t command)
 {
-	if (command == 0xA0)
-		return 1;
-	return command == 0xAA && sequence == 1 ? 2 : command == 0xA5 && sequence == 2 ? 3 : 0;
+	return (command >= REAL_FIRST && command <= REAL_LAST) || (command >= FAKE_FIRST && command <= FAKE_LAST) || command == BURST;
 }
 
-/* Commands take effect at the stop condition. Address change: A0, AA, A5, then the new 8-bit address, one command each. */
+static uint8_t next_in_sequence(uint8_t sequence, uint8_t command)
+{
+	if (command == ADDRESS_1)
+		return 1;
+	return command == ADDRESS_2 && sequence == 1 ? 2 : command == ADDRESS_3 && sequence == 2 ? 3 : 0;
+}
+
+/* Commands take effect at the stop condition. Address change: ADDRESS_1, _2, _3, then the new 8-bit address, each as a command. */
 static void on_stop(struct twi_device *self)
 {
 	struct ranger *r = (struct ranger *)self;
 	uint8_t command = r->written[1];
 
 	if (r->count == 2 && r->written[0] == COMMAND) {
-		if ((command >= 0x50 && command <= 0x52) || (command >= 0x56 && command <= 0x58) || command == 0x5C)
+		if (is_ping_command(command))
 			begin(r, command);
-		else if (r->sequence == 3 && command >= 0xE0 && !(command & 1))
+		else if (r->sequence == 3 && command >= ADDRESS_LOWEST && !(command & 1))
 			self->address = command >> 1;
 		r->sequence = next_in_sequence(r->sequence, command);
 	}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Two-wire interface, master mode, with the bit timing of TWBR and TWSR [ATmega32U4 data sheet, chapter 20], a bus of devices, clock
- * stretching, and an SDA line that a device may hold down until it has seen nine clocks. */
+ * Two-wire interface, master mode [ATmega32U4 data sheet, chapter 20]: bit timing of TWBR and TWSR, devices on the bus, clock
+ * stretching, and an SDA line that a device may hold low until it has received nine clocks. */
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>
@@ -10,20 +10,32 @@
 enum { TWBR = 0xB8, TWSR, TWAR, TWDR, TWCR };
 enum { TWINT = 0x80, TWEA = 0x40, TWSTA = 0x20, TWSTO = 0x10, TWEN = 4, TWIE = 1 };
 enum { DDRD = 0x2A, SCL = 1, SDA = 2 };
+enum { /* status codes [data sheet, tables 20-3 and 20-4] */
+	STATUS_START = 0x08,
+	STATUS_REPEATED_START = 0x10,
+	STATUS_WRITE_ADDRESS_ACK = 0x18,
+	STATUS_WRITE_ADDRESS_NACK = 0x20,
+	STATUS_WRITE_ACK = 0x28,
+	STATUS_WRITE_NACK = 0x30,
+	STATUS_LOST = 0x38,
+	STATUS_READ_ADDRESS_ACK = 0x40,
+	STATUS_READ_ADDRESS_NACK = 0x48,
+	STATUS_READ_ACK = 0x50,
+	STATUS_READ_NACK = 0x58,
+	STATUS_IDLE = 0xF8,
+};
 #define VECTOR 36
-#define IDLE_STATUS 0xF8
-#define LOST_STATUS 0x38
-#define READ_REFUSED_STATUS 0x58
+#define BITS_PER_BYTE 9 /* with the acknowledge */
 #define CLOCKS_TO_FREE 9
 
 static struct twi_device *devices, *active, *stopping;
 static enum { IDLE, ADDRESS, WRITING, READING, REFUSED } phase;
-static bool own;         /* a start condition was sent */
-static uint8_t status;   /* of the operation under way */
-static int read_byte = -1;
+static bool owns_bus;    /* a start condition was sent */
+static uint8_t status;   /* at the end of the operation under way */
+static int read_byte = -1; /* for TWDR at the end of the operation; -1: none */
 static avr_cycle_count_t bus_free_at;
 static enum twi_fault line;
-static unsigned clocks;
+static unsigned clocks; /* made by hand while the TWI is off */
 
 static unsigned bit_cycles(void)
 {
@@ -40,18 +52,18 @@ static void set_status(uint8_t value)
 static void release(void)
 {
 	active = NULL;
-	own = false;
+	owns_bus = false;
 	phase = IDLE;
-	set_status(IDLE_STATUS);
+	set_status(STATUS_IDLE);
 }
 
 static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	(void)when;
 	(void)param;
-	if (line != TWI_GOOD && status == READ_REFUSED_STATUS) {
-		release(); /* our NACK read back as an ACK */
-		status = LOST_STATUS;
+	if (line != TWI_GOOD && status == STATUS_READ_NACK) {
+		release(); /* the master's NACK reads back as an ACK */
+		status = STATUS_LOST;
 	}
 	set_status(status);
 	if (read_byte >= 0)
@@ -85,12 +97,12 @@ static void start(void)
 	unsigned wait = 0;
 
 	if (line != TWI_GOOD)
-		return; /* SDA never rises: the start condition never happens */
-	if (!own && avr->cycle < bus_free_at)
+		return; /* SDA does not rise: no start condition */
+	if (!owns_bus && avr->cycle < bus_free_at)
 		wait = (unsigned)((bus_free_at - avr->cycle + bit_cycles() - 1) / bit_cycles());
 	active = NULL;
-	operate(1 + wait, own ? 0x10 : 0x08);
-	own = true;
+	operate(1 + wait, owns_bus ? STATUS_REPEATED_START : STATUS_START);
+	owns_bus = true;
 	phase = ADDRESS;
 }
 
@@ -99,7 +111,7 @@ static void stop(void)
 	stopping = active;
 	release();
 	if (line != TWI_GOOD)
-		return; /* SDA never rises: the stop condition never happens */
+		return; /* SDA does not rise: no stop condition */
 	avr_cycle_timer_register(avr, bit_cycles(), stopped, NULL);
 	bus_free_at = avr->cycle + bit_cycles() + bit_cycles() / 2;
 }
@@ -114,20 +126,23 @@ static void address(uint8_t byte)
 			ack = true;
 		}
 	phase = !ack ? REFUSED : reading ? READING : WRITING;
-	operate(9, reading ? (ack ? 0x40 : 0x48) : (ack ? 0x18 : 0x20));
+	if (reading)
+		operate(BITS_PER_BYTE, ack ? STATUS_READ_ADDRESS_ACK : STATUS_READ_ADDRESS_NACK);
+	else
+		operate(BITS_PER_BYTE, ack ? STATUS_WRITE_ADDRESS_ACK : STATUS_WRITE_ADDRESS_NACK);
 }
 
-/* Somebody else holds SDA down: a one that we send reads back as a zero, which looks like another master that won. */
-static void lose(uint8_t byte)
+/* A device holds SDA low: a one that the master sends reads back as a zero, as if another master had won the arbitration. */
+static void lose_arbitration(uint8_t byte)
 {
 	unsigned zeros = 0;
 
 	while (!(byte & (0x80u >> zeros)))
 		zeros++;
 	active = NULL;
-	own = false;
+	owns_bus = false;
 	phase = IDLE;
-	operate(zeros + 1, LOST_STATUS);
+	operate(zeros + 1, STATUS_LOST);
 }
 
 static void transfer(uint8_t control)
@@ -135,17 +150,17 @@ static void transfer(uint8_t control)
 	uint8_t byte = avr->data[TWDR];
 
 	if (line != TWI_GOOD && phase != READING && byte) {
-		lose(byte);
+		lose_arbitration(byte);
 		return;
 	}
 	switch (phase) {
 	case ADDRESS: address(byte); break;
-	case WRITING: operate(9, active->write(active, byte) ? 0x28 : 0x30); break;
+	case WRITING: operate(BITS_PER_BYTE, active->write(active, byte) ? STATUS_WRITE_ACK : STATUS_WRITE_NACK); break;
 	case READING:
 		read_byte = line == TWI_GOOD ? active->read(active) : 0;
-		operate(9, control & TWEA ? 0x50 : READ_REFUSED_STATUS);
+		operate(BITS_PER_BYTE, control & TWEA ? STATUS_READ_ACK : STATUS_READ_NACK);
 		break;
-	case REFUSED: operate(9, 0x30); break;
+	case REFUSED: operate(BITS_PER_BYTE, STATUS_WRITE_NACK); break;
 	case IDLE: break;
 	}
 }
@@ -161,11 +176,11 @@ static void disable(void)
 	clocks = 0;
 }
 
-static void write_control(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+static void write_control(avr_t *a, avr_io_addr_t register_address, uint8_t value, void *param)
 {
 	uint8_t flag = a->data[TWCR] & TWINT;
 
-	(void)at;
+	(void)register_address;
 	(void)param;
 	a->data[TWCR] = (uint8_t)((value & 0x75) | (value & TWINT ? 0 : flag));
 	if (!(value & TWEN)) {
@@ -180,30 +195,30 @@ static void write_control(avr_t *a, avr_io_addr_t at, uint8_t value, void *param
 			stop();
 		if (value & TWSTA)
 			start();
-		else if (own)
+		else if (owns_bus)
 			transfer(value);
 	}
 }
 
-static void write_status(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+static void write_status(avr_t *a, avr_io_addr_t register_address, uint8_t value, void *param)
 {
 	(void)param;
-	a->data[at] = (uint8_t)((a->data[at] & 0xF8) | (value & 3));
+	a->data[register_address] = (uint8_t)((a->data[register_address] & 0xF8) | (value & 3));
 }
 
-static void write_plain(avr_t *a, avr_io_addr_t at, uint8_t value, void *param)
+static void write_plain(avr_t *a, avr_io_addr_t register_address, uint8_t value, void *param)
 {
 	(void)param;
-	a->data[at] = value;
+	a->data[register_address] = value;
 }
 
-static uint8_t read_plain(avr_t *a, avr_io_addr_t at, void *param)
+static uint8_t read_plain(avr_t *a, avr_io_addr_t register_address, void *param)
 {
 	(void)param;
-	return a->data[at];
+	return a->data[register_address];
 }
 
-/* With the TWI off, the program may clock the bus by hand: DDRD drives the lines low. */
+/* With the TWI off, the program can clock the bus by hand: a one in DDRD drives a line low. */
 static void lines_changed(struct avr_irq_t *irq, uint32_t value, void *param)
 {
 	static uint8_t before;
@@ -249,8 +264,8 @@ void twi_fault(enum twi_fault fault)
 	line = fault;
 	if (fault != TWI_GOOD || !(control & TWEN))
 		return;
-	if (control & TWSTO) /* what waited for SDA to rise happens now */
+	if (control & TWSTO) /* a stop or start that waited for SDA to rise */
 		stop();
-	if ((control & TWSTA) && !own)
+	if ((control & TWSTA) && !owns_bus)
 		start();
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The twin: an unmodified ATmega32U4 ELF in simavr, with buses, devices and a USB host around it.
+ * The twin: an unmodified ATmega32U4 ELF in simavr, with models of buses, devices and a USB host.
  *
- * simavr's own USB, TWI and SPI are replaced from outside, through its public tables, by models with true timing: usb_device.c, twi.c,
- * spi.c. Everything happens in simulated time; equal input gives equal output. */
+ * simavr's own USB, TWI and SPI are replaced, through its public tables, by models with true timing: usb_device.c, twi.c, spi.c.
+ * Everything happens in simulated time; equal input gives equal output. */
 #ifndef ECHOSTEP_TWIN_H
 #define ECHOSTEP_TWIN_H
 
@@ -15,14 +15,15 @@
 #define CYCLES_PER_MS 16000u
 #define US(n) ((avr_cycle_count_t)(n) * 16u)
 
-/* One millisecond of what the sensors feel (host/DESIGN.md, the bench). */
+/* One millisecond of the sensors' input (host/DESIGN.md, the bench). */
 struct row {
 	int16_t rate[3]; /* thigh, calf, belt: ADIS16100 counts */
-	uint16_t own_us[2], cross_us[2];
-	uint16_t bearing;
-	uint32_t pressure;
-	int16_t temperature;
-	uint16_t sync_us;
+	uint16_t own_us[2];   /* left, right ranger: trigger to its own echo, 0: none */
+	uint16_t cross_us[2]; /* trigger of the other ranger to its echo at this one, 0: none */
+	uint16_t bearing;     /* 0.1 deg */
+	uint32_t pressure;    /* 0.25 Pa */
+	int16_t temperature;  /* 0.05 degC */
+	uint16_t sync_us;     /* SyncOut edge within this millisecond, or NO_SYNC */
 } __attribute__((packed));
 
 #define ROW_SIZE sizeof(struct row)
@@ -30,27 +31,27 @@ struct row {
 
 extern avr_t *avr;
 extern struct row row;       /* the millisecond under way */
-extern uint64_t random_state; /* of everything that varies from part to part */
+extern uint64_t random_state; /* for everything that varies from part to part */
 
 uint32_t random_below(uint32_t limit);
-uint64_t time_ns(void);
-void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
+uint64_t time_ns(void); /* simulated */
+void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2))); /* one line on stderr, exit status 2 */
 avr_int_vector_t *vector(int number);
 
-/* What a chip outside drives onto an input; one pin a port. */
+/* Sets the level that a chip drives onto an input pin; at most one such pin per port. */
 void drive_pin(char port, uint8_t pin, bool level);
 
-/* Take a register over: reads and writes of the program call these. */
+/* Replaces the functions that the program's reads and writes of a register call. */
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write);
 
-/* bench.c: what leaves the board, and what tests may know about its buses. */
+/* bench.c: the bytes that the board sends, and traces of its buses for tests. */
 void bench_sent(const uint8_t *bytes, unsigned length);
-bool bench_has_room(void); /* else the program on the host does not read */
+bool bench_has_room(void); /* false: the program on the host does not read */
 void bench_trace(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void bench_reset(void);
 void bench_run(int in, int out);
 
-/* usb_device.c: the device controller, seen from the cable. */
+/* usb_device.c: the device controller, from the cable's side. */
 enum usb_answer { USB_ACK = 0, USB_NAK = -1, USB_STALL = -2, USB_SILENCE = -3 };
 void usb_device_init(void);
 void usb_device_reset(void);
@@ -58,10 +59,10 @@ bool usb_device_attached(void);
 void usb_bus_reset(void);
 void usb_frame(uint16_t number);
 int usb_setup(const uint8_t *request);
-int usb_in(uint8_t endpoint, uint8_t *bytes); /* length, or an answer */
+int usb_in(uint8_t endpoint, uint8_t *bytes); /* returns the length, or a usb_answer */
 int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length);
 
-/* usb_host.c: enumerates, opens the port, moves bytes. */
+/* usb_host.c: enumerates the device, opens the port, moves bytes. */
 void usb_host_start(void);   /* after power-up: registers its timer */
 void usb_host_unplug(void);
 void usb_host_reset(void);   /* a bus reset: the device is enumerated again */
@@ -76,7 +77,7 @@ struct twi_device {
 	bool (*write)(struct twi_device *self, uint8_t byte);  /* acknowledge? */
 	uint8_t (*read)(struct twi_device *self);
 	void (*stop)(struct twi_device *self);
-	uint32_t stretch; /* cycles that the device holds the clock at each byte */
+	uint32_t stretch; /* cycles for which the device holds the clock low after each byte */
 	struct twi_device *next;
 };
 enum twi_fault { TWI_GOOD, TWI_STUCK, TWI_STUCK_FOREVER };
@@ -100,19 +101,19 @@ void spi_add(struct spi_device *device);
 unsigned spi_hertz(void);
 unsigned spi_mode(void);
 
-/* The devices: power-up (a reset of the processor is none), and `name=value` switches (false: no such switch). */
+/* The devices: power-up (a reset of the processor is none), and fault switches `name=value` (false: no such switch). */
 void srf02_power(void);
 bool srf02_fault(const char *name, const char *value);
 void adis16100_power(void);
-void adis16100_resume(void); /* after a reset of the processor, which let its pins go */
+void adis16100_resume(void); /* after a reset of the processor: its pins are inputs again */
 bool adis16100_fault(const char *name, const char *value);
 void scp1000_power(void);
-void scp1000_resume(void); /* after a reset of the processor, which lost the timers */
+void scp1000_resume(void); /* after a reset of the processor: simavr has lost the timers */
 bool scp1000_fault(const char *name, const char *value);
 void compass_power(void);
 bool compass_fault(const char *name, const char *value);
 
-/* pty.c: the port as a pseudo terminal, there while the board is plugged in. */
+/* pty.c: the port as a pseudo terminal, which exists while the board is plugged in. */
 void pty_open(void);
 void pty_close(void);
 bool pty_wanted(void);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: registers on one side, the cable on the other.
  *
- * Two-bank endpoints, interrupts on levels as in silicon: recomputed on every access and after every interrupt. */
+ * Endpoints with two banks. Interrupts depend on levels, as in the chip: they are computed on every access and after every interrupt. */
 #include <string.h>
 
 #include <simavr/sim_interrupts.h>
@@ -17,21 +17,21 @@ enum { USBE = 0x80, FRZCLK = 0x20, OTGPADE = 0x10, VBUS = 1, VBUSTI = 1, VBUSTE 
 enum { PLLCSR = 0x49, PLOCK = 1, UVREGE = 1 };
 enum { EPEN = 1, RSTDT = 8, STALLRQC = 16, STALLRQ = 32, ALLOC = 2, ADDEN = 0x80 };
 #define ENDPOINTS 7
-#define BANK_SIZE 64 /* the most that full speed allows for control and bulk */
+#define BANK_SIZE 64 /* maximum of full speed for control and bulk */
 #define VECTOR_GENERAL 10
 #define VECTOR_ENDPOINT 11
 
 struct bank {
 	uint8_t bytes[BANK_SIZE];
 	int length, read;
-	bool full; /* belongs to the cable (IN) or to the program (OUT) */
+	bool full; /* holds a packet, which the cable (IN) or the program (OUT) has to fetch */
 };
 
 static struct endpoint {
 	uint8_t conx, cfg0, cfg1, enabled, flags;
 	bool stalled;
 	struct bank bank[2]; /* of a control endpoint: 0 is OUT and SETUP, 1 is IN */
-	int cpu, cable;      /* which bank either side works on */
+	int cpu, cable;      /* bank on which each side works */
 } endpoints[ENDPOINTS];
 
 static bool is_in(const struct endpoint *e) { return e->cfg0 & 1; }
@@ -119,7 +119,7 @@ static void write_byte(struct endpoint *e, uint8_t value)
 		b->bytes[b->length++] = value;
 }
 
-/* UEINTX: bits written as zero are cleared, and with some of them a bank changes hands. */
+/* UEINTX: bits written as zero are cleared; some of them hand over a bank. */
 static void clear_flags(struct endpoint *e, uint8_t cleared)
 {
 	e->flags &= (uint8_t)~(cleared & (STALLEDI | NAKOUTI | NAKINI));
@@ -153,7 +153,7 @@ static void clear_flags(struct endpoint *e, uint8_t cleared)
 	}
 }
 
-/* Of an IN endpoint, a one in the place of RXOUTI is KILLBK: the bank handed over last is taken back. */
+/* On an IN endpoint, a one in the bit of RXOUTI is KILLBK: it takes back the bank that was handed over last. */
 static void kill_bank(struct endpoint *e)
 {
 	int last = (e->cpu + banks_of(e) - 1) % banks_of(e);
@@ -177,31 +177,45 @@ static void reset_fifo(struct endpoint *e)
 		offer_bank(e);
 }
 
-static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void *param)
+/* Registers of the whole device. */
+static void write_device_register(avr_io_addr_t address, uint8_t value)
 {
-	struct endpoint *e = selected();
-	uint8_t old = a->data[address];
+	uint8_t old = avr->data[address];
 
-	(void)param;
 	switch (address) {
 	case USBCON:
-		a->data[address] = value;
+		avr->data[address] = value;
 		if ((value & OTGPADE) && !(old & OTGPADE)) {
-			a->data[USBSTA] |= VBUS;
-			a->data[USBINT] |= VBUSTI;
+			avr->data[USBSTA] |= VBUS;
+			avr->data[USBINT] |= VBUSTI;
 		}
 		if (!(value & USBE))
 			memset(endpoints, 0, sizeof endpoints);
 		break;
 	case USBINT:
-	case UDINT: a->data[address] &= value; break;
-	case UENUM: a->data[address] = value & 7; break;
+	case UDINT: avr->data[address] &= value; break;
+	case UENUM: avr->data[address] = value & 7; break;
 	case UERST:
 		for (int i = 1; i < ENDPOINTS; i++)
 			if ((old & ~value) & (1 << i))
 				reset_fifo(&endpoints[i]);
-		a->data[address] = value;
+		avr->data[address] = value;
 		break;
+	case UEINT:
+	case UDFNUML:
+	case UDFNUMH: break; /* read only */
+	default: avr->data[address] = value;
+	}
+}
+
+/* Registers of the selected endpoint, and those of the whole device. */
+static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void *param)
+{
+	struct endpoint *e = selected();
+
+	(void)a;
+	(void)param;
+	switch (address) {
 	case UECONX:
 		e->conx = value & EPEN;
 		if (value & STALLRQ)
@@ -222,14 +236,11 @@ static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void 
 			kill_bank(e);
 		clear_flags(e, (uint8_t)(e->flags & ~value));
 		break;
-	case UEINT:
 	case UEBCLX:
 	case UEBCHX:
 	case UESTA0X:
-	case UESTA1X:
-	case UDFNUML:
-	case UDFNUMH: break; /* read only */
-	default: a->data[address] = value;
+	case UESTA1X: break; /* read only */
+	default: write_device_register(address, value);
 	}
 	refresh();
 }
@@ -280,8 +291,8 @@ void usb_frame(uint16_t number)
 	refresh();
 }
 
-/* NULL: nobody answers under that number. */
-static struct endpoint *endpoint_at(uint8_t number)
+/* The endpoint with this number; NULL: not enabled. */
+static struct endpoint *enabled_endpoint(uint8_t number)
 {
 	if (!usb_device_attached() || number >= ENDPOINTS || !(endpoints[number].conx & EPEN) || !(endpoints[number].cfg1 & ALLOC))
 		return NULL;
@@ -290,11 +301,11 @@ static struct endpoint *endpoint_at(uint8_t number)
 
 int usb_setup(const uint8_t *request)
 {
-	struct endpoint *e = endpoint_at(0);
+	struct endpoint *e = enabled_endpoint(0);
 
 	if (!e)
 		return USB_SILENCE;
-	e->stalled = false; /* a SETUP always gets through */
+	e->stalled = false; /* a SETUP is always accepted */
 	memcpy(e->bank[0].bytes, request, 8);
 	e->bank[0].length = 8;
 	e->bank[0].read = 0;
@@ -305,7 +316,7 @@ int usb_setup(const uint8_t *request)
 
 int usb_in(uint8_t endpoint, uint8_t *bytes)
 {
-	struct endpoint *e = endpoint_at(endpoint);
+	struct endpoint *e = enabled_endpoint(endpoint);
 
 	if (!e)
 		return USB_SILENCE;
@@ -338,7 +349,7 @@ int usb_in(uint8_t endpoint, uint8_t *bytes)
 
 int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length)
 {
-	struct endpoint *e = endpoint_at(endpoint);
+	struct endpoint *e = enabled_endpoint(endpoint);
 
 	if (!e || length > (unsigned)size_of(e))
 		return USB_SILENCE;

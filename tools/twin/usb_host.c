@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The USB host: waits for a device, resets and enumerates it, configures the CDC-ACM port, then moves bulk data every millisecond.
- *
- * The requests are those of a Linux host with its cdc_acm driver. */
+ * The USB host: waits for a device, resets and enumerates it, configures the CDC-ACM port, then moves bulk data every millisecond. The
+ * requests are those of a Linux host with its cdc_acm driver. */
 #include <string.h>
 
 #include <simavr/sim_cycle_timers.h>
@@ -11,20 +10,20 @@
 #define CONTROL_POLL US(100)
 #define FRAME US(1000)
 #define DEBOUNCE_MS 20
-#define STAGE_LIMIT_MS 500
-#define PACKETS_PER_FRAME 19 /* what full speed has room for */
+#define STAGE_LIMIT_MS 500   /* for each stage of a request */
+#define PACKETS_PER_FRAME 19 /* maximum of full speed */
 #define DTR_RTS 3
 
 static const uint8_t script[][16] = {
 	/* request, data stage out */
-	{ 0x80, 6, 0, 1, 0, 0, 8, 0 },        /* device descriptor, its beginning: the size of control packets */
+	{ 0x80, 6, 0, 1, 0, 0, 8, 0 },        /* start of the device descriptor, for the size of control packets */
 	{ 0x00, 5, 7, 0, 0, 0, 0, 0 },        /* address 7 */
 	{ 0x80, 6, 0, 1, 0, 0, 18, 0 },       /* device descriptor */
-	{ 0x80, 6, 0, 2, 0, 0, 9, 0 },        /* configuration descriptor, its head */
+	{ 0x80, 6, 0, 2, 0, 0, 9, 0 },        /* start of the configuration descriptor */
 	{ 0x80, 6, 0, 2, 0, 0, 255, 0 },      /* configuration descriptor */
 	{ 0x80, 6, 0, 3, 0, 0, 255, 0 },      /* languages */
 	{ 0x80, 6, 2, 3, 9, 4, 255, 0 },      /* product */
-	{ 0x80, 6, 0, 6, 0, 0, 10, 0 },       /* device qualifier: a full-speed device refuses */
+	{ 0x80, 6, 0, 6, 0, 0, 10, 0 },       /* device qualifier: a full-speed device stalls */
 	{ 0x00, 9, 1, 0, 0, 0, 0, 0 },        /* configuration 1 */
 	{ 0x21, 0x20, 0, 0, 0, 0, 7, 0, 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }, /* 115200 8N1 */
 };
@@ -46,15 +45,15 @@ static unsigned outbox_length;
 static uint8_t descriptor[256];
 static int control_size = 8;
 
-/* Bulk endpoints from the configuration descriptor, as a driver finds them. */
+/* Finds the bulk endpoints in the configuration descriptor, as a driver does. */
 static void find_endpoints(unsigned length)
 {
-	for (unsigned at = 0; at + 1 < length && descriptor[at]; at += descriptor[at])
-		if (descriptor[at + 1] == 5 && at + 3 < length && (descriptor[at + 3] & 3) == 2) {
-			if (descriptor[at + 2] & 0x80)
-				in_endpoint = descriptor[at + 2] & 0x7F;
+	for (unsigned start = 0; start + 1 < length && descriptor[start]; start += descriptor[start])
+		if (descriptor[start + 1] == 5 && start + 3 < length && (descriptor[start + 3] & 3) == 2) {
+			if (descriptor[start + 2] & 0x80)
+				in_endpoint = descriptor[start + 2] & 0x7F;
 			else
-				out_endpoint = descriptor[at + 2];
+				out_endpoint = descriptor[start + 2];
 		}
 }
 
@@ -95,7 +94,7 @@ static void next_stage(enum stage next)
 	stage_ms = 0;
 }
 
-/* One attempt at the stage under way; true when the request moved on. */
+/* Tries the stage under way once; true: the request went on to its next stage, or ended. */
 static bool advance_request(void)
 {
 	uint8_t bytes[64];
@@ -166,6 +165,7 @@ static void move_bulk(void)
 	}
 }
 
+/* Once a millisecond: follows attach and detach, and gives up requests without an answer. */
 static void watch(void)
 {
 	if (!usb_device_attached()) {

@@ -100,7 +100,7 @@ _IDENTITY = struct.Struct("<IIBBBB")
 
 
 class Identity(NamedTuple):
-    """Who is speaking."""
+    """Firmware version and schema."""
 
     ticks: int  # 0.5 us
     schema_hash: int
@@ -130,7 +130,7 @@ PING_TIME_OF_FLIGHT_US_INVALID = 0
 
 
 class Ping(NamedTuple):
-    """One ping of one ranger, sent when its ranging cycle is over."""
+    """One ping of one ranger, sent at the end of its ranging cycle."""
 
     ticks: int  # 0.5 us
     ranger: int
@@ -163,7 +163,7 @@ GYROS_INVALID = -32768
 
 
 class Gyros(NamedTuple):
-    """Thigh, calf and belt rate gyros (ADIS16100), one instant."""
+    """Rates of the thigh, calf and belt gyros (ADIS16100) at one instant."""
 
     ticks: int  # 0.5 us
     thigh: int  # 0.2439 deg/s, -32768 = invalid
@@ -192,7 +192,7 @@ PRESSURE_TEMPERATURE_INVALID = -32768
 
 
 class Pressure(NamedTuple):
-    """Barometer (SCP1000)."""
+    """Pressure and temperature of the barometer (SCP1000)."""
 
     ticks: int  # 0.5 us
     pressure: int  # 0.25 Pa, 0 = invalid
@@ -219,7 +219,7 @@ COMPASS_BEARING_INVALID = 65535
 
 
 class Compass(NamedTuple):
-    """Compass bearing (CMPS03/CMPS10 class)."""
+    """Bearing of the compass (CMPS03/CMPS10 class)."""
 
     ticks: int  # 0.5 us
     bearing: int  # 0.1 deg, 65535 = invalid
@@ -244,7 +244,7 @@ _SYNC = struct.Struct("<IH")
 
 
 class Sync(NamedTuple):
-    """Rising edge of the MTx SyncOut pulse, captured by the timer."""
+    """Rising edge of the MTx's SyncOut pulse, captured by the timer."""
 
     ticks: int  # 0.5 us
     edge: int
@@ -269,7 +269,7 @@ _STATUS = struct.Struct("<IHHHHHHHHHHHHHHHBBBBBBBBH")
 
 
 class Status(NamedTuple):
-    """Once a second: what was lost and what is wrong."""
+    """Lost frames and failures, once a second."""
 
     ticks: int  # 0.5 us
     dropped_ping: int
@@ -357,7 +357,7 @@ _CONFIGURATION = struct.Struct("<IBBBBB")
 
 
 class Configuration(NamedTuple):
-    """The settings now in force: the answer to configure, and sent with identity when the port opens."""
+    """The settings in force."""
 
     ticks: int  # 0.5 us
     sensors: int
@@ -392,7 +392,7 @@ GYRO_HEALTH_INVALID = -32768
 
 
 class GyroHealth(NamedTuple):
-    """Once a second for each gyro: its temperature and how its last self-test ended."""
+    """Temperature of one gyro and the result of its last self-test; once a second for each gyro."""
 
     ticks: int  # 0.5 us
     gyro: int
@@ -426,7 +426,7 @@ _IDENTIFY = struct.Struct("<")
 
 
 class Identify(NamedTuple):
-    """Ask for identity and configuration."""
+    """Request for identity and configuration."""
 
     @property
     def id(self) -> int:
@@ -448,7 +448,7 @@ _CLOCK_QUERY = struct.Struct("<H")
 
 
 class ClockQuery(NamedTuple):
-    """Ask for the board's clock."""
+    """Request for the board's clock."""
 
     token: int
 
@@ -472,7 +472,7 @@ _CONFIGURE = struct.Struct("<BBBBB")
 
 
 class Configure(NamedTuple):
-    """Set what is measured."""
+    """New settings."""
 
     sensors: int
     schedule: int
@@ -505,7 +505,7 @@ _CHECK_GYROS = struct.Struct("<")
 
 
 class CheckGyros(NamedTuple):
-    """Run the self-test of the gyros: half a second without rates, then its outcome in gyro_health."""
+    """Start of the gyros' self-test: 0.56 s without rates, then the result in gyro_health."""
 
     @property
     def id(self) -> int:
@@ -529,7 +529,7 @@ BEACON_BEARING_INVALID = -32768
 
 
 class Beacon(NamedTuple):
-    """One measurement of one beacon to the boot, as a beacon gateway passes it on."""
+    """One measurement from a beacon to the boot, forwarded by a beacon gateway."""
 
     gateway_ms: int  # ms
     unit: int
