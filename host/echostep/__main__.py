@@ -1,4 +1,4 @@
-"""`python -m echostep` is the command `echostep`."""
+"""`python -m echostep` runs the command `echostep`."""
 
 from echostep.cli import main
 

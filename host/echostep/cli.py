@@ -1,6 +1,7 @@
-"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode`.
+"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode` and groups of commands.
 
-In: what the user typed. Out: files, a view, an exit status (0 done, 2 a mistake that one line names). Heavy imports wait until a command runs.
+In: the command's arguments and options. Out: files, views, an exit status (0: done; 2: a mistake, named in one line). Owns nothing.
+Modules that are slow to import are imported inside the command that needs them, so that `--help` answers at once.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from echostep.commands.recordings import app as logs
 from echostep.errors import EchostepError
 
 if TYPE_CHECKING:
-    from echostep.commands.run import Views
+    from echostep.page.server import Address
     from echostep.plan.model import Pose
     from echostep.team.endpoint import Outlet
 
@@ -42,36 +43,41 @@ Start = Annotated[
     typer.Option(
         "--start",
         metavar="X,Y,DEG[,LEVEL]",
-        help="Where the wearer stands and looks at first; level 0 is the plan's first, ? any.",
+        help="Position and heading of the wearer at the start; level 0 is the plan's first, ? any.",
     ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
-Headless = Annotated[bool, typer.Option("--headless", help="No view at all.")]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)]
+Headless = Annotated[bool, typer.Option("--headless", help="Neither terminal view nor page.")]
 Page = Annotated[
     bool | None,
     typer.Option(
         "--page/--no-page",
-        help="Serve the live page (the default), also when a replay is over; or do not.",
+        help="Serve the live page (the default; --page keeps it after the end of a replay), or do not.",
         show_default=False,
     ),
 ]
 Host = Annotated[
-    str, typer.Option("--host", metavar="ADDRESS", help="Serve the page to others too; its address then holds a token.")
+    str,
+    typer.Option(
+        "--host", metavar="ADDRESS", help="Serve the page to other computers too; its URL then holds a token."
+    ),
 ]
-Port = Annotated[int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)]
+Port = Annotated[
+    int | None, typer.Option("--port", help="TCP port of the page [8420, or a free one].", min=0, max=65535)
+]
 BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
 MtxPort = Annotated[
     str | None,
-    typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the leg gyros of the board carry."),
+    typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the board's leg gyros are used."),
 ]
 Publish = Annotated[
     list[str] | None,
     typer.Option(
         "--publish",
         metavar="URL",
-        help="Tell a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://, several times if you like.",
+        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://; may be given several times.",
     ),
 ]
 Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
@@ -83,7 +89,7 @@ BeaconsPort = Annotated[
     typer.Option("--beacons", metavar="PORT", help="Port of a beacon gateway: serial, or udp://127.0.0.1:9000."),
 ]
 GuideTo = Annotated[
-    str | None, typer.Option("--guide", metavar="TO", help="Guide the wearer there: a room, X,Y[,LEVEL], or start.")
+    str | None, typer.Option("--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], or start.")
 ]
 
 
@@ -100,18 +106,21 @@ def demo(
         typer.Option(
             "--board-command",
             metavar="COMMAND",
-            help="Program that plays the sensor board; without it the Python board does.",
+            help="Program that simulates the sensor board; without it the board is simulated in Python.",
         ),
     ] = None,
-    guide: Annotated[bool, typer.Option("--guide", help="With beacons, and guidance to the end of the walk.")] = False,
+    guide: Annotated[bool, typer.Option("--guide", help="Simulate beacons, and guide to the end of the walk.")] = False,
     page: Page = None,
     host: Host = LOCAL,
     port: Port = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
-    from echostep.commands import run as runs
+    from echostep.commands import demo as demo_run
+    from echostep.commands.options import OutputOptions
 
-    runs.demo(out, seed, board_command, _views(headless, page, host, port), _outlet(publish, name, team), guide=guide)
+    address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
+    output = OutputOptions(out, not headless, address, bool(page), outlet)
+    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide), output)
 
 
 @app.command()
@@ -124,7 +133,7 @@ def live(
     settings: SettingsFile = None,
     seed: Seed = 0,
     headless: Headless = False,
-    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)] = None,
     page: Page = None,
     host: Host = LOCAL,
     port: Port = None,
@@ -134,11 +143,14 @@ def live(
     beacons: BeaconsPort = None,
     guide: GuideTo = None,
 ) -> None:
-    """Track a wearer live and record everything. Without an MTx the leg gyros of the board carry."""
-    from echostep.commands import run as runs
+    """Track a wearer live and record everything. Without an MTx the board's leg gyros are used."""
+    from echostep.commands import live as live_run
+    from echostep.commands.options import OutputOptions, PortOptions, TrackingOptions
 
-    views, outlet = _views(headless, page, host, port), _outlet(publish, name, team)
-    runs.live(plan, board, mtx, out, _pose(start), settings, seed, seconds, views, outlet, beacons=beacons, guide=guide)
+    address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
+    output = OutputOptions(out, not headless, address, bool(page), outlet)
+    tracking = TrackingOptions(plan, _pose(start), settings, seed, guide)
+    live_run.live(tracking, PortOptions(board, mtx, beacons, seconds), output)
 
 
 @app.command()
@@ -148,13 +160,14 @@ def record(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
         "out/recording.mcap"
     ),
-    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)] = None,
     beacons: BeaconsPort = None,
 ) -> None:
-    """Record both ports without tracking."""
-    from echostep.commands import run as runs
+    """Record the ports without tracking."""
+    from echostep.commands import live as live_run
+    from echostep.commands.options import PortOptions
 
-    runs.record(board, mtx, out, seconds, beacons)
+    live_run.record(PortOptions(board, mtx, beacons, seconds), out)
 
 
 @app.command()
@@ -165,7 +178,9 @@ def replay(
     start: Start = None,
     settings: SettingsFile = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
-    truth: Annotated[Path | None, typer.Option("--truth", metavar="FILE", help="Truth to compare with (CSV).")] = None,
+    truth: Annotated[
+        Path | None, typer.Option("--truth", metavar="FILE", help="True path to compare with (CSV).")
+    ] = None,
     headless: Headless = False,
     page: Page = None,
     host: Host = LOCAL,
@@ -176,11 +191,12 @@ def replay(
     guide: GuideTo = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
-    from echostep.commands import run as runs
+    from echostep.commands import replay as replay_run
+    from echostep.commands.options import OutputOptions, TrackingOptions
 
-    views = _views(headless, page, host, port, stays=sys.stdout.isatty())
-    outlet = _outlet(publish, name, team)
-    runs.replay(recording, plan, out, _pose(start), settings, seed, truth, views, outlet, guide=guide)
+    address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
+    output = OutputOptions(out, not headless, address, bool(page) or sys.stdout.isatty(), outlet)
+    replay_run.replay(recording, TrackingOptions(plan, _pose(start), settings, seed, guide), truth, output)
 
 
 @app.command()
@@ -190,12 +206,12 @@ def foot(
     profile: Annotated[
         str, typer.Option("--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning.")
     ] = "default",
-    plot: Annotated[bool, typer.Option("--plot", help="Draw it beside the track, as PNG.")] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the track as PNG, beside the CSV.")] = False,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
-    from echostep.commands import run as runs
+    from echostep.commands import offline
 
-    runs.foot(imu, out, profile, plot=plot)
+    offline.foot(imu, out, profile, plot=plot)
 
 
 @app.command()
@@ -207,16 +223,18 @@ def legs(
     profile: Annotated[
         str, typer.Option("--profile", metavar="NAME", help="default, or lee2010: that paper's method.")
     ] = "default",
-    scale: Annotated[float | None, typer.Option("--scale", help="The wearer's, as --walked printed it.")] = None,
+    scale: Annotated[
+        float | None, typer.Option("--scale", help="The wearer's stride scale, as --walked printed it.")
+    ] = None,
     walked: Annotated[
         float | None,
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
 ) -> None:
-    """Distance and track of a recorded leg. Gyros on thigh and shank, and on the belt if there is one."""
-    from echostep.commands import run as runs
+    """Distance and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
+    from echostep.commands import offline
 
-    runs.legs(samples, thigh, shank, out, profile, scale, walked)
+    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked))
 
 
 @app.command()
@@ -224,11 +242,14 @@ def command(
     broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
     plan: Plan,
     team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop after so long.", min=0.0)] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)] = None,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the team at the end: .png or .svg.")
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw the team on its plan at the end: .png or .svg."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the roster as JSON at the end, no table.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the roster as JSON at the end, instead of the table.")
+    ] = False,
 ) -> None:
     """Follow a team on one plan, lost and silent ones first."""
     from echostep.team import commander
@@ -243,13 +264,15 @@ def floors(
     ],
     heights: Annotated[
         str,
-        typer.Option("--heights", metavar="METRES", help="Heights of the storeys, as 0,3.5,7; auto: from the record."),
+        typer.Option(
+            "--heights", metavar="METRES", help="Heights of the floors, as 0,3.5,7; auto: from the recording."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
     start: Annotated[
-        int | None, typer.Option("--start", metavar="FLOOR", help="The floor at the start, when it is known.", min=0)
+        int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
     ] = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw them beside, as PNG.")] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the floors as PNG, beside the CSV.")] = False,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
     from echostep.commands import floors as floor_run
@@ -261,20 +284,20 @@ def floors(
 def decode(
     file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
 ) -> None:
-    """Print a capture as JSON, one message a line."""
-    from echostep.commands import run as runs
+    """Print captured bytes as JSON, one message a line."""
+    from echostep.commands import offline
 
-    runs.decode(file)
+    offline.decode(file)
 
 
 @app.command()
 def doctor(
     board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
     mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
-    seconds: Annotated[float, typer.Option(help="Listen for so long.", min=3.0, max=3600.0)] = 6.0,
-    udev: Annotated[bool, typer.Option("--udev", help="Print the udev rules and do nothing else.")] = False,
+    seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Only print the udev rules.")] = False,
 ) -> None:
-    """Say what is wrong with ports, board and MTx. And what to do about it; exit status 1 when something is."""
+    """Check ports, board and MTx, and say what to do about each fault. Exit status 1 when there is a fault."""
     from echostep.commissioning import doctor as examination
 
     if udev:
@@ -286,11 +309,11 @@ def doctor(
 @app.command()
 def flash(
     port: Annotated[
-        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; else it is found.")
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; without it, it is searched for.")
     ] = None,
     hex_file: Annotated[
         Path | None,
-        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); else the one shipped with this program."),
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); without it, the one of this package."),
     ] = None,
 ) -> None:
     """Write the firmware to a board (needs avrdude)."""
@@ -304,19 +327,21 @@ def flash(
 @app.command()
 def calibrate(
     parts: Annotated[
-        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; all of them when none is named.")
+        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; without any, all of them.")
     ] = None,
     board: Annotated[
-        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; else it is found.")
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; without it, it is searched for.")
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="Settings file; its other sections are kept.")
+        Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
     ] = Path("calibration.toml"),
-    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee.")] = 0.43,
-    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle.")] = 0.43,
-    walked: Annotated[float, typer.Option("--walked", metavar="M", help="Length of the walk for the legs.")] = 10.0,
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, metres.")] = 0.43,
+    walked: Annotated[
+        float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
+    ] = 10.0,
 ) -> None:
-    """Measure gyros, mounting, compass and legs. Writes them as settings."""
+    """Calibrate gyros, mounting, compass and legs. Writes the results as settings."""
     from rich.console import Console
 
     from echostep.commissioning import calibrate as calibration
@@ -332,23 +357,22 @@ def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
 
 
 def _pose(text: str | None) -> Pose | None:
-    from echostep.commands.run import parse_pose
+    from echostep.commands.metadata import parse_pose
 
     return None if text is None else parse_pose(text)
 
 
-def _views(headless: bool, page: bool | None, host: str, port: int | None, *, stays: bool = False) -> Views:
-    from echostep.commands.run import Views
+def _page_address(headless: bool, page: bool | None, host: str, port: int | None) -> Address | None:
+    """Where to serve the page; None: no page."""
     from echostep.page.server import Address
 
     if headless and page:
-        raise EchostepError("--headless shows nothing: leave it out, or leave out --page")
-    served = not headless and page is not False
-    return Views(not headless, Address(host, port) if served else None, stays=bool(page) or stays)
+        raise EchostepError("--headless excludes --page: give one of the two")
+    return None if headless or page is False else Address(host, port)
 
 
 def main() -> None:
-    """Entry point: mistakes end with one line and status 2; Ctrl-C and SIGTERM end a run with its files."""
+    """Entry point: a mistake ends with one line and status 2; Ctrl-C and SIGTERM end a run after its files are written."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:

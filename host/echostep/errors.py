@@ -1,5 +1,5 @@
-"""The one error that people see: a line that names what is wrong and what to do."""
+"""The error that ends a command with one line for the user."""
 
 
 class EchostepError(Exception):
-    """A wrong file, port, setting or firmware; its text is one line for the user (exit status 2)."""
+    """A wrong file, port, option, setting or firmware; its text is one line that says what is wrong and what to do (exit status 2)."""

@@ -14,7 +14,8 @@ import pytest
 from pyarrow import parquet
 
 from command_line import echostep
-from echostep.commands.run import tracker_of
+from echostep.commands.options import TrackingOptions
+from echostep.commands.replay import tracker_of
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.output.track_files import export as write
@@ -41,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def estimates(folder: Path) -> list[Estimate]:
     recording, plan = open_recording(folder / "walk.mcap"), load_plan(folder / "plan.json")
-    tracker = tracker_of(recording, plan, None, None, None)
+    tracker = tracker_of(recording, plan, TrackingOptions(DEMO))
     return [e for portion in recording.portions() for e in tracker.take(portion)]
 
 
@@ -51,7 +52,7 @@ def export(folder: Path, name: str, plan: Path | None = None) -> Path:
         folder / "walk.mcap",
         plan or folder / "plan.json",
         out,
-        lambda recording, on: tracker_of(recording, on, None, None, None),
+        lambda recording, on: tracker_of(recording, on, TrackingOptions(DEMO)),
     )
     assert name in said
     return out

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from echostep.arrays import Floats
 from echostep.cli import app
-from echostep.commands.run import FOOT_PROFILES
-from echostep.commands.run import foot as run_foot
+from echostep.commands.offline import FOOT_PROFILES
+from echostep.commands.offline import foot as run_foot
 from echostep.errors import EchostepError
 from echostep.foot import steps as foot
 from echostep.papers import fischer2008

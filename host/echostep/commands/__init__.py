@@ -1,4 +1,4 @@
-"""What each command of the command line does; imported when it runs.
+"""One module per group of commands of the command line; each is imported when its command runs.
 
-In: options that the user gave. Out: files, a view, text. Owns the run.
+In: the options that were given. Out: files, views, lines on the terminal. Owns one `Session` per tracked run.
 """

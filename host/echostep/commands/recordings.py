@@ -1,4 +1,7 @@
-"""The commands about recordings: `echostep info | cut | repair | export`."""
+"""`echostep info`, `cut`, `repair` and `export`: commands about recordings.
+
+In: the command's arguments and options. Out: a summary, a new recording, a track for other programs. Slow imports wait until a command runs.
+"""
 
 from __future__ import annotations
 
@@ -10,34 +13,34 @@ import typer
 
 app = typer.Typer()
 
-Log = Annotated[Path, typer.Argument(metavar="FILE", help="A recording (.mcap).")]
+Recording = Annotated[Path, typer.Argument(metavar="FILE", help="A recording (.mcap).")]
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="The recording to write.")]
 
 
 @app.command()
-def info(file: Log) -> None:
-    """What a recording holds, and in what condition it is."""
-    from echostep.recording import edit as logs
+def info(file: Recording) -> None:
+    """Show what a recording holds, and whether it is whole."""
+    from echostep.recording import edit
 
-    print("\n".join(logs.info(file)))
+    print("\n".join(edit.info(file)))
 
 
 @app.command()
 def cut(
-    file: Log,
+    file: Recording,
     out: Out,
     begin_s: Annotated[float, typer.Option("--from", metavar="S", help="Seconds after the beginning.", min=0.0)] = 0.0,
     end_s: Annotated[float, typer.Option("--to", metavar="S", help="Seconds after the beginning.")] = math.inf,
 ) -> None:
     """Cut a piece out of a recording."""
-    from echostep.recording import edit as logs
+    from echostep.recording import edit
 
-    print("\n".join(logs.cut(file, begin_s, end_s, out)))
+    print("\n".join(edit.cut(file, begin_s, end_s, out)))
 
 
 @app.command()
 def export(
-    file: Log,
+    file: Recording,
     plan: Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")],
     out: Annotated[
         Path,
@@ -46,22 +49,24 @@ def export(
         ),
     ],
     start: Annotated[
-        str | None, typer.Option("--start", metavar="X,Y,DEG", help="Where the wearer stands and looks at first.")
+        str | None, typer.Option("--start", metavar="X,Y,DEG", help="Position and heading of the wearer at the start.")
     ] = None,
     settings: Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
 ) -> None:
     """Track a recording and write its track for other programs."""
-    from echostep.commands import run as runs
-    from echostep.output.track_files import export as write
+    from echostep.commands.metadata import parse_pose
+    from echostep.commands.options import TrackingOptions
+    from echostep.commands.replay import tracker_of
+    from echostep.output.track_files import export as export_track
 
-    pose = None if start is None else runs.parse_pose(start)
-    print(write(file, plan, out, lambda recording, on: runs.tracker_of(recording, on, pose, settings, seed)))
+    tracking = TrackingOptions(plan, None if start is None else parse_pose(start), settings, seed)
+    print(export_track(file, plan, out, lambda recording, on: tracker_of(recording, on, tracking)))
 
 
 @app.command()
-def repair(file: Log, out: Out) -> None:
-    """Save what a crash or damage left of a recording."""
-    from echostep.recording import edit as logs
+def repair(file: Recording, out: Out) -> None:
+    """Write what is readable of a damaged recording to a new one."""
+    from echostep.recording import edit
 
-    print("\n".join(logs.repair(file, out)))
+    print("\n".join(edit.repair(file, out)))

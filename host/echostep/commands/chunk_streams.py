@@ -1,0 +1,60 @@
+"""Stages between a source of chunks and the tracker: pacing, check-ins, recording, grouping into portions.
+
+In: chunks in order of arrival; None where a live port delivered nothing for a while. Out: the same chunks with check-ins among them, and portions.
+Owns nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+
+from echostep.commands.console import print_notices
+from echostep.page.live import LivePage
+from echostep.ports.check_in import PERSON
+from echostep.ports.chunks import Chunk, Portion, portion_of
+from echostep.recording.recorder import Recorder
+
+LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
+
+
+def paced(chunks: Iterable[Chunk], speed: float) -> Iterator[Chunk]:
+    """Delay chunks so that they come at most `speed` times as fast as they arrived."""
+    start_s, first_ns = time.monotonic(), None
+    for chunk in chunks:
+        first_ns = chunk.t_arrival_ns if first_ns is None else first_ns
+        early_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / speed - (time.monotonic() - start_s)
+        if early_s > LEAST_SLEEP_S:
+            time.sleep(early_s)
+        yield chunk
+
+
+def with_check_ins(
+    chunks: Iterable[Chunk | None], page: LivePage | None, arrival_ns: Callable[[Chunk | None], int]
+) -> Iterator[Chunk | None]:
+    """Insert each check-in of the page behind the chunk after which it was made; `arrival_ns` gives its arrival time from that chunk."""
+    for chunk in chunks:
+        yield chunk
+        for payload in page.said() if page else ():
+            yield Chunk(PERSON, arrival_ns(chunk), payload)
+
+
+def recorded(
+    chunks: Iterable[Chunk | None], recorder: Recorder, *, wait_for_disk: bool = False
+) -> Iterator[Chunk | None]:
+    """Write each chunk before it is passed on. `wait_for_disk`: for sources that can be slowed down."""
+    for chunk in chunks:
+        if chunk is not None:
+            recorder.write(chunk)
+            if wait_for_disk:
+                recorder.settle(chunk)
+        print_notices(recorder.notices)
+        yield chunk
+
+
+def portions_of(chunks: Iterable[Chunk | None], size: int) -> Iterator[Portion]:
+    """Portions of `size` chunks; with 1, no chunk waits for the next. A None gives no row, so a portion may be empty."""
+    remaining = iter(chunks)
+    while batch := list(islice(remaining, size)):
+        yield portion_of([chunk for chunk in batch if chunk is not None])

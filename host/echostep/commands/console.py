@@ -1,0 +1,15 @@
+"""The terminal that the commands print on."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from rich.console import Console
+
+console = Console(soft_wrap=True)  # each message stays on one line, whatever the width of the terminal
+
+
+def print_notices(notices: deque[str]) -> None:
+    """Print queued messages of a port or of a recorder, and empty the queue."""
+    while notices:
+        console.print(notices.popleft())

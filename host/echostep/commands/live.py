@@ -1,0 +1,103 @@
+"""`echostep live` and `echostep record`: chunks from serial ports, until Ctrl-C or for a given time.
+
+In: ports. Out: a recording; from `live` also track and summary. Owns the ports while the run lasts.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+
+from echostep.board.frames import encode
+from echostep.board.messages import Identify
+from echostep.commands.chunk_streams import portions_of, recorded, with_check_ins
+from echostep.commands.console import console, print_notices
+from echostep.commands.metadata import clock_metadata, run_metadata, version_metadata
+from echostep.commands.options import OutputOptions, PortOptions, TrackingOptions
+from echostep.commands.results import output_folder
+from echostep.commands.session import Session
+from echostep.guidance.guided_run import destination
+from echostep.page.live import LivePage
+from echostep.plan.importers.formats import open_plan
+from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk, SerialPorts
+from echostep.recording.recorder import Recorder
+from echostep.settings import parse_settings, read_settings
+from echostep.timing.timeline import MtxTiming
+from echostep.tracker import Tracker
+from echostep.xsens.reader import warm_up
+from echostep.xsens.startup import MtxStart
+
+BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
+
+
+def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -> None:
+    """Track a wearer and record everything."""
+    plan = open_plan(tracking.plan_path)
+    path = tracking.settings_path
+    settings_toml = read_settings(path) if path else ""
+    settings, seed = parse_settings(settings_toml, str(path)), tracking.seed or 0
+    tracker = Tracker(plan, tracking.start, settings, seed, waits=output.page is not None)
+    guide_to = destination(tracking.guide_to, plan) if tracking.guide_to else None
+    session = Session(tracker, "echostep live", "live", output, guide_to)
+    tracker.warm_up()
+    folder = output_folder(output.folder)
+    with closing(_open_ports(ports)) as opened:
+        opened.send(BOARD, encode(Identify(), 0))
+        metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
+        with session, Recorder(folder / "walk.mcap", metadata) as recorder:
+            chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session.page)
+            session.track(portions_of(chunks, 1), None, recorder)
+        print_notices(recorder.notices)
+    session.finish("live")
+
+
+def record(ports: PortOptions, out: Path) -> None:
+    """Record the ports without tracking."""
+    warm_up()
+    byte_count: Counter[str] = Counter()
+    with closing(_open_ports(ports)) as opened:
+        opened.send(BOARD, encode(Identify(), 0))
+        metadata = version_metadata() | clock_metadata() | {"note": "recorded without tracking"}
+        with Recorder(out, metadata) as recorder, suppress(KeyboardInterrupt):
+            for chunk in _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds):
+                if chunk is not None:
+                    byte_count[chunk.port] += len(chunk.data)
+        print_notices(recorder.notices)
+    from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
+    console.print(f"{out}: {byte_count[BOARD]} bytes from the board, {byte_count[MTX]} from the MTx{from_gateway}")
+
+
+def _open_ports(options: PortOptions) -> SerialPorts:
+    urls = {BOARD: options.board, MTX: options.mtx, GATEWAY: options.beacons}
+    return SerialPorts({name: url for name, url in urls.items() if url is not None}, BAUD)
+
+
+def _recorded_chunks(
+    ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None, page: LivePage | None = None
+) -> Iterator[Chunk | None]:
+    """Chunks of the ports and check-ins of the page, each recorded before anything else sees it. The MTx is set up on the way."""
+    chunks = with_check_ins(_chunks_for(ports, seconds), page, lambda _: time.monotonic_ns())
+    chunks = recorded(chunks, recorder)
+    return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
+
+
+def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | None]:
+    """Chunks of the ports for so many seconds, None: without end; None as a chunk when nothing came for a while."""
+    end_s = math.inf if seconds is None else time.monotonic() + seconds
+    for chunk in ports.chunks():
+        print_notices(ports.notices)
+        yield chunk
+        if time.monotonic() >= end_s:
+            return
+
+
+def _with_mtx_setup(chunks: Iterable[Chunk | None], ports: SerialPorts, rate_hz: float) -> Iterator[Chunk | None]:
+    """The same chunks, while the MTx is set up at the start and whenever it wakes up."""
+    start = MtxStart(rate_hz, lambda request: ports.send(MTX, request), console.print)
+    for chunk in chunks:
+        start.follow(chunk)
+        yield chunk

@@ -1,0 +1,102 @@
+"""`echostep foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
+
+In: CSV files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from echostep.commands.console import console
+from echostep.errors import EchostepError
+from echostep.foot.alignment import aligned
+from echostep.foot.steps import Track, walk_track
+from echostep.legs.strides import StrideSettings
+from echostep.offline import leg_csv
+from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
+from echostep.output.track_plot import draw_foot
+from echostep.papers import fischer2008
+from echostep.recording.capture import Decoder, as_json, read_capture
+from echostep.xsens.onboard_filter import orientations
+
+SCALE_RANGE = (0.5, 2.0)  # of --scale; by reason: beyond it the lengths of the leg are wrong
+
+
+def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
+    """Track a recorded foot IMU with this project's method or that of a paper."""
+    if profile not in FOOT_PROFILES:
+        raise EchostepError(f"--profile {profile}: the foot has no such profile; it has {', '.join(FOOT_PROFILES)}")
+    imu = load_imu(path)
+    for note in imu.notes:
+        console.print(f"{path.name}: {note}")
+    track = FOOT_PROFILES[profile](imu, path.name)
+    write_foot_track(out, track)
+    console.print(f"{path.name}: {describe_track(track)}")
+    if plot:
+        draw_foot(out.with_suffix(".png"), track, path.name)
+        console.print(f"{out} and {out.with_suffix('.png')}")
+
+
+def _own_track(imu: Imu, name: str) -> Track:
+    return checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro, mag=imu.mag)), name)
+
+
+def _fischer2008_track(imu: Imu, name: str) -> Track:
+    """The paper's method. It needs the MTx's rotation matrices, which no CSV holds: they come from a model of the MTx's filter."""
+    if imu.mag is None:
+        console.print(f"{name}: no columns mx,my,mz: the MTx's filter is modelled without its magnetometer.")
+    good = fischer2008.usable(imu.t_s, imu.accel, imu.gyro)[0]
+    matrices = np.full((len(imu.t_s), 3, 3), np.nan)
+    mag = None if imu.mag is None else imu.mag[good]
+    matrices[good] = orientations(imu.t_s[good], imu.accel[good], imu.gyro[good], mag)
+    return fischer2008.walk_track(imu.t_s, imu.accel, imu.gyro, matrices)
+
+
+FOOT_PROFILES = {"default": _own_track, "fischer2008": _fischer2008_track}
+
+
+@dataclass(frozen=True, slots=True)
+class LegOptions:
+    """Lengths of the leg (hip to knee, knee to ankle or floor), the wearer's stride scale, and the true length of the walk if known."""
+
+    thigh_m: float
+    shank_m: float
+    profile: str = "default"
+    scale: float | None = None
+    walked_m: float | None = None
+
+
+def legs(path: Path, out: Path, options: LegOptions) -> None:
+    """Track a recorded leg with this project's method or that of a paper."""
+    profile, scale = options.profile, options.scale
+    if profile not in leg_csv.PROFILES:
+        raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(leg_csv.PROFILES)}")
+    if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
+        raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
+    lengths = leg_csv.segments(options.thigh_m, options.shank_m, scale or 1.0)
+    samples = leg_csv.load_legs(path)
+    for note in samples.notes:
+        console.print(f"{path.name}: {note}")
+    if lengths.measured_to_floor and profile == "default":
+        ankle = f"{lengths.to_ankle_m:.3f} m to the ankle"
+        console.print(f"--shank {options.shank_m:g} is taken as knee to floor: {ankle}")
+    track = leg_csv.PROFILES[profile](samples, StrideSettings(lengths, calibrated=scale is not None))
+    leg_csv.write_leg_track(out, track)
+    console.print(f"{path.name}: {leg_csv.describe_legs(track)}")
+    if options.walked_m is not None:
+        distance_m = float(track.rows[-1, 1]) if len(track.rows) else 0.0
+        factor = leg_csv.calibrated_scale(distance_m, options.walked_m)
+        console.print(f"--scale {(scale or 1.0) * factor:.4f} makes this walk {options.walked_m:g} m long")
+
+
+def decode(path: Path) -> None:
+    """Print a capture as JSON lines; print on stderr what was rejected."""
+    decoder = Decoder()
+    for message in read_capture(path, decoder):
+        sys.stdout.write(json.dumps(as_json(message)) + "\n")
+    print(f"board: {decoder.board.counts}\nmtx: {decoder.mtx.counts}", file=sys.stderr)

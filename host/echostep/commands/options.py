@@ -1,0 +1,48 @@
+"""Options that several commands share, as the command line parsed them.
+
+In: values of command-line options. Out: frozen dataclasses. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from echostep.page.server import Address
+from echostep.plan.model import Pose
+
+if TYPE_CHECKING:
+    from echostep.team.endpoint import Outlet
+
+
+@dataclass(frozen=True, slots=True)
+class OutputOptions:
+    """Where the results of a tracked run go: files in `folder`, the terminal view, the page, a commander."""
+
+    folder: Path
+    terminal: bool = True
+    page: Address | None = None  # address to serve the page at; None: no page
+    page_stays: bool = False  # serve the page until Ctrl-C after the run is over
+    outlet: Outlet | None = None  # where estimates are published; None: nowhere
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingOptions:
+    """What the tracker is made from. A value of None is replaced by that of the plan, of the recording, or by the default."""
+
+    plan_path: Path
+    start: Pose | None = None
+    settings_path: Path | None = None
+    seed: int | None = None
+    guide_to: str | None = None  # destination of the guidance; None: no guidance
+
+
+@dataclass(frozen=True, slots=True)
+class PortOptions:
+    """Ports to read, as serial ports or pyserial URLs, and for how long."""
+
+    board: str
+    mtx: str | None = None
+    beacons: str | None = None
+    seconds: float | None = None  # None: until Ctrl-C

@@ -1,0 +1,153 @@
+"""One tracked run: the tracker, and everything that shows, publishes, guides or records what it estimates.
+
+In: a tracker, portions of chunks. Out: estimates to the views, the page, the commander and the recording; result files at the end.
+Owns the estimates, the page and the connection to the commander while the run lasts.
+
+`demo`, `live` and `replay` differ only in where their portions come from: all of them pass through `Session.track`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, nullcontext
+from functools import partial
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from echostep.commands.console import console
+from echostep.commands.options import OutputOptions
+from echostep.commands.results import Result, write_results
+from echostep.guidance.cues import Cue, arrow_sign, describe_cue
+from echostep.guidance.guided_run import GuidedRun
+from echostep.localization.estimate import Estimate
+from echostep.localization.metrics import Truth
+from echostep.output.derived import Derived
+from echostep.output.terminal import TerminalView
+from echostep.page.live import LivePage
+from echostep.plan.routing import RoutePlace
+from echostep.ports.chunks import Portion
+from echostep.recording.recorder import Recorder
+from echostep.tracker import Tracker
+
+if TYPE_CHECKING:
+    from echostep.team.publish import Publishing, Source
+
+PAGE_POLL_S = 0.2
+
+
+class Session:
+    """Serves the page and publishes estimates while it is entered; `track` feeds the tracker, `finish` writes the results."""
+
+    def __init__(
+        self, tracker: Tracker, title: str, source: Source, output: OutputOptions, guide_to: RoutePlace | None = None
+    ) -> None:
+        """`source`: origin of the estimates, as a commander is told. Raises EchostepError when no route leads to `guide_to`."""
+        self.tracker = tracker
+        self.title = title
+        self.source = source
+        self.output = output
+        self.guided = GuidedRun(tracker, guide_to) if guide_to else None
+        self.page: LivePage | None = None
+        self.estimates: list[Estimate] = []
+        self._publishing: Publishing | None = None
+        self._opened = ExitStack()
+        self._interrupted = False
+
+    def __enter__(self) -> Self:
+        with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
+            self._open_page(opened)
+            self._open_publishing(opened)
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._opened.__exit__(kind, error, at)
+
+    def _open_page(self, opened: ExitStack) -> None:
+        address = self.output.page
+        if address is None:
+            return
+        page = LivePage(self.tracker, self.title, address, self.guided, replay=self.source == "replay")
+        self.page = opened.enter_context(page)
+        console.print(f"The page: {page.url}", highlight=False)
+
+    def _open_publishing(self, opened: ExitStack) -> None:
+        if self.output.outlet is None:
+            return
+        from echostep.team.publish import Publishing
+
+        print_line = partial(console.print, markup=False, highlight=False)
+        publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line)
+        self._publishing = opened.enter_context(publishing)
+
+    @property
+    def watched(self) -> bool:
+        """Whether the run is shown, on the terminal or on the page."""
+        return self.output.terminal or self.output.page is not None
+
+    def track(
+        self,
+        portions: Iterable[Portion],
+        progress: Callable[[], float] | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        """Feed all portions; Ctrl-C ends the run as its last portion does.
+
+        `progress` gives the finished fraction, 0 to 1. `recorder` gets the derived messages of each portion, after the portion was shown.
+        """
+        derived = Derived(self.tracker)
+        view = TerminalView(self.tracker, self.title, progress, console) if self.output.terminal else None
+        with view or nullcontext():
+            try:
+                for portion in portions:
+                    estimates = self._take(portion)
+                    self._show(estimates, view)
+                    if recorder:
+                        recorder.notes(derived.take(portion, estimates))
+            except KeyboardInterrupt:
+                self._interrupted = True
+
+    def _take(self, portion: Portion) -> list[Estimate]:
+        """Track one portion and publish its estimates."""
+        if self.page:
+            self.page.coming()
+        estimates = self.tracker.take(portion)
+        if self.page:
+            self.page.shown(portion)
+        self.estimates += estimates
+        if self._publishing:
+            self._publishing.tell(estimates)
+        return estimates
+
+    def _show(self, estimates: list[Estimate], view: TerminalView | None) -> None:
+        """Show new estimates and the newest cue; without a view, print each new cue that is spoken."""
+        cues = self.guided.news() if self.guided else []
+        if view:
+            cue = self.guided.cue if self.guided else None
+            view.show(estimates, describe_cue(cue) if cue else "")
+        else:
+            _print_spoken(cues)
+
+    def finish(self, title: str, truth: Truth | None = None, elapsed_s: float | None = None) -> None:
+        """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written."""
+        write_results(self.output.folder, self.tracker, self.guided, Result(title, self.estimates, truth, elapsed_s))
+
+    def keep_page_open(self) -> None:
+        """Serve the page after the run: while a browser shows it, or until Ctrl-C if that was asked for."""
+        page, stays = self.page, self.output.page_stays
+        if page is None or self._interrupted or not (stays or page.pages):
+            return
+        end = "until" if stays else "while it is open, or until"
+        console.print(f"The page stays at {page.url} {end} Ctrl-C.", highlight=False)
+        try:
+            while stays or page.pages:
+                time.sleep(PAGE_POLL_S)
+        except KeyboardInterrupt:
+            pass
+
+
+def _print_spoken(cues: Sequence[Cue]) -> None:
+    for cue in cues:
+        if cue.spoken:
+            console.print(f"{cue.t_s:7.1f} s  {arrow_sign(cue.arrow_rad)}  {cue.spoken}")
