@@ -15,8 +15,10 @@ from shapely import LineString, MultiLineString
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.evaluate import girard2011 as study
-from echostep.evaluate.echoes.study import evaluate_echoes
-from echostep.evaluate.study import Row, Study, summary, write_json
+from echostep.evaluate.echoes.study import echoes_study
+from echostep.evaluate.report import Row, summary, write_json
+from echostep.evaluate.runs import SeededRuns
+from echostep.evaluate.study import Request, run_study
 from echostep.simulation.people.marker_walk import STEP_M, lay_markers, walk_markers
 from echostep.simulation.world import sites
 
@@ -88,7 +90,7 @@ def test_the_command_writes_json_parquet_and_the_picture(tmp_path: Path) -> None
 
 
 def test_what_rangers_hear(tmp_path: Path) -> None:
-    evaluate_echoes(1, tmp_path / "e.json", tmp_path, fit=False)
+    run_study(echoes_study(fit=False), Request(1, 1, tmp_path / "e.json", tmp_path))
     rows = {row["name"]: row for row in json.loads((tmp_path / "e.json").read_text())["rows"]}
     assert (tmp_path / "figures1-5.png").stat().st_size > 50_000
     for name in ("incidence", "near and far", "oblique", "limits", "door frames"):
@@ -122,15 +124,15 @@ def ran(folder: Path) -> int:
 
 def test_a_killed_study_goes_on_where_it_was(tmp_path: Path) -> None:
     one = Counted(tmp_path)
-    first = Study("s", 3, 10, one, tmp_path).rows()
+    first = SeededRuns("s", 3, 10, one, tmp_path).rows()
     journal = tmp_path / "s.journal.jsonl"
     journal.write_text(journal.read_text() + '{"seed": 13, "rows": [{"na')  # killed while writing
-    whole = Study("s", 5, 10, one, tmp_path).rows()
+    whole = SeededRuns("s", 5, 10, one, tmp_path).rows()
     assert whole[:3] == first
     assert [row["value"] for row in whole] == [math.sqrt(seed) for seed in range(10, 15)]
     assert ran(tmp_path) == 5
     journal.write_text(journal.read_text().replace('"fingerprint": "', '"fingerprint": "x'))
-    assert Study("s", 2, 10, one, tmp_path).rows() == whole[:2]
+    assert SeededRuns("s", 2, 10, one, tmp_path).rows() == whole[:2]
     assert ran(tmp_path) >= 6  # other code's rows are not taken
 
 
@@ -140,8 +142,8 @@ def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
     ) as cluster:
-        far = Study("s", 4, 1, math_run, there, cluster.scheduler_address).rows()
-    assert far == Study("s", 4, 1, math_run, here).rows()
+        far = SeededRuns("s", 4, 1, math_run, there, cluster.scheduler_address).rows()
+    assert far == SeededRuns("s", 4, 1, math_run, here).rows()
 
 
 def math_run(seed: int) -> list[Row]:
@@ -152,7 +154,7 @@ def math_run(seed: int) -> list[Row]:
 def test_no_cluster_is_one_clear_error(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="skipped: no Dask (pip install 'echostep[cluster]')")
     with pytest.raises(EchostepError, match="no Dask scheduler answers there"):
-        Study("s", 2, 1, math_run, tmp_path, "tcp://127.0.0.1:9").rows()
+        SeededRuns("s", 2, 1, math_run, tmp_path, "tcp://127.0.0.1:9").rows()
 
 
 def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> None:
@@ -160,4 +162,4 @@ def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> N
     with pytest.raises(EchostepError, match="cannot write"):
         write_json(tmp_path / "file" / "x.json", "s", 1, 1, [])
     with pytest.raises(EchostepError, match="cannot write there"):
-        Study("s", 1, 1, math_run, tmp_path / "file").rows()
+        SeededRuns("s", 1, 1, math_run, tmp_path / "file").rows()

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from echostep.arrays import Floats
 from echostep.cli import app
-from echostep.evaluate.trails.study import METHODS, RATES_HZ, Walked, judge, summaries, track
+from echostep.evaluate.trails.study import summaries
+from echostep.evaluate.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 from echostep.foot.steps import FootCounts, Track
 from echostep.papers import fischer2008
 from echostep.simulation.devices.mtx import MtxModel, measure
@@ -131,7 +132,7 @@ def test_a_true_track_has_no_errors_and_a_turned_one_those_of_the_turn(short_wal
 
 
 @pytest.fixture(scope="module")
-def by_machinery() -> dict[tuple[int, int, str], Walked]:
+def by_machinery() -> dict[tuple[int, int, str], JudgedTrack]:
     trail, found = BY_NAME["machinery"], {}
     for seed in SEEDS:
         walked = walk_trail(trail, seed)
@@ -143,7 +144,7 @@ def by_machinery() -> dict[tuple[int, int, str], Walked]:
 
 
 def test_our_heading_holds_by_machinery_where_the_paper_s_is_unusable(
-    by_machinery: dict[tuple[int, int, str], Walked],
+    by_machinery: dict[tuple[int, int, str], JudgedTrack],
 ) -> None:
     """The corridor of Figure 6. A magnetometer that is fused without distrust fails here; gyros alone drift by some degrees in four minutes."""
     for (_, _, profile), walked in by_machinery.items():

@@ -31,9 +31,10 @@ def girard2011(
     scheduler: Scheduler = None,
 ) -> None:
     """The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated)."""
-    from echostep.evaluate.girard2011 import evaluate_girard2011
+    from echostep.evaluate.girard2011 import STUDY
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_girard2011(runs, seed, json, out, scheduler)
+    run_study(STUDY, Request(runs, seed, json, out, scheduler))
 
 
 @app.command()
@@ -46,9 +47,10 @@ def echoes(
     ] = False,
 ) -> None:
     """What simulated rangers hear, and how well the tracker's likelihood expects it."""
-    from echostep.evaluate.echoes.study import evaluate_echoes
+    from echostep.evaluate.echoes.study import echoes_study
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_echoes(seed, json, out, fit=fit)
+    run_study(echoes_study(fit=fit), Request(1, seed, json, out))
 
 
 @app.command()
@@ -60,9 +62,10 @@ def lee2010(
     scheduler: Scheduler = None,
 ) -> None:
     """The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated)."""
-    from echostep.evaluate.lee2010.study import evaluate_lee2010
+    from echostep.evaluate.lee2010.study import STUDY
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_lee2010(runs, seed, json, out, scheduler)
+    run_study(STUDY, Request(runs, seed, json, out, scheduler))
 
 
 @app.command()
@@ -74,9 +77,10 @@ def trails(
     scheduler: Scheduler = None,
 ) -> None:
     """The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated)."""
-    from echostep.evaluate.trails.study import trails as study
+    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.trails.study import STUDY
 
-    study(runs, seed, out, json, scheduler)
+    run_study(STUDY, Request(runs, seed, json, out, scheduler))
 
 
 @app.command("legs")
@@ -88,9 +92,10 @@ def legs_command(
     scheduler: Scheduler = None,
 ) -> None:
     """Walks of 5 m by many people without calibration, and what each fault of the sensors does (simulated)."""
-    from echostep.evaluate.legs import evaluate_legs
+    from echostep.evaluate.legs import STUDY
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_legs(runs, seed, json, out, scheduler)
+    run_study(STUDY, Request(runs, seed, json, out, scheduler))
 
 
 @app.command("floors")
@@ -102,9 +107,10 @@ def floors_command(
     scheduler: Scheduler = None,
 ) -> None:
     """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
-    from echostep.evaluate.floors import evaluate_floors
+    from echostep.evaluate.floors import STUDY
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_floors(runs, seed, json, out, scheduler)
+    run_study(STUDY, Request(runs, seed, json, out, scheduler))
 
 
 @app.command("storeys")
@@ -119,9 +125,10 @@ def storeys_command(
     scheduler: Scheduler = None,
 ) -> None:
     """Walks through all floors of a building by stairs and lift (simulated)."""
-    from echostep.evaluate.multi_floor import evaluate_storeys
+    from echostep.evaluate.multi_floor import storeys_study
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_storeys(runs, seed, folder, json, out, scheduler)
+    run_study(storeys_study(folder), Request(runs, seed, json, out, scheduler))
 
 
 @app.command("feet")
@@ -135,9 +142,11 @@ def feet_command(
     ] = False,
 ) -> None:
     """The foot on real recordings, one setting for all, beside the peers' figures."""
-    from echostep.evaluate.feet.study import feet
+    from echostep.evaluate.feet.study import feet_study, recordings_in
+    from echostep.evaluate.study import Request, run_study
 
-    feet(folder, json, out, left_out=left_out)
+    recordings = recordings_in(folder)
+    run_study(feet_study(recordings, out, left_out=left_out), Request(len(recordings), 0, json, out or Path()))
 
 
 @app.command()
@@ -149,6 +158,7 @@ def fischer2008(
     scheduler: Scheduler = None,
 ) -> None:
     """The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated)."""
-    from echostep.evaluate.fischer2008.study import evaluate_fischer2008
+    from echostep.evaluate.fischer2008.study import fischer2008_study
+    from echostep.evaluate.study import Request, run_study
 
-    evaluate_fischer2008(runs, seed, json, out, scheduler)
+    run_study(fischer2008_study(runs, seed), Request(runs, seed, json, out, scheduler))

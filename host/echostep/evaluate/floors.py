@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -20,7 +19,8 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.barometer import vertical_kernels as vertical
 from echostep.barometer.altitude import BarometerSettings, Pressures
 from echostep.barometer.floor_filter import FloorFilter, Floors
-from echostep.evaluate.study import Row, Study, print_table, write_json, write_parquet
+from echostep.evaluate.report import Row, Table, rows_by_name
+from echostep.evaluate.study import Request, Study
 from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
 from echostep.simulation.people.vertical_day import VerticalMove, climb
 from echostep.simulation.world.air_pressure import Weather, device_temperatures, pressures
@@ -64,17 +64,6 @@ COLUMNS = {
     "name": "", "runs": "runs", "floor_right": "right %", "strict_right": "strict %", "worst_right": "worst run %",
     "longest_wrong_s": "longest wrong s",    "changes": "changes",
 }  # fmt: skip
-
-
-def evaluate_floors(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
-    """Run the study, print the table, write JSON, Parquet."""
-    each = Study("floors", runs, seed, one_run, out, scheduler).rows()
-    rows = [_summary(name, [row for row in each if row["name"] == name]) for name in SCENES]
-    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
-    print_table(f"Floors by pressure, {runs} simulated runs of 20 minutes, weather of 1 hPa/h", shown, COLUMNS)
-    write_parquet(out / "floors.parquet", each)
-    if json_path is not None:
-        write_json(json_path, "floors", runs, seed, rows)
 
 
 def one_run(seed: int) -> list[Row]:
@@ -130,12 +119,12 @@ def longest_s(t_s: Floats, wrong: Bools) -> float:
     return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in edges.tolist()), default=0.0)
 
 
-def _summary(name: str, rows: Sequence[Row]) -> Row:
+def _summary(rows: Sequence[Row]) -> Row:
     def over(key: str, how: Callable[[list[float]], float]) -> float:
         return round(how([row[key] for row in rows]), 5)
 
     return {
-        "name": name,
+        "name": rows[0]["name"],
         "runs": len(rows),
         "floor_right": over("floor_right", lambda v: sum(v) / len(v)),
         "strict_right": over("strict_right", lambda v: sum(v) / len(v)),
@@ -144,3 +133,12 @@ def _summary(name: str, rows: Sequence[Row]) -> Row:
         "late_runs": sum(row["longest_wrong_s"] > 10.0 for row in rows),
         "changes": sum(row["changes"] for row in rows),
     }
+
+
+def _tables(rows: list[Row], request: Request) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
+    title = f"Floors by pressure, {request.runs} simulated runs of 20 minutes, weather of 1 hPa/h"
+    return [Table(title, shown, COLUMNS)]
+
+
+STUDY = Study("floors", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.evaluate.study import Row, Study, print_table, summary, write_json, write_parquet
+from echostep.evaluate.report import Row, Table, rows_by_name, summary
+from echostep.evaluate.study import Request, Study
 from echostep.localization.map_filter import MapFilter
 from echostep.papers.girard2011 import Girard, GirardSettings
 from echostep.path import MeasuredSegment, PathSegment
@@ -69,22 +70,7 @@ class Seen:
     cloud: Floats
 
 
-def evaluate_girard2011(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
-    """Run the study, print the table beside the paper's, and write JSON, Parquet and the pictures."""
-    each = Study("girard2011", runs, seed, one_run, out, scheduler).rows()
-    names = list(dict.fromkeys(row["name"] for row in each))
-    rows = [_summary([row for row in each if row["name"] == name]) for name in names]
-    printed = [row | {"name": f"{row['name']}, the paper"} for row in PAPER]
-    print_table(
-        f"Position error in metres, {runs} simulated runs; below, the paper's one real run", [*rows, *printed], COLUMNS
-    )
-    write_parquet(out / "girard2011.parquet", each)
-    draw(out / "figures10-13.png", seed)
-    if json_path is not None:
-        write_json(json_path, "girard2011", runs, seed, rows)
-
-
-def draw(path: Path, seed: int) -> None:
+def draw(folder: Path, seed: int, _rows: list[Row]) -> None:
     """The clouds after 9, 21 and 52 steps: without the plan, with it, with ranging, and ours [Girard 2011, Figures 10-13]."""
     from echostep.evaluate.pictures import draw_clouds
 
@@ -101,7 +87,7 @@ def draw(path: Path, seed: int) -> None:
         seen = list(system(site, walk, seed))
         clouds[name] = {step: seen[step - 1].cloud for step in (9, 21, 52)}
         tracks[name] = np.vstack([walk.trunk_m[0], [s.at_m for s in seen]])
-    draw_clouds(path, site.plan, walk.trunk_m, clouds, tracks)
+    draw_clouds(folder / "figures10-13.png", site.plan, walk.trunk_m, clouds, tracks)
 
 
 def one_run(seed: int) -> list[Row]:
@@ -216,3 +202,13 @@ def _summary(runs: list[Row]) -> Row:
         if key in runs[0]:
             row[key] = round(sum(r[key] for r in runs) / len(runs), 4)
     return row
+
+
+def _tables(rows: list[Row], request: Request) -> list[Table]:
+    """The table, with the paper's rows at its end."""
+    printed = [row | {"name": f"{row['name']}, the paper"} for row in PAPER]
+    title = f"Position error in metres, {request.runs} simulated runs; below, the paper's one real run"
+    return [Table(title, [*rows, *printed], COLUMNS)]
+
+
+STUDY = Study("girard2011", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, draw)

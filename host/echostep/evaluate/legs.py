@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.evaluate.study import Row, Study, console, print_table, write_json, write_parquet
+from echostep.evaluate.report import Row, Table, rows_by_name
+from echostep.evaluate.study import Request, Study
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.strides import StrideEstimator, StrideSettings
@@ -47,18 +47,6 @@ CAUSES = {
     "15 degrees aslant": LegSensors(aslant_rad=math.radians(15.0)),
     "50 Hz, noise 0.03 rad/s": LegSensors(rate_hz=50.0, noise_rad_s=0.03),
 }
-
-
-def evaluate_legs(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
-    """Run the study, print the table, write JSON and Parquet."""
-    each = Study("legs", runs, seed, one_run, out, scheduler).rows()
-    names = dict.fromkeys(row["name"] for row in each)
-    rows = [_summary([row for row in each if row["name"] == name]) for name in names]
-    print_table(f"About {WAY_M:g} m by {runs} people, legs known, no calibration (simulated)", rows, COLUMNS)
-    console.print("Error of the distance from standing to standing.")
-    write_parquet(out / "legs.parquet", each)
-    if json_path is not None:
-        write_json(json_path, "legs", runs, seed, rows)
 
 
 def one_run(seed: int) -> list[Row]:
@@ -112,3 +100,11 @@ def _summary(rows: list[Row]) -> Row:
         "worst": np.abs(errors).max(),
     }
     return found | {f"{key}_percent": round(float(value), 2) for key, value in figures.items()}
+
+
+def _tables(rows: list[Row], request: Request) -> list[Table]:
+    title = f"About {WAY_M:g} m by {request.runs} people, legs known, no calibration (simulated)"
+    return [Table(title, rows, COLUMNS, ("Error of the distance from standing to standing.",))]
+
+
+STUDY = Study("legs", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

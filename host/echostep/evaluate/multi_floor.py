@@ -18,7 +18,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.evaluate.study import Row, Study, console, print_table, write_json, write_parquet
+from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
+from echostep.evaluate.study import Request, Study
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles import ANY_LEVEL
 from echostep.plan.importers.formats import open_plan
@@ -33,8 +34,8 @@ from echostep.simulation.world.tower import tour, tower
 from echostep.tracker import Tracker
 
 STOREYS = 5
+WESTPORT = "storeys/westport"  # name of the row of the real plan
 TIE_M = 0.5
-LOST_M = 3.0
 PORTION = 1000
 AWAY_M = (8.0, 30.0)  # of a place to visit from the stairs, as one walks
 COLUMNS = {
@@ -54,30 +55,12 @@ class BuildingScene:
 SCENES = {"": BuildingScene(), "-legs": BuildingScene(foot=False), "-any": BuildingScene(known=False)}
 
 
-def evaluate_storeys(
-    runs: int, seed: int, data: Path | None, json_path: Path | None, out: Path, scheduler: str | None
-) -> None:
-    """Run the study, print the table, write JSON, Parquet."""
-    real = None if data is None else data / "maps" / "westport-house"
-    if real is not None and not real.is_dir():
-        raise EchostepError(f"{real}: not there: the tower alone can do without --data")
-    each = Study("storeys", runs, seed, partial(one_run, real), out, scheduler).rows()
-    rows = [_summary([row for row in each if row["name"] == name]) for name in dict.fromkeys(r["name"] for r in each)]
-    shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
-    print_table(f"All floors of a building, {runs} simulated walks", shown, COLUMNS)
-    if real is None:
-        console.print("Without --data westport-house is left out.")
-    write_parquet(out / "storeys.parquet", each)
-    if json_path is not None:
-        write_json(json_path, "storeys", runs, seed, rows)
-
-
 def one_run(real: Path | None, seed: int) -> list[Row]:
     """Every scene with the person of this seed."""
     rows = [_row(f"storeys/tower{name}", scene, tower(STOREYS), tour(STOREYS), seed) for name, scene in SCENES.items()]
     if real is not None:
         plan = open_plan(real)
-        rows.append(_row("storeys/westport", BuildingScene(), plan, through(plan, seed), seed))
+        rows.append(_row(WESTPORT, BuildingScene(), plan, through(plan, seed), seed))
     return rows
 
 
@@ -158,3 +141,20 @@ def _summary(rows: Sequence[Row]) -> Row:
     found |= {k: over(k, mean) for k in ("mean_m", "sd_m", "ending_m", "coverage95", "floor_right", "strict_right")}
     found |= {"max_m": over("max_m", max), "min_m": over("min_m", min), "lost": sum(row["lost"] for row in rows)}
     return found | {"longest_wrong_s": over("longest_wrong_s", max)}
+
+
+def _tables(rows: list[Row], request: Request) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
+    real = any(row["name"] == WESTPORT for row in rows)
+    notes = () if real else ("Without --data westport-house is left out.",)
+    return [Table(f"All floors of a building, {request.runs} simulated walks", shown, COLUMNS, notes)]
+
+
+def storeys_study(data: Path | None) -> Study:
+    """The study; `data`: folder of the public recordings, which holds the plan of westport-house."""
+    westport = None if data is None else data / "maps" / "westport-house"
+    if westport is not None and not westport.is_dir():
+        raise EchostepError(f"{westport}: not there: the tower alone can do without --data")
+    return Study(
+        "storeys", partial(one_run, westport), lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables
+    )

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echostep.evaluate.echoes.study import Effect, log_p, pipe_range_m
+from echostep.evaluate.echoes.effects import Effect, pipe_range_m
+from echostep.evaluate.echoes.likelihood import log_p
 from echostep.evaluate.pictures import BLUE, GREEN, ORANGE, RED, axes_of, save
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.simulation.world.acoustics import SRF02, directivity_db

@@ -10,10 +10,11 @@ from time import process_time
 import numpy as np
 
 from echostep.evaluate.feet.datasets import FootRecording
-from echostep.evaluate.study import Row
+from echostep.evaluate.report import Row
 from echostep.foot.steps import Foot, Step
 
 LIVE_HZ = 200.0
+LIVE = "live"  # the `set` of these rows
 
 
 def pace(recording: FootRecording) -> tuple[list[float], float]:
@@ -41,7 +42,7 @@ def pace_rows(recordings: list[FootRecording]) -> list[Row]:
     }
     return [
         {
-            "set": "live",
+            "set": LIVE,
             "recording": "all",
             "metric": metric,
             "value": round(value, 4),

@@ -14,7 +14,7 @@ from statistics import fmean
 from rich.progress import track as progress
 
 from echostep.evaluate.feet.datasets import FootRecording
-from echostep.evaluate.study import Row, console
+from echostep.evaluate.report import Row, console
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track
 

@@ -11,10 +11,12 @@ from statistics import median
 
 from echostep.errors import EchostepError
 from echostep.evaluate.feet.datasets import FootRecording, read_recordings
-from echostep.evaluate.feet.latency import pace_rows
+from echostep.evaluate.feet.latency import LIVE, pace_rows
 from echostep.evaluate.feet.leave_one_out import add_left_out, leave_one_out, said
-from echostep.evaluate.feet.metrics import Figure, align, places, way
-from echostep.evaluate.study import Row, console, print_table, write_json
+from echostep.evaluate.feet.metrics import Figure, way
+from echostep.evaluate.feet.pictures import draw_tracks
+from echostep.evaluate.report import Row, Table, console
+from echostep.evaluate.study import Request, Study
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
 
@@ -28,27 +30,39 @@ COLUMNS = {
 }
 
 
-def feet(folder: Path, json: Path | None, out: Path | None, *, left_out: bool) -> None:
-    """Print the table of all recordings in the folder; raises EchostepError when there is none."""
-    recordings = recordings_in(folder)
+def feet_study(recordings: list[FootRecording], out: Path | None, *, left_out: bool) -> Study:
+    """The study of these recordings; `out`: folder of the picture, if one is wanted; `left_out`: also leave one set out."""
     tracks = [track_of(recording) for recording in recordings]
+    return Study(
+        "feet",
+        lambda _seed: _rows_of_all(recordings, tracks, left_out=left_out),
+        lambda rows: rows,
+        _tables,
+        None if out is None else lambda folder, _seed, _rows: draw_tracks(folder / "feet.png", recordings, tracks),
+        seeds=range(1),
+        journal=False,
+        parquet=None,
+    )
+
+
+def _rows_of_all(recordings: list[FootRecording], tracks: list[Track], *, left_out: bool) -> list[Row]:
+    """Rows of the recordings, the medians of the sets, and the rows of the live foot."""
     rows = [row for recording, track in zip(recordings, tracks, strict=True) for row in rows_of(recording, track)]
     rows += medians(rows)
-    columns = COLUMNS
     if left_out:
         choices = leave_one_out(recordings, track_of)
         add_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
-        columns = COLUMNS | {"left_out": "left out, m"}
         for group, noise in choices.items():
             console.print(f"{group} left out, the others choose: {said(noise)}")
-    print_table("The foot on real recordings, one setting", [_printed(row) for row in rows], columns)
-    live = pace_rows(recordings)
-    for row in live:
-        console.print(f"{row['metric']}: {row['value']:.4f}")
-    if json:
-        write_json(json, "feet", len(recordings), 0, rows + live)
-    if out:
-        draw_tracks(out / "feet.png", recordings, tracks)
+    return rows + pace_rows(recordings)
+
+
+def _tables(rows: list[Row], _request: Request) -> list[Table]:
+    """The figures of the recordings; below, those of the live foot."""
+    live = [f"{row['metric']}: {row['value']:.4f}" for row in rows if row["set"] == LIVE]
+    figures = [row for row in rows if row["set"] != LIVE]
+    columns = COLUMNS | {"left_out": "left out, m"} if any("left_out" in row for row in figures) else COLUMNS
+    return [Table("The foot on real recordings, one setting", [_printed(row) for row in figures], columns, live)]
 
 
 def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> list[Row]:
@@ -108,29 +122,3 @@ def _printed(row: Row) -> Row:
     peer = "" if row["peer"] is None else f"{row['peer']:.3f} {row['peer_name']}"
     digits = {key: f"{row[key]:.3f}" for key in ("value", "left_out") if row.get(key) is not None}
     return row | digits | {"peer": peer}
-
-
-def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]) -> None:
-    """Every track from above, on its truth where that is a path, as one PNG."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure as Sheet
-
-    from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
-
-    across = 6
-    down = -(-len(recordings) // across)
-    sheet = Sheet(figsize=(3 * across, 3 * down), dpi=80, layout="constrained")
-    FigureCanvasAgg(sheet)
-    for k, (recording, track) in enumerate(zip(recordings, tracks, strict=True)):
-        axes = sheet.add_subplot(down, across, k + 1, aspect="equal", title=f"{recording.group} {recording.name}")
-        xy = track.position_m[:, :2]
-        if recording.truth_m is not None and recording.truth_t_s is not None:
-            axes.plot(*recording.truth_m.T, color=TRUTH_COLOUR, linewidth=3, alpha=0.5)
-            xy = align(places(track, recording.truth_t_s), recording.truth_m)
-        axes.plot(*xy.T, color=TRACK_COLOUR, linewidth=1)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        sheet.savefig(path)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
-    console.print(f"{path}: tracks blue, truth green")

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from echostep.evaluate.fischer2008.simulator import OBEDIENT, OURS, PAPER, PDR, ObedientPerson, guided_return
-from echostep.evaluate.study import Row, Study, print_table, write_json, write_parquet
+from echostep.evaluate.report import Row, Table, rows_by_name
+from echostep.evaluate.study import Request, Study
 from echostep.simulation.world.beacon_ground import GroundSettings, ground
 
 BATCH = 50  # returns a task
@@ -80,20 +81,26 @@ def _with(parameter: str, value: float) -> GroundSettings:
     return replace(NOMINAL, **changed)
 
 
-def evaluate_fischer2008(runs: int, seed: int, json_path: Path | None, out: Path, scheduler: str | None) -> None:
-    """Run the study, print success rates with 95 % intervals, and write JSON, Parquet and the pictures."""
-    one = partial(one_batch, first=seed, runs=runs)
-    each = Study("fischer2008", math.ceil(runs / BATCH), 0, one, out, scheduler).rows()
-    rows = [_summary(name, [r for r in each if r["name"] == name]) for name in dict.fromkeys(r["name"] for r in each)]
+def fischer2008_study(runs: int, seed: int) -> Study:
+    """The study of `runs` returns from `seed` on. Its runs are batches of returns: the seed of a run is the batch's index."""
+    return Study(
+        "fischer2008",
+        partial(one_batch, first=seed, runs=runs),
+        lambda rows: [_summary(group) for group in rows_by_name(rows)],
+        _tables,
+        draw,
+        seeds=range(math.ceil(runs / BATCH)),
+        parquet="summary",
+    )
+
+
+def _tables(rows: list[Row], request: Request) -> list[Table]:
+    """Success rates with 95 % intervals, in percent."""
     printed = [
         r | {"percent": 100 * r["success"], "low_percent": 100 * r["low95"], "high_percent": 100 * r["high95"]}
         for r in rows
     ]
-    print_table(f"People guided back to the exit in time, {runs} simulated returns", printed, COLUMNS)
-    write_parquet(out / "fischer2008.parquet", rows)
-    draw(out, rows)
-    if json_path is not None:
-        write_json(json_path, "fischer2008", runs, seed, rows)
+    return [Table(f"People guided back to the exit in time, {request.runs} simulated returns", printed, COLUMNS)]
 
 
 def one_batch(batch: int, first: int, runs: int) -> list[Row]:
@@ -118,10 +125,10 @@ def one_return(case: Case, seed: int) -> bool:
     ).arrived  # fmt: skip
 
 
-def _summary(name: str, batches: list[Row]) -> Row:
+def _summary(batches: list[Row]) -> Row:
     runs, out = sum(b["runs"] for b in batches), sum(b["out"] for b in batches)
     low, high = wilson95(out, runs)
-    return {"name": name, "success": out / runs, "low95": low, "high95": high, "runs": runs}
+    return {"name": batches[0]["name"], "success": out / runs, "low95": low, "high95": high, "runs": runs}
 
 
 def wilson95(successes: int, runs: int) -> tuple[float, float]:
@@ -133,7 +140,7 @@ def wilson95(successes: int, runs: int) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-def draw(out: Path, rows: list[dict[str, Any]]) -> None:
+def draw(out: Path, _seed: int, rows: list[Row]) -> None:
     """The paper's Figures 9 and 10 and ours on the same ground, and the sweeps."""
     from echostep.evaluate.fischer2008.pictures import draw_returns, draw_sweeps
 

@@ -12,21 +12,18 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.evaluate.lee2010.study import (
-    METHODS,
+from echostep.evaluate.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
+from echostep.evaluate.lee2010.walks import (
     STOREY_M,
     STOREYS,
-    Found,
     Measured,
     chunks_of,
     descent_of,
-    floors_of,
     lap_of,
     lap_plan,
     measure,
     start_of,
     storeys,
-    with_plan,
 )
 from echostep.simulation.people.walker import Walk
 
@@ -60,7 +57,7 @@ def draw(folder: Path, seed: int) -> None:
         raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
 
 
-def _tracks(walked: Walk, measured: Measured) -> dict[str, Found]:
+def _tracks(walked: Walk, measured: Measured) -> dict[str, MethodTrack]:
     return {name: method(measured, start_of(walked)) for name, method in METHODS.items()}
 
 
@@ -73,7 +70,7 @@ def _figure(size_inches: tuple[float, float]) -> Any:
     return figure
 
 
-def _lap(path: Path, lap: Walk, tracks: dict[str, Found]) -> None:
+def _lap(path: Path, lap: Walk, tracks: dict[str, MethodTrack]) -> None:
     figure = _figure((8.0, 6.6))
     axes = figure.subplots()
     axes.plot(*lap.trunk_m[::50].T, **STYLES["truth"])
@@ -105,7 +102,7 @@ def _pressure(path: Path, pressure: Floats, descent: Walk) -> None:
     _finish(figure, axes, path)
 
 
-def _three(path: Path, descent: Walk, tracks: dict[str, Found], floors: Floats) -> None:
+def _three(path: Path, descent: Walk, tracks: dict[str, MethodTrack], floors: Floats) -> None:
     figure = _figure((8.5, 6.5))
     axes = figure.add_subplot(projection="3d")
     axes.plot(*descent.trunk_m[::100].T, descent.height_m[::100] - (STOREYS - 1) * STOREY_M, **STYLES["truth"])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.evaluate.trails.study import METHODS, RATES_HZ, Walked, judge, track
+from echostep.evaluate.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 from echostep.simulation.people.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
 
 # Told apart by the colour-blind [Okabe and Ito 2008], and by their lines.
@@ -48,13 +48,13 @@ def draw_trails(folder: Path, seed: int) -> None:
         raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
 
 
-def _walks(trail: Trail, seed: int) -> dict[str, Walked]:
+def _walks(trail: Trail, seed: int) -> dict[str, JudgedTrack]:
     walked = walk_trail(trail, seed)
     samples = measure_trail(trail, walked, RATES_HZ[0], seed)
     return {profile: judge(track(samples, profile), walked) for profile in METHODS}
 
 
-def _size_inches(trail: Trail, walks: dict[str, Walked]) -> tuple[float, float]:
+def _size_inches(trail: Trail, walks: dict[str, JudgedTrack]) -> tuple[float, float]:
     """Of a picture nine inches wide that suits the trail's shape."""
     places = np.vstack(
         [[waypoint[:2] for waypoint in trail.waypoints], *(walked.places_m for walked in walks.values())]
@@ -64,7 +64,7 @@ def _size_inches(trail: Trail, walks: dict[str, Walked]) -> tuple[float, float]:
 
 
 def _draw(
-    path: Path, some: tuple[Trail, ...], walks: dict[str, dict[str, Walked]], size_inches: tuple[float, float]
+    path: Path, some: tuple[Trail, ...], walks: dict[str, dict[str, JudgedTrack]], size_inches: tuple[float, float]
 ) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -81,7 +81,7 @@ def _draw(
     figure.savefig(path)
 
 
-def _draw_trail(axes: Any, trail: Trail, walks: dict[str, Walked]) -> None:
+def _draw_trail(axes: Any, trail: Trail, walks: dict[str, JudgedTrack]) -> None:
     way = np.array([waypoint[:2] for waypoint in trail.waypoints])
     axes.plot(*way.T, **TRUTH)
     if trail.machines:

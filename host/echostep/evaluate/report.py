@@ -1,0 +1,102 @@
+"""What a study puts out: summary rows, tables on the terminal, JSON and Parquet files.
+
+In: rows, which are dictionaries with the same keys in every run. Out: printed tables and files. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table as TerminalTable
+
+from echostep.errors import EchostepError
+
+Row = dict[str, Any]
+
+LOST_M = 3.0  # error at the end of a run above which it counts as lost: a definition
+MIN_TABLE_WIDTH = 110  # characters of a table where the terminal is narrower or its width is unknown
+console = Console(soft_wrap=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table on the terminal; `columns`: key of the rows -> heading; `notes`: lines below it. A missing value is an empty cell."""
+
+    title: str
+    rows: Sequence[Mapping[str, Any]]
+    columns: Mapping[str, str]
+    notes: Sequence[str] = ()
+
+    def print(self) -> None:
+        """Print the table, then its notes. Floats have two digits after the point."""
+        table = TerminalTable(title=self.title)
+        for k, heading in enumerate(self.columns.values()):
+            table.add_column(heading, justify="right" if k else "left", overflow="fold")
+        for row in self.rows:
+            table.add_row(*(_cell(row.get(key)) for key in self.columns))
+        Console(width=max(console.width, MIN_TABLE_WIDTH)).print(table)
+        for note in self.notes:
+            console.print(note)
+
+
+def rows_by_name(rows: Sequence[Row]) -> list[list[Row]]:
+    """The rows of all runs grouped by their `name`, names in the order of their first row."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row["name"], []).append(row)
+    return list(groups.values())
+
+
+def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]) -> Row:
+    """A row in the form of [Girard 2011, Table 1] from the errors at the steps of each run, (runs, steps).
+
+    `mean_m`, `sd_m`, `max_m`, `min_m`, `ending_m` are computed for each run, then averaged over the runs; `worst_m` is the greatest error of all.
+    `coverage95`: share of all steps with the truth inside the 95 % ellipse, None without `inside95`.
+    `lost`: number of runs that end more than `LOST_M` off.
+    """
+    each = [_of_run(errors) for errors in errors_m]
+    row: Row = {"name": name, "profile": profile, "runs": len(each)}
+    for k, key in enumerate(("mean_m", "sd_m", "max_m", "min_m", "ending_m")):
+        row[key] = round(sum(run[k] for run in each) / len(each), 4)
+    row["worst_m"] = round(max(run[2] for run in each), 4)
+    steps = [bool(x) for run in inside95 for x in run]
+    row["coverage95"] = round(sum(steps) / len(steps), 4) if steps else None
+    row["lost"] = sum(errors[-1] > LOST_M for errors in errors_m)
+    return row
+
+
+def _of_run(errors: Sequence[float]) -> tuple[float, float, float, float, float]:
+    """Mean, standard deviation, maximum, minimum and last of the errors of a run."""
+    mean = sum(errors) / len(errors)
+    sd = math.sqrt(sum((e - mean) ** 2 for e in errors) / len(errors))
+    return mean, sd, max(errors), min(errors), errors[-1]
+
+
+def write_json(path: Path, study: str, runs: int, seed: int, rows: Sequence[Mapping[str, Any]]) -> None:
+    """`{study, runs, seed, rows}`; raises EchostepError when the file cannot be written."""
+    text = json.dumps({"study": study, "runs": runs, "seed": seed, "rows": list(rows)}, indent=1)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n")
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the results: {error.strerror}") from error
+
+
+def write_parquet(path: Path, rows: Sequence[Row]) -> None:
+    """One record per row, for pandas, DuckDB or Arrow."""
+    import pyarrow
+    import pyarrow.parquet
+
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), path)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
