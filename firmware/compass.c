@@ -10,7 +10,7 @@
 #define REGISTER_BEARING 2u
 #define BEARING_MAX 3599u
 
-#define RETRY_TICKS TICKS_PER_MS
+#define RETRY_TICKS TICKS_PER_MS /* when the bus is in use, or a trigger is near */
 
 static struct twi_transfer transfer;
 static bool reading;    /* a transfer is under way */

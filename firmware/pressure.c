@@ -24,13 +24,13 @@
 #define TEMPERATURE_MASK 0x3FFFu
 #define TEMPERATURE_SIGN 0x2000
 
-#define RESET_TICKS (60u * TICKS_PER_MS)
-#define STARTING_MAX_TICKS (150u * TICKS_PER_MS)
+#define RESET_TICKS (60u * TICKS_PER_MS)         /* busy after a reset */
+#define STARTING_MAX_TICKS (150u * TICKS_PER_MS) /* after that: limit of the start */
 #define STARTING_POLL_TICKS (10u * TICKS_PER_MS)
 #define READY_POLL_TICKS (5u * TICKS_PER_MS)
 #define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 110 ms per sample: an earlier DRDY is a stuck line */
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)   /* the slow mode needs 560 ms per sample */
-#define RETRY_TICKS TICKS_PER_S
+#define RETRY_TICKS TICKS_PER_S               /* from a failure to the next reset */
 
 enum stage { STARTING, MEASURING, FAILED };
 

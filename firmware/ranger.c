@@ -9,22 +9,24 @@
 #define REGISTER_COMMAND 0u
 #define REGISTER_REVISION 0u
 #define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
-#define RANGING_MIN_TICKS (60u * TICKS_PER_MS)
-#define RANGING_MAX_TICKS (72u * TICKS_PER_MS)
-#define POLL_TICKS (TICKS_PER_MS / 2u)
+#define RANGING_MIN_TICKS (60u * TICKS_PER_MS) /* first request for the result */
+#define RANGING_MAX_TICKS (72u * TICKS_PER_MS) /* last request: 65 ms with a margin */
+#define POLL_TICKS (TICKS_PER_MS / 2u)         /* between requests */
 
 #define TRIGGER_TRIES 3u
-#define RETRY_TICKS TICKS_PER_MS
-#define QUIET_TICKS TICKS_PER_MS
+#define RETRY_TICKS TICKS_PER_MS          /* between tries */
+#define QUIET_TICKS TICKS_PER_MS          /* before a trigger the bus is kept free: longer than any other transfer */
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
-#define IDLE_TICKS (30u * TICKS_PER_MS)
+#define IDLE_TICKS (30u * TICKS_PER_MS)   /* until the next call of a ranger with a transfer under way, or with nothing to do */
 
+/* Half periods of the two schedules: see ranger.h. */
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
-#define CONCURRENT_JITTER_MASK 0x1FFFu /* ticks: up to 4.1 ms */
-#define JITTER_STEPS 13u        /* bits of the mask: every bit of a delay is new */
-#define LFSR_TAPS 0xB400u       /* 16-bit Galois register of maximal length */
-#define LFSR_START 0xACE1u      /* any value but 0 */
 #define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
+
+#define CONCURRENT_JITTER_MASK 0x1FFFu /* ticks: up to 4.1 ms */
+#define JITTER_STEPS 13u               /* bits of the mask: every bit of a delay is new */
+#define LFSR_TAPS 0xB400u              /* 16-bit Galois register of maximal length */
+#define LFSR_START 0xACE1u             /* any value but 0 */
 
 enum stage { WAITING, TRIGGERING, RANGING, READING };
 

@@ -4,8 +4,7 @@
 
 /* Four parts, 0.56 s in all: at rest, ST1, ST2, at rest again. Each part waits 60 ms for the 40 Hz filter, then averages 16 samples. */
 #define SETTLE_SAMPLES 12u
-#define WINDOW_SHIFT 4u
-#define WINDOW_SAMPLES (1u << WINDOW_SHIFT)
+#define WINDOW_SAMPLES 16u
 #define PART_SAMPLES (SETTLE_SAMPLES + WINDOW_SAMPLES)
 
 /* Response in counts: 150 to 450 mV [ADXRS300 data sheet; typical 270 mV] through the ADIS16100's converter, 4096 counts for 5 V, with
