@@ -228,11 +228,12 @@ FIRST_FIX = """
 import time
 import numpy as np
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.particles import _reweight
+from echostep.localization.particle_kernels import ParticleArrays, reweight_by_ping
 from echostep.walls.echo_sources import Walls
 x = np.linspace(0.5, 3.5, 300)
 index = Walls(np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0]])).near(x, x * 0.5)
-_reweight(x, x * 0.5, x * 0.1, np.zeros(300), 1.57, 1.2, 1.0, echo_model(EchoSettings()), index)
+cloud = ParticleArrays(x, x * 0.5, x * 0.1, np.ones(300), np.zeros(300))
+reweight_by_ping(cloud, 1.57, 1.2, 1.0, echo_model(EchoSettings()), index)
 print(time.process_time())
 """
 

@@ -17,8 +17,9 @@ from echostep.errors import EchostepError
 from echostep.legs.heading import CompassErrors
 from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.estimate import Estimate, estimate, unobserved
-from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles import CloudSettings, Move, systematic
+from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.particle_kernels import Move, systematic
+from echostep.localization.particles import CloudSettings
 from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan, Pose
@@ -94,7 +95,7 @@ class Tracker:
             particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
             plan_explained=math.nan if self.filter is None else self.filter.explained,
             beacon_numbers=tuple(self.gateway.numbers),
-            beacon_heard_s=None if self.filter is None else self.filter.crumbs.heard_s,
+            beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
         )
 
     @property
@@ -129,7 +130,7 @@ class Tracker:
 
     def beacon_places(self, t_s: float) -> list[BeaconPlace]:
         """Every beacon with a known place, as the particles believe it at `t_s`."""
-        return [] if self.filter is None else self.filter.crumbs.places(self.filter.cloud, t_s)
+        return [] if self.filter is None else self.filter.beacon_map.places(self.filter.cloud, t_s)
 
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""
@@ -182,7 +183,7 @@ class Tracker:
                 self.filter = self.filter or self._first(piece.segment.heading0_rad)
                 if self.filter is None:
                     continue
-                self._last = self.filter.follow(piece, self._words_until(piece.segment.t1_s))
+                self._last = self.filter.update(piece, self._words_until(piece.segment.t1_s))
                 estimates.append(self._last)
                 self._tell(piece, self._last)
             elif self._last is not None:
@@ -208,8 +209,8 @@ class Tracker:
         leg = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         one = MeasuredSegment(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
         first = self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
-        first.follow(one, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
-        first.crumbs.places(first.cloud, 1.0)
+        first.update(one, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+        first.beacon_map.places(first.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
 
     def _first(self, walk_heading_rad: float) -> MapFilter | None:
@@ -233,5 +234,6 @@ class Tracker:
     def _begin(
         self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
     ) -> MapFilter:
-        s, b = self.settings, self.laid_out
-        return MapFilter(b.walls, start, walk_heading_rad, rng, cloud or s.cloud, s.echo, b.storeys, s.climb, s.beacons)
+        s, laid_out = self.settings, self.laid_out
+        settings = FilterSettings(cloud or s.cloud, s.echo, s.climb, s.beacons)
+        return MapFilter(laid_out.walls, start, walk_heading_rad, rng, settings, laid_out.sheet)

@@ -15,7 +15,7 @@ from echostep.board.frames import encode
 from echostep.board.gateway import MOST_BEACONS, SETTLED, Gateway
 from echostep.board.messages import Beacon, Identity
 from echostep.errors import EchostepError
-from echostep.localization.beacon_initialisation import found_place
+from echostep.localization.beacon_initialisation import locate_beacon
 from echostep.ports.chunks import BOARD, GATEWAY, Chunk, SerialPorts, portion_of
 from echostep.ports.udp import UdpPort
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, heard_at, lay_beacons, message
@@ -112,10 +112,10 @@ def test_a_beacon_is_placed_by_a_way_past_it() -> None:
     world = BeaconWorld(np.array([[3.0, 2.0, 0.4]]), np.zeros((0, 4)))
     rng = np.random.default_rng(1)
     rows = [(x, 0.0, r, b) for x in np.arange(0.0, 7.0, 0.2) for _, r, b in heard_at(world, float(x), 0.0, rng)]
-    assert found_place(np.array(rows)) == pytest.approx((3.0, 2.0), abs=0.3)
-    assert found_place(np.array(rows[:8])) is None
+    assert locate_beacon(np.array(rows)) == pytest.approx((3.0, 2.0), abs=0.3)
+    assert locate_beacon(np.array(rows[:8])) is None
     ranges_only = np.array([(x, y, r, math.nan) for x, y, r, _ in rows])
-    assert found_place(ranges_only) is None  # it may as well lie on the other side
+    assert locate_beacon(ranges_only) is None  # it may as well lie on the other side
 
 
 def test_walls_hide_beacons() -> None:

@@ -16,7 +16,7 @@ import pytest
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.guidance.guided_run import GuidedRun, destination
-from echostep.localization.beacon_slam import Beliefs, moments
+from echostep.localization.beacon_beliefs import BeaconBeliefs, moments
 from echostep.localization.estimate import digest
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.routing import RoutePlace
@@ -67,7 +67,7 @@ def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> 
     assert digest(one) == digest(two)
     assert live.gateway.counts.words > 100
     assert live.filter is not None
-    places = live.filter.crumbs.places(live.filter.cloud, one[-1].t_s)
+    places = live.filter.beacon_map.places(live.filter.cloud, one[-1].t_s)
     assert len(places) >= 3
     for p in places:
         x, y, _ = walk.places[live.gateway.numbers[p.slot] - 1]
@@ -92,7 +92,7 @@ def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, st
     tracker = Tracker(plan, scenario.start, seed=SEED)
     tracker.take(portion_of(list(heapq.merge(scenario.chunks(), said, key=attrgetter("t_arrival_ns")))))
     assert tracker.filter
-    found = tracker.filter.crumbs.places(tracker.filter.cloud, t_s[-1])
+    found = tracker.filter.beacon_map.places(tracker.filter.cloud, t_s[-1])
     return {tracker.gateway.numbers[p.slot]: p.state.value for p in found}
 
 
@@ -106,7 +106,7 @@ def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> 
 def test_moments_are_those_of_the_mixture() -> None:
     rng = np.random.default_rng(SEED)
     n, b = 500, 3
-    beliefs = Beliefs(rng.normal(40.0, 2.0, (n, b, 3)), rng.uniform(0.1, 1.0, (n, b, 6)), np.zeros((n, b)))
+    beliefs = BeaconBeliefs(rng.normal(40.0, 2.0, (n, b, 3)), rng.uniform(0.1, 1.0, (n, b, 6)), np.zeros((n, b)))
     weight = rng.uniform(size=n)
     weight /= weight.sum()
     for k, (x, y, sd, axis) in enumerate(moments(beliefs, weight)):

@@ -8,20 +8,24 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.beacon_slam import (
-    UNFIT_RUNS,
-    BeaconSettings,
-    Beliefs,
-    beacon_model,
-    hear,
-    inherit,
-    kick,
-    no_beliefs,
-    place,
-    unheard,
-    weigh,
-    wrapped,
+from echostep.localization.beacon_beliefs import (
+    BeaconBeliefs,
+    BeaconMeasurement,
+    empty_beliefs,
+    resample_beliefs,
+    set_beliefs,
+    wrap_angle,
 )
+from echostep.localization.beacon_model import BeaconSettings, beacon_model
+from echostep.localization.beacon_slam import (
+    CLOUD_FIT,
+    TIMES_MOVED,
+    initial_health,
+    propose_heading_jumps,
+    reweight,
+    update_by_measurement,
+)
+from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 
@@ -37,6 +41,19 @@ def walls(*rows: tuple[float, float, float, float]) -> WallIndex:
 OPEN = walls()
 
 
+def weigh(
+    x: Floats,
+    y: Floats,
+    weight: Floats,
+    beliefs: BeaconBeliefs,
+    range_m: float,
+    bearing: float,
+    index: WallIndex = OPEN,
+) -> tuple[float, float]:
+    particles = ParticleArrays(x, y, np.zeros(len(x)), np.ones(len(x)), weight)
+    return reweight(particles, beliefs, BeaconMeasurement(0, range_m, bearing), MODEL, index)
+
+
 def ring(n: int, radius_m: float) -> tuple[Floats, Floats]:
     angle = np.linspace(-math.pi, math.pi, n, endpoint=False)
     return radius_m * np.cos(angle), radius_m * np.sin(angle)
@@ -44,9 +61,9 @@ def ring(n: int, radius_m: float) -> tuple[Floats, Floats]:
 
 def test_range_prefers_particles_at_that_distance() -> None:
     x, y = np.linspace(1.0, 6.0, 51), np.zeros(51)
-    weight, beliefs = np.zeros(51), no_beliefs(51, 1)
-    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    fit, size = weigh(x, y, weight, beliefs, 0, 3.0, math.nan, MODEL, OPEN)
+    weight, beliefs = np.zeros(51), empty_beliefs(51, 1)
+    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    fit, size = weigh(x, y, weight, beliefs, 3.0, math.nan)
     assert abs(x[weight.argmax()] - 3.0) < 0.06
     assert 0.0 < fit < 1.0
     assert 1.0 < size < 51.0
@@ -54,17 +71,17 @@ def test_range_prefers_particles_at_that_distance() -> None:
 
 def test_bearing_prefers_particles_on_that_side() -> None:
     x, y = ring(72, 3.0)
-    weight, beliefs = np.zeros(72), no_beliefs(72, 1)
-    place(beliefs, 0, 0.0, 0.0, math.radians(40.0), 0.0, 0.0)
-    weigh(x, y, weight, beliefs, 0, 3.0, math.radians(50.0), MODEL, OPEN)
+    weight, beliefs = np.zeros(72), empty_beliefs(72, 1)
+    set_beliefs(beliefs, 0, 0.0, 0.0, math.radians(40.0), 0.0, 0.0)
+    weigh(x, y, weight, beliefs, 3.0, math.radians(50.0))
     assert abs(math.atan2(y[weight.argmax()], x[weight.argmax()]) - math.radians(90.0)) < 0.1
 
 
 def test_outlier_costs_no_particle_its_life() -> None:
     x, y = np.full(10, 2.0), np.linspace(-0.5, 0.5, 10)
-    weight, beliefs = np.zeros(10), no_beliefs(10, 1)
-    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    fit, size = weigh(x, y, weight, beliefs, 0, 9.0, math.nan, MODEL, OPEN)
+    weight, beliefs = np.zeros(10), empty_beliefs(10, 1)
+    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    fit, size = weigh(x, y, weight, beliefs, 9.0, math.nan)
     assert 0.8 < fit < 0.9  # it may also have been moved
     assert size > 9.9
 
@@ -72,23 +89,21 @@ def test_outlier_costs_no_particle_its_life() -> None:
 def test_wall_on_the_line_of_sight_makes_a_fitting_range_less_likely() -> None:
     seen = []
     for index in (OPEN, walls((1.0, -5.0, 1.0, 5.0))):
-        weight, beliefs = np.zeros(1), no_beliefs(1, 1)
-        place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        seen.append(weigh(np.full(1, 2.0), np.zeros(1), weight, beliefs, 0, 2.0, math.nan, MODEL, index)[0])
+        weight, beliefs = np.zeros(1), empty_beliefs(1, 1)
+        set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        seen.append(weigh(np.full(1, 2.0), np.zeros(1), weight, beliefs, 2.0, math.nan, index)[0])
     assert seen[1] < seen[0] - 0.005
 
 
 def test_place_and_axis_are_learnt_from_a_walk_around() -> None:
     rng = np.random.default_rng(1)
     n, true = 20, (1.0, -0.5, 0.7)
-    beliefs, weight = no_beliefs(n, 1), np.zeros(n)
-    place(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
+    beliefs, weight = empty_beliefs(n, 1), np.zeros(n)
+    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
     for angle in np.linspace(0.0, 2.0 * math.pi, 200):
         x, y = true[0] + 3.0 * math.cos(angle), true[1] + 3.0 * math.sin(angle)
-        bearing = wrapped(angle - true[2] + math.radians(30.0) * rng.standard_normal())
-        weigh(
-            np.full(n, x), np.full(n, y), weight, beliefs, 0, 3.0 + 0.05 * rng.standard_normal(), bearing, MODEL, OPEN
-        )
+        bearing = wrap_angle(angle - true[2] + math.radians(30.0) * rng.standard_normal())
+        weigh(np.full(n, x), np.full(n, y), weight, beliefs, 3.0 + 0.05 * rng.standard_normal(), bearing)
     place_off = beliefs.mean[:, 0, :2] - true[:2]
     assert np.hypot(*place_off.T).max() < 0.15
     assert np.abs(beliefs.mean[:, 0, 2] - true[2]).max() < 0.15
@@ -99,21 +114,25 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
     rng = np.random.default_rng(2)
     n = 100
     x, y = 0.05 * rng.standard_normal(n), 0.05 * rng.standard_normal(n)
-    turn, weight, health = np.zeros(n), np.zeros(n), unheard(3)
-    beliefs = no_beliefs(n, 3)
+    turn, weight, health = np.zeros(n), np.zeros(n), initial_health(3)
+    beliefs = empty_beliefs(n, 3)
     at = [(4.0, 0.0), (0.0, 4.0), (-4.0, 0.0)]
     for k, (bx, by) in enumerate(at):
-        place(beliefs, k, bx, by, 0.0, 0.0, 0.0)
+        set_beliefs(beliefs, k, bx, by, 0.0, 0.0, 0.0)
     health.known[:] = True
     for _ in range(60):
         for k, range_m in enumerate((4.0, 4.0, 7.0)):  # the third lies 3 m further off than believed
-            hear(x, y, turn, weight, beliefs, health, k, range_m, math.nan, MODEL, 0.25, OPEN, rng)
+            particles, measurement = (
+                ParticleArrays(x, y, turn, np.ones(n), weight),
+                BeaconMeasurement(k, range_m, math.nan),
+            )
+            update_by_measurement(particles, beliefs, health, measurement, MODEL, OPEN, rng)
         chosen = rng.choice(n, n, p=np.exp(weight) / np.exp(weight).sum())
         weight[:], x[:], y[:] = 0.0, x[chosen], y[chosen]
-        inherit(beliefs, chosen)
-    assert health.each[:2, UNFIT_RUNS].tolist() == [0.0, 0.0]
-    assert health.each[2, UNFIT_RUNS] >= 1.0
-    assert health.all[0] > 0.5
+        resample_beliefs(beliefs, chosen)
+    assert health.each[:2, TIMES_MOVED].tolist() == [0.0, 0.0]
+    assert health.each[2, TIMES_MOVED] >= 1.0
+    assert health.all[CLOUD_FIT] > 0.5
     assert beliefs.doubt[:, 2].min() > 3.0
     assert np.abs(beliefs.mean[:, 2, 0] + 4.0).max() < 0.1  # nobody learns from it
     assert np.hypot(x.mean(), y.mean()) < 0.1
@@ -121,7 +140,7 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
 
 def test_kick_prices_what_it_tries() -> None:
     turn, weight = np.zeros(10_000), np.zeros(10_000)
-    kick(turn, weight, 0.2, MODEL, np.random.default_rng(3))
+    propose_heading_jumps(turn, weight, 0.2, MODEL, np.random.default_rng(3))
     kicked = turn != 0.0
     assert abs(kicked.mean() - 0.2 * MODEL.tries_per_m) < 0.02
     assert np.allclose(weight[kicked], math.log(MODEL.kick_per_m / MODEL.tries_per_m))
@@ -134,10 +153,10 @@ def test_kick_prices_what_it_tries() -> None:
 def test_no_measurement_makes_a_belief_infinite(
     range_m: float, bearing: float, x: float, y: float, place_var: float, axis_var: float
 ) -> None:
-    beliefs, weight = no_beliefs(3, 1), np.zeros(3)
-    place(beliefs, 0, 0.0, 0.0, 0.0, place_var, axis_var)
+    beliefs, weight = empty_beliefs(3, 1), np.zeros(3)
+    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, place_var, axis_var)
     for _ in range(3):
-        weigh(np.full(3, x), np.full(3, y), weight, beliefs, 0, range_m, bearing, MODEL, OPEN)
+        weigh(np.full(3, x), np.full(3, y), weight, beliefs, range_m, bearing)
     assert np.isfinite(weight).all()
     assert all(np.isfinite(part).all() for part in beliefs)
     assert (beliefs.cov[:, 0, (0, 3, 5)] >= -1e-9).all()
@@ -145,8 +164,8 @@ def test_no_measurement_makes_a_belief_infinite(
 
 def test_inherit_copies_what_the_chosen_believed() -> None:
     mean, cov = np.arange(12.0).reshape(2, 2, 3), np.arange(24.0).reshape(2, 2, 6)
-    beliefs = Beliefs(mean.copy(), cov.copy(), np.arange(4.0).reshape(2, 2))
-    inherit(beliefs, np.array([1, 1]))
+    beliefs = BeaconBeliefs(mean.copy(), cov.copy(), np.arange(4.0).reshape(2, 2))
+    resample_beliefs(beliefs, np.array([1, 1]))
     assert (beliefs.mean == mean[[1, 1]]).all()
     assert (beliefs.cov == cov[[1, 1]]).all()
     assert beliefs.doubt.tolist() == [[2.0, 3.0], [2.0, 3.0]]
@@ -154,26 +173,26 @@ def test_inherit_copies_what_the_chosen_believed() -> None:
 
 def test_beacon_that_was_moved_costs_no_more_than_a_moved_one_and_is_trusted_again() -> None:
     """A particle that one beacon contradicts for long is left with the others' word; when it fits again it counts again."""
-    beliefs, weight = no_beliefs(1, 1), np.zeros(1)
-    place(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    beliefs, weight = empty_beliefs(1, 1), np.zeros(1)
+    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
     at = np.full(1, 4.0), np.zeros(1)
-    trust = [weigh(*at, weight, beliefs, 0, 8.0, math.nan, MODEL, OPEN)[0] for _ in range(20)]
+    trust = [weigh(*at, weight, beliefs, 8.0, math.nan)[0] for _ in range(20)]
     assert trust[0] > 0.8
     assert trust[-1] < 0.05
     assert beliefs.doubt[0, 0] < 8.0
-    trust = [weigh(*at, weight, beliefs, 0, 4.0, math.nan, MODEL, OPEN)[0] for _ in range(10)]
+    trust = [weigh(*at, weight, beliefs, 4.0, math.nan)[0] for _ in range(10)]
     assert trust[-1] > 0.95
 
 
 def test_first_bearing_ties_the_axis_to_the_place() -> None:
     """The place is uncertain across the line of sight: whoever then learns that the beacon lies to the left learns that its axis is another."""
-    beliefs, weight = no_beliefs(1, 1), np.zeros(1)
-    place(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
-    weigh(np.full(1, 5.0), np.zeros(1), weight, beliefs, 0, 5.0, 0.3, MODEL, OPEN)
+    beliefs, weight = empty_beliefs(1, 1), np.zeros(1)
+    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
+    weigh(np.full(1, 5.0), np.zeros(1), weight, beliefs, 5.0, 0.3)
     axis = beliefs.mean[0, 0, 2]
     assert abs(axis + 0.3) < 0.1
     for _ in range(20):
-        weigh(np.zeros(1), np.full(1, -5.0), weight, beliefs, 0, 6.0, math.nan, MODEL, OPEN)
+        weigh(np.zeros(1), np.full(1, -5.0), weight, beliefs, 6.0, math.nan)
     assert abs(beliefs.mean[0, 0, 1] - 0.9) < 0.2
     seen = math.atan2(-beliefs.mean[0, 0, 1], 5.0)
     assert abs(beliefs.mean[0, 0, 2] - (seen - 0.3)) < 0.06

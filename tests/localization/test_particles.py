@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from echostep.localization.echo_likelihood import EchoSettings, echo_model, log_echo
 from echostep.localization.estimate import TrackStatus, ellipse95, estimate, trust
-from echostep.localization.particles import Cloud, CloudSettings, Move, PingBatch, effective_size, systematic
+from echostep.localization.particle_kernels import Move, PingBatch, effective_size, systematic
+from echostep.localization.particles import Cloud, CloudSettings
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.visibility import CORNER, EDGE
@@ -81,14 +82,14 @@ def test_the_effective_size() -> None:
 
 def test_walls_take_the_weight_and_the_rest_carries_on() -> None:
     found = cloud()
-    found.follow(Move(0.0, 0.9, 0.1, 0.0), NOTHING, MODEL, BOX)  # up to the wall at y = 2
+    found.propagate_and_reweight(Move(0.0, 0.9, 0.1, 0.0), NOTHING, MODEL, BOX)  # up to the wall at y = 2
     assert estimate(found, 0.0, 0.0, 0).y_m < 2.0
     assert found.rescues == 0
 
 
 def test_a_move_through_a_wall_is_survived_wider() -> None:
     found = cloud()
-    found.follow(Move(0.0, 3.0, 0.01, 0.0), NOTHING, MODEL, BOX)
+    found.propagate_and_reweight(Move(0.0, 3.0, 0.01, 0.0), NOTHING, MODEL, BOX)
     assert found.rescues == 1
     assert estimate(found, 0.0, 0.0, 0).ellipse95.major_m > 1.0
 
@@ -97,7 +98,7 @@ def test_echoes_find_the_place_across_a_corridor() -> None:
     found = cloud()
     for _ in range(30):
         for axis, range_m in ((math.pi / 2, 0.7), (-math.pi / 2, 1.3)):  # the left wall is 0.7 m away: y = 1.3
-            explained = found.follow(Move(0.0, 0.0, 0.0, 0.0), heard(axis, range_m), MODEL, BOX)
+            explained = found.propagate_and_reweight(Move(0.0, 0.0, 0.0, 0.0), heard(axis, range_m), MODEL, BOX)
     assert estimate(found, 0.0, 0.0, 0).y_m == pytest.approx(1.3, abs=0.05)
     assert explained[0] > 1.0
 
@@ -111,7 +112,7 @@ def test_pings_count_where_they_were_triggered() -> None:
     for name, ranges in (("passed", [1.0] * 5 + [0.0] * 5), ("not yet", [1.0] * 10)):
         found = Cloud(CloudSettings(size=2000, start_sd_m=0.3), place, 0.0, np.random.default_rng(3))
         pings = PingBatch(shares, np.full(10, math.pi / 2), np.array(ranges), np.ones(10))
-        found.follow(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)
+        found.propagate_and_reweight(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)
         ends[name] = estimate(found, 0.0, 0.0, 0).x_m
     assert ends["passed"] > ends["not yet"] + 0.2
 
@@ -125,7 +126,7 @@ def test_an_unwatched_move_grows_the_cloud_and_it_shrinks_again() -> None:
     found.y_m[:] = 1.0 + 0.1 * np.random.default_rng(2).standard_normal(len(found.y_m))
     found.turn_rad[:] = 0.0
     for _ in range(60):
-        found.follow(Move(0.0, 0.0, 0.0, 0.0), heard(math.pi / 2, 1.0, power=1.0), MODEL, BOX)
+        found.propagate_and_reweight(Move(0.0, 0.0, 0.0, 0.0), heard(math.pi / 2, 1.0, power=1.0), MODEL, BOX)
     assert len(found.x_m) < 1000
 
 

@@ -16,8 +16,15 @@ from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.evaluate.multi_floor import judge, through
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.level_changes import ClimbSettings, HeightChange, climb, climb_model
-from echostep.localization.particles import ANY_LEVEL, Cloud, CloudSettings, Move
+from echostep.localization.level_changes import (
+    ClimbSettings,
+    HeightArrays,
+    HeightChange,
+    change_levels,
+    level_change_model,
+)
+from echostep.localization.particle_kernels import Move, ParticleArrays
+from echostep.localization.particles import ANY_LEVEL, Cloud, CloudSettings
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
@@ -74,9 +81,9 @@ def test_each_level_lies_out_of_reach_of_the_others() -> None:
     plan = tower(3)
     sheet = lay_out_levels(plan)
     for k, level in enumerate(plan.levels):
-        x = level.solid[:, [0, 2]].ravel() + k * sheet.storeys.pitch_m
-        assert (level_of(x, sheet.storeys) == k).all()
-    assert sheet.storeys.pitch_m > np.ptp(plan.levels[0].solid[:, [0, 2]]) + 50.0
+        x = level.solid[:, [0, 2]].ravel() + k * sheet.sheet.pitch_m
+        assert (level_of(x, sheet.sheet) == k).all()
+    assert sheet.sheet.pitch_m > np.ptp(plan.levels[0].solid[:, [0, 2]]) + 50.0
 
 
 def test_a_single_level_lies_where_its_map_has_it() -> None:
@@ -168,7 +175,8 @@ def test_heights_are_those_of_the_obvious_way(felt_m: float, height_sd_m: float)
     particles = np.column_stack([x, y, turn, scale, z, lag])
     wanted = [naive_climb(row, move, rise, 0.3, s, plan, storeys) for row in particles]
     weights = log_weight + [row[3] for row in wanted]
-    variance = climb(x, y, turn, scale, z, lag, log_weight, 0.6, 0.1, np.zeros(n), rise, 0.3, climb_model(s), storeys)
+    cloud, heights = ParticleArrays(x, y, turn, scale, log_weight), HeightArrays(z, lag)
+    variance = change_levels(cloud, heights, move, np.zeros(n), rise, 0.3, level_change_model(s), storeys)
     np.testing.assert_allclose(np.column_stack([x, z, lag]), np.array(wanted)[:, :3], rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(log_weight, weights - weights.max(), rtol=0.0, atol=1e-9)
     assert variance == pytest.approx(0.3 * 0.04 / 0.34 if math.isfinite(height_sd_m) else 0.3)
@@ -183,7 +191,7 @@ def test_who_stays_on_the_flat_stays_on_his_level_whatever_the_weather_does() ->
     storeys = level_sheet_of(plan)
     standing = cloud(storeys, Pose(15.0, 1.5, 0.0, 1))
     for minute in range(60):
-        standing.climb(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 3.5 + 8.3 * minute / 60.0, 0.15, 60.0))
+        standing.change_levels(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 3.5 + 8.3 * minute / 60.0, 0.15, 60.0))
     assert (standing.level == 1).all()
     assert np.allclose(standing.z_m, STOREY_M)
 
@@ -193,7 +201,7 @@ def test_a_lift_carries_those_who_are_in_it() -> None:
     storeys = level_sheet_of(plan)
     riding = cloud(storeys, Pose(*LIFT_AT, 0.0, 0))
     for half in range(20):
-        riding.climb(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 100.0 + min(0.5 * half, 7.0), 0.15, 0.5))
+        riding.change_levels(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 100.0 + min(0.5 * half, 7.0), 0.15, 0.5))
     assert np.bincount(riding.level, np.exp(riding.log_weight)).argmax() == 2
     assert np.ptp(riding.map_x_m) < 2.0
 

@@ -133,9 +133,9 @@ def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
     since_s = -math.inf
     for k, (turning, step) in enumerate(_legs(walk)):
         if turning is not None:
-            ours.follow(_passage(turning, walk, since_s))
+            ours.update(_passage(turning, walk, since_s))
             since_s = turning.t1_s
-        found = ours.follow(_passage(step, walk, since_s))
+        found = ours.update(_passage(step, walk, since_s))
         since_s = step.t1_s
         cloud = np.column_stack([ours.cloud.x_m, ours.cloud.y_m])
         yield Seen((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)

@@ -1,7 +1,7 @@
-"""Where a beacon lies that was first heard from afar: found from what it said along a piece of the way, before anybody is weighed by it.
+"""The place of a beacon that was first heard from afar, from several of its readings along the path.
 
-In: places of the boot with the ranges and bearings measured there. Out: the beacon's place, or none while there are several that fit. Owns nothing.
-Ranges along a straight way fit two places, one on either side: the bearings decide, or a bend of the way does.
+In: readings, each with the boot's place. Out: the beacon's place, or None while several places fit. Owns nothing.
+Ranges along a straight path fit two places, one on either side: bearings decide, or a bend of the path does.
 """
 
 from __future__ import annotations
@@ -12,42 +12,52 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-FEWEST = 12
-WAY_M = 3.0  # between the outermost places of the boot
+X, Y, RANGE, BEARING = (
+    0,
+    1,
+    2,
+    3,
+)  # columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)
+
+# All constants here are by reason.
+FEWEST = 12  # readings
+PATH_M = 3.0  # between the outermost places of the boot
 GRID_M = 0.25
+FINER = 5.0  # the second grid
 RANGE_SD_M = 0.3
 BEARING_SD_RAD = math.radians(30.0)
-WORST = 9.0  # squares: an outlier costs no more
-APART_M = 1.5  # two places
-SURER = 12.0  # by which the cost of any other place must be higher
-FITTING = 0.6  # share of ranges that must fit
+OUTLIER_COST = 9.0  # greatest cost of one reading: three standard deviations, squared
+APART_M = 1.5  # places further apart are two hypotheses
+MARGIN = 12.0  # by which the cost of any other hypothesis must be higher
+FITTING = 0.6  # share of ranges that must fit within three standard deviations
 
 
-def found_place(words: Floats) -> tuple[float, float] | None:
-    """The beacon (x, y) that explains words (n, 4): x, y of the boot, range (m), bearing (rad, NaN: not measured); None while it is not certain."""
-    if len(words) < FEWEST or math.hypot(*np.ptp(words[:, :2], axis=0)) < WAY_M:
+def locate_beacon(readings: Floats) -> tuple[float, float] | None:
+    """The beacon's place (x, y) that fits readings (n, 4) best; None while they are too few or another place fits nearly as well."""
+    places = readings[:, : Y + 1]
+    if len(readings) < FEWEST or math.hypot(*np.ptp(places, axis=0)) < PATH_M:
         return None
-    best, cost, grid = _cheapest(words, words[:, :2].mean(0), float(words[:, 2].max()) + 1.0, GRID_M)
-    apart = np.hypot(*(grid - best).T) > APART_M
-    if apart.any() and cost[apart].min() - cost.min() < SURER:
+    best, cost, grid = _search(readings, places.mean(0), float(readings[:, RANGE].max()) + 1.0, GRID_M)
+    others = np.hypot(*(grid - best).T) > APART_M
+    if others.any() and cost[others].min() - cost.min() < MARGIN:
         return None
-    best, _, _ = _cheapest(words, best, 2.0 * GRID_M, GRID_M / 5.0)
-    off = np.hypot(*(words[:, :2] - best).T) - words[:, 2]
-    if (np.abs(off) < 3.0 * RANGE_SD_M).mean() < FITTING:
+    best, _, _ = _search(readings, best, 2.0 * GRID_M, GRID_M / FINER)
+    residual = np.hypot(*(places - best).T) - readings[:, RANGE]
+    if (np.abs(residual) < 3.0 * RANGE_SD_M).mean() < FITTING:
         return None
     return float(best[0]), float(best[1])
 
 
-def _cheapest(words: Floats, middle: Floats, reach_m: float, step_m: float) -> tuple[Floats, Floats, Floats]:
-    """The cheapest place of a grid about a middle, the costs (m,), and the grid (m, 2)."""
+def _search(readings: Floats, centre: Floats, reach_m: float, step_m: float) -> tuple[Floats, Floats, Floats]:
+    """The place of least cost on a grid about a centre, the costs (m,), and the grid (m, 2)."""
     side = np.arange(-reach_m, reach_m + 0.5 * step_m, step_m)
-    grid = middle + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    dx, dy = words[:, 0] - grid[:, :1], words[:, 1] - grid[:, 1:]
-    cost = np.minimum(((np.hypot(dx, dy) - words[:, 2]) / RANGE_SD_M) ** 2, WORST).sum(1)
-    told = ~np.isnan(words[:, 3])
-    if told.any():
-        gap = np.arctan2(dy, dx)[:, told] - words[told, 3]  # the axis, by each word
-        axis = np.arctan2(np.sin(gap).sum(1), np.cos(gap).sum(1))
-        off = np.angle(np.exp(1j * (gap - axis[:, None])))
-        cost = cost + np.minimum((off / BEARING_SD_RAD) ** 2, WORST).sum(1)
+    grid = centre + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    dx, dy = readings[:, X] - grid[:, :1], readings[:, Y] - grid[:, 1:]
+    cost = np.minimum(((np.hypot(dx, dy) - readings[:, RANGE]) / RANGE_SD_M) ** 2, OUTLIER_COST).sum(1)
+    has_bearing = ~np.isnan(readings[:, BEARING])
+    if has_bearing.any():
+        axes = np.arctan2(dy, dx)[:, has_bearing] - readings[has_bearing, BEARING]  # the beacon's axis by each reading
+        axis = np.arctan2(np.sin(axes).sum(1), np.cos(axes).sum(1))
+        residual = np.angle(np.exp(1j * (axes - axis[:, None])))
+        cost = cost + np.minimum((residual / BEARING_SD_RAD) ** 2, OUTLIER_COST).sum(1)
     return grid[cost.argmin()], cost, grid

@@ -1,7 +1,7 @@
-"""Beacons in the map filter: the cloud hears them, and what it believes of them is told.
+"""The beacons of one walk: the cloud is reweighted by their readings, and their places follow from the cloud.
 
-In: a cloud, its last leg, the beacons' words of that leg. Out: weights, and `BeaconPlace`s. Owns how well each beacon is explained, when it was
-heard, and the words of those whose place is not known yet.
+In: a cloud, its last path segment, the beacons' readings on it. Out: log-weights, and `BeaconPlace`s. Owns each beacon's health, when it was
+last heard, and the readings of beacons whose place is not known yet.
 """
 
 from __future__ import annotations
@@ -16,31 +16,28 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_initialisation import found_place
+from echostep.localization.beacon_beliefs import BeaconBeliefs, BeaconMeasurement, moments, set_beliefs
+from echostep.localization.beacon_initialisation import locate_beacon
+from echostep.localization.beacon_model import BeaconSettings, beacon_model
 from echostep.localization.beacon_slam import (
-    FIT,
-    HEARD,
-    UNFIT_RUNS,
-    BeaconSettings,
-    Beliefs,
-    Health,
-    beacon_model,
-    hear,
-    kick,
-    moments,
-    place,
-    unheard,
+    IN_PLACE,
+    TIMES_MOVED,
+    BeaconHealth,
+    initial_health,
+    propose_heading_jumps,
+    update_by_measurement,
 )
 from echostep.localization.particles import Cloud
 from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall
 
-MOST_STRANGE = 60  # words that are kept of a beacon without a place
-TRY_EVERY = 4  # words: then it is tried to find it
-PLACED_SD_M = 0.4
-SILENT_S = 8.0  # a beacon that should be heard all the time, and others are, is silent after so long
-NEAR_SHARE = 0.6  # of the greatest range at which it was heard: so near, and without a wall between, it should be heard
+# All constants here are by reason.
+MOST_UNPLACED = 60  # readings kept of a beacon without a place
+LOCATE_EVERY = 4  # readings of a beacon without a place
+LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`
+SILENT_S = 8.0  # without a reading, while it is expected to be heard and others are: the beacon is silent
+EXPECTED_SHARE = 0.6  # of the greatest range at which a beacon was heard: within it, and without a wall between, it is expected to be heard
 
 
 class BeaconState(StrEnum):
@@ -53,7 +50,7 @@ class BeaconState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BeaconPlace:
-    """Where the cloud believes a beacon to be: on the map (m), its standard deviation, axis (rad), level, and when it was last heard."""
+    """A beacon's place by the cloud: on the map (m), its standard deviation, axis (rad), level, and when it was last heard."""
 
     slot: int
     x_m: float
@@ -66,131 +63,124 @@ class BeaconPlace:
 
 
 class BeaconMap:
-    """All beacons that one wearer has met."""
+    """All beacons that were heard on one walk."""
 
     def __init__(self, walls: Walls, settings: BeaconSettings, rng: np.random.Generator) -> None:
         self._walls = walls
         self._settings = settings
         self._model = beacon_model(settings)
         self._rng = rng
-        self._health = unheard(0)
-        self._strange: dict[int, deque[tuple[float, float, float, float]]] = {}  # words of beacons without a place
+        self._health = initial_health(0)
+        self._unplaced: dict[int, deque[tuple[float, float, float, float]]] = {}  # by slot: rows for `locate_beacon`
         self._heard_s: list[float] = []
-        self._reach_m: list[float] = []
-        self._hindered_s: list[float] = []  # when it was last too far or behind a wall
+        self._reach_m: list[float] = []  # greatest range at which each was heard
+        self._unexpected_s: list[float] = []  # when each was last too far away or behind a wall
         self.heard_s: float | None = None  # when any beacon was last heard
 
-    def hear(self, cloud: Cloud, leg: PathSegment, words: Sequence[BeaconReading]) -> None:
-        """Weigh the cloud, which stands at the end of a leg, by the words that were said on it."""
-        length = math.hypot(leg.dx_m, leg.dy_m)
-        if length > 0.0 and words:
-            kick(cloud.turn_rad, cloud.log_weight, length, self._model, self._rng)
-        for word in words:
-            self._make_room(cloud, word.slot)
-            self._heard_s[word.slot] = word.t_s
-            self._reach_m[word.slot] = max(self._reach_m[word.slot], word.range_m)
-            self.heard_s = word.t_s
-            x, y = self._at_word(cloud, leg, word)
-            if self._has_place(cloud, x, y, word):
-                self._weigh(cloud, x, y, word)
-                cloud.renew()
+    def update(self, cloud: Cloud, segment: PathSegment, readings: Sequence[BeaconReading]) -> None:
+        """Reweight the cloud, which is at the end of a segment, by the readings on this segment."""
+        length = math.hypot(segment.dx_m, segment.dy_m)
+        if length > 0.0 and readings:
+            propose_heading_jumps(cloud.turn_rad, cloud.log_weight, length, self._model, self._rng)
+        for reading in readings:
+            self._make_room(cloud, reading.slot)
+            self._heard_s[reading.slot] = reading.t_s
+            self._reach_m[reading.slot] = max(self._reach_m[reading.slot], reading.range_m)
+            self.heard_s = reading.t_s
+            x, y = _places_at(cloud, segment, reading.t_s)
+            if self._has_place(cloud, x, y, reading):
+                self._reweight(cloud, x, y, reading)
+                cloud.resample_if_needed()
         if self._health.known.any():
-            self._expect(cloud, leg.t1_s)
+            self._note_unexpected(cloud, segment.t1_s)
 
     def places(self, cloud: Cloud, t_s: float) -> list[BeaconPlace]:
-        """Every beacon that was heard, by slot."""
-        _, found = self._moments(cloud)
+        """Every beacon with a place, by slot."""
+        beacons = moments(cloud.beliefs, cloud.weight)
         known = np.flatnonzero(self._health.known).tolist()
-        return [self._place(cloud, slot, found[slot].tolist(), t_s) for slot in known]
+        return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in known]
 
-    def _moments(self, cloud: Cloud) -> tuple[tuple[float, float], Floats]:
-        """Where he is on the sheet, and what `moments` says of the beacons."""
-        weight = np.exp(cloud.log_weight)
-        weight /= weight.sum()
-        return (float(weight @ cloud.x_m), float(weight @ cloud.y_m)), moments(cloud.beliefs, weight)
-
-    def _expect(self, cloud: Cloud, t_s: float) -> None:
-        """Note which beacons cannot be expected to be heard now."""
-        (x, y), found = self._moments(cloud)
-        index = self._walls.index
-        for slot in np.flatnonzero(self._health.known).tolist():
-            bx, by = float(found[slot, 0]), float(found[slot, 1])
-            far = math.hypot(bx - x, by - y) > NEAR_SHARE * self._reach_m[slot]
-            if far or (len(index.walls) and crosses_wall(bx, by, x, y, index)):
-                self._hindered_s[slot] = t_s
-
-    def _place(self, cloud: Cloud, slot: int, found: list[float], t_s: float) -> BeaconPlace:
-        x, y, sd, axis = found
-        state = BeaconState.MOVED if self._health.each[slot, UNFIT_RUNS] else BeaconState.WELL
-        others = self.heard_s is not None and t_s - self.heard_s < SILENT_S
-        if others and t_s - max(self._heard_s[slot], self._hindered_s[slot]) > SILENT_S:
+    def _place(self, cloud: Cloud, slot: int, moments_of_it: list[float], t_s: float) -> BeaconPlace:
+        x, y, sd, axis = moments_of_it
+        state = BeaconState.MOVED if self._health.each[slot, TIMES_MOVED] else BeaconState.WELL
+        any_heard = self.heard_s is not None and t_s - self.heard_s < SILENT_S
+        if any_heard and t_s - max(self._heard_s[slot], self._unexpected_s[slot]) > SILENT_S:
             state = BeaconState.SILENT
         level = cloud.level_at(x)
         return BeaconPlace(slot, x - level * cloud.pitch_m, y, sd, axis, level, state, self._heard_s[slot])
 
-    def _at_word(self, cloud: Cloud, leg: PathSegment, word: BeaconReading) -> tuple[Floats, Floats]:
-        """Where the particles were (n,), (n,) when a word of the last leg was said."""
-        span_s = leg.t1_s - leg.t0_s
-        back = min(max((leg.t1_s - word.t_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 0.0
-        c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
-        x = cloud.x_m - back * cloud.scale * (c * leg.dx_m - s * leg.dy_m)
-        y = cloud.y_m - back * cloud.scale * (s * leg.dx_m + c * leg.dy_m)
-        return x, y
+    def _note_unexpected(self, cloud: Cloud, t_s: float) -> None:
+        """Note the time for each beacon that is not expected to be heard from the cloud's mean place."""
+        weight = cloud.weight
+        x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
+        beacons = moments(cloud.beliefs, weight)
+        index = self._walls.index
+        for slot in np.flatnonzero(self._health.known).tolist():
+            bx, by = float(beacons[slot, 0]), float(beacons[slot, 1])
+            far = math.hypot(bx - x, by - y) > EXPECTED_SHARE * self._reach_m[slot]
+            if far or (len(index.walls) and crosses_wall(bx, by, x, y, index)):
+                self._unexpected_s[slot] = t_s
 
-    def _has_place(self, cloud: Cloud, x: Floats, y: Floats, word: BeaconReading) -> bool:
-        """Whether the particles have a belief of the beacon; one that is first heard from afar gets it after some way."""
-        k = word.slot
-        near = word.range_m < 2.0 * self._settings.drop_sd_m
-        if self._health.known[k] or (near and k not in self._strange):
+    def _has_place(self, cloud: Cloud, x: Floats, y: Floats, reading: BeaconReading) -> bool:
+        """Whether this reading can reweight the particles at (x, y).
+
+        A near beacon is placed by its first reading. One that is first heard from afar is located from several readings, this one included.
+        """
+        slot = reading.slot
+        near = reading.range_m < 2.0 * self._settings.drop_sd_m
+        if self._health.known[slot] or (near and slot not in self._unplaced):
             return True
-        weight = np.exp(cloud.log_weight)
-        weight /= weight.sum()
-        words = self._strange.setdefault(k, deque(maxlen=MOST_STRANGE))
-        words.append((float(weight @ x), float(weight @ y), word.range_m, word.bearing_rad))
-        if len(words) % TRY_EVERY:
+        weight = cloud.weight
+        rows = self._unplaced.setdefault(slot, deque(maxlen=MOST_UNPLACED))
+        rows.append((float(weight @ x), float(weight @ y), reading.range_m, reading.bearing_rad))
+        if len(rows) % LOCATE_EVERY:
             return False
-        if (at := found_place(np.array(words))) is not None:
-            place(cloud.beliefs, k, *at, 0.0, PLACED_SD_M**2, math.pi**2)
-            self._health.known[k] = True
-            self._health.each[k, FIT] = 1.0
-            del self._strange[k]
+        if (place := locate_beacon(np.array(rows))) is not None:
+            set_beliefs(cloud.beliefs, slot, *place, 0.0, LOCATED_SD_M**2, math.pi**2)
+            self._health.known[slot] = True
+            self._health.each[slot, IN_PLACE] = 1.0
+            del self._unplaced[slot]
         return False
 
-    def _weigh(self, cloud: Cloud, x: Floats, y: Floats, word: BeaconReading) -> None:
-        """One word; who is found elsewhere by it is moved with his way since."""
-        off_x, off_y, before = cloud.x_m - x, cloud.y_m - y, self._health.each[word.slot, UNFIT_RUNS]
-        index = self._walls.near(cloud.x_m, cloud.y_m, word.range_m)
-        hear(
-            x, y, cloud.turn_rad, cloud.log_weight, cloud.beliefs, self._health, word.slot, word.range_m, word.bearing_rad,
-            self._model, self._settings.drop_sd_m**2, index, self._rng,
-        )  # fmt: skip
-        cloud.x_m, cloud.y_m = x + off_x, y + off_y
-        if (
-            self._health.each[word.slot, UNFIT_RUNS] > before
-        ):  # it was moved: its new place is found like a strange one's
-            self._health.known[word.slot] = False
-            self._strange[word.slot] = deque(maxlen=MOST_STRANGE)
+    def _reweight(self, cloud: Cloud, x: Floats, y: Floats, reading: BeaconReading) -> None:
+        """Update the cloud by one reading at places (x, y); particles that the update moves keep their path since then."""
+        slot, before = reading.slot, self._health.each[reading.slot, TIMES_MOVED]
+        since_x, since_y = cloud.x_m - x, cloud.y_m - y
+        index = self._walls.near(cloud.x_m, cloud.y_m, reading.range_m)
+        measurement = BeaconMeasurement(slot, reading.range_m, reading.bearing_rad)
+        particles = cloud.arrays._replace(x_m=x, y_m=y)
+        update_by_measurement(particles, cloud.beliefs, self._health, measurement, self._model, index, self._rng)
+        cloud.x_m, cloud.y_m = x + since_x, y + since_y
+        if self._health.each[slot, TIMES_MOVED] > before:  # found moved: it is located anew
+            self._health.known[slot] = False
+            self._unplaced[slot] = deque(maxlen=MOST_UNPLACED)
 
     def _make_room(self, cloud: Cloud, slot: int) -> None:
-        """Room for one more beacon in the cloud and here."""
+        """Extend the cloud's beliefs and the lists here, so that they hold this slot."""
         known = len(self._heard_s)
         if slot < known:
             return
         n, more = len(cloud.x_m), slot + 1 - known
         mean, cov, doubt = cloud.beliefs
-        cloud.beliefs = Beliefs(
+        cloud.beliefs = BeaconBeliefs(
             np.concatenate([mean, np.zeros((n, more, 3))], axis=1),
             np.concatenate([cov, np.zeros((n, more, 6))], axis=1),
             np.concatenate([doubt, np.zeros((n, more))], axis=1),
         )
-        fresh, health = unheard(more), self._health
-        self._health = Health(
+        fresh, health = initial_health(more), self._health
+        self._health = BeaconHealth(
             np.concatenate([health.each, fresh.each]), health.all, np.concatenate([health.known, fresh.known])
         )
         self._heard_s += [-math.inf] * more
         self._reach_m += [0.0] * more
-        self._hindered_s += [-math.inf] * more
+        self._unexpected_s += [-math.inf] * more
 
-    def heard_times(self, slot: int) -> int:
-        """Measurements of a beacon that were weighed."""
-        return int(self._health.each[slot, HEARD])
+
+def _places_at(cloud: Cloud, segment: PathSegment, t_s: float) -> tuple[Floats, Floats]:
+    """Places x (n,), y (n,) of the particles at a time on the last segment."""
+    span_s = segment.t1_s - segment.t0_s
+    back = min(max((segment.t1_s - t_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 0.0
+    c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
+    x = cloud.x_m - back * cloud.scale * (c * segment.dx_m - s * segment.dy_m)
+    y = cloud.y_m - back * cloud.scale * (s * segment.dx_m + c * segment.dy_m)
+    return x, y

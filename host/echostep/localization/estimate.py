@@ -1,6 +1,6 @@
-"""The estimate: what people are told.
+"""The estimate: moments of the cloud.
 
-In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, and in one word how far to trust it. Owns nothing.
+In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that says how far to trust it. Owns nothing.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.particles import Cloud
 
-CHI2_95 = 5.991464547107979  # two degrees of freedom
-TRACKING_M = 1.0
-LOST_M = 5.0
-SURE_OF_LEVEL = 0.9  # of the cloud's weight
-WALKER_M_S = 1.5
+CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
+TRACKING_M, LOST_M = (
+    1.0,
+    5.0,
+)  # 95 % radius up to which the status is tracking, beyond which it is lost; by reason: a door, a room
+SURE_OF_LEVEL = 0.9  # least probability of the likeliest level while tracking, by reason
+WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
 
 
 class TrackStatus(StrEnum):
@@ -61,9 +63,11 @@ class Estimate:
         return ellipse95(self.xx_m2, self.xy_m2, self.yy_m2)
 
     def holds(self, x_m: float, y_m: float) -> bool:
-        """Whether a place lies in the 95 % ellipse."""
+        """Whether a place lies in the 95 % ellipse; in an ellipse without area, only its centre does."""
         dx, dy = x_m - self.x_m, y_m - self.y_m
         determinant = self.xx_m2 * self.yy_m2 - self.xy_m2**2
+        if determinant <= 0.0:
+            return dx == dy == 0.0
         square = self.yy_m2 * dx * dx - 2.0 * self.xy_m2 * dx * dy + self.xx_m2 * dy * dy
         return square <= CHI2_95 * determinant
 
@@ -84,9 +88,8 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
 
 
 def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, doubt_m: float = 0.0) -> Estimate:
-    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]; `doubt_m`: standard deviation that the cloud does not know of."""
-    weight = np.exp(cloud.log_weight)
-    weight /= weight.sum()
+    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]; `doubt_m`: standard deviation per axis to be added."""
+    weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
     map_x = cloud.map_x_m
     x, y = float(weight @ map_x), float(weight @ cloud.y_m)
@@ -106,15 +109,15 @@ def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, doubt
 
 def _heights(cloud: Cloud, weight: Floats) -> tuple[tuple[float, ...], float, float]:
     """Probability of each level; mean and standard deviation of the height."""
-    if cloud.storeys is None:
+    if cloud.sheet is None:
         return (1.0,), 0.0, 0.0
-    share = np.bincount(cloud.level, weight, len(cloud.storeys.height_m))
+    share = np.bincount(cloud.level, weight, len(cloud.sheet.height_m))
     z = float(weight @ cloud.z_m)
     return tuple(share.tolist()), z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2))
 
 
 def unobserved(last: Estimate, t_s: float) -> Estimate:
-    """What is left of an estimate when the foot has been silent since: he may have walked any way at a walker's speed."""
+    """An estimate carried on to `t_s` without measurements: the position spreads at WALKER_M_S, the heading is unknown."""
     more = (WALKER_M_S * max(t_s - last.t_s, 0.0)) ** 2
     return replace(
         last, t_s=t_s, xx_m2=last.xx_m2 + more, yy_m2=last.yy_m2 + more, heading_sd_rad=math.pi, status=TrackStatus.LOST
@@ -122,7 +125,7 @@ def unobserved(last: Estimate, t_s: float) -> Estimate:
 
 
 def trust(radius95_m: float) -> TrackStatus:
-    """How far to trust a position whose 95 % ellipse reaches so far."""
+    """Status of a position whose 95 % ellipse has this longer half axis."""
     if radius95_m <= TRACKING_M:
         return TrackStatus.TRACKING
     return TrackStatus.UNCERTAIN if radius95_m <= LOST_M else TrackStatus.LOST

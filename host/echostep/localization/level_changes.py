@@ -1,12 +1,11 @@
-"""Up and down: how high each particle is, and what the foot and the barometer say of it.
+"""Height and level of each particle, from the rise that the foot measured and the height by air pressure.
 
-In: a particle's way over a leg, the rise that the foot felt, the height that the air pressure gives. Out: heights, log-weights, and the level that
-each particle is on now (its x on the sheet). Owns nothing.
+In: particles after a move, and the `HeightChange` over it. Out: heights, log-weights, and levels (the level shows in x on the sheet). Owns nothing.
 
-On a level a particle is as high as its floor, and a foot that rises there is unlikely. Only in a connector its height changes: on stairs and ramps by
-what the foot felt, in a lift by the pressure, which is also all there is on stairs when no foot tells. Who leaves a connector must be as high as the
-floor that he steps on. Weather moves the pressure's height slowly, so each particle knows by how much it is off: `lag`, a Kalman filter of one state
-whose variance is the same for all [Schoen et al. 2005, the linear part of a marginalised particle filter].
+On a level a particle has the height of that level, and a rise of the foot is unlikely. Only in a connector the height changes: on stairs and ramps
+by the foot's rise, or by pressure without a foot; in a lift by pressure. A particle that leaves a connector must have the height of the level it
+enters. Weather slowly shifts the height by pressure, so each particle estimates this offset, `lag`: a Kalman filter of one state, whose variance is
+the same for all particles [Schoen et al. 2005, the linear part of a marginalised particle filter].
 """
 
 from __future__ import annotations
@@ -19,14 +18,20 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import kernel
-from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, nearest_level
+from echostep.localization.particle_kernels import Move, ParticleArrays
+from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, level_on_sheet, nearest_level
+
+PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
+LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
 
 
 @dataclass(frozen=True, slots=True)
 class ClimbSettings:
-    """`flat_sd_m`: how far the foot's height is off after a stride on the flat, thresholds and all; `landing_sd_m`: how far a stairwell's floor
-    may be from where particles think that they are; `drift_m`: wandering of the pressure's height in a second, weather, doors, fans; it counts
-    with `unlikely` at most in log-weight, each of them.
+    """Standard deviations in metres, and a limit.
+
+    `flat_sd_m`: rise of the foot after a stride on a level, with door sills. `landing_sd_m`: between a particle's height and the level it enters.
+    `drift_m`: random walk of the height by pressure in a second, from weather, doors and fans. `unlikely`: most log-weight that each of the three
+    can cost.
     """
 
     flat_sd_m: float = 0.06
@@ -36,8 +41,10 @@ class ClimbSettings:
 
 
 class HeightChange(NamedTuple):
-    """What is known of height over a leg: `felt_m` by the foot with its standard deviation (infinite: no foot), `height_m` by the pressure at its
-    end with its standard deviation (infinite: no pressure), and how long it took.
+    """What is known of the height over a path segment of duration `span_s`.
+
+    `felt_m`: rise by the foot, with its standard deviation (infinite: no foot). `height_m`: height by pressure at the segment's end, with its
+    standard deviation (infinite: no pressure).
     """
 
     felt_m: float
@@ -55,53 +62,59 @@ class LevelChangeModel(NamedTuple):
     unlikely: float
 
 
-def climb_model(s: ClimbSettings) -> LevelChangeModel:
+def level_change_model(s: ClimbSettings) -> LevelChangeModel:
     """The settings in the kernel's form."""
     return LevelChangeModel(s.flat_sd_m, s.landing_sd_m, s.unlikely)
 
 
+class HeightArrays(NamedTuple):
+    """Of n particles, each (n,) in metres: height in the plan, and offset of the height by pressure."""
+
+    z_m: Floats
+    lag_m: Floats
+
+
 @kernel
-def climb(
-    x: Floats, y: Floats, turn: Floats, scale: Floats, z: Floats, lag: Floats, log_weight: Floats,
-    dx: float, dy: float, noise: Floats, rise: HeightChange, lag_variance: float, m: LevelChangeModel, s: LevelSheet,
+def change_levels(
+    particles: ParticleArrays, heights: HeightArrays, move: Move, noise: Floats, change: HeightChange,
+    lag_variance: float, model: LevelChangeModel, sheet: LevelSheet,
 ) -> float:  # fmt: skip
-    """Heights, levels and weights after a move (dx, dy) in the walk frame that led to (x, y) on the sheet; `noise` (n,) standard normal.
+    """Update heights, levels and log-weights after a move that led to the particles' present places; `noise` (n,) is standard normal.
 
     Returns the variance of `lag` afterwards; the greatest log-weight is 0 again.
     """
-    has_foot, has_air = math.isfinite(rise.felt_sd_m), math.isfinite(rise.height_sd_m)
-    spread = lag_variance + rise.height_sd_m**2 if has_air else np.inf
-    gain = lag_variance / spread if has_air else 0.0
-    flat_sd, last, top = math.hypot(m.flat_sd_m, rise.felt_sd_m), len(s.height_m) - 1, -np.inf
+    x, y, turn, scale, log_weight = particles
+    z, lag = heights
+    has_foot, has_pressure = math.isfinite(change.felt_sd_m), math.isfinite(change.height_sd_m)
+    variance = lag_variance + change.height_sd_m**2 if has_pressure else np.inf
+    gain = lag_variance / variance if has_pressure else 0.0
+    flat_sd, top = math.hypot(model.flat_sd_m, change.felt_sd_m), -np.inf
     for i in range(len(x)):
-        level = min(max(math.floor((x[i] - s.x0_m) / s.pitch_m), 0), last)
-        shift = level * s.pitch_m
-        way = connector_at(x[i] - shift, y[i], level, s)
-        passing = way
-        if way < 0:
-            to_x = scale[i] * (math.cos(turn[i]) * dx - math.sin(turn[i]) * dy)
-            to_y = scale[i] * (math.sin(turn[i]) * dx + math.cos(turn[i]) * dy)
-            passing = connector_at(x[i] - 0.5 * to_x - shift, y[i] - 0.5 * to_y, level, s)
-            if passing < 0:
-                passing = connector_at(x[i] - to_x - shift, y[i] - to_y, level, s)
-        if passing >= 0:
-            if s.kind[passing] != LIFT and has_foot:
-                z[i] += rise.felt_m + rise.felt_sd_m * noise[i]
-            elif has_air:
-                z[i] = rise.height_m - lag[i]
-            now = nearest_level(z[i], passing, s)
-            x[i] += (now - level) * s.pitch_m
-            level = now
+        level = level_on_sheet(x[i], sheet)
+        inside = connector_at(x[i] - level * sheet.pitch_m, y[i], level, sheet)
+        connector = inside
+        if inside < 0:
+            dx = scale[i] * (math.cos(turn[i]) * move.dx_m - math.sin(turn[i]) * move.dy_m)
+            dy = scale[i] * (math.sin(turn[i]) * move.dx_m + math.cos(turn[i]) * move.dy_m)
+            connector = _connector_left(x[i], y[i], dx, dy, level, sheet)
+        if connector >= 0:
+            if sheet.kind[connector] != LIFT and has_foot:
+                z[i] += change.felt_m + change.felt_sd_m * noise[i]
+            elif has_pressure:
+                z[i] = change.height_m - lag[i]
+            new_level = nearest_level(z[i], connector, sheet)
+            x[i] += (new_level - level) * sheet.pitch_m
+            level = new_level
         elif has_foot:
-            log_weight[i] -= min(0.5 * (rise.felt_m / flat_sd) ** 2, m.unlikely)
-        if way < 0:
-            log_weight[i] -= min(0.5 * ((z[i] - s.height_m[level]) / m.landing_sd_m) ** 2, m.unlikely)
-            z[i] = s.height_m[level]
-        if has_air:
-            off = rise.height_m - z[i] - lag[i]
-            log_weight[i] -= min(2.0 * math.log1p(off * off / (3.0 * spread)), m.unlikely)
-            if off * off < 9.0 * spread:
-                lag[i] += gain * off
+            log_weight[i] -= min(0.5 * (change.felt_m / flat_sd) ** 2, model.unlikely)
+        if inside < 0:
+            log_weight[i] -= min(0.5 * ((z[i] - sheet.height_m[level]) / model.landing_sd_m) ** 2, model.unlikely)
+            z[i] = sheet.height_m[level]
+        if has_pressure:
+            innovation = change.height_m - z[i] - lag[i]
+            log_weight[i] -= min(2.0 * math.log1p(innovation * innovation / (PRESSURE_TAIL * variance)), model.unlikely)
+            if innovation * innovation < LAG_GATE * variance:
+                lag[i] += gain * innovation
         top = max(top, log_weight[i])
     for i in range(len(x)):
         log_weight[i] -= top
@@ -109,11 +122,19 @@ def climb(
 
 
 @kernel
-def carry(x: Floats, z: Floats, lag: Floats, height_m: float, s: LevelSheet) -> None:
-    """Put each particle on the level that the pressure gives, after a time that nobody watched."""
-    last = len(s.height_m) - 1
+def _connector_left(x: float, y: float, dx: float, dy: float, level: int, sheet: LevelSheet) -> int:
+    """The connector that held the middle of a move (dx, dy) to (x, y) on the sheet, else the one that held its start; -1: none."""
+    shift = level * sheet.pitch_m
+    connector = connector_at(x - 0.5 * dx - shift, y - 0.5 * dy, level, sheet)
+    return connector if connector >= 0 else connector_at(x - dx - shift, y - dy, level, sheet)
+
+
+@kernel
+def set_levels_by_pressure(x: Floats, heights: HeightArrays, height_m: float, sheet: LevelSheet) -> None:
+    """Put each particle on the level nearest to the height by pressure, after an unobserved move."""
+    z, lag = heights
     for i in range(len(x)):
-        level = min(max(math.floor((x[i] - s.x0_m) / s.pitch_m), 0), last)
-        now = int(np.argmin(np.abs(s.height_m - (height_m - lag[i]))))
-        x[i] += (now - level) * s.pitch_m
-        z[i] = s.height_m[now]
+        level = level_on_sheet(x[i], sheet)
+        new_level = int(np.argmin(np.abs(sheet.height_m - (height_m - lag[i]))))
+        x[i] += (new_level - level) * sheet.pitch_m
+        z[i] = sheet.height_m[new_level]

@@ -1,4 +1,4 @@
-"""How far off: estimates against the truth, where it is known.
+"""Errors of estimates against the truth, where it is known.
 
 In: truth.csv (`t_s,x,y,heading_rad`, the trunk, map frame) and estimates. Out: `Errors`. Owns nothing.
 """
@@ -13,14 +13,14 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import CHI2_95, Estimate
+from echostep.localization.estimate import Estimate
 
-NEARBY_S = 2.5
+NEARBY_S = 2.5  # by reason: estimates come at each step, and twice a second while standing
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where the trunk was: `t_s` (n,), `xy_m` (n, 2)."""
+    """True positions of the trunk: `t_s` (n,), `xy_m` (n, 2)."""
 
     t_s: Floats
     xy_m: Floats
@@ -30,14 +30,14 @@ class Truth:
         return np.column_stack([np.interp(t_s, self.t_s, self.xy_m[:, k]) for k in (0, 1)])
 
     def between(self, estimates: Sequence[Estimate]) -> Floats:
-        """Positions (m, 2) while these estimates were made, NaN for the times between them when there are none for seconds."""
+        """True positions (n, 2) near the times of estimates; NaN where no estimate is within NEARBY_S."""
         t_s = np.array([e.t_s for e in estimates])
         if not len(t_s):
             return np.zeros((0, 2))
-        away = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s), 0, len(t_s) - 1)])
+        after = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s), 0, len(t_s) - 1)])
         before = np.abs(self.t_s - t_s[np.clip(np.searchsorted(t_s, self.t_s) - 1, 0, len(t_s) - 1)])
-        found: Floats = np.where((np.minimum(away, before) < NEARBY_S)[:, None], self.xy_m, np.nan)
-        return found
+        positions: Floats = np.where((np.minimum(after, before) < NEARBY_S)[:, None], self.xy_m, np.nan)
+        return positions
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +71,10 @@ def errors(estimates: Sequence[Estimate], truth: Truth) -> Errors | None:
     inside = [e for e in estimates if truth.t_s[0] <= e.t_s <= truth.t_s[-1]]
     if not inside:
         return None
-    off = np.array([(e.x_m, e.y_m) for e in inside]) - truth.at(np.array([e.t_s for e in inside]))
+    true_xy_m = truth.at(np.array([e.t_s for e in inside]))
+    off = np.array([(e.x_m, e.y_m) for e in inside]) - true_xy_m
     distance = np.hypot(off[:, 0], off[:, 1])
-    held = [_holds(e, dx, dy) for e, (dx, dy) in zip(inside, off, strict=True)]
+    held = [e.holds(x, y) for e, (x, y) in zip(inside, true_xy_m.tolist(), strict=True)]
     return Errors(
         float(distance.mean()),
         float(distance.std()),
@@ -83,11 +84,3 @@ def errors(estimates: Sequence[Estimate], truth: Truth) -> Errors | None:
         float(np.sqrt((distance**2).mean())),
         float(np.mean(held)),
     )
-
-
-def _holds(e: Estimate, dx: float, dy: float) -> bool:
-    """Whether the 95 % ellipse holds a point that is (dx, dy) from its centre."""
-    determinant = e.xx_m2 * e.yy_m2 - e.xy_m2 * e.xy_m2
-    if determinant <= 0.0:
-        return dx == dy == 0.0
-    return (e.yy_m2 * dx * dx - 2.0 * e.xy_m2 * dx * dy + e.xx_m2 * dy * dy) / determinant <= CHI2_95

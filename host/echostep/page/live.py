@@ -160,7 +160,7 @@ class LivePage:
         if passage is not None and (particles := tracker.particles(MOST_KEPT if self._replay else MOST_SHOWN)):
             shown = specks(particles)
             sheet = tracker.laid_out
-            new = beams(passage, told, told.level * sheet.storeys.pitch_m, sheet.walls.index, self._model)
+            new = beams(passage, told, told.level * sheet.sheet.pitch_m, sheet.walls.index, self._model)
             heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)
         heard = tuple(sorted((b for b in heard if told.t_s - b.t_s < STALE_S), key=attrgetter("ranger")))
         guide = self._scene.guidance

@@ -1,13 +1,17 @@
-"""The lay_out_levels: all levels of a plan laid side by side on one sheet, and the ways between them.
+"""All levels of a plan laid side by side on one sheet, and the connectors between them.
 
 In: a plan. Out: `LaidOutPlan`: walls for the cloud, and `LevelSheet`, plain arrays for kernels. Owns nothing.
 
-Level k lies `k * pitch_m` east of its place in the map. So a particle's x says on which level it is, walls and echoes of other levels are out of its
-reach, and nothing that looks at walls need know of levels. A lay_out_levels of one level lies where its map has it.
+    x of the sheet:  x0_m          x0_m + pitch_m    x0_m + 2 pitch_m
+                     |  level 0    |    level 1      |    level 2      |
+
+Level k lies `k * pitch_m` east of its place in the map. So a particle's x tells its level, walls and echoes of other levels are out of its reach,
+and only this module and `level_changes` need to know of levels. A plan of one level lies where its map has it.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,7 +22,9 @@ from echostep.jit import kernel
 from echostep.plan.model import Plan
 from echostep.walls.echo_sources import Walls
 
-MARGIN_M = 50.0  # between levels on the sheet, twice: nobody walks so far out of the lay_out_levels unnoticed
+MARGIN_M = (
+    50.0  # on either side of a level on the sheet, by reason: particles do not go so far beyond the outermost walls
+)
 STAIRS, LIFT, RAMP = 0, 1, 2
 KINDS = {"stairs": STAIRS, "lift": LIFT, "ramp": RAMP}
 
@@ -41,21 +47,21 @@ class LevelSheet(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LaidOutPlan:
-    """`walls` on the sheet."""
+    """The walls of all levels on the sheet, and the sheet."""
 
     walls: Walls
-    storeys: LevelSheet
+    sheet: LevelSheet
 
 
 def lay_out_levels(plan: Plan) -> LaidOutPlan:
     """The sheet of a plan; raises EchostepError for a plan too wide for its tiles."""
-    storeys = level_sheet_of(plan)
-    sheets = [level.solid + k * storeys.pitch_m * np.array([1.0, 0.0, 1.0, 0.0]) for k, level in enumerate(plan.levels)]
-    return LaidOutPlan(Walls(np.concatenate(sheets) if len(sheets) > 1 else sheets[0]), storeys)
+    sheet = level_sheet_of(plan)
+    walls = [level.solid + k * sheet.pitch_m * np.array([1.0, 0.0, 1.0, 0.0]) for k, level in enumerate(plan.levels)]
+    return LaidOutPlan(Walls(np.concatenate(walls) if len(walls) > 1 else walls[0]), sheet)
 
 
 def level_sheet_of(plan: Plan) -> LevelSheet:
-    """Where the levels lie, and what joins them."""
+    """The sheet of a plan: levels and connectors, without walls."""
     ends = np.concatenate([level.solid.reshape(-1, 2) for level in plan.levels])
     low, high = (float(ends[:, 0].min()), float(ends[:, 0].max())) if len(ends) else (0.0, 0.0)
     outlines = [c.outline_m for c in plan.connectors]
@@ -73,12 +79,18 @@ def level_sheet_of(plan: Plan) -> LevelSheet:
     )
 
 
-def level_of(x_m: Floats, storeys: LevelSheet) -> Ints:
-    """Levels (n,) of places on the sheet; those beyond it count to the outermost."""
-    last = len(storeys.height_m) - 1
+def level_of(x_m: Floats, sheet: LevelSheet) -> Ints:
+    """Levels (n,) of places on the sheet; a place beyond the sheet is on the outermost level."""
+    last = len(sheet.height_m) - 1
     if last == 0:
         return np.zeros(len(x_m), np.int64)
-    return np.clip(np.floor((x_m - storeys.x0_m) / storeys.pitch_m), 0, last).astype(np.int64)
+    return np.clip(np.floor((x_m - sheet.x0_m) / sheet.pitch_m), 0, last).astype(np.int64)
+
+
+@kernel
+def level_on_sheet(x: float, sheet: LevelSheet) -> int:
+    """`level_of` for one place, in kernels."""
+    return min(max(math.floor((x - sheet.x0_m) / sheet.pitch_m), 0), len(sheet.height_m) - 1)
 
 
 @kernel
@@ -103,7 +115,7 @@ def nearest_level(z: float, c: int, s: LevelSheet) -> int:
 
 @kernel
 def _inside(x: float, y: float, corners: Floats, first: int, beyond: int) -> bool:
-    """Whether a polygon holds a point: it is left of an odd number of sides."""
+    """Whether a polygon, corners[first:beyond], holds a point: a ray from it to the east crosses an odd number of sides."""
     odd = False
     ax, ay = corners[beyond - 1, 0], corners[beyond - 1, 1]
     for k in range(first, beyond):

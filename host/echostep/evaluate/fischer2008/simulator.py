@@ -14,21 +14,21 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.jit import kernel
-from echostep.localization.beacon_slam import (
-    BeaconModel,
-    BeaconSettings,
-    Beliefs,
-    Health,
-    beacon_model,
-    hear,
-    inherit,
-    kick,
-    no_beliefs,
-    place,
-    stride,
-    unheard,
+from echostep.localization.beacon_beliefs import (
+    BeaconBeliefs,
+    BeaconMeasurement,
+    empty_beliefs,
+    resample_beliefs,
+    set_beliefs,
 )
-from echostep.localization.particles import systematic
+from echostep.localization.beacon_model import BeaconModel, BeaconSettings, beacon_model
+from echostep.localization.beacon_slam import (
+    BeaconHealth,
+    initial_health,
+    propose_heading_jumps,
+    update_by_measurement,
+)
+from echostep.localization.particle_kernels import Move, ParticleArrays, propagate_without_walls, systematic
 from echostep.plan.polyline import along, nearest, way_m
 from echostep.simulation.world.beacon_ground import BeaconGround, disturb, hears, measured
 from echostep.walls.echo_sources import Walls
@@ -82,7 +82,6 @@ class _Rules(NamedTuple):
     heading_sd_rad: float
     wrong_turns: float
     deployed: bool
-    drop_var: float
     step_sd: float
     deaf_s: float
 
@@ -93,8 +92,8 @@ class _Cloud(NamedTuple):
     turn: Floats
     scale: Floats
     log_weight: Floats
-    beliefs: Beliefs
-    health: Health
+    beliefs: BeaconBeliefs
+    health: BeaconHealth
 
 
 class _Walker(Protocol):
@@ -139,7 +138,7 @@ def guided_return(
     particles = particles or (MORE_PARTICLES if deployed or place_sd_m > 0.0 or period_s >= SELDOM_S else PARTICLES)
     rules = _Rules(
         system, max(round(period_s / TICK_S), 1), threshold_m, round(person.delay_s / TICK_S), math.radians(person.heading_sd_deg),
-        person.wrong_turns, deployed, settings.drop_sd_m**2, settings.step_sd, max(DEAF_S, 1.5 * period_s),
+        person.wrong_turns, deployed, settings.step_sd, max(DEAF_S, 1.5 * period_s),
     )  # fmt: skip
     rng = np.random.default_rng(seed)
     count = len(world.beacons)
@@ -150,13 +149,13 @@ def guided_return(
         np.zeros(size),
         np.ones(size),
         np.zeros(size),
-        no_beliefs(size, count),
-        unheard(count),
+        empty_beliefs(size, count),
+        initial_health(count),
     )
     if not deployed:
         for k in range(count):
             x, y, axis = world.believed[k].tolist()
-            place(cloud.beliefs, k, x, y, axis, place_sd_m**2, axis_sd_rad**2)
+            set_beliefs(cloud.beliefs, k, x, y, axis, place_sd_m**2, axis_sd_rad**2)
         cloud.health.known[:] = True
     model = beacon_model(settings)
     walker = np.zeros(1, _WALKER)
@@ -235,7 +234,7 @@ def _listen(
         if hears(world, k, w.x, w.y):
             heard, heard_ticks[k] = True, tick
             range_m, bearing = measured(world, k, w.x, w.y, rng)
-            _hear(cloud, k, range_m, bearing, rules, model, walls, rng)
+            _hear(cloud, k, range_m, bearing, model, walls, rng)
     if not heard:
         w.silent_tick = tick
         return
@@ -348,20 +347,25 @@ def _normals(rng: np.random.Generator, n: int) -> Floats:
 
 
 @kernel
+def _particles(cloud: _Cloud) -> ParticleArrays:
+    """The cloud's arrays in the form that the filter's kernels take."""
+    return ParticleArrays(cloud.x, cloud.y, cloud.turn, cloud.scale, cloud.log_weight)
+
+
+@kernel
 def _hear(
-    cloud: _Cloud, k: int, range_m: float, bearing: float, rules: _Rules, model: BeaconModel, walls: WallIndex, rng: np.random.Generator
+    cloud: _Cloud, k: int, range_m: float, bearing: float, model: BeaconModel, walls: WallIndex, rng: np.random.Generator
 ) -> None:  # fmt: skip
     """One measurement into the cloud, which is resampled when too few particles carry the weight."""
-    size = hear(
-        cloud.x, cloud.y, cloud.turn, cloud.log_weight, cloud.beliefs, cloud.health, k, range_m, bearing, model, rules.drop_var, walls, rng
-    )  # fmt: skip
+    measurement = BeaconMeasurement(k, range_m, bearing)
+    size = update_by_measurement(_particles(cloud), cloud.beliefs, cloud.health, measurement, model, walls, rng)
     if size >= 0.5 * len(cloud.x):
         return
     chosen = systematic(np.exp(cloud.log_weight), rng.random(), len(cloud.x))
     cloud.x[:], cloud.y[:] = cloud.x[chosen], cloud.y[chosen]
     cloud.turn[:], cloud.scale[:] = cloud.turn[chosen], cloud.scale[chosen]
     cloud.log_weight[:] = 0.0
-    inherit(cloud.beliefs, chosen)
+    resample_beliefs(cloud.beliefs, chosen)
 
 
 @kernel
@@ -389,7 +393,7 @@ def _way_in(
                 world.works[k] = (count - 1 - k) * total <= (tick * step + DROPPED_BEFORE_M) * (count - 1)
                 if hears(world, k, x, y):
                     range_m, bearing = measured(world, k, x, y, rng)
-                    _hear(cloud, k, range_m, bearing, rules, model, walls, rng)
+                    _hear(cloud, k, range_m, bearing, model, walls, rng)
         error += disturb(world.sources, inside, x, y, heading)
         dx, dy = dx + step * math.cos(heading + error), dy + step * math.sin(heading + error)
     return error
@@ -427,8 +431,8 @@ def _advance(cloud: _Cloud, rules: _Rules, model: BeaconModel, dx: float, dy: fl
     if length > 0.0:
         root = math.sqrt(length)
         sd_m, turn_sd, scale_sd = rules.step_sd * root, math.radians(1.0) * root, 0.002 * root
-        stride(cloud.x, cloud.y, cloud.turn, cloud.scale, dx, dy, sd_m, turn_sd, scale_sd, rng)
-        kick(cloud.turn, cloud.log_weight, length, model, rng)
+        propagate_without_walls(_particles(cloud), Move(dx, dy, sd_m, turn_sd, scale_sd), rng)
+        propose_heading_jumps(cloud.turn, cloud.log_weight, length, model, rng)
 
 
 @kernel

@@ -1,0 +1,163 @@
+"""What each particle believes of each beacon: a small Kalman filter of three states per particle and beacon [Montemerlo 2002, FastSLAM].
+
+In: innovations of one measurement. Out: means, covariances, and their moments over all particles. Owns `BeaconBeliefs`. Given a particle's path,
+the beacons do not depend on each other, so each has a covariance of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.jit import kernel
+from echostep.localization.beacon_model import BeaconModel
+
+TWO_PI = 2.0 * math.pi
+X, Y, AXIS = 0, 1, 2  # states: place on the sheet (m), direction of the beacon's axis (rad)
+XX, XY, X_AXIS, YY, Y_AXIS, AXIS_AXIS = 0, 1, 2, 3, 4, 5  # stored terms of the symmetric covariance
+DROPPED_SHARE = 0.7  # of beacons heard for the first time: just dropped, at whatever range; by reason: most are
+FAR_SD_M, FAR_SD_PER_M = (
+    0.3,
+    0.1,
+)  # of one particle's guess of a far beacon's place, by reason: a guess in each direction
+FAR_AXIS_VAR_RAD2 = 0.01  # added to the bearing's variance then: (6 deg)^2, by reason
+
+
+class BeaconBeliefs(NamedTuple):
+    """Of n particles about b beacons.
+
+    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): log-odds that the beacon was moved, above those of one that has
+    just been placed.
+    """
+
+    mean: Floats
+    cov: Floats
+    doubt: Floats
+
+
+class BeaconMeasurement(NamedTuple):
+    """One measurement by the beacon in column `slot`: range to the boot, and bearing from the beacon's own axis (NaN: not measured)."""
+
+    slot: int
+    range_m: float
+    bearing_rad: float
+
+
+def empty_beliefs(particles: int, beacons: int) -> BeaconBeliefs:
+    """Room for beacons of which nothing is known yet."""
+    return BeaconBeliefs(
+        np.zeros((particles, beacons, 3)), np.zeros((particles, beacons, 6)), np.zeros((particles, beacons))
+    )
+
+
+@kernel
+def set_beliefs(
+    beliefs: BeaconBeliefs, slot: int, x: float, y: float, axis: float, place_var: float, axis_var: float
+) -> None:
+    """Give all particles the same belief of one beacon: its place and axis, with variances in m2 and rad2."""
+    for i in range(len(beliefs.mean)):
+        beliefs.mean[i, slot] = x, y, axis
+        beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, axis_var
+        beliefs.doubt[i, slot] = 0.0
+
+
+@kernel
+def initialise_beliefs(
+    beliefs: BeaconBeliefs, x: Floats, y: Floats, measurement: BeaconMeasurement, model: BeaconModel,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Beliefs of a beacon after its first measurement, for particles at (x, y), each (n,).
+
+    A near beacon was just dropped: it lies about the particle. Of a far one each particle guesses a direction, and the next measurements judge it.
+    """
+    k, range_m = measurement.slot, measurement.range_m
+    near = range_m * range_m < 4.0 * model.drop_var_m2
+    for i in range(len(beliefs.mean)):
+        mean, cov = beliefs.mean[i, k], beliefs.cov[i, k]
+        beliefs.doubt[i, k] = 0.0
+        if near or rng.random() < DROPPED_SHARE:
+            mean[X], mean[Y], mean[AXIS] = x[i], y[i], 0.0
+            _set_variances(cov, model.drop_var_m2, math.pi * math.pi)
+            continue
+        direction = TWO_PI * rng.random()
+        mean[X] = x[i] + range_m * math.cos(direction)
+        mean[Y] = y[i] + range_m * math.sin(direction)
+        mean[AXIS] = direction + math.pi - measurement.bearing_rad
+        sd = FAR_SD_M + FAR_SD_PER_M * range_m
+        _set_variances(cov, sd * sd, model.bearing_sd_rad**2 + FAR_AXIS_VAR_RAD2)
+
+
+@kernel
+def _set_variances(cov: Floats, place_var: float, axis_var: float) -> None:
+    """A diagonal covariance."""
+    cov[XX], cov[XY], cov[X_AXIS], cov[YY], cov[Y_AXIS], cov[AXIS_AXIS] = place_var, 0.0, 0.0, place_var, 0.0, axis_var
+
+
+@kernel
+def resample_beliefs(beliefs: BeaconBeliefs, chosen: Ints) -> None:
+    """Copy the beliefs of the chosen particles (n,) in place; their number stays."""
+    mean, cov = beliefs.mean[chosen], beliefs.cov[chosen]
+    beliefs.mean[:] = mean
+    beliefs.cov[:] = cov
+    beliefs.doubt[:] = beliefs.doubt[chosen]
+
+
+@kernel
+def wrap_angle(angle: float) -> float:
+    """The same angle in [-pi, pi), for kernels. It rounds differently from `angles.wrap`, and results depend on the last bit."""
+    return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
+
+
+@kernel
+def correct(
+    mean: Floats, cov: Floats, hx: float, hy: float, h_axis: float, innovation: float, noise_var: float
+) -> None:
+    """Kalman update of one belief, mean (3,) and cov (6,), by a scalar whose gradient is (hx, hy, h_axis)."""
+    px = cov[XX] * hx + cov[XY] * hy + cov[X_AXIS] * h_axis
+    py = cov[XY] * hx + cov[YY] * hy + cov[Y_AXIS] * h_axis
+    p_axis = cov[X_AXIS] * hx + cov[Y_AXIS] * hy + cov[AXIS_AXIS] * h_axis
+    variance = hx * px + hy * py + h_axis * p_axis + noise_var
+    gx, gy, g_axis = px / variance, py / variance, p_axis / variance
+    mean[X] += gx * innovation
+    mean[Y] += gy * innovation
+    mean[AXIS] = wrap_angle(mean[AXIS] + g_axis * innovation)
+    cov[XX] -= gx * px
+    cov[XY] -= gx * py
+    cov[X_AXIS] -= gx * p_axis
+    cov[YY] -= gy * py
+    cov[Y_AXIS] -= gy * p_axis
+    cov[AXIS_AXIS] -= g_axis * p_axis
+
+
+@kernel
+def moments(beliefs: BeaconBeliefs, weight: Floats) -> Floats:
+    """Mean belief of all particles of each beacon (b, 4): x, y (m), standard deviation per axis (m), axis (rad).
+
+    `weight` (n,) sums to 1. One pass over the particles as they lie in memory; squares are of offsets from the first particle's belief.
+    """
+    mean, cov, _ = beliefs
+    beacons = mean.shape[1]
+    sums = np.zeros(
+        (beacons, 5)
+    )  # of offset x, offset y, their squares with the variances, sine and cosine of the axis
+    for i in range(len(mean)):
+        w = weight[i]
+        for k in range(beacons):
+            m, c, s = mean[i, k], cov[i, k], sums[k]
+            dx, dy = m[X] - mean[0, k, X], m[Y] - mean[0, k, Y]
+            s[0] += w * dx
+            s[1] += w * dy
+            s[2] += w * (dx * dx + dy * dy + c[XX] + c[YY])
+            s[3] += w * math.sin(m[AXIS])
+            s[4] += w * math.cos(m[AXIS])
+    result = np.empty((beacons, 4))
+    for k in range(beacons):
+        s = sums[k]
+        result[k, 0] = mean[0, k, X] + s[0]
+        result[k, 1] = mean[0, k, Y] + s[1]
+        result[k, 2] = math.sqrt(0.5 * max(s[2] - s[0] * s[0] - s[1] * s[1], 0.0))
+        result[k, 3] = math.atan2(s[3], s[4])
+    return result

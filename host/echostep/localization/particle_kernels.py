@@ -1,0 +1,192 @@
+"""The steps of the particle filter on plain arrays: propagate, reweight by a ping, normalise, choose whom to keep.
+
+In: `ParticleArrays`, a `Move` in the walk frame, a `PingBatch`, the walls. Out: the same arrays, changed in place. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.jit import kernel, lean_kernel
+from echostep.localization.echo_likelihood import EchoModel, echo_density
+from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
+from echostep.walls.index import WallIndex, crosses_wall
+
+NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed, by reason: the next resampling drops such particles
+NOISE_TURN, NOISE_SCALE = 2, 3  # rows of the noise (4, n); rows 0 and 1 are x and y
+
+
+class ParticleArrays(NamedTuple):
+    """n particles, each array (n,): place on the sheet (m), rotation walk -> map (rad), true length / measured length, log-weight."""
+
+    x_m: Floats
+    y_m: Floats
+    turn_rad: Floats
+    scale: Floats
+    log_weight: Floats
+
+
+class Move(NamedTuple):
+    """A straight piece of the path in the walk frame, and the standard deviations that it adds: per axis, of the rotation, of the scale."""
+
+    dx_m: float
+    dy_m: float
+    sd_m: float
+    turn_sd_rad: float
+    scale_sd: float = 0.0
+
+
+class PingBatch(NamedTuple):
+    """k pings on a move: share of the move at the trigger (ascending), axis of the ranger in the walk frame, range (0: none), power.
+
+    `power`: share of independent information in the ping; its log-likelihood is multiplied by it.
+    """
+
+    share: Floats
+    axis_rad: Floats
+    range_m: Floats
+    power: Floats
+
+
+class CloudModel(NamedTuple):
+    """What the kernels need of the settings: log-weight that crossing a wall costs, effective share that asks for resampling, the echo model."""
+
+    wall_cost: float
+    resample_below: float
+    echo: EchoModel
+
+
+class MoveProgress(NamedTuple):
+    """How far a move has been processed: share of its length, and index of the next ping."""
+
+    share: float
+    ping: int
+
+
+@kernel
+def propagate_and_reweight(
+    particles: ParticleArrays, move: Move, noise: Floats, progress: MoveProgress, pings: PingBatch,
+    model: CloudModel, walls: WallIndex, log_evidence: Floats,
+) -> tuple[MoveProgress, float]:  # fmt: skip
+    """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (4, n) is for the rest of the move.
+
+    Writes to `log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, and the lowest best
+    log-weight before renormalising.
+    """
+    done, k = progress.share, progress.ping
+    rest, lowest = 1.0 - done, 0.0
+    while done < 1.0 or k < len(pings.share):
+        until = max(pings.share[k], done) if k < len(pings.share) else 1.0
+        if until > done:
+            part = until - done
+            best = propagate(
+                particles, part * move.dx_m, part * move.dy_m, part / rest, noise, model.wall_cost, walls
+            )  # fmt: skip
+            lowest = min(lowest, best)
+            done = until
+        if k < len(pings.share):
+            log_evidence[k], size = reweight_by_ping(
+                particles, pings.axis_rad[k], pings.range_m[k], pings.power[k], model.echo, walls
+            )
+            k += 1
+        else:
+            size = effective_size(particles.log_weight)
+        if size < model.resample_below * len(particles.x_m):
+            break
+    return MoveProgress(done, k), lowest
+
+
+@lean_kernel
+def propagate(
+    particles: ParticleArrays, dx: float, dy: float, share: float, noise: Floats, wall_cost: float, walls: WallIndex
+) -> float:
+    """Move every particle by (dx, dy) in the walk frame, with this share of its noise; returns the greatest log-weight and makes it 0 again."""
+    x, y, turn, scale, log_weight = particles
+    top = -np.inf
+    for i in range(len(x)):
+        turn[i] += share * noise[NOISE_TURN, i]
+        scale[i] += share * noise[NOISE_SCALE, i]
+        c, s = math.cos(turn[i]), math.sin(turn[i])
+        to_x = x[i] + scale[i] * (c * dx - s * dy) + share * noise[0, i]
+        to_y = y[i] + scale[i] * (s * dx + c * dy) + share * noise[1, i]
+        if crosses_wall(x[i], y[i], to_x, to_y, walls):
+            log_weight[i] -= wall_cost
+        top = max(top, log_weight[i])
+        x[i], y[i] = to_x, to_y
+    if top != 0.0:
+        for i in range(len(x)):
+            log_weight[i] -= top
+    return top
+
+
+@kernel
+def propagate_without_walls(particles: ParticleArrays, move: Move, rng: np.random.Generator) -> None:
+    """Move every particle on open ground, where there are no walls to ask."""
+    x, y, turn, scale, _ = particles
+    for i in range(len(x)):
+        turn[i] += move.turn_sd_rad * rng.standard_normal()
+        scale[i] += move.scale_sd * rng.standard_normal()
+        c, s = math.cos(turn[i]), math.sin(turn[i])
+        x[i] += scale[i] * (c * move.dx_m - s * move.dy_m) + move.sd_m * rng.standard_normal()
+        y[i] += scale[i] * (s * move.dx_m + c * move.dy_m) + move.sd_m * rng.standard_normal()
+
+
+@kernel
+def reweight_by_ping(
+    particles: ParticleArrays, axis: float, range_m: float, power: float, model: EchoModel, walls: WallIndex
+) -> tuple[float, float]:
+    """Add each particle's log-likelihood, times `power`, and make the greatest log-weight 0.
+
+    Returns the log of the mean likelihood before, and the effective size after.
+    """
+    x, y, turn, _, log_weight = particles
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    top = -np.inf
+    weight, evidence, total, squares = 0.0, 0.0, 0.0, 0.0
+    for i in range(len(x)):
+        w = math.exp(log_weight[i])
+        if w < NEGLIGIBLE:
+            continue
+        count = echo_sources(x[i], y[i], axis + turn[i], walls, distance_m, off_axis_rad, kind)
+        likelihood = echo_density(range_m, count, distance_m, off_axis_rad, kind, model)
+        weight += w
+        evidence += w * likelihood
+        log_likelihood = power * math.log(likelihood)
+        log_weight[i] += log_likelihood
+        top = max(top, log_weight[i])
+        w *= math.exp(log_likelihood)
+        total += w
+        squares += w * w
+    for i in range(len(x)):
+        log_weight[i] -= top
+    return math.log(evidence / weight), total * total / squares
+
+
+@lean_kernel
+def effective_size(log_weight: Floats) -> float:
+    """Effective number of particles, (sum w)^2 / sum w^2."""
+    total, squares = 0.0, 0.0
+    for v in log_weight:
+        w = math.exp(v)
+        total += w
+        squares += w * w
+    return total * total / squares if squares > 0.0 else 0.0
+
+
+@kernel
+def systematic(weight: Floats, draw: float, count: int) -> Ints:
+    """`count` indices of systematic resampling [Kitagawa 1996] for weights (n,) and one uniform draw in [0, 1)."""
+    step = weight.sum() / count
+    chosen = np.empty(count, np.int64)
+    reach, k = weight[0], 0
+    for i in range(count):
+        mark = (i + draw) * step
+        while reach < mark and k < len(weight) - 1:
+            k += 1
+            reach += weight[k]
+        chosen[i] = k
+    return chosen
