@@ -14,7 +14,7 @@ import pytest
 from command_line import echostep
 from echostep.evaluate.fischer2008.simulator import _WALKER, OURS, PAPER, PDR, fuse, guided_return
 from echostep.evaluate.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95
-from echostep.simulation.world.beacon_ground import OUTLIER_M, disturb, ground, hears, measured
+from echostep.simulation.world.beacon_ground import OUTLIER_M, disturb, ground, is_in_reach, measured
 
 
 def test_source_turns_the_heading_once_by_the_side_of_approach() -> None:
@@ -34,8 +34,8 @@ def test_measurements_have_the_papers_spread() -> None:
     assert abs(far.mean() - 0.1) < 0.01
     assert abs(seen[~far, 0].std() - 0.05) < 0.002
     assert abs(np.degrees(np.angle(np.exp(1j * (seen[:, 1] + axis)))).std() - 30.0) < 1.0
-    assert hears(world, 3, x + 7.9, y)
-    assert not hears(world, 3, x + 8.1, y)
+    assert is_in_reach(world, 3, x + 7.9, y)
+    assert not is_in_reach(world, 3, x + 8.1, y)
 
 
 def test_fusion_leaves_small_discrepancies_alone_and_turns_about_the_last_reliable_place() -> None:
@@ -76,7 +76,7 @@ def test_nearly_all_come_out_of_a_map_that_was_made_on_the_way_in() -> None:
 
 
 def test_three_dead_beacons_in_a_row_are_a_gap_that_is_crossed() -> None:
-    """20 m without a beacon leave 4 m in which nobody hears him; who was sent back once goes on."""
+    """20 m without a beacon leave 4 m in which nobody is_in_reach him; who was sent back once goes on."""
     for seed in range(3):
         world = ground(replace(NOMINAL, sources=0), np.random.default_rng(seed))
         world.works[5:8] = False

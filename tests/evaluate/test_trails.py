@@ -19,7 +19,7 @@ from echostep.papers import fischer2008
 from echostep.simulation.devices.mtx import MtxModel, measure
 from echostep.simulation.people.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
 from echostep.simulation.people.walker import Walk
-from echostep.simulation.world.magnetic_field import EARTH_T, Machine, Magnetism, dipole
+from echostep.simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
 from echostep.xsens.onboard_filter import OnBoardFilter
 
 BY_NAME = {trail.name: trail for trail in TRAILS}
@@ -29,7 +29,7 @@ SEEDS = (1, 2, 3)
 # ---- machines ----
 
 
-def potential(place: Floats, machine: Machine) -> float:
+def potential(place: Floats, machine: MagneticDipole) -> float:
     """Of the field in earth units times metres: H is minus its gradient."""
     away = place - np.array(machine.at_m)
     return float(1e-7 / EARTH_T * np.dot(machine.moment_a_m2, away) / np.linalg.norm(away) ** 3)
@@ -37,7 +37,7 @@ def potential(place: Floats, machine: Machine) -> float:
 
 def test_a_machine_s_field_is_the_gradient_of_a_dipole_s_potential() -> None:
     rng = np.random.default_rng(4)
-    machine = Machine((1.0, -2.0, 0.6), (300.0, -800.0, 500.0))
+    machine = MagneticDipole((1.0, -2.0, 0.6), (300.0, -800.0, 500.0))
     for place in np.array(machine.at_m) + 2.0 * rng.standard_normal((20, 3)):
         if np.linalg.norm(place - machine.at_m) < 0.6:
             continue
@@ -48,15 +48,15 @@ def test_a_machine_s_field_is_the_gradient_of_a_dipole_s_potential() -> None:
 
 def test_a_field_at_a_printed_place() -> None:
     """On the axis the field is 2 (mu0 / 4 pi) m / r3: 1000 A m2 give 25 uT at 2 m."""
-    found = dipole(np.array([[2.0, 0.0, 0.0], [0.0, 0.0, 0.0]]), Machine((0.0, 0.0, 0.0), (1000.0, 0.0, 0.0)))
+    found = dipole(np.array([[2.0, 0.0, 0.0], [0.0, 0.0, 0.0]]), MagneticDipole((0.0, 0.0, 0.0), (1000.0, 0.0, 0.0)))
     assert found[0] * EARTH_T == pytest.approx([25e-6, 0.0, 0.0])
     assert np.isfinite(found).all()
 
 
 def test_machines_add_to_a_building_that_stays_the_same() -> None:
     places = np.random.default_rng(1).uniform(0.0, 40.0, (50, 2))
-    machine = Machine((20.0, 20.0, 0.6), (500.0, 0.0, 0.0))
-    plain, with_machine = (Magnetism(np.random.default_rng(2), m).field(places) for m in ((), (machine,)))
+    machine = MagneticDipole((20.0, 20.0, 0.6), (500.0, 0.0, 0.0))
+    plain, with_machine = (MagneticField(np.random.default_rng(2), m).field(places) for m in ((), (machine,)))
     added = dipole(np.column_stack([places, np.full(50, 0.1)]), machine)
     assert with_machine == pytest.approx(plain + added)
 

@@ -10,14 +10,14 @@ import pytest
 from echostep.arrays import Floats
 from echostep.legs.clipping import ClippingRepair, find_clipping_limits, repair_clipping
 from echostep.legs.strides import StrideEstimator, StrideSettings
-from echostep.simulation.people.joint_gait import FAST, draw_stroller, stroll
+from echostep.simulation.people.joint_gait import FAST, draw_person, simulate_gait
 
 LIMIT = math.radians(300.0)
 
 
 def swings(seed: int = 0, noise: float = 0.01) -> tuple[Floats, Floats, Floats]:
     """Times, true rates of thigh and shank, the same with noise and clipped."""
-    gait = stroll(draw_stroller(np.random.default_rng(seed)), FAST, 5.0, np.random.default_rng(seed))
+    gait = simulate_gait(draw_person(np.random.default_rng(seed)), FAST, 5.0, np.random.default_rng(seed))
     at = slice(None, None, 5)
     true = np.column_stack([gait.thigh_rad_s[at], gait.shank_rad_s[at]])
     noisy = true + noise * np.random.default_rng(seed + 1).standard_normal(true.shape)

@@ -15,7 +15,7 @@ from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.strides import Flag, Stride, StrideEstimator, StrideSettings, distance_sd_m
 from echostep.offline.leg_csv import LegSamples, describe_legs, load_legs, track_default, track_lee2010
-from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, Manner, draw_stroller, stroll
+from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, WalkingPace, draw_person, simulate_gait
 from echostep.simulation.people.leg_angles import LegDimensions
 from echostep.simulation.people.walker import Person, Waypoint, walk
 
@@ -59,12 +59,12 @@ def test_five_metres_by_many_people_whose_feet_are_placed() -> None:
     ("manner", "seconds", "mean", "flag"),
     [(SLOW, 6.0, 0.04, Flag.SLOW), (NATURAL, 4.0, 0.04, Flag.NONE), (FAST, 3.0, 0.04, Flag.FAST)],
 )
-def test_people_by_their_joint_curves(manner: Manner, seconds: float, mean: float, flag: Flag) -> None:
+def test_people_by_their_joint_curves(manner: WalkingPace, seconds: float, mean: float, flag: Flag) -> None:
     errors, flags = [], []
     for seed in range(16):
         rng = np.random.default_rng(seed)
-        person = draw_stroller(rng)
-        gait = stroll(person, manner, seconds, rng)
+        person = draw_person(rng)
+        gait = simulate_gait(person, manner, seconds, rng)
         strides = _strides(
             gait.t_s, gait.thigh_rad_s, -gait.shank_rad_s, LegLengths(person.leg.thigh_m, person.leg.shank_m)
         )

@@ -18,7 +18,7 @@ from command_line import echostep
 from echostep import cli
 from echostep.errors import EchostepError
 from echostep.offline.imu_csv import load_imu
-from echostep.simulation.devices.mtx import feelings
+from echostep.simulation.devices.mtx import specific_force_and_rate
 from echostep.simulation.people.walker import Person, walk
 from foot_walks import data_folder
 
@@ -30,7 +30,7 @@ Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 def table() -> np.ndarray:
     """A simulated foot that walks 12 m out and 5 m to the side, 100 Hz."""
     found = walk([(0.0, 0.0), (12.0, 0.0), (12.0, 5.0)], Person(), np.random.default_rng(1))
-    force, rate = feelings(found)
+    force, rate = specific_force_and_rate(found)
     mean = np.column_stack([force, rate])[: len(force) // 10 * 10].reshape(-1, 10, 6).mean(1)
     return np.column_stack([np.arange(len(mean)) / 100.0, mean])
 

@@ -24,7 +24,7 @@ from echostep.plan.model import Level, Plan, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.simulation.devices.board import BoardProcess, PythonBoard
 from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model
-from echostep.simulation.devices.mtx import GRAVITY_M_S2, MtxModel, MtxStream, feelings, stream
+from echostep.simulation.devices.mtx import GRAVITY_M_S2, MtxModel, MtxStream, specific_force_and_rate, stream
 from echostep.simulation.devices.serial_delivery import deliver
 from echostep.simulation.people.attitude import quaternions, rotations
 from echostep.simulation.people.walker import RATE_HZ, Person, Walk, walk
@@ -41,7 +41,7 @@ from echostep.simulation.world.acoustics import (
 )
 from echostep.simulation.world.echoes import Echoes, echoes
 from echostep.simulation.world.image_sources import wall_edges
-from echostep.simulation.world.magnetic_field import EARTH, Magnetism
+from echostep.simulation.world.magnetic_field import EARTH, MagneticField
 from echostep.xsens import MtSample, MtxReader
 
 WAYPOINTS = ((0.0, 0.0), (6.0, 0.0), (6.0, 5.0))
@@ -162,7 +162,7 @@ def rotation_of(turn: Floats) -> Floats:
 
 
 def test_what_the_foot_feels_integrates_back_to_its_path(l_walk: Walk) -> None:
-    force, rate = feelings(l_walk)
+    force, rate = specific_force_and_rate(l_walk)
     r0 = rotations(l_walk.foot_rpy_rad[:1])[0]
     path = strapdown(force, rate, r0, 1.0 / RATE_HZ)
     truth = l_walk.foot_m - l_walk.foot_m[0]
@@ -171,7 +171,7 @@ def test_what_the_foot_feels_integrates_back_to_its_path(l_walk: Walk) -> None:
 
 
 def test_a_standing_foot_feels_gravity_and_nothing_else(l_walk: Walk) -> None:
-    force, rate = feelings(l_walk)
+    force, rate = specific_force_and_rate(l_walk)
     assert np.allclose(force[10:2_000], [0.0, 0.0, GRAVITY_M_S2], atol=1e-9)
     assert np.allclose(rate[10:2_000], 0.0, atol=1e-12)
     assert np.abs(force).max() < 180.0
@@ -181,7 +181,7 @@ def test_a_standing_foot_feels_gravity_and_nothing_else(l_walk: Walk) -> None:
 @pytest.mark.parametrize("rate_hz", [100.0, 200.0])
 def test_samples_are_means_over_their_interval(l_walk: Walk, rate_hz: float) -> None:
     found = stream(l_walk, MtxModel(**{**vars_of(FAULTLESS), "rate_hz": rate_hz}), np.random.default_rng(1))
-    force, rate = feelings(l_walk)
+    force, rate = specific_force_and_rate(l_walk)
     samples = samples_of(found.frames)
     n = int(RATE_HZ / rate_hz)
     for k in (len(samples) // 3, len(samples) // 2):
@@ -284,7 +284,7 @@ def test_nothing_leaves_the_sensors_range(l_walk: Walk) -> None:
 
 
 def test_a_disturbed_field_turns_the_sensors_north_slowly(l_walk: Walk) -> None:
-    magnetism = Magnetism(np.random.default_rng(5))
+    magnetism = MagneticField(np.random.default_rng(5))
     found = stream(l_walk, FAULTLESS, np.random.default_rng(1), magnetism)
     q = np.array([x.quaternion for x in samples_of(found.frames)])
     yaw = np.arctan2(2 * (q[:, 0] * q[:, 3] + q[:, 1] * q[:, 2]), 1 - 2 * (q[:, 2] ** 2 + q[:, 3] ** 2)) + 0.5 * math.pi

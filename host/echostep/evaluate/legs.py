@@ -17,7 +17,16 @@ from echostep.evaluate.study import Request, Study
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.strides import StrideEstimator, StrideSettings
-from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, Gait, Manner, Stroller, draw_stroller, stroll
+from echostep.simulation.people.joint_gait import (
+    FAST,
+    NATURAL,
+    SLOW,
+    JointGaitPerson,
+    SimulatedGait,
+    WalkingPace,
+    draw_person,
+    simulate_gait,
+)
 
 PACES = {"slow": SLOW, "natural": NATURAL, "fast": FAST}
 WAY_M, NEAR_M, TRIES = 5.0, 0.4, 8
@@ -51,7 +60,7 @@ CAUSES = {
 
 def one_run(seed: int) -> list[Row]:
     """One person at every pace, with every cause."""
-    person = draw_stroller(np.random.default_rng([seed, 50]))
+    person = draw_person(np.random.default_rng([seed, 50]))
     rows = []
     for pace, manner in PACES.items():
         gait = five_metres(person, manner, seed)
@@ -62,11 +71,11 @@ def one_run(seed: int) -> list[Row]:
     return rows
 
 
-def five_metres(person: Stroller, manner: Manner, seed: int) -> Gait:
+def five_metres(person: JointGaitPerson, manner: WalkingPace, seed: int) -> SimulatedGait:
     """A walk from standing to standing, as near to 5 m as whole steps come."""
-    walk_s, found = 4.0, list[Gait]()
+    walk_s, found = 4.0, list[SimulatedGait]()
     for _ in range(TRIES):
-        gait = stroll(person, manner, walk_s, np.random.default_rng([seed, 51]), STAND_S)
+        gait = simulate_gait(person, manner, walk_s, np.random.default_rng([seed, 51]), STAND_S)
         found.append(gait)
         off = WAY_M - float(gait.way_m[-1])
         if abs(off) < NEAR_M:
@@ -75,7 +84,7 @@ def five_metres(person: Stroller, manner: Manner, seed: int) -> Gait:
     return min(found, key=lambda g: abs(float(g.way_m[-1]) - WAY_M))
 
 
-def measured_m(gait: Gait, person: Stroller, sensors: LegSensors, seed: int) -> float:
+def measured_m(gait: SimulatedGait, person: JointGaitPerson, sensors: LegSensors, seed: int) -> float:
     """What our method says of the way when these sensors are worn."""
     rng = np.random.default_rng([seed, 52])
     moves = np.flatnonzero(np.abs(gait.shank_rad_s) > 0.0)

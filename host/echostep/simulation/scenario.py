@@ -20,7 +20,7 @@ from echostep.simulation.devices.board import Board
 from echostep.simulation.devices.mtx import MtxModel, stream
 from echostep.simulation.people.walker import Person, Waypoint, walk
 from echostep.simulation.stimulus import BoardSensors
-from echostep.simulation.world.magnetic_field import Magnetism
+from echostep.simulation.world.magnetic_field import MagneticField
 
 BLOCK_MS = 50
 USB_LATENCY_NS = 1_000_000
@@ -41,7 +41,7 @@ class Scenario:
     ) -> None:  # fmt: skip
         """`configure` is sent to the board before it starts."""
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
-        magnetism = Magnetism(streams[3])
+        magnetism = MagneticField(streams[3])
         self.walk = walk(waypoints, person or Person(), streams[0])
         self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
         self.sensors = BoardSensors(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)

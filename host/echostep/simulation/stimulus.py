@@ -16,7 +16,7 @@ from echostep.simulation.devices.board_sensors import Adis16100Model, CompassMod
 from echostep.simulation.people.walker import Walk
 from echostep.simulation.world.acoustics import SRF02, speed_of_sound_m_s
 from echostep.simulation.world.echoes import echoes, ranger_bias_m
-from echostep.simulation.world.magnetic_field import Magnetism
+from echostep.simulation.world.magnetic_field import MagneticField
 
 ROW = np.dtype(
     [
@@ -34,7 +34,7 @@ class BoardSensors:
 
     def __init__(
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
-        magnetism: Magnetism | None = None, air_pa: Floats | None = None,
+        magnetism: MagneticField | None = None, air_pa: Floats | None = None,
     ) -> None:  # fmt: skip
         """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone. He hears the level nearest to him.
 

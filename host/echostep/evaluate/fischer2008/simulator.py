@@ -30,7 +30,7 @@ from echostep.localization.beacon_slam import (
 )
 from echostep.localization.particle_kernels import Move, ParticleArrays, propagate_without_walls, systematic
 from echostep.plan.polyline import along, nearest, way_m
-from echostep.simulation.world.beacon_ground import BeaconGround, disturb, hears, measured
+from echostep.simulation.world.beacon_ground import BeaconGround, disturb, is_in_reach, measured
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 
@@ -231,7 +231,7 @@ def _listen(
     w.piece_x, w.piece_y = 0.0, 0.0
     heard = False
     for k in range(len(world.beacons)):
-        if hears(world, k, w.x, w.y):
+        if is_in_reach(world, k, w.x, w.y):
             heard, heard_ticks[k] = True, tick
             range_m, bearing = measured(world, k, w.x, w.y, rng)
             _hear(cloud, k, range_m, bearing, model, walls, rng)
@@ -250,7 +250,7 @@ def _correct(world: BeaconGround, rules: _Rules, rng: np.random.Generator, w: _W
     """One ultrasound event for the paper's fusion, which takes the nearest beacon's word."""
     closest, closest_m, closest_bearing = -1, np.inf, 0.0
     for k in range(len(world.beacons)):
-        if hears(world, k, w.x, w.y):
+        if is_in_reach(world, k, w.x, w.y):
             range_m, bearing = measured(world, k, w.x, w.y, rng)
             if range_m < closest_m:
                 closest, closest_m, closest_bearing = k, range_m, bearing
@@ -391,7 +391,7 @@ def _way_in(
             dx, dy = 0.0, 0.0
             for k in range(count - 1, -1, -1):
                 world.works[k] = (count - 1 - k) * total <= (tick * step + DROPPED_BEFORE_M) * (count - 1)
-                if hears(world, k, x, y):
+                if is_in_reach(world, k, x, y):
                     range_m, bearing = measured(world, k, x, y, rng)
                     _hear(cloud, k, range_m, bearing, model, walls, rng)
         error += disturb(world.sources, inside, x, y, heading)
@@ -403,7 +403,7 @@ def _way_in(
 def _crumbs(cloud: _Cloud, i: int, exit_x: float, exit_y: float, heard: Bools) -> tuple[Floats, float, float]:
     """The way back as a particle believes it, from beacon to beacon to the exit, and between which lengths along it (m) he must be.
 
-    He is within one beacon of those that he hears (b,): a bent map may come by again, but there other beacons are heard.
+    He is within one beacon of those that he is_in_reach (b,): a bent map may come by again, but there other beacons are heard.
     """
     count = len(heard)
     path = np.empty((count + 1, 2))

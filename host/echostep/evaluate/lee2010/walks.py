@@ -25,7 +25,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.leg_angles import LegDimensions
 from echostep.simulation.people.walker import Person, Walk, Waypoint, walk
 from echostep.simulation.stimulus import BoardSensors
-from echostep.simulation.world.magnetic_field import Magnetism
+from echostep.simulation.world.magnetic_field import MagneticField
 from echostep.timing.timeline import PLAIN, Arrivals, MtxTiming, Timeline
 
 LAP: tuple[Waypoint, ...] = ((0.0, 0.0), (40.0, 0.0), (40.0, 30.0), (0.0, 30.0), (0.0, 0.0))  # [Lee 2010, Figure 6]
@@ -105,7 +105,7 @@ def _with_doors(a: Floats, b: Floats, deep_m: float, rng: np.random.Generator) -
 
 def chunks_of(walked: Walk, levels: Sequence[Level], seed: int) -> list[Chunk]:
     """The bytes of a board that is worn on this walk, as they reach the host; pings where there are walls."""
-    magnetism = Magnetism(np.random.default_rng([seed, 34]))
+    magnetism = MagneticField(np.random.default_rng([seed, 34]))
     sensors = BoardSensors(walked, levels, np.empty(0), np.random.default_rng([seed, 35]), magnetism)
     board = PythonBoard(seed=seed)
     if not len(levels[0].walls):

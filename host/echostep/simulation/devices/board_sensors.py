@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.simulation.world.magnetic_field import EARTH, Magnetism
+from echostep.simulation.world.magnetic_field import EARTH, MagneticField
 
 GYRO_RAD_S = math.radians(0.2439)  # per count [ADIS16100 data sheet]
 GYRO_LIMIT = 1230  # counts: 300 deg/s
@@ -71,7 +71,7 @@ class Scp1000Model:
 class CompassModel:
     """A magnetic compass on the trunk: the field of the place, the iron that the wearer carries, noise."""
 
-    def __init__(self, magnetism: Magnetism | None, rng: np.random.Generator) -> None:
+    def __init__(self, magnetism: MagneticField | None, rng: np.random.Generator) -> None:
         self._rng = rng
         self._magnetism = magnetism
         self._iron = HARD_IRON * rng.standard_normal(2)

@@ -17,7 +17,7 @@ from echostep.arrays import Floats
 from echostep.simulation.devices.serial_delivery import deliver
 from echostep.simulation.people.attitude import quaternions, rotations, turns
 from echostep.simulation.people.walker import RATE_HZ, Walk
-from echostep.simulation.world.magnetic_field import EARTH, Magnetism
+from echostep.simulation.world.magnetic_field import EARTH, MagneticField
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 from echostep.xsens.onboard_filter import OnBoardFilter, orientations
 
@@ -80,7 +80,7 @@ class MtxStream:
     portions: list[bytes]
 
 
-def feelings(walk: Walk, mounting: Floats | None = None) -> tuple[Floats, Floats]:
+def specific_force_and_rate(walk: Walk, mounting: Floats | None = None) -> tuple[Floats, Floats]:
     """Specific force (m/s2) and angular rate (rad/s) (n, 3) at 1 kHz, without error, in the sensor's frame; `mounting` (3, 3) sensor -> foot."""
     r = rotations(walk.foot_rpy_rad) if mounting is None else rotations(walk.foot_rpy_rad) @ mounting
     accel = np.zeros_like(walk.foot_m)
@@ -91,7 +91,7 @@ def feelings(walk: Walk, mounting: Floats | None = None) -> tuple[Floats, Floats
     return np.einsum("nji,nj->ni", r, accel), rate
 
 
-def stream(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: Magnetism | None = None) -> MtxStream:
+def stream(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: MagneticField | None = None) -> MtxStream:
     """All samples of a walk, each the mean over its interval, as an MTx gives them."""
     found = measure(walk, model, rng, magnetism)
     t, q = found.t_s, quaternions(found.orientation)
@@ -103,13 +103,15 @@ def stream(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: Mag
     return MtxStream(t, arrival_s, frames, portion_s, portions)
 
 
-def measure(walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: Magnetism | None = None) -> MtxSamples:
+def measure(
+    walk: Walk, model: MtxModel, rng: np.random.Generator, magnetism: MagneticField | None = None
+) -> MtxSamples:
     """All samples of a walk, each the mean over its interval, with their errors, before they become bytes."""
     period = (1.0 + model.drift_ppm * 1e-6) / model.rate_hz
     count = int((walk.t_s[-1] - 2.0 * FIRST_S) / period)
     t: Floats = FIRST_S + period * np.arange(1, count, dtype=np.float64)
     mounting = rotations(np.array([model.mounting_rpy_rad]))[0]
-    force, rate = (_means(v, t, period) for v in feelings(walk, mounting))
+    force, rate = (_means(v, t, period) for v in specific_force_and_rate(walk, mounting))
     root = math.sqrt(model.rate_hz)
     accel = (
         force

@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.simulation.devices.mtx import MtxModel, MtxSamples, measure
 from echostep.simulation.people.walker import Person, Walk, Waypoint, walk
-from echostep.simulation.world.magnetic_field import Machine, Magnetism
+from echostep.simulation.world.magnetic_field import MagneticDipole, MagneticField
 from echostep.xsens.onboard_filter import OnBoardFilter
 
 BUILDING = 2008  # seed of the field that the steel of every building makes; the people differ from run to run, the buildings do not
@@ -31,7 +31,7 @@ class Trail:
     name: str
     length_m: float
     waypoints: tuple[Waypoint, ...]
-    machines: tuple[Machine, ...]
+    machines: tuple[MagneticDipole, ...]
     printed_percent: float | None
     printed: str
 
@@ -45,7 +45,7 @@ def walk_trail(trail: Trail, seed: int) -> Walk:
 
 def measure_trail(trail: Trail, walked: Walk, rate_hz: float, seed: int) -> MtxSamples:
     """What an MTx on the foot measures, with its own, fooled orientation."""
-    magnetism = Magnetism(np.random.default_rng(BUILDING), trail.machines)
+    magnetism = MagneticField(np.random.default_rng(BUILDING), trail.machines)
     model = MtxModel(rate_hz=rate_hz, filter=OnBoardFilter())
     return measure(walked, model, np.random.default_rng([seed, int(rate_hz)]), magnetism)
 
@@ -71,10 +71,10 @@ def _round_the_machines() -> tuple[Waypoint, ...]:
 
 def _row(
     first_m: tuple[float, float], step_m: tuple[float, float], count: int, moment_a_m2: tuple[float, float, float]
-) -> tuple[Machine, ...]:
+) -> tuple[MagneticDipole, ...]:
     """Equal machines in a row, their middles `HEIGHT_M` above the floor."""
     (x, y), (dx, dy) = first_m, step_m
-    return tuple(Machine((x + k * dx, y + k * dy, HEIGHT_M), moment_a_m2) for k in range(count))
+    return tuple(MagneticDipole((x + k * dx, y + k * dy, HEIGHT_M), moment_a_m2) for k in range(count))
 
 
 TRAILS = (

@@ -1,6 +1,6 @@
 """People who walk by the joints' own curves: what the hips do follows from feet that roll on the floor and do not slip.
 
-In: a gait (slow, natural, fast), a person drawn from a seed, how long. Out: `Gait`: rates of thigh and shank, and where the hips are. Owns
+In: a gait (slow, natural, fast), a person drawn from a seed, how long. Out: `SimulatedGait`: rates of thigh and shank, and where the hips are. Owns
 the curves.
 
 Nothing here knows how far a stride goes. Heel and ball of both feet hang from the hips by thigh, shank and foot; the lower one of a foot that
@@ -31,7 +31,7 @@ START = 0.55  # of the stride's time, from standing to the whole movement: the f
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class WalkingPace:
     """How one walks: `hip` and `load` scale the hip's excursion and the knee's flexion under load, `swing` that in the swing, `stride_s`."""
 
     hip: float
@@ -40,11 +40,15 @@ class Manner:
     stride_s: float
 
 
-SLOW, NATURAL, FAST = Manner(0.78, 0.55, 0.93, 1.42), Manner(1.0, 1.0, 1.0, 1.10), Manner(1.14, 1.25, 1.03, 0.97)
+SLOW, NATURAL, FAST = (
+    WalkingPace(0.78, 0.55, 0.93, 1.42),
+    WalkingPace(1.0, 1.0, 1.0, 1.10),
+    WalkingPace(1.14, 1.25, 1.03, 0.97),
+)
 
 
 @dataclass(frozen=True, slots=True)
-class Stroller:
+class JointGaitPerson:
     """One person: the leg, the foot (`ankle_m` high, `heel_m` behind and `ball_m` ahead of the ankle), and how the curves are this person's own."""
 
     leg: LegDimensions
@@ -62,7 +66,7 @@ class Stroller:
 
 
 @dataclass(frozen=True, slots=True)
-class Gait:
+class SimulatedGait:
     """Arrays of n samples at `RATE_HZ`: time, rates of thigh and shank (rad/s, forward positive), how far the hips have come."""
 
     t_s: Floats
@@ -71,7 +75,7 @@ class Gait:
     way_m: Floats
 
 
-def draw_stroller(rng: np.random.Generator) -> Stroller:
+def draw_person(rng: np.random.Generator) -> JointGaitPerson:
     """An adult of 1.50 to 1.95 m, proportions after [Winter 2009], each a little otherwise; curves that differ as people's do [Kadaba 1990]."""
     height = rng.uniform(1.50, 1.95)
     share = 1.0 + 0.04 * rng.standard_normal(5)
@@ -80,12 +84,14 @@ def draw_stroller(rng: np.random.Generator) -> Stroller:
     hip, knee, ankle, other, pace = (1.0 + np.array([0.08, 0.08, 0.15, 0.03, 0.05]) * rng.standard_normal(5)).tolist()
     pelvis_deg = 4.0 + 1.2 * rng.standard_normal()
     ankle_m, heel_m, ball_m = (np.array([0.039, 0.032, 0.075]) * height * share[2:]).tolist()
-    return Stroller(
+    return JointGaitPerson(
         leg, ankle_m, heel_m, ball_m, thigh_deg, ankle_deg, hip, knee, ankle, other, pace, pelvis_deg
     )  # fmt: skip
 
 
-def stroll(person: Stroller, manner: Manner, walk_s: float, rng: np.random.Generator, stand_s: float = 1.5) -> Gait:
+def simulate_gait(
+    person: JointGaitPerson, manner: WalkingPace, walk_s: float, rng: np.random.Generator, stand_s: float = 1.5
+) -> SimulatedGait:
     """Stand, walk for so long or up to half a stride longer, stand: which leg goes first is drawn, too.
 
     He begins with a foot that leaves the floor and ends with one that comes down beside the other [Jian 1993].
@@ -106,11 +112,11 @@ def stroll(person: Stroller, manner: Manner, walk_s: float, rng: np.random.Gener
     )
     way = np.cumsum(sum(_carried(phase + k) * step for k, step in zip((0.0, 0.5), moved, strict=True)))
     thigh, shank = (np.gradient(angle) * RATE_HZ for angle in right[:2])
-    return Gait(t, thigh, shank, way)
+    return SimulatedGait(t, thigh, shank, way)
 
 
 def _angles(
-    person: Stroller, manner: Manner, phase: Floats, moves: Floats, amplitude: float
+    person: JointGaitPerson, manner: WalkingPace, phase: Floats, moves: Floats, amplitude: float
 ) -> tuple[Floats, Floats, Floats]:
     """Thigh, shank and foot against their standing (rad, forward and toe up positive)."""
     part = phase % 1.0
@@ -127,7 +133,7 @@ def _angles(
     return thigh, shank, shank + moves * ankle + (1.0 - moves) * (knee - thigh)
 
 
-def _points(person: Stroller, angles: tuple[Floats, Floats, Floats]) -> Floats:
+def _points(person: JointGaitPerson, angles: tuple[Floats, Floats, Floats]) -> Floats:
     """Heel and ball (n, 2, 2) from the hip, forward and up."""
     thigh, shank, foot = angles
     leg, found = person.leg, []

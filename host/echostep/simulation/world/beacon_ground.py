@@ -1,7 +1,7 @@
 """The world of a guided return [Fischer 2008, 4]: a trail on open ground, beacons dropped along it, magnetic sources beside it.
 
 In: a seed and how dense, far-reaching and noisy things are. Out: a `BeaconGround` of plain arrays, and kernels for what happens on it: how a source
-turns the measured heading, which beacon hears the boot, and what it measures. Owns nothing. The paper does not print its trail: each seed draws
+turns the measured heading, which beacon is_in_reach the boot, and what it measures. Owns nothing. The paper does not print its trail: each seed draws
 another.
 """
 
@@ -28,7 +28,7 @@ CLEARANCE_M = 8.0  # a trail keeps so far from its own earlier parts: on open gr
 class GroundSettings:
     """[Fischer 2008, 4.1]: `range_sd_m`, `bearing_sd_deg` of the beacons' measurements, `outliers` the share of ranges with 3 m too much.
 
-    `spacing_m`, `reach_m`: between beacons along the trail, and how far one hears. `place_sd_m`, `axis_sd_deg`: how well place (per axis) and
+    `spacing_m`, `reach_m`: between beacons along the trail, and how far one is_in_reach. `place_sd_m`, `axis_sd_deg`: how well place (per axis) and
     orientation of a beacon are known. `sources` magnetic sources a trail, each within `source_aside_m` of it, with radius and amplitude drawn
     from the ranges. `moved`, `dead`: share of beacons that were kicked away by some metres, or stopped, before the way back.
     """
@@ -143,7 +143,7 @@ def disturb(sources: Floats, inside: Bools, x: float, y: float, heading: float) 
 
 
 @kernel
-def hears(world: BeaconGround, k: int, x: float, y: float) -> bool:
+def is_in_reach(world: BeaconGround, k: int, x: float, y: float) -> bool:
     """Whether beacon k works and a boot at (x, y) is within its reach."""
     dx, dy = x - world.beacons[k, 0], y - world.beacons[k, 1]
     return bool(world.works[k]) and dx * dx + dy * dy <= world.reach_m * world.reach_m

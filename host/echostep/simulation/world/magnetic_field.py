@@ -26,17 +26,17 @@ SIZE_M = 0.5  # of a machine: nearer than that it is no dipole
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class MagneticDipole:
     """A magnetic dipole: the middle of a machine, `at_m` x, y, z, and its `moment_a_m2` east, north, up; tonnes of steel have 100 to 1000."""
 
     at_m: tuple[float, float, float]
     moment_a_m2: tuple[float, float, float]
 
 
-class Magnetism:
+class MagneticField:
     """One building's field."""
 
-    def __init__(self, rng: np.random.Generator, machines: Sequence[Machine] = ()) -> None:
+    def __init__(self, rng: np.random.Generator, machines: Sequence[MagneticDipole] = ()) -> None:
         self._machines = machines
         angle, phase = rng.uniform(0.0, 2.0 * math.pi, (2, WAVES))
         number = 2.0 * math.pi / rng.uniform(*WAVELENGTH_M, WAVES)
@@ -52,7 +52,7 @@ class Magnetism:
         return found
 
 
-def dipole(places_m: Floats, machine: Machine) -> Floats:
+def dipole(places_m: Floats, machine: MagneticDipole) -> Floats:
     """Field (n, 3) of a dipole at places (n, 3), in units of the earth's field [Jackson 1999, eq. 5.56]."""
     away = places_m - np.array(machine.at_m)
     distance = np.maximum(np.linalg.norm(away, axis=1), SIZE_M)[:, None]
