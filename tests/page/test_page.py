@@ -25,14 +25,14 @@ from websockets.typing import Origin
 from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus, digest
-from echostep.page import protocol as wire
-from echostep.page.elements.echo_lines import Beam
-from echostep.page.elements.guidance import Errand, Ways, straight
-from echostep.page.elements.lookahead import ahead
-from echostep.page.elements.scene import PageScene, Specks, words
+from echostep.page import protocol
+from echostep.page.elements.echo_lines import EchoLine
+from echostep.page.elements.guidance import Destination, RouteFinder, straight_line
+from echostep.page.elements.lookahead import extrapolate
+from echostep.page.elements.scene import PageScene, ParticleSample, status_text
 from echostep.page.live import LivePage
-from echostep.page.mailbox import MOST_CHECK_INS, Film, Mailbox
-from echostep.page.replay_cursor import Cursor
+from echostep.page.mailbox import MOST_CHECK_INS, Mailbox, SceneHistory
+from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.server import MOST_PAGES, Address, PageServer
 from echostep.page.session import MOST_UNDRAWN
 from echostep.plan.model import Pose, load_plan
@@ -66,19 +66,26 @@ def told(
     return Estimate(t_s, x_m, y_m, sd_m**2, 0.0, sd_m**2, 0.0, 0.02, 1, status)
 
 
-def scene(t_s: float = 1.0, walked: int = 0, particles: int = 300) -> PageScene:
+def scene(t_s: float = 1.0, trail_count: int = 0, particles: int = 300) -> PageScene:
     x = np.linspace(1.0, 3.0, particles, dtype=np.float32)
-    cloud = Specks(x, x + 5.0, np.full(particles, 200, np.uint8), np.zeros(particles, np.uint8))
+    cloud = ParticleSample(x, x + 5.0, np.full(particles, 200, np.uint8), np.zeros(particles, np.uint8))
     return PageScene(
-        time.monotonic_ns(), t_s, told(t_s=t_s), cloud, (Beam(t_s, 0, 2.0, 7.5, 1.6, 1.0, None),), None, walked, ""
+        time.monotonic_ns(),
+        t_s,
+        told(t_s=t_s),
+        cloud,
+        (EchoLine(t_s, 0, 2.0, 7.5, 1.6, 1.0, None),),
+        None,
+        trail_count,
+        "",
     )
 
 
 @contextlib.contextmanager
-def served(stage: Mailbox | None = None) -> Iterator[tuple[PageServer, Mailbox]]:
-    stage = stage or Mailbox(PLAN, "test", replay=False)
-    with PageServer(stage, LOCAL) as server:
-        yield server, stage
+def served(mailbox: Mailbox | None = None) -> Iterator[tuple[PageServer, Mailbox]]:
+    mailbox = mailbox or Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        yield server, mailbox
 
 
 def opened(server: PageServer) -> ClientConnection:
@@ -101,12 +108,12 @@ def next_frame(page: ClientConnection) -> dict[str, Any]:
 
 @given(kinds, st.dictionaries(fields, json_like, max_size=6))
 def test_no_request_breaks_the_parser(kind: str, rest: dict[str, object]) -> None:
-    wire.parse_request(json.dumps({"kind": kind, **rest}))
+    protocol.parse_request(json.dumps({"kind": kind, **rest}))
 
 
 @given(st.text() | st.just("[" * 2000) | st.just("9" * 2000) | json_like.map(json.dumps))
 def test_no_text_breaks_the_parser(text: str) -> None:
-    assert wire.parse_request(text) is None or '"kind"' in text
+    assert protocol.parse_request(text) is None or '"kind"' in text
 
 
 @given(
@@ -199,9 +206,9 @@ def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     with LivePage(watched, "test", LOCAL) as page:
         for chunk in chunks:
             portion = portion_of([chunk])
-            page.coming()
+            page.note_arrival()
             found += watched.take(portion)
-            page.shown(portion)
+            page.publish(portion)
         with opened_url(page.url) as looking:
             assert json.loads(looking.recv(timeout=5))["kind"] == "hello"
             frame = next_frame(looking)
@@ -223,7 +230,7 @@ def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
         ]:
             portion = portion_of([chunk] if chunk else [])
             tracker.take(portion)
-            page.shown(portion)
+            page.publish(portion)
         looking.recv(timeout=5)
         frame = next_frame(looking)
         while not frame["words"].startswith("lost"):
@@ -236,9 +243,9 @@ def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
 
 
 def test_a_page_gets_plan_walls_and_frames() -> None:
-    with served() as (server, stage):
-        stage.trail.add(1.0, 2.0, 0)
-        stage.publish(scene(walked=1))
+    with served() as (server, mailbox):
+        mailbox.trail.add(1.0, 2.0, 0)
+        mailbox.publish(scene(trail_count=1))
         with opened(server) as page:
             hello = json.loads(page.recv(timeout=5))
             frame = next_frame(page)
@@ -252,12 +259,12 @@ def test_a_page_gets_plan_walls_and_frames() -> None:
 def test_the_cloud_is_quantised_to_a_millimetre() -> None:
     rng = np.random.default_rng(0)
     x, y = (rng.uniform(-20.0, 20.0, 999).astype(np.float32) for _ in range(2))
-    sent = wire.frame(
-        replace(scene(), specks=None),
+    sent = protocol.frame(
+        replace(scene(), particles=None),
         1,
         b"",
         0,
-        Specks(x, y, np.zeros(999, np.uint8), np.zeros(999, np.uint8)),
+        ParticleSample(x, y, np.zeros(999, np.uint8), np.zeros(999, np.uint8)),
         None,
         None,
     )
@@ -269,14 +276,14 @@ def test_the_cloud_is_quantised_to_a_millimetre() -> None:
 
 
 def test_a_page_that_sleeps_is_sent_nothing_and_catches_up() -> None:
-    with served() as (server, stage):
-        stage.publish(scene(0.0))
+    with served() as (server, mailbox):
+        mailbox.publish(scene(0.0))
         with opened(server) as page:
             page.recv(timeout=5)
             serials = [next_frame(page)["seq"]]
             for k in range(100):
-                stage.trail.add(float(k), 0.0, 0)
-                stage.publish(scene(float(k), walked=k + 1))
+                mailbox.trail.add(float(k), 0.0, 0)
+                mailbox.publish(scene(float(k), trail_count=k + 1))
                 time.sleep(0.002)
             with contextlib.suppress(TimeoutError):
                 while True:
@@ -291,13 +298,13 @@ def test_a_page_that_sleeps_is_sent_nothing_and_catches_up() -> None:
 
 
 def test_the_tracker_never_waits_for_ten_pages_that_are_stuck() -> None:
-    with served() as (server, stage), contextlib.ExitStack() as stack:
+    with served() as (server, mailbox), contextlib.ExitStack() as stack:
         for _ in range(10):
             stack.enter_context(opened(server))
         longest_s = 0.0
         for k in range(300):
             began = time.perf_counter()
-            stage.publish(scene(float(k), particles=10_000))
+            mailbox.publish(scene(float(k), particles=10_000))
             longest_s = max(longest_s, time.perf_counter() - began)
             time.sleep(0.001)
         assert server.pages == 10
@@ -319,7 +326,7 @@ def test_another_site_is_refused(origin: str | None, host: str | None) -> None:
         own = server.url.rstrip("/")
         with pytest.raises((InvalidStatus, ConnectionClosed)):
             connect_as(server, own if origin is None else origin, host).recv(timeout=5)
-        assert server.guard.refused == 1
+        assert server.access_control.refused == 1
         assert server.pages == 0
 
 
@@ -350,8 +357,8 @@ def test_without_the_token_nothing_answers() -> None:
 
 
 def test_noise_is_counted_and_the_page_goes_on() -> None:
-    with served() as (server, stage):
-        stage.publish(scene())
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
         with opened(server) as page:
             noise: list[str | bytes] = [
                 "",
@@ -377,8 +384,8 @@ def test_noise_is_counted_and_the_page_goes_on() -> None:
 
 
 def test_too_long_or_too_many_messages_end_the_socket_alone() -> None:
-    with served() as (server, stage):
-        stage.publish(scene())
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
         for message, count in (("x" * 5000, 1), ("{}", 1000)):
             with opened(server) as page, pytest.raises(ConnectionClosed):
                 send_and_listen(page, message, count)
@@ -405,17 +412,17 @@ def test_so_many_pages_and_no_more() -> None:
 
 def test_check_ins_that_nobody_takes_are_refused() -> None:
     said = '{"kind":"check_in","x_m":1,"y_m":2,"heading_rad":null,"sd_m":0.5}'
-    with served() as (server, stage), opened(server) as page:
+    with served() as (server, mailbox), opened(server) as page:
         page.recv(timeout=5)
         for _ in range(MOST_CHECK_INS + 1):
             page.send(said)
         assert json.loads(page.recv(timeout=5)) == {"kind": "refused", "what": "check_in"}
-        assert list(stage.said()) == [CheckIn(1.0, 2.0, None, 0.5)] * MOST_CHECK_INS
-    with served(Mailbox(PLAN, "a replay", replay=True)) as (server, stage), opened(server) as page:
+        assert list(mailbox.pop_check_ins()) == [CheckIn(1.0, 2.0, None, 0.5)] * MOST_CHECK_INS
+    with served(Mailbox(PLAN, "a replay", replay=True)) as (server, mailbox), opened(server) as page:
         assert json.loads(page.recv(timeout=5))["replay"]
         page.send(said)
         assert json.loads(page.recv(timeout=5))["kind"] == "refused"
-        assert not list(stage.said())
+        assert not list(mailbox.pop_check_ins())
 
 
 def test_an_address_that_is_taken_is_named_or_another_is_found() -> None:
@@ -428,11 +435,11 @@ def test_an_address_that_is_taken_is_named_or_another_is_found() -> None:
 
 
 def test_a_cursor_plays_stops_seeks_and_steps() -> None:
-    film = Film()
-    cursor = Cursor(film)
+    history = SceneHistory()
+    cursor = ReplayCursor(history)
     assert cursor.scene(100.0) is None
     for t_s in (10.0, 11.0, 12.0, 13.0):
-        film.add(scene(t_s))
+        history.add(scene(t_s))
 
     def at(now_s: float) -> float:
         shown = cursor.scene(now_s)
@@ -441,43 +448,43 @@ def test_a_cursor_plays_stops_seeks_and_steps() -> None:
 
     assert at(100.0) == 10.0
     assert at(101.5) == 11.0
-    cursor.take(wire.Speed(4.0))
+    cursor.handle(protocol.SetSpeed(4.0))
     assert at(101.9) == 13.0
     assert at(500.0) == 13.0
-    cursor.take(wire.Skip(-2))
+    cursor.handle(protocol.StepBy(-2))
     assert (at(501.0), cursor.playing) == (11.0, False)
     assert at(502.0) == 11.0
-    cursor.take(wire.Seek(12.4))
+    cursor.handle(protocol.Seek(12.4))
     assert at(503.0) == 12.0
-    cursor.take(wire.Seek(1e9))
+    cursor.handle(protocol.Seek(1e9))
     assert at(504.0) == 13.0
-    cursor.take(wire.Playing(True))  # at the end: from the beginning
+    cursor.handle(protocol.SetPlaying(True))  # at the end: from the beginning
     assert at(504.0) == 10.0
 
 
 def test_status_in_words() -> None:
-    assert words(told()) == "tracking, 0.2 m"
-    assert words(told(sd_m=1.2, status=TrackStatus.UNCERTAIN)) == "uncertain, 3 m"
-    assert words(told(status=TrackStatus.LOST)) == "lost: walk along a wall or tap where you are"
-    assert words(None, waits=True) == "tap where you stand to start"
+    assert status_text(told()) == "tracking, 0.2 m"
+    assert status_text(told(sd_m=1.2, status=TrackStatus.UNCERTAIN)) == "uncertain, 3 m"
+    assert status_text(told(status=TrackStatus.LOST)) == "lost: walk along a wall or tap where you are"
+    assert status_text(None, needs_start=True) == "tap where you stand to start"
 
 
 def test_an_errand_finds_its_way_around_walls() -> None:
-    errand, here, goal = Errand(RoutePlace(13.0, 4.5)), told(9.0, 7.5), RoutePlace(13.0, 4.5)
-    assert "straight line" in errand.guidance(here).text
-    assert errand.lacks_way(here)
-    errand.found(Ways(PLAN).way(here, goal), "", here)
-    way = errand.guidance(here)
-    assert not errand.lacks_way(here)
+    destination, here, goal = Destination(RoutePlace(13.0, 4.5)), told(9.0, 7.5), RoutePlace(13.0, 4.5)
+    assert "straight line" in destination.guidance_at(here).text
+    assert destination.needs_route(here)
+    destination.set_route(RouteFinder(PLAN).find(here, goal), "", here)
+    way = destination.guidance_at(here)
+    assert not destination.needs_route(here)
     assert (way.left_m or 0.0) > 5.5  # through the door at (13, 6.5)
     assert way.path[-1] == (13.0, 4.5)
     assert abs(way.arrow_rad or 0.0) < 0.3
     with pytest.raises(EchostepError) as outside:
-        Ways(PLAN).way(here, RoutePlace(500.0, 500.0))
-    errand.found(None, str(outside.value), here)
-    assert "outside the plan" in errand.guidance(here).text
-    assert not errand.lacks_way(here)
-    assert errand.lacks_way(told(9.0, 7.5, t_s=10.0))
+        RouteFinder(PLAN).find(here, RoutePlace(500.0, 500.0))
+    destination.set_route(None, str(outside.value), here)
+    assert "outside the plan" in destination.guidance_at(here).text
+    assert not destination.needs_route(here)
+    assert destination.needs_route(told(9.0, 7.5, t_s=10.0))
 
 
 def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
@@ -491,7 +498,7 @@ def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
         if new:
             last, then = new[-1], None
         if last and (since := tracker.intake.ahead) and tracker.leg and not then:
-            then = ahead(last, tracker.leg, since[:1])
+            then = extrapolate(last, tracker.leg, since[:1])
             assert then.xx_m2 > last.xx_m2
     assert len(off_m) > 5
     assert max(off_m) < 0.3
@@ -499,12 +506,12 @@ def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
 
 
 def test_guidance_points_and_arrives() -> None:
-    way = straight(told(), RoutePlace(2.0, 17.5, 0))
+    way = straight_line(told(), RoutePlace(2.0, 17.5, 0))
     assert (way.left_m or 0.0) == 10.0
     assert way.arrow_rad == pytest.approx(math.pi / 2)
-    assert straight(told(), RoutePlace(2.3, 7.5, 0)).text == "You have arrived"
-    assert "1 level up" in straight(told(), RoutePlace(2.3, 7.5, 1)).text
+    assert straight_line(told(), RoutePlace(2.3, 7.5, 0)).text == "You have arrived"
+    assert "1 floor up" in straight_line(told(), RoutePlace(2.3, 7.5, 1)).text
     looks_north = replace(told(), heading_rad=math.pi / 2)
-    assert straight(looks_north, RoutePlace(2.0, 17.5, 0)).arrow_rad == pytest.approx(0.0)
-    unknown = straight(replace(told(), heading_sd_rad=2.0), RoutePlace(2.0, 17.5, 0))
+    assert straight_line(looks_north, RoutePlace(2.0, 17.5, 0)).arrow_rad == pytest.approx(0.0)
+    unknown = straight_line(replace(told(), heading_sd_rad=2.0), RoutePlace(2.0, 17.5, 0))
     assert (unknown.kind, unknown.arrow_rad) == ("stop", None)

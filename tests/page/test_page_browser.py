@@ -23,8 +23,8 @@ from board_runs import ROOT
 from echostep.foot.steps import Step
 from echostep.guidance.cues import Cue, CueKind
 from echostep.guidance.guided_run import GuidedRun
-from echostep.page.elements.guidance import Guidance, guidance
-from echostep.page.elements.scene import Specks
+from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
+from echostep.page.elements.scene import ParticleSample
 from echostep.page.live import LivePage
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
@@ -110,7 +110,7 @@ class Walk:
             ahead_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / self._pace - (time.monotonic() - began)
             if self._stop.wait(max(ahead_s, 0.0)):
                 return
-            for said in self.page.said():
+            for said in self.page.pop_check_ins():
                 self.taken += 1
                 self._take(Chunk("person", chunk.t_arrival_ns, said))
             self._take(chunk)
@@ -118,9 +118,9 @@ class Walk:
     def _take(self, chunk: Chunk) -> None:
         self._now_s = (chunk.t_arrival_ns - START_NS) * 1e-9
         portion = portion_of([chunk])
-        self.page.coming()
+        self.page.note_arrival()
         self._tracker.take(portion)
-        self.page.shown(portion)
+        self.page.publish(portion)
 
 
 def looking(browser: Any, url: str, look: str) -> Any:
@@ -186,11 +186,11 @@ def test_from_a_step_to_the_pixel_in_a_tenth_of_a_second(browser: Any) -> None:
 
 
 def test_thirty_frames_a_second_with_ten_thousand_particles(browser: Any) -> None:
-    stage = Mailbox(PLAN, "test", replay=False)
-    with PageServer(stage, LOCAL) as server:
-        stage.publish(scene())
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
         page = looking(browser, server.url, "dark")
-        rates_hz = [frame_rate(page, stage) for _ in range(5)]
+        rates_hz = [frame_rate(page, mailbox) for _ in range(5)]
         assert page.evaluate("echostep.scene.cloud.count") == 10_000
         page.context.close()
     print("with 10,000 particles, frames/s:", ", ".join(f"{rate_hz:.1f}" for rate_hz in rates_hz))
@@ -198,14 +198,14 @@ def test_thirty_frames_a_second_with_ten_thousand_particles(browser: Any) -> Non
     assert max(rates_hz) > 28.5  # the machine does other things too
 
 
-def frame_rate(page: Any, stage: Mailbox, span_s: float = 2.0) -> float:
-    """Frames that a page draws in a second while the stage has a new cloud sixty times a second."""
+def frame_rate(page: Any, mailbox: Mailbox, span_s: float = 2.0) -> float:
+    """Frames that a page draws in a second while the mailbox has a new cloud sixty times a second."""
     rng = np.random.default_rng(0)
     began, frames, k = time.monotonic(), page.evaluate("echostep.frames"), 0
     while (now := time.monotonic()) - began < span_s:
         x, y = (rng.normal(v, 1.0, 10_000).astype(np.float32) for v in (12.0, 7.0))
-        crowd = Specks(x, y, rng.integers(0, 256, 10_000).astype(np.uint8), np.zeros(10_000, np.uint8))
-        stage.publish(replace(scene(now), specks=crowd))
+        crowd = ParticleSample(x, y, rng.integers(0, 256, 10_000).astype(np.uint8), np.zeros(10_000, np.uint8))
+        mailbox.publish(replace(scene(now), particles=crowd))
         k += 1
         time.sleep(max(began + k / 60.0 - time.monotonic(), 0.0))
     drawn = page.evaluate("echostep.frames") - frames
@@ -281,9 +281,9 @@ def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
 
 
 def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
-    stage = Mailbox(PLAN, "test", replay=False)
-    with PageServer(stage, LOCAL) as server:
-        stage.publish(scene())
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         before = page.evaluate("[echostep.view.scale, echostep.view.turn]")
         fingers, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
@@ -308,21 +308,21 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
 def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
     start, chunks = demo_walk(beacons=False)
     tracker = Tracker(PLAN, start, seed=1)
-    with LivePage(tracker, "A replay", LOCAL, replay=True) as film:
+    with LivePage(tracker, "A replay", LOCAL, replay=True) as replay_page:
         for begin in range(0, len(chunks), 2000):
             portion = portion_of(chunks[begin : begin + 2000])
             tracker.take(portion)
-            film.shown(portion)
-        page = looking(browser, film.url, "bright")
+            replay_page.publish(portion)
+        page = looking(browser, replay_page.url, "bright")
         assert page.is_hidden("#here")
         page.select_option("#times", "16")
         wait_for(page, "echostep.scene.frame.play.t_s > 8")
         page.click("#play")
         wait_for(page, "!echostep.scene.frame.play.playing")
-        walked = page.evaluate("echostep.scene.trail.count")
+        trail_count = page.evaluate("echostep.scene.trail.count")
         page.locator("#time").fill("60")
         wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 60) < 0.1")
-        assert page.evaluate("echostep.scene.trail.count") > walked
+        assert page.evaluate("echostep.scene.trail.count") > trail_count
         assert page.evaluate("echostep.scene.frame.t_s") == pytest.approx(60.0, abs=2.0)
         page.click("#back")
         wait_for(page, "echostep.scene.frame.play.t_s < 59.9")
@@ -398,15 +398,17 @@ def ink_near(page: Any, x_m: float, y_m: float) -> bool:
 
 
 def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
-    stage = Mailbox(PLAN, "test", replay=False)
-    told = [guidance(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES]
-    with PageServer(stage, LOCAL) as server:
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    told = [
+        guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES
+    ]
+    with PageServer(mailbox, LOCAL) as server:
         page = browser.new_context(**LOOKS["bright"]).new_page()
         page.add_init_script(SPEECH)
         page.goto(server.url)
 
-        def hears(shown: Guidance) -> None:
-            stage.publish(replace(scene(), guidance=shown))
+        def hears(shown: ShownGuidance) -> None:
+            mailbox.publish(replace(scene(), guidance=shown))
             wait_for(page, f"document.querySelector('#sentence').textContent === '{shown.spoken}'")
 
         hears(told[0])
@@ -431,20 +433,20 @@ SENTENCES = ((1.0, "Turn left"), (2.0, "Turn right"), (3.0, "Turn left"))
 
 
 def test_the_arrow_turns_the_short_way_and_is_gone_when_nobody_knows(browser: Any) -> None:
-    stage = Mailbox(PLAN, "test", replay=False)
+    mailbox = Mailbox(PLAN, "test", replay=False)
     turn = "document.querySelector('#arrow').style.transform"
-    with PageServer(stage, LOCAL) as server:
-        shown = replace(guidance(Cue(1.0, CueKind.TURN, "Turn left", 2.0, "", 9.0, 3.0), None, 0, None))
-        stage.publish(replace(scene(), guidance=shown))
+    with PageServer(mailbox, LOCAL) as server:
+        shown = replace(guidance_of_cue(Cue(1.0, CueKind.TURN, "Turn left", 2.0, "", 9.0, 3.0), None, 0, None))
+        mailbox.publish(replace(scene(), guidance=shown))
         page = looking(browser, server.url, "bright")
         wait_for(page, f"{turn} === 'rotate(-3rad)'")
-        stage.publish(replace(scene(), guidance=replace(shown, arrow_rad=-3.0)))
+        mailbox.publish(replace(scene(), guidance=replace(shown, arrow_rad=-3.0)))
         wait_for(page, f"Math.abs(parseFloat({turn}.slice(7)) + 2 * Math.PI - 3) < 1e-4")
-        stage.publish(replace(scene(), guidance=shown.stopped("There is nothing from the foot", 2.0)))
+        mailbox.publish(replace(scene(), guidance=shown.stopped("There is nothing from the foot", 2.0)))
         wait_for(page, f"{GUIDED}.sign === 'halt'")
         assert page.is_hidden("#arrow")
         assert page.evaluate(f"{GUIDED}.cue") == "Stop. There is nothing from the foot"
-        stage.publish(replace(scene(), guidance=None))
+        mailbox.publish(replace(scene(), guidance=None))
         wait_for(page, "document.querySelector('#guidance').hidden")
         assert page.evaluate(f"{GUIDED}.sentence") == ""
         page.context.close()

@@ -17,8 +17,8 @@ from websockets.sync.client import ClientConnection
 from echostep.guidance.cues import Cue, CueKind
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate
-from echostep.page.elements.beacon_marks import Mark
-from echostep.page.elements.guidance import guidance, rest
+from echostep.page.elements.beacon_marks import BeaconMark
+from echostep.page.elements.guidance import guidance_of_cue, remaining_path
 from echostep.page.elements.scene import PageScene
 from echostep.page.live import LivePage
 from echostep.plan.routing import Route, RoutePlace, Stretch
@@ -63,28 +63,34 @@ def at(t_s: float) -> Callable[[dict[str, Any]], bool]:
 
 
 def test_a_sentence_stands_until_there_is_a_new_one() -> None:
-    first = guidance(AHEAD, WAY, 0, None)
+    first = guidance_of_cue(AHEAD, WAY, 0, None)
     assert (first.spoken, first.spoken_s) == ("Straight ahead.", 1.0)
     assert first.path == ((2.0, 7.5), (9.5, 7.5))
-    silent = guidance(replace(AHEAD, t_s=2.0, spoken=""), WAY, 1, first)
+    silent = guidance_of_cue(replace(AHEAD, t_s=2.0, spoken=""), WAY, 1, first)
     assert (silent.spoken, silent.spoken_s) == ("Straight ahead.", 1.0)
     assert silent.path == ((9.5, 7.5), (9.5, 10.8))
-    left = guidance(replace(AHEAD, t_s=3.0, kind=CueKind.STOP, spoken="Stop."), None, 0, silent)
+    left = guidance_of_cue(replace(AHEAD, t_s=3.0, kind=CueKind.STOP, spoken="Stop."), None, 0, silent)
     assert (left.spoken, left.spoken_s, left.left_m, left.path) == ("Stop.", 3.0, None, ())
 
 
 def test_what_is_left_of_a_way() -> None:
     there_and_back = Route((*WAY.stretches, Stretch(0, np.array([[9.5, 10.8], [9.5, 5.8], [2.0, 5.8]]))))
-    assert rest(there_and_back, 0, 99.0) == ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
-    assert rest(there_and_back, 0, 12.5 + 3.3 + 4.5) == ((5.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
-    assert rest(there_and_back, 1, 12.5 + 1.3) == ((9.5, 9.5), (9.5, 10.8))
-    assert rest(there_and_back, 0, 12.5 + 1.3) == ((9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
-    assert np.allclose(rest(there_and_back, 0, 7.0), ((9.0, 5.8), (2.0, 5.8)))
-    assert rest(there_and_back, 1, 7.0) == rest(there_and_back, 0, 0.0) == ()
+    assert remaining_path(there_and_back, 0, 99.0) == ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
+    assert remaining_path(there_and_back, 0, 12.5 + 3.3 + 4.5) == (
+        (5.0, 7.5),
+        (9.5, 7.5),
+        (9.5, 10.8),
+        (9.5, 5.8),
+        (2.0, 5.8),
+    )
+    assert remaining_path(there_and_back, 1, 12.5 + 1.3) == ((9.5, 9.5), (9.5, 10.8))
+    assert remaining_path(there_and_back, 0, 12.5 + 1.3) == ((9.5, 10.8), (9.5, 5.8), (2.0, 5.8))
+    assert np.allclose(remaining_path(there_and_back, 0, 7.0), ((9.0, 5.8), (2.0, 5.8)))
+    assert remaining_path(there_and_back, 1, 7.0) == remaining_path(there_and_back, 0, 0.0) == ()
 
 
 def test_who_turns_and_who_falls_silent() -> None:
-    shown = guidance(AHEAD, WAY, 0, None)
+    shown = guidance_of_cue(AHEAD, WAY, 0, None)
     assert shown.turned(0.3).arrow_rad == pytest.approx(-0.2)
     stopped = shown.stopped("There is nothing from the foot", 4.0)
     assert (stopped.kind, stopped.arrow_rad, stopped.left_m) == ("stop", None, None)
@@ -93,10 +99,10 @@ def test_who_turns_and_who_falls_silent() -> None:
 
 
 def test_every_page_is_guided_by_the_run_but_for_one_with_a_destination_of_its_own() -> None:
-    guide = guidance(AHEAD, WAY, 0, None)
-    mark = Mark(7, 3.0, 4.0, 0.5, 0, "moved", heard=True)
-    with served() as (server, stage):
-        stage.publish(replace(scene(), guidance=guide, marks=(mark,)))
+    guide = guidance_of_cue(AHEAD, WAY, 0, None)
+    mark = BeaconMark(7, 3.0, 4.0, 0.5, 0, "moved", heard=True)
+    with served() as (server, mailbox):
+        mailbox.publish(replace(scene(), guidance=guide, beacons=(mark,)))
         with opened(server) as one, opened(server) as other:
             for page in (one, other):
                 page.recv(timeout=5)
@@ -108,7 +114,7 @@ def test_every_page_is_guided_by_the_run_but_for_one_with_a_destination_of_its_o
             own = until(one, lambda frame: frame["guidance"]["own"] and frame["guidance"]["kind"] != "straight")
             assert own["guidance"]["spoken"]
             assert own["guidance"]["path"][-1] == [13.0, 4.5]
-            stage.publish(replace(scene(), guidance=guide))
+            mailbox.publish(replace(scene(), guidance=guide))
             assert not until(other, lambda frame: not frame["beacons"])["guidance"]["own"]
             one.send('{"kind":"go_nowhere"}')
             assert until(one, lambda frame: not frame["guidance"]["own"])["guidance"]["text"] == "Straight ahead"
@@ -116,11 +122,11 @@ def test_every_page_is_guided_by_the_run_but_for_one_with_a_destination_of_its_o
 
 def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk]) -> None:
     tracker, guided = guided_tracker()
-    with LivePage(tracker, "A replay", LOCAL, guided, replay=True) as film:
+    with LivePage(tracker, "A replay", LOCAL, guided, replay=True) as replay_page:
         portion = portion_of(chunks)  # all at once, as a headless replay does
         tracker.take(portion)
-        film.shown(portion)
-        with opened_url(film.url) as page:
+        replay_page.publish(portion)
+        with opened_url(replay_page.url) as page:
             page.recv(timeout=5)
             page.send('{"kind":"play","playing":false}')
             for t_s in (2.5, 15.2, 11.0, 7.0):
@@ -149,8 +155,8 @@ def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
         for chunk in early:
             portion = portion_of([replace(chunk, t_arrival_ns=chunk.t_arrival_ns + shift_ns)])
             tracker.take(portion)
-            live.shown(portion)
-        live.shown(portion_of([]))
+            live.publish(portion)
+        live.publish(portion_of([]))
         with opened_url(live.url) as page:
             page.recv(timeout=5)
             frame = until(page, lambda frame: frame["guidance"]["kind"] == "stop")
@@ -165,22 +171,24 @@ def test_a_step_that_is_shown_before_its_echoes_turns_the_arrow(chunks: list[Chu
     scenes: list[PageScene] = []
     estimates: list[Estimate] = []
     with LivePage(tracker, "test", LOCAL, guided) as live:
-        publish = live._stage.publish
+        publish = live._mailbox.publish
 
         def kept(scene: PageScene) -> None:
             scenes.append(scene)
             publish(scene)
 
-        live._stage.publish = kept  # type: ignore[method-assign]
+        live._mailbox.publish = kept  # type: ignore[method-assign]
         for chunk in chunks:
             portion = portion_of([chunk])
-            live.coming()
+            live.note_arrival()
             estimates += tracker.take(portion)
-            live.shown(portion)
-    ahead = [(a, b) for a, b in itertools.pairwise(scenes) if b.guidance and b.told and b.told not in estimates]
+            live.publish(portion)
+    ahead = [(a, b) for a, b in itertools.pairwise(scenes) if b.guidance and b.estimate and b.estimate not in estimates]
     turns = [aim(b) - aim(a) for a, b in ahead if b.guidance and b.guidance.kind != "arrived"]
     assert not any(shown.guidance.kind == "stop" for shown in scenes if shown.guidance)
-    assert max(abs(b.told.heading_rad - a.told.heading_rad) for a, b in ahead if a.told and b.told) > 0.1
+    assert (
+        max(abs(b.estimate.heading_rad - a.estimate.heading_rad) for a, b in ahead if a.estimate and b.estimate) > 0.1
+    )
     assert len(turns) > 5
     assert max(map(abs, turns)) < 1e-9
 
@@ -188,5 +196,5 @@ def test_a_step_that_is_shown_before_its_echoes_turns_the_arrow(chunks: list[Chu
 def aim(shown: PageScene) -> float:
     """Where the arrow points in the map; NaN for none."""
     assert shown.guidance
-    assert shown.told
-    return math.nan if shown.guidance.arrow_rad is None else shown.told.heading_rad + shown.guidance.arrow_rad
+    assert shown.estimate
+    return math.nan if shown.guidance.arrow_rad is None else shown.estimate.heading_rad + shown.guidance.arrow_rad

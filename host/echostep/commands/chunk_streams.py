@@ -36,7 +36,7 @@ def with_check_ins(
     """Insert each check-in of the page behind the chunk after which it was made; `arrival_ns` gives its arrival time from that chunk."""
     for chunk in chunks:
         yield chunk
-        for payload in page.said() if page else ():
+        for payload in page.pop_check_ins() if page else ():
             yield Chunk(PERSON, arrival_ns(chunk), payload)
 
 

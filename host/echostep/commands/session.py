@@ -111,10 +111,10 @@ class Session:
     def _take(self, portion: Portion) -> list[Estimate]:
         """Track one portion and publish its estimates."""
         if self.page:
-            self.page.coming()
+            self.page.note_arrival()
         estimates = self.tracker.take(portion)
         if self.page:
-            self.page.shown(portion)
+            self.page.publish(portion)
         self.estimates += estimates
         if self._publishing:
             self._publishing.tell(estimates)

@@ -1,7 +1,8 @@
-"""The guard: who may see the page.
+"""Access control: which requests the server answers.
 
-In: every request to the server. Out: the request, or a refusal. Owns the count of refusals. On the loopback a page of another site must not reach the
-socket: `Host` must name this machine and `Origin` must be the page's own. Elsewhere the address holds a random token, without which nothing answers.
+In: every request to the server. Out: the same request, or a refusal. Owns the count of refused requests. On the loopback interface a web page of
+another site must not reach the socket: `Host` must name this machine and `Origin` must be the page's own. On other interfaces the address contains
+a random token, and requests without it are refused.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-SAFE = {
+SECURITY_HEADERS = {
     "content-security-policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -25,8 +26,8 @@ SAFE = {
 }
 
 
-class Guard:
-    """ASGI middleware; `token` None: loopback only."""
+class AccessControl:
+    """ASGI middleware. `token`: first part of each path; None: only requests to the loopback interface are answered."""
 
     def __init__(self, app: ASGIApp, token: str | None) -> None:
         self.refused = 0
@@ -34,11 +35,11 @@ class Guard:
         self._token = token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or refuse it."""
+        """Pass an allowed request to the application; answer any other with 404 or close code 1008 (policy violation)."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        if not self._welcome(scope):
+        if not self._is_allowed(scope):
             self.refused += 1
             if scope["type"] == "http":
                 await PlainTextResponse("not here", 404)(scope, receive, send)
@@ -46,18 +47,18 @@ class Guard:
                 await send({"type": "websocket.close", "code": 1008})
             return
 
-        async def safe(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(SAFE)
+                MutableHeaders(scope=message).update(SECURITY_HEADERS)
             await send(message)
 
-        await self._app(scope, receive, safe)
+        await self._app(scope, receive, send_with_headers)
 
-    def _welcome(self, scope: Scope) -> bool:
+    def _is_allowed(self, scope: Scope) -> bool:
         headers = Headers(scope=scope)
         host, origin = headers.get("host", ""), headers.get("origin")
         if self._token is None:
-            if _name(host) not in LOOPBACK:
+            if _host_name(host) not in LOOPBACK:
                 return False
         elif not hmac.compare_digest(scope["path"].split("/")[1].encode(), self._token.encode()):
             return False
@@ -66,8 +67,8 @@ class Guard:
         return origin.lower() == f"http://{host.lower()}"
 
 
-def _name(host: str) -> str | None:
-    """The name in a Host header, without its port."""
+def _host_name(host: str) -> str | None:
+    """The host name in a Host header, without the port; None when the header is malformed."""
     try:
         return urlsplit(f"//{host}").hostname
     except ValueError:

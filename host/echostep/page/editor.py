@@ -1,7 +1,7 @@
-"""The plan's page: walls and doors are drawn over a picture of a plan, in a browser on this machine.
+"""The plan editor: walls, doors and rooms are drawn in a browser on this machine, over a picture of a plan if there is one.
 
-In: a plan's file (which need not exist yet), a picture, what the page posts. Out: the page, the plan as JSON, the file.
-Owns the server, and the file while it runs. Loopback only; the address holds a random token, without which nothing answers.
+In: a plan file (which need not exist yet), a picture, plans posted by the page. Out: the page, the plan as JSON, the plan file. Owns the server, and
+the plan file while it runs. It listens on the loopback interface only; the address contains a random token, and requests without it are refused.
 """
 
 from __future__ import annotations
@@ -25,55 +25,56 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 
 from echostep.errors import EchostepError
-from echostep.page.access import Guard
-from echostep.page.server import STATIC, STOP_S, Address, listen
+from echostep.page.access import AccessControl
+from echostep.page.server import STATIC, STOP_S, Address, open_listener
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
 
 PAGE = Path(__file__).parent / "edit"
-SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # of the live page
-MOST_BODY = 8_000_000  # a browser draws so much without stumbling
-MOST_PICTURE = 32_000_000
-POST_S = 20.0
-NO_FILE = "none"
+SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # files of the live page
+MOST_BODY = 8_000_000  # bytes of a plan. By reason: a browser draws so much smoothly
+MOST_PICTURE = 32_000_000  # bytes
+POST_S = 20.0  # time for a posted plan to arrive
+NO_FILE = "none"  # state of a plan file that does not exist
 
 
 class PlanFile:
-    """A plan's file: read, and written so that there is always one whole plan; raises EchostepError when what it holds is no plan or too large."""
+    """A plan file, replaced in one step when it is written, so that it always holds a complete plan."""
 
     def __init__(self, path: Path) -> None:
+        """Raises EchostepError when the file is not a plan or too large, or when its folder does not exist."""
         self.path = path.resolve()
         if self.path.exists():
             if self.path.is_file() and self.path.stat().st_size > MOST_BODY:
                 raise EchostepError(
-                    f"{path}: larger than {MOST_BODY // 1_000_000} MB: draw it in the program it came from and import it again"
+                    f"{path}: larger than {MOST_BODY // 1_000_000} MB: change it in the program it came from and import it again"
                 )
             load_plan(path)
         elif not self.path.parent.is_dir():
-            raise EchostepError(f"{path}: there is no folder {self.path.parent}")
+            raise EchostepError(f"{path}: there is no folder {self.path.parent}: make it first")
 
     def read(self) -> tuple[str, str]:
-        """The plan as JSON, and the state of the file (its digest) that it shows."""
+        """The plan as JSON, and the SHA-256 of the file; an empty plan and `NO_FILE` when there is no file."""
         if not self.path.exists():
             return plan_json(_empty(self.path.stem)), NO_FILE
         plan = load_plan(self.path)
         return plan_json(plan), plan.digest
 
     def write(self, plan: Plan) -> str:
-        """The plan into the file, the former file into PLAN.bak; returns the digest of what the file now holds."""
+        """Write the plan; the previous file is kept as PLAN.bak. Returns the SHA-256 of the new file."""
         raw = plan_json(plan).encode()
         try:
-            former = self.path.read_bytes() if self.path.exists() else None
-            if former is not None and former != raw:
-                self._replace(self.path.with_name(self.path.name + ".bak"), former)
-            if former != raw:
+            previous = self.path.read_bytes() if self.path.exists() else None
+            if previous is not None and previous != raw:
+                self._replace(self.path.with_name(self.path.name + ".bak"), previous)
+            if previous != raw:
                 self._replace(self.path, raw)
         except OSError as error:
             raise EchostepError(f"{self.path}: cannot write the plan: {error.strerror or error}") from error
         return hashlib.sha256(raw).hexdigest()
 
     def state(self) -> str:
-        """Digest of the file as it is now."""
+        """SHA-256 of the file as it is now; `NO_FILE` when there is none."""
         try:
             return hashlib.sha256(self.path.read_bytes()).hexdigest()
         except FileNotFoundError:
@@ -82,7 +83,7 @@ class PlanFile:
             raise EchostepError(f"{self.path}: cannot read the plan: {error.strerror or error}") from error
 
     def _replace(self, path: Path, raw: bytes) -> None:
-        """Bytes into a new file beside it, onto the disk, then in its place."""
+        """Write a temporary file in the same folder, sync it to the disk, and rename it to `path`."""
         new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
         try:
             with new.open("xb") as file:
@@ -97,23 +98,24 @@ class PlanFile:
 
 
 class EditServer:
-    """Serves the page until it is closed; raises EchostepError when file, picture or port cannot be had."""
+    """Serves the editor until it is closed; raises EchostepError when the plan, the picture or the port cannot be opened."""
 
     def __init__(self, plan: Path, picture: Path | None = None, port: int | None = None) -> None:
         self.file = PlanFile(plan)
         self._picture = None if picture is None else _picture(picture)
         self._pages = {name: STATIC / name for name in SHARED} | {path.name: path for path in PAGE.iterdir()}
-        self._listening = listen(Address(port=port))
+        self._listener = open_listener(Address(port=port))
         token = secrets.token_urlsafe(16)
-        self.url = f"http://127.0.0.1:{self._listening.getsockname()[1]}/{token}/"
-        self.guard = Guard(Guard(self._application(token), token), None)  # the outer one looks at Host
+        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}/{token}/"
+        checks_token = AccessControl(self._application(token), token)
+        self.access_control = AccessControl(checks_token, None)  # checks that Host is this machine
         settings = uvicorn.Config(
-            self.guard, log_config=None, log_level="critical", access_log=False, server_header=False, date_header=False,
+            self.access_control, log_config=None, log_level="critical", access_log=False, server_header=False, date_header=False,
             limit_concurrency=64, timeout_graceful_shutdown=1,
         )  # fmt: skip
         self._server = uvicorn.Server(settings)
         self._thread = threading.Thread(
-            target=self._server.run, kwargs={"sockets": [self._listening]}, name="echostep plan edit", daemon=True
+            target=self._server.run, kwargs={"sockets": [self._listener]}, name="echostep plan edit", daemon=True
         )
 
     def __enter__(self) -> Self:
@@ -123,10 +125,10 @@ class EditServer:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._server.should_exit = True
         self._thread.join(STOP_S)
-        self._listening.close()
+        self._listener.close()
 
     def wait(self) -> None:
-        """Until Ctrl-C."""
+        """Wait until Ctrl-C or until the server ends."""
         while self._thread.is_alive():
             self._thread.join(0.5)
 
@@ -134,9 +136,9 @@ class EditServer:
         routes = [
             Route("/", self._index),
             Route("/static/{name}", self._static),
-            Route("/picture", self._show),
-            Route("/plan", self._read, methods=["GET"]),
-            Route("/plan", self._write, methods=["POST"]),
+            Route("/picture", self._get_picture),
+            Route("/plan", self._get_plan, methods=["GET"]),
+            Route("/plan", self._post_plan, methods=["POST"]),
         ]
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
@@ -144,48 +146,49 @@ class EditServer:
         return FileResponse(self._pages["index.html"])
 
     async def _static(self, request: Request) -> Response:
-        found = self._pages.get(request.path_params["name"])
-        if found is None:
+        path = self._pages.get(request.path_params["name"])
+        if path is None:
             raise HTTPException(404)
-        return FileResponse(found)
+        return FileResponse(path)
 
-    async def _show(self, _: Request) -> Response:
+    async def _get_picture(self, _: Request) -> Response:
         if self._picture is None:
             return Response(status_code=204)
-        raw, kind = self._picture
-        return Response(raw, media_type=kind)
+        raw, media_type = self._picture
+        return Response(raw, media_type=media_type)
 
-    async def _read(self, _: Request) -> Response:
+    async def _get_plan(self, _: Request) -> Response:
         try:
             text, state = self.file.read()
         except EchostepError as error:
-            return _no(500, str(error))
+            return _error(500, str(error))
         return Response(text, media_type="application/json", headers={"etag": f'"{state}"'})
 
-    async def _write(self, request: Request) -> Response:
+    async def _post_plan(self, request: Request) -> Response:
+        """Write a posted plan, unless the file has changed since the page read it (If-Match)."""
         try:
             async with asyncio.timeout(POST_S):
                 raw = await _body(request)
         except (TimeoutError, ClientDisconnect):
-            return _no(408, f"the plan did not come within {POST_S:.0f} s")
+            return _error(408, f"the plan did not arrive within {POST_S:.0f} s")
         if raw is None:
-            return _no(413, f"larger than {MOST_BODY // 1_000_000} MB")
+            return _error(413, f"larger than {MOST_BODY // 1_000_000} MB")
         try:
             plan = parse_plan(raw)
         except ValueError as error:
-            return _no(422, str(error))
+            return _error(422, str(error))
         try:
             known = request.headers.get("if-match")
             if known is not None and known.strip('"') != self.file.state():
-                return _no(409, f"{self.file.path.name} has changed since this page read it")
+                return _error(409, f"{self.file.path.name} has changed since this page read it")
             state = self.file.write(plan)
         except EchostepError as error:
-            return _no(500, str(error))
+            return _error(500, str(error))
         return JSONResponse({"saved": self.file.path.name}, headers={"etag": f'"{state}"'})
 
 
 async def _body(request: Request) -> bytes | None:
-    """What was posted; None when it is too large."""
+    """The body of a request; None when it is larger than `MOST_BODY`."""
     raw = bytearray()
     async for part in request.stream():
         raw += part
@@ -194,16 +197,17 @@ async def _body(request: Request) -> bytes | None:
     return bytes(raw)
 
 
-def _no(status: int, why: str) -> Response:
-    return JSONResponse({"error": why[:500]}, status)
+def _error(status: int, reason: str) -> Response:
+    return JSONResponse({"error": reason[:500]}, status)
 
 
 def _empty(name: str) -> Plan:
+    """A plan with one level without walls."""
     return Plan(name, (Level("Ground floor", 0.0, np.zeros((0, 4))),), None, "")
 
 
 def _picture(path: Path) -> tuple[bytes, str]:
-    """Bytes and kind of a picture: PNG, JPEG or SVG, told by what it holds."""
+    """Bytes and media type of a picture: PNG, JPEG or SVG, recognised by the file's contents."""
     try:
         if path.stat().st_size > MOST_PICTURE:
             raise EchostepError(f"{path}: larger than {MOST_PICTURE // 1_000_000} MB: make the picture smaller")
@@ -216,11 +220,11 @@ def _picture(path: Path) -> tuple[bytes, str]:
         return raw, "image/jpeg"
     if b"<svg" in raw[:4096]:
         return raw, "image/svg+xml"
-    raise EchostepError(f"{path}: neither PNG, JPEG nor SVG: convert the picture to one of these")
+    raise EchostepError(f"{path}: the picture is not PNG, JPEG or SVG: convert it to one of these")
 
 
 def edit_plan(plan: Path, picture: Path | None, port: int | None, *, browser: bool) -> None:
-    """Serve the page until Ctrl-C."""
+    """Serve the editor until Ctrl-C. `browser`: open it in the browser too."""
     import webbrowser
 
     with EditServer(plan, picture, port) as server:

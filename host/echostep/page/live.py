@@ -1,7 +1,7 @@
-"""The live page of a run: watches a tracker and shows what it knows.
+"""The live page of a run, or the page of a replay: watches a tracker and publishes scenes.
 
-In: a tracker, who guides its wearer, and the moment after each portion that it took. Out: scenes on a stage that a server serves; check-ins for the
-tracker. Owns both.
+In: a tracker, perhaps the guidance of its wearer, and each portion of bytes after the tracker has taken it. Out: scenes in a mailbox that a server
+serves; check-ins for the tracker. Owns both.
 """
 
 from __future__ import annotations
@@ -17,54 +17,57 @@ from typing import Self
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.echo_likelihood import echo_model
 from echostep.localization.estimate import Estimate, unobserved
-from echostep.page.elements.beacon_marks import marks
-from echostep.page.elements.echo_lines import beams, expected_range
-from echostep.page.elements.guidance import guidance
-from echostep.page.elements.lookahead import ahead
-from echostep.page.elements.scene import MOST_SHOWN, PageScene, specks, words
-from echostep.page.elements.stream_rates import Pulse
+from echostep.page.elements.beacon_marks import beacon_marks
+from echostep.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
+from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
+from echostep.page.elements.lookahead import extrapolate
+from echostep.page.elements.scene import MOST_SHOWN, PageScene, sample_of, status_text
+from echostep.page.elements.stream_rates import StreamRateMeter
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.path import MeasuredSegment
 from echostep.ports.chunks import BOARD, MTX, Portion
 from echostep.tracker import Tracker
 
-STEP_M = 0.02  # the trail gets a point when he has moved so far
-PULSE_NS = 250_000_000
-SILENT_S = 2.0  # without bytes of the foot or the board
-STEPLESS_S = 6.0  # with bytes that tell no step: longer than the first steps are held back
-STALE_S = 1.5  # echoes are shown no longer
-MOST_KEPT = 2000  # specks of each scene of a film
+# By reason, all of them:
+STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
+RATES_NS = 250_000_000  # time between two measurements of the stream rates
+SILENT_S = 2.0  # without bytes of the MTx and the board: the position is lost
+STEPLESS_S = 6.0  # with bytes but without an estimate: the same; longer than the delay of the first steps
+STALE_S = 1.5  # an echo line is shown for this long
+MOST_KEPT = 2000  # particles in each scene of a replay
 
 
 class LivePage:
-    """Call `shown` after each portion; `said` gives what pages had to say, as bytes of chunks."""
+    """Call `note_arrival` and `publish` for each portion; `pop_check_ins` gives the pages' check-ins as bytes of chunks."""
 
     def __init__(
         self, tracker: Tracker, title: str, address: Address, guided: GuidedRun | None = None, *, replay: bool = False
     ) -> None:
-        """`guided` was made before, so that its cue of an estimate is there when the page is told of it."""
-        self.wanted = True  # until Ctrl-C
+        """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate."""
+        self.wanted = True  # false from Ctrl-C on
         self._tracker = tracker
         self._guided = guided
-        self._stage = Mailbox(tracker.plan, title, replay=replay)
-        self.server = PageServer(self._stage, address)
-        self._model = echo_model(tracker.settings.echo)
-        self._pulse = Pulse()
-        self._pulsed_ns = 0
-        self._arrived_ns = 0
-        self._heard_ns = 0  # foot or board
-        self._told_ns = 0
-        self._ahead: PageScene | None = None  # of the foot's last step, as long as its echoes are not in
-        self._ahead_s = -math.inf
-        self._new: list[PageScene] = []
-        self._scene = PageScene(0, 0.0, None, None, (), None, 0, words(None, waits=tracker.lost_at_start))
         self._replay = replay
-        self._last: Estimate | None = None  # in the trail
+        self._mailbox = Mailbox(tracker.plan, title, replay=replay)
+        self.server = PageServer(self._mailbox, address)
+        self._model = echo_model(tracker.settings.echo)
+        self._rate_meter = StreamRateMeter()
+        self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of those of MTx or board, of the last estimate
+        self._arrived_ns = 0
+        self._sensors_ns = 0
+        self._estimate_ns = 0
+        self._bytes_arrived_ns = time.monotonic_ns()
+        self._scene = PageScene(
+            0, 0.0, None, None, (), None, 0, status_text(None, needs_start=tracker.state.waits_for_start)
+        )  # of the last estimate
+        self._lookahead: PageScene | None = None  # of the last step, until its echoes have been used
+        self._lookahead_s = -math.inf
+        self._new: list[PageScene] = []  # to publish
+        self._trail_end: Estimate | None = None
         self._check_ins = 0
-        self._born_ns = time.monotonic_ns()
         if not replay:
-            self._stage.publish(self._scene)
+            self._mailbox.publish(self._scene)
         expected_range(0.0, 0.0, 0.0, tracker.laid_out.walls.index, self._model)  # compiled now, not at the first step
 
     @property
@@ -74,7 +77,7 @@ class LivePage:
 
     @property
     def pages(self) -> int:
-        """How many pages look."""
+        """Number of connected pages."""
         return self.server.pages
 
     def __enter__(self) -> Self:
@@ -86,89 +89,123 @@ class LivePage:
         self._tracker.watchers.remove(self._watch)
         self.server.__exit__(kind, error, at)
 
-    def said(self) -> Iterator[bytes]:
-        """Check-ins that pages made since, as the tracker takes them."""
-        for check_in in self._stage.said():
+    def pop_check_ins(self) -> Iterator[bytes]:
+        """Check-ins that pages have made since the last call, encoded as the tracker takes them."""
+        for check_in in self._mailbox.pop_check_ins():
             yield check_in.encode()
 
-    def coming(self) -> None:
-        """Bytes have come: what is seen next was born now."""
-        self._born_ns = time.monotonic_ns()
+    def note_arrival(self) -> None:
+        """Bytes have arrived: their time is the start of the latency of the scenes that follow."""
+        self._bytes_arrived_ns = time.monotonic_ns()
 
-    def shown(self, portion: Portion) -> None:
-        """The tracker has taken a portion: publish what it told, and now and then how the streams are."""
+    def publish(self, portion: Portion) -> None:
+        """The tracker has taken a portion: publish the scenes of its estimates, and the stream rates every quarter of a second."""
+        self._advance_clock(portion)
+        if self._new:
+            self._estimate_ns = self._arrived_ns
+        else:
+            self._publish_lookahead()
+        due = self._arrived_ns - self._rates_ns >= RATES_NS
+        if due:
+            self._rates_ns = self._arrived_ns
+            self._scene = replace(self._scene, streams=self._rate_meter.measure(self._tracker, self._arrived_ns))
+        if self._new or (due and not self._replay):
+            for scene in self._new or [self._scene_without_news()]:
+                self._mailbox.publish(replace(scene, streams=self._scene.streams))
+            self._new = []
+
+    def _advance_clock(self, portion: Portion) -> None:
+        """The arrival clock: time of the newest chunk, or the host's clock when a portion is empty."""
         if len(portion.t_arrival_ns):
             self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
             if BOARD in portion.ports or MTX in portion.ports:
-                self._heard_ns = self._arrived_ns
+                self._sensors_ns = self._arrived_ns
         else:
             self._arrived_ns = max(self._arrived_ns, time.monotonic_ns())
-        if self._new:
-            self._told_ns = self._arrived_ns
-        else:
-            self._look_ahead()
-        due = self._arrived_ns - self._pulsed_ns >= PULSE_NS
-        if due:
-            self._pulsed_ns = self._arrived_ns
-            self._scene = replace(self._scene, streams=self._pulse.streams(self._tracker, self._arrived_ns))
-        if self._new or (due and not self._replay):
-            for scene in self._new or [self._meanwhile()]:
-                self._stage.publish(replace(scene, streams=self._scene.streams))
-            self._new = []
 
-    def _look_ahead(self) -> None:
-        """A step that the foot has told is shown at once; its echoes correct it a quarter of a second later."""
-        told, since = self._scene.told, self._tracker.intake.ahead
-        if self._replay or told is None or self._tracker.leg is None or not since or since[-1].t1_s <= self._ahead_s:
+    def _publish_lookahead(self) -> None:
+        """Publish a new step of the foot at once, by dead reckoning; the estimate with its echoes follows about 0.25 s later."""
+        estimate, state = self._scene.estimate, self._tracker.state
+        later = state.pending_segments
+        if self._replay or estimate is None or state.last_segment is None:
             return
-        self._ahead_s = since[-1].t1_s
-        there = ahead(told, self._tracker.leg, since)
-        cloud = self._scene.specks and self._scene.specks.moved(there.x_m - told.x_m, there.y_m - told.y_m)
-        guide = self._scene.guidance and self._scene.guidance.turned(there.heading_rad - told.heading_rad)
-        self._ahead = replace(
-            self._scene, born_ns=self._born_ns, t_s=there.t_s, told=there, specks=cloud, words=words(there), guidance=guide
-        )  # fmt: skip
-        self._stage.publish(self._ahead)
+        if not later or later[-1].t1_s <= self._lookahead_s:
+            return
+        self._lookahead_s = later[-1].t1_s
+        moved = extrapolate(estimate, state.last_segment, later)
+        particles, guidance = self._scene.particles, self._scene.guidance
+        self._lookahead = replace(
+            self._scene,
+            arrived_ns=self._bytes_arrived_ns,
+            t_s=moved.t_s,
+            estimate=moved,
+            particles=particles and particles.moved(moved.x_m - estimate.x_m, moved.y_m - estimate.y_m),
+            status_text=status_text(moved),
+            guidance=guidance and guidance.turned(moved.heading_rad - estimate.heading_rad),
+        )
+        self._mailbox.publish(self._lookahead)
 
-    def _meanwhile(self) -> PageScene:
-        """What is known without news: when no step has been told for a while, that he may be anywhere near."""
-        scene = replace(self._ahead or self._scene, born_ns=self._born_ns)
-        if scene.told is None:
-            return replace(scene, words=words(None, waits=self._tracker.lost_at_start))
-        untold_s = (self._arrived_ns - self._told_ns) * 1e-9
-        silent = self._arrived_ns - self._heard_ns >= SILENT_S * 1e9
-        if not silent and untold_s < STEPLESS_S:
+    def _scene_without_news(self) -> PageScene:
+        """The last scene again; without bytes or steps for too long: the same with a grown ellipse, and status lost."""
+        scene = replace(self._lookahead or self._scene, arrived_ns=self._bytes_arrived_ns)
+        if scene.estimate is None:
+            return replace(scene, status_text=status_text(None, needs_start=self._tracker.state.waits_for_start))
+        age_s = (self._arrived_ns - self._estimate_ns) * 1e-9
+        silent = self._arrived_ns - self._sensors_ns >= SILENT_S * 1e9
+        if not silent and age_s < STEPLESS_S:
             return scene
-        why = "nothing from the foot" if silent else "no step of the foot"
-        guide = scene.guidance and scene.guidance.stopped(f"There is {why}", scene.t_s)
+        reason = "nothing from the foot" if silent else "no step of the foot"
         return replace(
-            scene, told=unobserved(scene.told, scene.told.t_s + untold_s), beams=(), words=f"lost: {why} for {untold_s:.0f} s",
-            guidance=guide, marks=tuple(replace(mark, heard=False) for mark in scene.marks),
-        )  # fmt: skip
+            scene,
+            estimate=unobserved(scene.estimate, scene.estimate.t_s + age_s),
+            echo_lines=(),
+            status_text=f"lost: {reason} for {age_s:.0f} s",
+            guidance=scene.guidance and scene.guidance.stopped(f"There is {reason}", scene.t_s),
+            beacons=tuple(replace(mark, heard=False) for mark in scene.beacons),
+        )
 
-    def _watch(self, passage: MeasuredSegment | None, told: Estimate) -> None:
-        """The tracker told an estimate."""
-        tracker = self._tracker
-        self._ahead = None
-        last = self._last
-        if last is None or max(abs(told.x_m - last.x_m), abs(told.y_m - last.y_m)) > STEP_M or told.level != last.level:
-            if tracker.check_ins != self._check_ins:
-                self._stage.trail.add(math.nan, math.nan, told.level)
-            self._last, self._check_ins = told, tracker.check_ins
-            self._stage.trail.add(told.x_m, told.y_m, told.level)
-        shown, heard = self._scene.specks, self._scene.beams
-        if passage is not None and (particles := tracker.particles(MOST_KEPT if self._replay else MOST_SHOWN)):
-            shown = specks(particles)
-            sheet = tracker.laid_out
-            new = beams(passage, told, told.level * sheet.sheet.pitch_m, sheet.walls.index, self._model)
-            heard = (*(old for old in heard if old.ranger not in [beam.ranger for beam in new]), *new)
-        heard = tuple(sorted((b for b in heard if told.t_s - b.t_s < STALE_S), key=attrgetter("ranger")))
-        guide = self._scene.guidance
-        if self._guided and self._guided.cue:
-            guide = guidance(self._guided.cue, self._guided.route, told.level, guide)
+    def _watch(self, measured: MeasuredSegment | None, estimate: Estimate) -> None:
+        """Make a scene of the tracker's new estimate. `measured` None: the foot is silent, and there are no new echoes."""
+        self._lookahead = None
+        self._extend_trail(estimate)
+        published = None if measured is None else self._tracker.particles(MOST_KEPT if self._replay else MOST_SHOWN)
         self._scene = replace(
-            self._scene, born_ns=self._born_ns, t_s=told.t_s, told=told, walked=len(self._stage.trail),
-            words=words(told, taps=not self._replay), specks=shown, beams=heard, guidance=guide,
-            marks=marks(tracker, told.t_s),
-        )  # fmt: skip
+            self._scene,
+            arrived_ns=self._bytes_arrived_ns,
+            t_s=estimate.t_s,
+            estimate=estimate,
+            trail_count=len(self._mailbox.trail),
+            status_text=status_text(estimate, accepts_taps=not self._replay),
+            particles=self._scene.particles if published is None else sample_of(published),
+            echo_lines=self._echo_lines(measured, estimate),
+            guidance=self._guidance(estimate),
+            beacons=beacon_marks(self._tracker, estimate.t_s),
+        )
         self._new.append(self._scene)
+
+    def _extend_trail(self, estimate: Estimate) -> None:
+        """Append the estimate to the trail when it has moved; a check-in breaks the line."""
+        end, trail = self._trail_end, self._mailbox.trail
+        moved_m = max(abs(estimate.x_m - end.x_m), abs(estimate.y_m - end.y_m)) if end is not None else math.inf
+        if end is not None and estimate.level == end.level and moved_m <= STEP_M:
+            return
+        check_ins = self._tracker.state.check_ins
+        if check_ins != self._check_ins:
+            trail.add(math.nan, math.nan, estimate.level)
+        self._trail_end, self._check_ins = estimate, check_ins
+        trail.add(estimate.x_m, estimate.y_m, estimate.level)
+
+    def _echo_lines(self, measured: MeasuredSegment | None, estimate: Estimate) -> tuple[EchoLine, ...]:
+        """The newest line of each ranger that is not older than `STALE_S`."""
+        lines = self._scene.echo_lines
+        if measured is not None:
+            laid_out = self._tracker.laid_out
+            east_m = estimate.level * laid_out.sheet.pitch_m
+            new = last_echo_lines(measured, estimate, east_m, laid_out.walls.index, self._model)
+            lines = (*(old for old in lines if old.ranger not in [line.ranger for line in new]), *new)
+        return tuple(sorted((line for line in lines if estimate.t_s - line.t_s < STALE_S), key=attrgetter("ranger")))
+
+    def _guidance(self, estimate: Estimate) -> ShownGuidance | None:
+        if self._guided and self._guided.cue:
+            return guidance_of_cue(self._guided.cue, self._guided.route, estimate.level, self._scene.guidance)
+        return self._scene.guidance

@@ -1,7 +1,7 @@
-"""The stage: where the tracker leaves scenes and the pages find them; neither waits for the other.
+"""The mailbox between the tracker's thread and the server's thread; neither waits for the other.
 
-In: scenes from the tracker's thread, check-ins from the server's. Out: the latest scene, or in a replay all of them (the film), the trail, and the
-check-ins for the tracker. Owns these.
+In: scenes from the tracker's thread, check-ins from the server's thread. Out: the latest scene (in a replay: the history of all scenes), the trail,
+and the check-ins for the tracker. Owns these.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from echostep.page.elements.scene import PageScene
 from echostep.plan.model import Plan
 from echostep.ports.check_in import CheckIn
 
-MOST_CHECK_INS = 16  # that wait for the tracker; one more is refused
+MOST_CHECK_INS = (
+    16  # in the queue to the tracker; further ones are refused. By reason: a person makes a few in a minute
+)
 
 
 class PageTrail:
-    """The way so far: points that are only ever appended; any thread may read."""
+    """The walked path as points. Points are only appended, so any thread may read the points that it knows to exist."""
 
     def __init__(self) -> None:
         self._rows = array("f")
@@ -28,7 +30,7 @@ class PageTrail:
         return len(self._rows) // 3
 
     def add(self, x_m: float, y_m: float, level: int) -> None:
-        """One more point."""
+        """Append a point in map metres; NaN coordinates break the line."""
         self._rows.extend((x_m, y_m, level))
 
     def part(self, begin: int, end: int) -> bytes:
@@ -36,7 +38,7 @@ class PageTrail:
         return self._rows[3 * begin : 3 * end].tobytes()
 
 
-class Film:
+class SceneHistory:
     """All scenes of a replay, in order of `t_s`."""
 
     def __init__(self) -> None:
@@ -46,56 +48,56 @@ class Film:
     def __len__(self) -> int:
         return len(self._t_s)
 
-    def __getitem__(self, k: int) -> PageScene:
-        return self._scenes[k]
+    def __getitem__(self, index: int) -> PageScene:
+        return self._scenes[index]
 
     def add(self, scene: PageScene) -> None:
-        """One more; one that is not later than the last takes its time."""
+        """Append a scene; one that is earlier than the last scene gets the last scene's time."""
         self._scenes.append(scene)
         self._t_s.append(max(scene.t_s, self._t_s[-1]) if self._t_s else scene.t_s)
 
-    def at(self, t_s: float) -> int:
-        """Index of the last scene at or before a time."""
+    def index_at(self, t_s: float) -> int:
+        """Index of the last scene at or before `t_s`; 0 when all scenes are later."""
         return max(bisect_right(self._t_s, t_s) - 1, 0)
 
-    def t_s(self, k: int) -> float:
+    def t_s(self, index: int) -> float:
         """Time of a scene."""
-        return self._t_s[k]
+        return self._t_s[index]
 
 
 class Mailbox:
-    """What tracker and pages share."""
+    """State shared by the tracker's thread and the server's thread."""
 
     def __init__(self, plan: Plan, title: str, *, replay: bool) -> None:
-        """`replay`: keep all scenes, and take no check-ins."""
+        """`replay`: keep all scenes, and refuse check-ins."""
         self.plan = plan
         self.title = title
         self.trail = PageTrail()
-        self.film = Film() if replay else None
+        self.history = SceneHistory() if replay else None
         self.latest: PageScene | None = None
-        self.on_news: Callable[[], None] | None = None
+        self.on_publish: Callable[[], None] | None = None
         self._check_ins: queue.Queue[CheckIn] = queue.Queue(MOST_CHECK_INS)
 
     def publish(self, scene: PageScene) -> None:
-        """The tracker has something new."""
-        if self.film is not None:
-            self.film.add(scene)
+        """Store a new scene and call `on_publish`; called in the tracker's thread."""
+        if self.history is not None:
+            self.history.add(scene)
         self.latest = scene
-        if self.on_news:
-            self.on_news()
+        if self.on_publish:
+            self.on_publish()
 
-    def check_in(self, said: CheckIn) -> bool:
-        """A page has something for the tracker; whether it is taken."""
-        if self.film is not None or said.level >= len(self.plan.levels):
+    def add_check_in(self, check_in: CheckIn) -> bool:
+        """Queue a check-in for the tracker; False when it is refused: in a replay, on an unknown level, or with a full queue."""
+        if self.history is not None or check_in.level >= len(self.plan.levels):
             return False
         try:
-            self._check_ins.put_nowait(said)
+            self._check_ins.put_nowait(check_in)
         except queue.Full:
             return False
         return True
 
-    def said(self) -> Iterator[CheckIn]:
-        """The check-ins that came since; never waits."""
+    def pop_check_ins(self) -> Iterator[CheckIn]:
+        """Remove and yield the queued check-ins; never waits."""
         while True:
             try:
                 yield self._check_ins.get_nowait()

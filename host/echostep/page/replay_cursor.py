@@ -1,6 +1,6 @@
-"""The cursor: which moment of a replay one page looks at.
+"""The replay cursor: which moment of a replay one page shows.
 
-In: requests to play, stop, seek, step; the film as far as it is there. Out: the scene to show. Owns the place and the speed.
+In: requests to play, pause, seek and step; the history as far as it has been computed. Out: the scene to show. Owns the position and the speed.
 """
 
 from __future__ import annotations
@@ -8,57 +8,61 @@ from __future__ import annotations
 from typing import Any
 
 from echostep.page.elements.scene import PageScene
-from echostep.page.mailbox import Film
-from echostep.page.protocol import Playing, Request, Seek, Skip, Speed
+from echostep.page.mailbox import SceneHistory
+from echostep.page.protocol import Request, Seek, SetPlaying, SetSpeed, StepBy
 
 
-class Cursor:
-    """Runs along a film; times are the walk's own."""
+class ReplayCursor:
+    """A position in a history that moves with the clock while it plays. `position_s` is in data time; None before the first scene."""
 
-    def __init__(self, film: Film) -> None:
+    def __init__(self, history: SceneHistory) -> None:
         self.playing = True
         self.times = 1.0
-        self._film = film
-        self._at_s: float | None = None
+        self._history = history
+        self._position_s: float | None = None
         self._now_s = 0.0
 
-    def take(self, request: Request) -> None:
-        """Do what a page asks; a step stops the replay."""
+    def handle(self, request: Request) -> None:
+        """Change position or speed as a page asks; stepping pauses the replay, playing at the end starts again from the beginning."""
         match request:
-            case Playing(playing):
+            case SetPlaying(playing):
                 self.playing = playing
-                if playing and len(self._film) and self._at_s is not None and self._at_s >= self._film.t_s(-1):
-                    self._at_s = self._film.t_s(0)
-            case Speed(times):
+                ended = (
+                    len(self._history) and self._position_s is not None and self._position_s >= self._history.t_s(-1)
+                )
+                if playing and ended:
+                    self._position_s = self._history.t_s(0)
+            case SetSpeed(times):
                 self.times = times
             case Seek(t_s):
-                self._at_s = t_s
-            case Skip(by) if len(self._film):
+                self._position_s = t_s
+            case StepBy(by) if len(self._history):
                 self.playing = False
-                k = self._film.at(self._at_s if self._at_s is not None else self._film.t_s(0)) + by
-                self._at_s = self._film.t_s(min(max(k, 0), len(self._film) - 1))
+                start_s = self._position_s if self._position_s is not None else self._history.t_s(0)
+                index = self._history.index_at(start_s) + by
+                self._position_s = self._history.t_s(min(max(index, 0), len(self._history) - 1))
 
     def scene(self, now_s: float) -> PageScene | None:
-        """The scene to show at a moment of the monotonic clock; None before there is any."""
+        """The scene to show at `now_s` of the monotonic clock; None while the history is empty."""
         passed_s, self._now_s = now_s - self._now_s, now_s
-        if not len(self._film):
+        if not len(self._history):
             return None
-        begin_s, end_s = self._film.t_s(0), self._film.t_s(-1)
-        if self._at_s is None:
-            self._at_s = begin_s
+        begin_s, end_s = self._history.t_s(0), self._history.t_s(-1)
+        if self._position_s is None:
+            self._position_s = begin_s
         elif self.playing:
-            self._at_s += passed_s * self.times
-        self._at_s = min(max(self._at_s, begin_s), end_s)
-        return self._film[self._film.at(self._at_s)]
+            self._position_s += passed_s * self.times
+        self._position_s = min(max(self._position_s, begin_s), end_s)
+        return self._history[self._history.index_at(self._position_s)]
 
     def state(self) -> dict[str, Any] | None:
-        """Place and speed, for the time bar."""
-        if not len(self._film) or self._at_s is None:
+        """Position and speed for the page's time bar, as sent in frames; None before the first scene."""
+        if not len(self._history) or self._position_s is None:
             return None
         return {
-            "t_s": self._at_s,
-            "begin_s": self._film.t_s(0),
-            "end_s": self._film.t_s(-1),
+            "t_s": self._position_s,
+            "begin_s": self._history.t_s(0),
+            "end_s": self._history.t_s(-1),
             "playing": self.playing,
             "times": self.times,
         }

@@ -1,6 +1,6 @@
 """The server: the page and its sockets, in a thread with an event loop of its own.
 
-In: a stage, an address. Out: pages in browsers. Owns the thread, the listening socket and the sessions.
+In: a mailbox, an address. Out: HTML, walls and frames to browsers. Owns the thread, the listening socket and the sessions.
 """
 
 from __future__ import annotations
@@ -26,80 +26,78 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
-from echostep.page import protocol as wire
-from echostep.page.access import LOOPBACK, Guard
-from echostep.page.elements.guidance import Ways
+from echostep.page import protocol
+from echostep.page.access import LOOPBACK, AccessControl
+from echostep.page.elements.guidance import RouteFinder
 from echostep.page.mailbox import Mailbox
 from echostep.page.session import PageCounts, Session
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
 PORT = 8420
-MOST_PAGES = 32
-FULL = 1013
-STOP_S = 5.0
+MOST_PAGES = 32  # open at the same time; further ones are refused
+TRY_AGAIN_LATER = 1013  # WebSocket close code [IANA]
+STOP_S = 5.0  # time for the thread to end
+BACKLOG = 64  # connections that wait to be accepted
 
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where the page is served; port None: 8420, or any free one when that is taken."""
+    """Where the page is served. `port` None: 8420, or any free port when 8420 is in use."""
 
     host: str = LOCAL
     port: int | None = None
 
 
 class PageServer:
-    """Serves a stage until it is closed; raises EchostepError when the address cannot be had."""
+    """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address."""
 
-    def __init__(self, stage: Mailbox, address: Address = Address()) -> None:
+    def __init__(self, mailbox: Mailbox, address: Address = Address()) -> None:
         self.counts = PageCounts()
         self.sessions: set[Session] = set()
-        self._stage = stage
-        self._ways = Ways(stage.plan)
-        self._listening = listen(address)
+        self._mailbox = mailbox
+        self._route_finder = RouteFinder(mailbox.plan)
+        self._listener = open_listener(address)
         token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
-        host, port = self._listening.getsockname()[:2]
-        shown = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
-        shown = f"[{shown}]" if ":" in shown else shown
-        self.url = f"http://{shown}:{port}/" + (f"{token}/" if token else "")
-        self.guard = Guard(self._application(token), token)
+        self.url = _url(self._listener, token)
+        self.access_control = AccessControl(self._application(token), token)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._rung = False
+        self._wake_pending = False
         settings = uvicorn.Config(
-            self.guard, log_config=None, log_level="critical", access_log=False, server_header=False, date_header=False,
-            ws_max_size=wire.MOST_REQUEST, ws_per_message_deflate=False, limit_concurrency=512, timeout_graceful_shutdown=1,
+            self.access_control, log_config=None, log_level="critical", access_log=False, server_header=False, date_header=False,
+            ws_max_size=protocol.MOST_REQUEST, ws_per_message_deflate=False, limit_concurrency=512, timeout_graceful_shutdown=1,
         )  # fmt: skip
         self._server = uvicorn.Server(settings)
         self._thread = threading.Thread(
-            target=self._server.run, kwargs={"sockets": [self._listening]}, name="echostep page", daemon=True
+            target=self._server.run, kwargs={"sockets": [self._listener]}, name="echostep page", daemon=True
         )
 
     def __enter__(self) -> Self:
-        self._stage.on_news = self._ring
+        self._mailbox.on_publish = self._request_wake
         self._thread.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._stage.on_news = None
+        self._mailbox.on_publish = None
         self._server.should_exit = True
         self._thread.join(STOP_S)
-        self._listening.close()
+        self._listener.close()
 
     @property
     def pages(self) -> int:
-        """How many pages look."""
+        """Number of connected pages."""
         return len(self.sessions)
 
-    def _ring(self) -> None:
-        """Wake the sessions, from any thread; many rings before the loop gets to it are one."""
+    def _request_wake(self) -> None:
+        """Have the loop wake the sessions; may be called from any thread. Requests until the loop runs count as one."""
         loop = self._loop
-        if loop is not None and not self._rung:
-            self._rung = True
+        if loop is not None and not self._wake_pending:
+            self._wake_pending = True
             with contextlib.suppress(RuntimeError):  # the loop is just closing
                 loop.call_soon_threadsafe(self._wake)
 
     def _wake(self) -> None:
-        self._rung = False
+        self._wake_pending = False
         for session in self.sessions:
             session.wake()
 
@@ -123,17 +121,17 @@ class PageServer:
 
     async def _walls(self, request: Request) -> Response:
         level = request.path_params["level"]
-        if level >= len(self._stage.plan.levels):
+        if level >= len(self._mailbox.plan.levels):
             raise HTTPException(404)
-        return Response(wire.walls(self._stage.plan, level), media_type="application/octet-stream")
+        return Response(protocol.walls(self._mailbox.plan, level), media_type="application/octet-stream")
 
-    async def _socket(self, opened: WebSocket) -> None:
-        await opened.accept()
+    async def _socket(self, websocket: WebSocket) -> None:
+        await websocket.accept()
         if len(self.sessions) >= MOST_PAGES:
             self.counts.refused += 1
-            await opened.close(FULL)
+            await websocket.close(TRY_AGAIN_LATER)
             return
-        session = Session(opened, self._stage, self._ways, self.counts)
+        session = Session(websocket, self._mailbox, self._route_finder, self.counts)
         self.sessions.add(session)
         try:
             session.wake()
@@ -142,28 +140,35 @@ class PageServer:
             self.sessions.discard(session)
 
 
-def listen(address: Address) -> socket.socket:
-    """A socket that listens at an address."""
+def _url(listener: socket.socket, token: str | None) -> str:
+    """Address of the page for a browser; a socket on all interfaces is named by the host."""
+    host, port = listener.getsockname()[:2]
+    name = socket.gethostname() if host in ("0.0.0.0", "::") else host
+    name = f"[{name}]" if ":" in name else name
+    return f"http://{name}:{port}/" + (f"{token}/" if token else "")
+
+
+def open_listener(address: Address) -> socket.socket:
+    """A socket that listens at an address; raises EchostepError when that is not possible."""
     try:
-        return _bound(address.host, PORT if address.port is None else address.port)
+        return _bind(address.host, PORT if address.port is None else address.port)
     except OSError as error:
         if address.port is None and address.host in LOOPBACK:
-            return _bound(address.host, 0)
+            return _bind(address.host, 0)
         raise EchostepError(
             f"--host {address.host} --port {address.port}: cannot serve the page there: {error.strerror or error}"
         ) from error
 
 
-def _bound(host: str, port: int) -> socket.socket:
-    family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[
-        0
-    ]
-    listening = socket.socket(family, kind, protocol)
+def _bind(host: str, port: int) -> socket.socket:
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    family, kind, ip_protocol, _, address = found[0]
+    listener = socket.socket(family, kind, ip_protocol)
     try:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(place)
-        listening.listen(64)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(BACKLOG)
     except OSError:
-        listening.close()
+        listener.close()
         raise
-    return listening
+    return listener

@@ -1,6 +1,6 @@
-"""Marks: beacons as a page draws them.
+"""Beacon marks: beacons as a page draws them.
 
-In: a tracker, in its thread. Out: `Mark`s that any thread may read. Owns nothing.
+In: a tracker, in its thread. Out: `BeaconMark`s that any thread may read. Owns nothing.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ from dataclasses import dataclass
 from echostep.localization.estimate import CHI2_95
 from echostep.tracker import Tracker
 
-HEARD_S = 1.5  # since it spoke: longer than a step, whose end brings the words
+HEARD_S = 1.5  # a beacon counts as heard this long after its last reading. By reason: longer than a step, at whose end readings are used
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
-    """A beacon by its number, where the cloud believes it to be now.
+class BeaconMark:
+    """A beacon by its number, at the mean of its position over the particles. The field names are keys of the frame's JSON.
 
-    `radius95_m`: of a circle as wide as its spread, as a 95 % ellipse is drawn. `state`: a `BeaconState`; `heard`: it speaks now.
+    `radius95_m`: radius of a circle with the beacon's spread, scaled as a 95 % ellipse. `state`: value of a `BeaconState`.
+    `heard`: whether a reading came within the last `HEARD_S`.
     """
 
     number: int
@@ -30,13 +31,13 @@ class Mark:
     heard: bool
 
 
-def marks(tracker: Tracker, t_s: float) -> tuple[Mark, ...]:
-    """All beacons whose place is known at a moment."""
+def beacon_marks(tracker: Tracker, t_s: float) -> tuple[BeaconMark, ...]:
+    """Marks of all beacons with a known position at time `t_s`."""
     numbers = tracker.state.beacon_numbers
     if not numbers:
         return ()
     return tuple(
-        Mark(
+        BeaconMark(
             numbers[b.slot], b.x_m, b.y_m, math.sqrt(CHI2_95) * b.sd_m, b.level, b.state.value,
             t_s - b.heard_s < HEARD_S,
         )

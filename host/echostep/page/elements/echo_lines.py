@@ -1,6 +1,7 @@
-"""Beams: what both rangers heard last, beside what the plan would have them hear.
+"""Echo lines: the last measured range of each ranger, beside the range that the plan predicts.
 
-In: a passage, the estimate at its end, the walls. Out: `Beam`s in the map. Owns nothing; looks at no tile that the cloud has not reached.
+In: a measured segment, the estimate at its end, the walls. Out: `EchoLine`s in the map frame. Owns nothing. It reads only wall tiles that the filter
+has already loaded.
 """
 
 from __future__ import annotations
@@ -21,8 +22,11 @@ from echostep.walls.index import WallIndex
 
 
 @dataclass(frozen=True, slots=True)
-class Beam:
-    """A ping sent at `t_s` from (x_m, y_m) along `axis_rad` of the map; None: no echo came, or none is expected."""
+class EchoLine:
+    """A ping sent at `t_s` from (x_m, y_m) along `axis_rad` (map frame). None: no echo came, or none is expected.
+
+    The field names are keys of the frame's JSON. `ranger`: 0 left, 1 right.
+    """
 
     t_s: float
     ranger: int
@@ -33,43 +37,49 @@ class Beam:
     expected_m: float | None
 
 
-def beams(
-    passage: MeasuredSegment, told: Estimate, east_m: float, index: WallIndex, model: EchoModel
-) -> tuple[Beam, ...]:
-    """The last ping of each ranger on a passage, placed where the estimate says that the trunk was then.
+def last_echo_lines(
+    measured: MeasuredSegment, estimate: Estimate, east_m: float, index: WallIndex, model: EchoModel
+) -> tuple[EchoLine, ...]:
+    """The last ping of each ranger on a measured segment, at the pose that the estimate gives for the time of the ping.
 
-    `east_m`: how far east of the map its level lies on the walls' sheet.
+    `east_m`: how far the estimate's level is shifted to the east on the sheet of walls.
     """
-    leg, found = passage.segment, []
-    turn = told.heading_rad - leg.heading1_rad
-    span_s = leg.t1_s - leg.t0_s
+    lines = []
     for ranger in (0, 1):
-        mine = np.flatnonzero(passage.ranger == ranger)
-        if not len(mine):
+        rows = np.flatnonzero(measured.ranger == ranger)
+        if not len(rows):
             continue
-        ping_s, range_m = float(passage.t_s[mine[-1]]), float(passage.range_m[mine[-1]])
-        share = min(max((ping_s - leg.t0_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
-        heading = leg.heading0_rad + share * float(wrap(leg.heading1_rad - leg.heading0_rad))
-        axis = turn + heading + float(RANGER_AXES_RAD[ranger])
-        back, c, s = share - 1.0, math.cos(turn), math.sin(turn)
-        x = told.x_m + back * (c * leg.dx_m - s * leg.dy_m)
-        y = told.y_m + back * (s * leg.dx_m + c * leg.dy_m)
+        ping_s, range_m = float(measured.t_s[rows[-1]]), float(measured.range_m[rows[-1]])
+        x, y, heading_rad = _trunk_pose(measured, estimate, ping_s)
+        axis = heading_rad + float(RANGER_AXES_RAD[ranger])
         expected = expected_range(x + east_m, y, axis, index, model)
-        found.append(
-            Beam(ping_s, ranger, x, y, axis, *(None if math.isnan(v) else float(v) for v in (range_m, expected)))
-        )
-    return tuple(found)
+        ranges = (None if math.isnan(v) else float(v) for v in (range_m, expected))
+        lines.append(EchoLine(ping_s, ranger, x, y, axis, *ranges))
+    return tuple(lines)
+
+
+def _trunk_pose(measured: MeasuredSegment, estimate: Estimate, t_s: float) -> tuple[float, float, float]:
+    """Position and heading of the trunk at `t_s`, in the map: the estimate moved back along its segment."""
+    segment = measured.segment
+    turn = estimate.heading_rad - segment.heading1_rad  # from the segment's frame to the map
+    span_s = segment.t1_s - segment.t0_s
+    share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
+    heading = segment.heading0_rad + share * float(wrap(segment.heading1_rad - segment.heading0_rad))
+    back, c, s = share - 1.0, math.cos(turn), math.sin(turn)
+    x = estimate.x_m + back * (c * segment.dx_m - s * segment.dy_m)
+    y = estimate.y_m + back * (s * segment.dx_m + c * segment.dy_m)
+    return x, y, turn + heading
 
 
 @kernel
 def expected_range(x: float, y: float, axis_rad: float, index: WallIndex, model: EchoModel) -> float:
-    """Range of the likeliest first echo at a pose, NaN when silence is likelier."""
+    """Range of the likeliest first echo at a pose; NaN when it is likelier that no echo comes."""
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
     count = echo_sources(x, y, axis_rad, index, distance_m, off_axis_rad, kind)
-    unheard, best, range_m = 1.0, 0.0, np.nan
+    no_echo, best, range_m = 1.0, 0.0, np.nan  # no_echo: probability that no source up to here has been detected
     for k in range(count):
-        heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], model)
-        unheard -= heard
-        if heard > best:
-            best, range_m = heard, distance_m[k]
-    return range_m if best > unheard else np.nan
+        first_echo = no_echo * detection(distance_m[k], off_axis_rad[k], kind[k], model)
+        no_echo -= first_echo
+        if first_echo > best:
+            best, range_m = first_echo, distance_m[k]
+    return range_m if best > no_echo else np.nan

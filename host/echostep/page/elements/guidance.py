@@ -1,7 +1,8 @@
-"""Guidance: what a page shows of a cue, and the way to a destination of its own.
+"""Guidance as a page shows it: of the run's cues, or to a destination that was chosen on the page.
 
-In: cues with their way; for a page's own destination estimates, a place, the plan. Out: `Guidance`. Owns the plan's routes (made when first asked
-for, in a thread) and how far along its own way the wearer has come. Until that way is found, and where there is none, it is the straight line.
+In: cues with their route; for a page's own destination: estimates, a place, the plan. Out: `ShownGuidance`. Owns the plan's route planner (made at
+the first request, in a thread) and the progress along a page's own route. Until that route is found, and where there is none, the straight line is
+shown.
 """
 
 from __future__ import annotations
@@ -12,60 +13,66 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.guidance.cues import NO_HEADING, Cue, CueKind, GuidanceSettings, Guide
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Plan
 from echostep.plan.polyline import along, way_m
 from echostep.plan.routing import Route, RoutePlace, Routes
 
-ARRIVED_M = 1.0
-AGAIN_S = 5.0  # a new way is looked for no sooner, in data time
-UNKNOWN_RAD = math.radians(GuidanceSettings().heading_sd_deg)
+ARRIVED_M = 1.0  # from the destination, on the straight line
+AGAIN_S = 5.0  # shortest time between two searches for a route, in data time
+UNKNOWN_RAD = math.radians(
+    GuidanceSettings().heading_sd_deg
+)  # above this standard deviation the heading counts as unknown
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
 NO_WAY = "No way was found. The arrow shows the straight line."
-STRAIGHT = "straight"  # the kind of a guidance that knows no way
+STRAIGHT = "straight"  # kind of a guidance without a route
+
+Points = tuple[tuple[float, float], ...]  # (x, y) in map metres
 
 
 @dataclass(frozen=True, slots=True)
-class Guidance:
-    """What to do, in words; `arrow_rad`: where to walk, from where he looks, counter-clockwise; `path`: what is left of the way on his
-    level, as points.
+class ShownGuidance:
+    """What the wearer should do. The field names are keys of the frame's JSON.
 
-    `kind` is a `CueKind` or `STRAIGHT`, `left_m` the way that is left, None where that helps nobody. `spoken` is the last sentence and `spoken_s`
-    when it was said. `own`: the page's own destination, not the run's.
+    `kind`: a `CueKind` or `STRAIGHT`. `arrow_rad`: direction to walk, counter-clockwise from the heading; None: no arrow is drawn. `left_m`:
+    length of the remaining route; None where it does not help. `path`: the remaining route on the estimate's level. `spoken`: the last sentence;
+    `spoken_s`: the time at which it was due. `own`: the page's own destination, not the run's.
     """
 
     kind: str
     text: str
     arrow_rad: float | None
     left_m: float | None
-    path: tuple[tuple[float, float], ...]
+    path: Points
     spoken: str = ""
     spoken_s: float = 0.0
     own: bool = False
 
-    def turned(self, by_rad: float) -> Guidance:
-        """The same for somebody who has turned to the left since."""
+    def turned(self, by_rad: float) -> ShownGuidance:
+        """The same guidance after the heading has turned by `by_rad` counter-clockwise."""
         return self if self.arrow_rad is None else replace(self, arrow_rad=self.arrow_rad - by_rad)
 
-    def stopped(self, why: str, t_s: float) -> Guidance:
-        """Nothing is known any more: no arrow; the way stays to be seen."""
-        text = f"Stop. {why}"
+    def stopped(self, reason: str, t_s: float) -> ShownGuidance:
+        """The guidance while the position is unknown: "Stop" and the reason, without an arrow; the path stays."""
+        text = f"Stop. {reason}"
         return replace(
             self, kind=CueKind.STOP.value, text=text, arrow_rad=None, left_m=None, spoken=f"{text}.", spoken_s=t_s
         )
 
 
-def guidance(cue: Cue, route: Route | None, level: int, before: Guidance | None) -> Guidance:
-    """A cue as it is shown on a level; `before`: what was shown until now, whose sentence stands as long as there is no new one."""
-    said = (cue.spoken, cue.t_s) if cue.spoken else (before.spoken, before.spoken_s) if before else ("", cue.t_s)
-    path = () if route is None or math.isnan(cue.left_m) else rest(route, level, cue.left_m)
+def guidance_of_cue(cue: Cue, route: Route | None, level: int, before: ShownGuidance | None) -> ShownGuidance:
+    """A cue as it is shown on a level. `before`: the guidance shown until now; its sentence stays while the cue has no new one."""
+    kept = (before.spoken, before.spoken_s) if before else ("", cue.t_s)
+    spoken = (cue.spoken, cue.t_s) if cue.spoken else kept
+    path = () if route is None or math.isnan(cue.left_m) else remaining_path(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
-    return Guidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *said)
+    return ShownGuidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *spoken)
 
 
-def rest(route: Route, level: int, left_m: float) -> tuple[tuple[float, float], ...]:
-    """The last `left_m` of a way, what of it is on a level, as points."""
+def remaining_path(route: Route, level: int, left_m: float) -> Points:
+    """The part of the last `left_m` metres of a route that lies on a level."""
     points: list[tuple[float, float]] = []
     for stretch in reversed(route.stretches):
         if left_m <= 0.0:
@@ -74,77 +81,76 @@ def rest(route: Route, level: int, left_m: float) -> tuple[tuple[float, float], 
         if stretch.level == level:
             if left_m < length_m:
                 x, y, _ = along(line, length_m - left_m)
-                come_m = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
-                line = np.vstack([(x, y), line[come_m > length_m - left_m]])
+                corner_m = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]  # of each corner along the line
+                line = np.vstack([(x, y), line[corner_m > length_m - left_m]])
             points[:0] = [(x, y) for x, y in line.tolist()]
         left_m -= length_m
     return tuple(points)
 
 
-class Ways:
-    """Finds ways through a plan; slow, so it is called in threads."""
+class RouteFinder:
+    """Finds routes through a plan. A search is slow, so call `find` in a thread; one search runs at a time."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._routes: Routes | None = None
         self._lock = threading.Lock()
 
-    def way(self, told: Estimate, goal: RoutePlace) -> Route:
-        """The way from an estimate to a place; raises EchostepError when there is none."""
+    def find(self, estimate: Estimate, goal: RoutePlace) -> Route:
+        """The route from an estimate to a place; raises EchostepError when there is none."""
         with self._lock:
             self._routes = self._routes or Routes(self._plan)
-            return self._routes.way(RoutePlace(told.x_m, told.y_m, told.level), goal)
+            return self._routes.way(RoutePlace(estimate.x_m, estimate.y_m, estimate.level), goal)
 
 
-class Errand:
-    """One destination of one page: tell it estimates, and the way once it is found."""
+class Destination:
+    """A destination chosen on one page: estimates and, once it is found, a route -> guidance."""
 
     def __init__(self, goal: RoutePlace) -> None:
         self.goal = goal
-        self.looking = False
+        self.searching = False
         self._guide: Guide | None = None
-        self._why = ""
-        self._again_s = -math.inf
-        self._last: tuple[Estimate, Guidance] | None = None
+        self._reason = ""  # why there is no route
+        self._search_again_s = -math.inf
+        self._last: tuple[Estimate, ShownGuidance] | None = None
 
-    def lacks_way(self, told: Estimate) -> bool:
-        """Whether a way should be looked for now."""
-        return not self.looking and told.t_s >= self._again_s
+    def needs_route(self, estimate: Estimate) -> bool:
+        """Whether a search for a route should start now."""
+        return not self.searching and estimate.t_s >= self._search_again_s
 
-    def found(self, route: Route | None, why: str, told: Estimate) -> None:
-        """The way from an estimate; or None and why there is none: then it is looked for again later."""
-        self.looking = False
+    def set_route(self, route: Route | None, reason: str, estimate: Estimate) -> None:
+        """The result of a search from an estimate: a route, or None and the reason. Without a route the search is repeated after `AGAIN_S`."""
+        self.searching = False
         self._guide = Guide(route) if route is not None and route.stretches else None
-        self._why, self._last = why, None
-        self._again_s = math.inf if self._guide else told.t_s + AGAIN_S
+        self._reason, self._last = reason, None
+        self._search_again_s = math.inf if self._guide else estimate.t_s + AGAIN_S
 
-    def guidance(self, told: Estimate) -> Guidance:
-        """What to do at an estimate."""
-        if self._last is None or self._last[0] is not told:
-            self._last = (
-                told,
-                replace(self._along(told) if self._guide else straight(told, self.goal, self._why), own=True),
-            )
+    def guidance_at(self, estimate: Estimate) -> ShownGuidance:
+        """The guidance at an estimate; the same object while the estimate is the same."""
+        if self._last is None or self._last[0] is not estimate:
+            shown = self._along_route(estimate) if self._guide else straight_line(estimate, self.goal, self._reason)
+            self._last = estimate, replace(shown, own=True)
         return self._last[1]
 
-    def _along(self, told: Estimate) -> Guidance:
+    def _along_route(self, estimate: Estimate) -> ShownGuidance:
+        """The next cue of the route; when the estimate has left the route, a new search becomes due."""
         assert self._guide
-        cue = self._guide.cue(told)
-        if cue.kind is CueKind.OFF and self._again_s == math.inf:
-            self._again_s = told.t_s
-        return guidance(cue, self._guide.route, told.level, self._last[1] if self._last else None)
+        cue = self._guide.cue(estimate)
+        if cue.kind is CueKind.OFF and self._search_again_s == math.inf:
+            self._search_again_s = estimate.t_s
+        return guidance_of_cue(cue, self._guide.route, estimate.level, self._last[1] if self._last else None)
 
 
-def straight(told: Estimate, goal: RoutePlace, why: str = "") -> Guidance:
-    """The straight line to a place, and why it is no better way."""
-    dx, dy, levels = goal.x_m - told.x_m, goal.y_m - told.y_m, goal.level - told.level
+def straight_line(estimate: Estimate, goal: RoutePlace, reason: str = "") -> ShownGuidance:
+    """The straight line to a place. `reason`: why there is no route, empty while it is being searched for."""
+    dx, dy, floors = goal.x_m - estimate.x_m, goal.y_m - estimate.y_m, goal.level - estimate.level
     distance_m = math.hypot(dx, dy)
-    path = ((told.x_m, told.y_m), (goal.x_m, goal.y_m))
-    if distance_m <= ARRIVED_M and not levels:
-        return Guidance(CueKind.ARRIVED.value, "You have arrived", None, None, path, "You have arrived.")
-    climb = f", {abs(levels)} level{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
-    if told.heading_sd_rad > UNKNOWN_RAD:
-        return Guidance(CueKind.STOP.value, NO_HEADING, None, None, path, f"{NO_HEADING}.")
-    arrow = math.remainder(math.atan2(dy, dx) - told.heading_rad, 2.0 * math.pi)
-    text = f"In a straight line{climb}{': ' if why else ''}{why}"
-    return Guidance(STRAIGHT, text, arrow, distance_m, path, NO_WAY if why else "")
+    path = ((estimate.x_m, estimate.y_m), (goal.x_m, goal.y_m))
+    if distance_m <= ARRIVED_M and not floors:
+        return ShownGuidance(CueKind.ARRIVED.value, "You have arrived", None, None, path, "You have arrived.")
+    if estimate.heading_sd_rad > UNKNOWN_RAD:
+        return ShownGuidance(CueKind.STOP.value, NO_HEADING, None, None, path, f"{NO_HEADING}.")
+    climb = f", {abs(floors)} floor{'s' if abs(floors) > 1 else ''} {'up' if floors > 0 else 'down'}" if floors else ""
+    arrow = wrap(math.atan2(dy, dx) - estimate.heading_rad)
+    text = f"In a straight line{climb}{': ' if reason else ''}{reason}"
+    return ShownGuidance(STRAIGHT, text, arrow, distance_m, path, NO_WAY if reason else "")

@@ -1,6 +1,6 @@
-"""Ahead: where a step has led that the foot has just told, before its echoes are in.
+"""Look-ahead: the position after a step whose echoes have not been used yet.
 
-In: the last estimate, the leg that it belongs to, the legs since. Out: an estimate by dead reckoning from there. Owns nothing.
+In: the last estimate, the path segment at whose end it is, the later segments. Out: an estimate by dead reckoning from there. Owns nothing.
 """
 
 from __future__ import annotations
@@ -13,22 +13,26 @@ from echostep.angles import wrap
 from echostep.localization.estimate import Estimate, ellipse95, trust
 from echostep.path import PathSegment
 
-DRIFT_M = 0.05  # of a step, per axis, beside what the foot says
+DRIFT_M = 0.05  # standard deviation that is added per segment and axis to the foot's own. By reason: no source
 
 
-def ahead(told: Estimate, leg: PathSegment, since: Sequence[PathSegment]) -> Estimate:
-    """An estimate moved by further legs, its ellipse grown by theirs and by what the heading may be off."""
-    turn = told.heading_rad - leg.heading1_rad
-    x, y, xx, xy, yy = told.x_m, told.y_m, told.xx_m2, told.xy_m2, told.yy_m2
+def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSegment]) -> Estimate:
+    """The estimate moved along the later segments; its covariance grows by theirs and by the uncertainty of the heading."""
+    turn = estimate.heading_rad - segment.heading1_rad
+    x, y, xx, xy, yy = estimate.x_m, estimate.y_m, estimate.xx_m2, estimate.xy_m2, estimate.yy_m2
     c, s = math.cos(turn), math.sin(turn)
-    for step in since:
+    for step in later:
         dx, dy = c * step.dx_m - s * step.dy_m, s * step.dx_m + c * step.dy_m
         x, y = x + dx, y + dy
-        along, across = (step.sd_m**2 + DRIFT_M**2), told.heading_sd_rad**2
-        xx, xy, yy = xx + along + across * dy * dy, xy - across * dx * dy, yy + along + across * dx * dx
-    last = since[-1]
-    status = max(told.status, trust(ellipse95(xx, xy, yy).major_m), key=list(type(told.status)).index)
+        position_m2, heading_rad2 = (step.sd_m**2 + DRIFT_M**2), estimate.heading_sd_rad**2
+        xx, xy, yy = (
+            xx + position_m2 + heading_rad2 * dy * dy,
+            xy - heading_rad2 * dx * dy,
+            yy + position_m2 + heading_rad2 * dx * dx,
+        )
+    last = later[-1]
+    status = max(estimate.status, trust(ellipse95(xx, xy, yy).major_m), key=list(type(estimate.status)).index)
     heading = float(wrap(last.heading1_rad + turn))
     return replace(
-        told, t_s=last.t1_s, x_m=x, y_m=y, xx_m2=xx, xy_m2=xy, yy_m2=yy, heading_rad=heading, step=last.step, status=status
+        estimate, t_s=last.t1_s, x_m=x, y_m=y, xx_m2=xx, xy_m2=xy, yy_m2=yy, heading_rad=heading, step=last.step, status=status
     )  # fmt: skip

@@ -12,66 +12,70 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Octets
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.page.elements.beacon_marks import Mark
-from echostep.page.elements.echo_lines import Beam
-from echostep.page.elements.guidance import Guidance
+from echostep.page.elements.beacon_marks import BeaconMark
+from echostep.page.elements.echo_lines import EchoLine
+from echostep.page.elements.guidance import ShownGuidance
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.tracker_state import Particles
 
-KNOWN_HEADING_RAD = 1.0  # beyond this standard deviation the arrow is a circle
-MOST_SHOWN = 10_000
+KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
+MOST_SHOWN = 10_000  # particles in a frame
 
 
 @dataclass(frozen=True, slots=True)
-class Specks:
-    """A cloud as it is drawn: `x_m`, `y_m` (n,) float32 in the map, `weight` (n,) uint8, 255 for the greatest, `level` (n,) uint8."""
+class ParticleSample:
+    """Particles to draw: `x_m`, `y_m` (n,) float32 in the map, `weight` (n,) uint8, 255 for the greatest, `level` (n,) uint8."""
 
     x_m: NDArray[np.float32]
     y_m: NDArray[np.float32]
     weight: Octets
     level: Octets
 
-    def moved(self, dx_m: float, dy_m: float) -> Specks:
-        """The cloud elsewhere."""
+    def moved(self, dx_m: float, dy_m: float) -> ParticleSample:
+        """The same particles, shifted."""
         return replace(self, x_m=self.x_m + np.float32(dx_m), y_m=self.y_m + np.float32(dy_m))
 
 
 @dataclass(frozen=True, slots=True)
 class PageScene:
-    """One moment: `walked` points of the trail belong to it; `born_ns` is the host's monotonic clock when its bytes had come.
+    """What a page shows of one moment.
 
-    `guidance` is the run's; a page's own destination is the session's.
+    `arrived_ns`: host's monotonic clock when the bytes of the estimate arrived. `trail_count`: number of points of the trail up to this moment.
+    `guidance`: of the run; a page's own destination is added by its session.
     """
 
-    born_ns: int
+    arrived_ns: int
     t_s: float
-    told: Estimate | None
-    specks: Specks | None
-    beams: tuple[Beam, ...]
+    estimate: Estimate | None
+    particles: ParticleSample | None
+    echo_lines: tuple[EchoLine, ...]
     streams: StreamRates | None
-    walked: int
-    words: str
-    marks: tuple[Mark, ...] = ()
-    guidance: Guidance | None = None
+    trail_count: int
+    status_text: str
+    beacons: tuple[BeaconMark, ...] = ()
+    guidance: ShownGuidance | None = None
 
 
-def specks(particles: Particles) -> Specks:
-    """Particles as they are drawn."""
+def sample_of(particles: Particles) -> ParticleSample:
+    """The tracker's published particles as they are drawn: weights relative to the greatest, positions in single precision."""
     weight = np.exp(particles.log_weight)
     shown = (255.0 * weight / max(float(weight.max()), 1e-300)).astype(np.uint8)
     x_m, y_m = particles.x_m.astype(np.float32), particles.y_m.astype(np.float32)
-    return Specks(x_m, y_m, shown, np.minimum(particles.level, 255).astype(np.uint8))
+    return ParticleSample(x_m, y_m, shown, np.minimum(particles.level, 255).astype(np.uint8))
 
 
-def words(told: Estimate | None, *, waits: bool = False, taps: bool = True) -> str:
-    """How far to trust a position, in words; `waits`: for somebody to say where he is; `taps`: one can say so on the page."""
-    if told is None:
-        return "tap where you stand to start" if waits else "waiting for the foot to stand still"
-    if told.status == TrackStatus.LOST:
-        return "lost: walk along a wall or tap where you are" if taps else "lost"
-    return f"{told.status.value}, {metres(told.ellipse95.major_m)}"
+def status_text(estimate: Estimate | None, *, needs_start: bool = False, accepts_taps: bool = True) -> str:
+    """Status and accuracy in words.
+
+    `needs_start`: the tracker waits for a check-in that gives the start. `accepts_taps`: the page takes check-ins (not so in a replay).
+    """
+    if estimate is None:
+        return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
+    if estimate.status == TrackStatus.LOST:
+        return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
+    return f"{estimate.status.value}, {format_metres(estimate.ellipse95.major_m)}"
 
 
-def metres(distance_m: float) -> str:
-    """A length as people say it: 0.2 m, 3 m, 40 m."""
+def format_metres(distance_m: float) -> str:
+    """A length as text, rounded as people need it: 0.2 m, 3 m, 40 m."""
     return f"{distance_m:.1f} m" if distance_m < 0.95 else f"{distance_m:.0f} m"

@@ -1,6 +1,6 @@
-"""Streams of the streams: rates and losses.
+"""Rates and losses of each input stream.
 
-In: the tracker's counts at moments of arrival. Out: `StreamRates`. Owns the counts of the last seconds.
+In: the tracker's counters at arrival times. Out: `StreamRates`. Owns the counters of the last seconds.
 """
 
 from __future__ import annotations
@@ -10,13 +10,19 @@ from dataclasses import dataclass
 
 from echostep.board.health import Severity, board_findings
 from echostep.tracker import Tracker
+from echostep.tracker_state import StreamState
 
-WINDOW_NS = 2_000_000_000
+WINDOW_NS = 2_000_000_000  # over which rates are averaged
+SHORTEST_S = 0.5  # no rate is given for a shorter time
 
 
 @dataclass(frozen=True, slots=True)
 class StreamRates:
-    """Rates over the last two seconds (None: not known yet), and since the beginning what was lost on the way, rejected, and came late."""
+    """Rates over the last two seconds (None: not known yet), and counts since the start. The field names are keys of the frame's JSON.
+
+    `lost`: messages that did not arrive. `rejected`: bytes or messages with wrong contents. `late_pings`: pings that came after their segment.
+    `wrong`: what is wrong with the board or a stream and what to do, as text; empty when nothing is.
+    """
 
     mtx_hz: float | None
     pings_hz: float | None
@@ -25,46 +31,50 @@ class StreamRates:
     late_pings: int
     synchronised: bool
     check_ins: int
-    wrong: str  # with the board or a stream and what to do, in words; empty: nothing
+    wrong: str
 
 
-class Pulse:
-    """Takes the tracker's counts after each portion."""
+class StreamRateMeter:
+    """Turns counters into rates; call `measure` after each portion."""
 
     def __init__(self) -> None:
-        self._counts: deque[tuple[int, int, int]] = deque()
+        self._counts: deque[tuple[int, int, int]] = deque()  # time (ns), MTx samples, pings
 
-    def streams(self, tracker: Tracker, t_ns: int) -> StreamRates:
-        """Streams at a moment of the arrival clock, not earlier than the last one."""
-        intake = tracker.intake
-        samples, pings = intake.mtx.counts.good, intake.pings
-        while len(self._counts) > 1 and t_ns - self._counts[1][0] >= WINDOW_NS:
-            self._counts.popleft()
-        begin_ns, before_samples, before_pings = self._counts[0] if self._counts else (t_ns, samples, pings)
-        if not self._counts or t_ns - self._counts[-1][0] >= WINDOW_NS // 20:
-            self._counts.append((t_ns, samples, pings))
-        span_s = (t_ns - begin_ns) * 1e-9
-        known = span_s >= 0.5
-        board, mtx, status = intake.board.counts, intake.mtx.counts, intake.status
+    def measure(self, tracker: Tracker, t_ns: int) -> StreamRates:
+        """Rates and counts at `t_ns` of the arrival clock, which must not go back."""
+        streams = tracker.streams
+        board, mtx, status = streams.board, streams.mtx, streams.status
+        mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
         dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
-        mtx_hz = (samples - before_samples) / span_s if known else None
-        pings_hz = (pings - before_pings) / span_s if known else None
         return StreamRates(
             mtx_hz=mtx_hz,
             pings_hz=pings_hz,
             lost=board.lost + mtx.lost + dropped,
             rejected=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
-            late_pings=intake.counts.late_pings,
-            synchronised=intake.timeline.synchronised,
-            check_ins=tracker.check_ins,
-            wrong=_wrong(tracker, mtx_hz, pings_hz),
+            late_pings=streams.front_end.late_pings,
+            synchronised=streams.synchronised,
+            check_ins=tracker.state.check_ins,
+            wrong=_advice(streams, mtx_hz, pings_hz),
         )
 
+    def _rates_hz(self, samples: int, pings: int, t_ns: int) -> tuple[float | None, float | None]:
+        """Samples and pings a second over the window; adds these counts to the window."""
+        while len(self._counts) > 1 and t_ns - self._counts[1][0] >= WINDOW_NS:
+            self._counts.popleft()
+        begin_ns, first_samples, first_pings = self._counts[0] if self._counts else (t_ns, samples, pings)
+        if not self._counts or t_ns - self._counts[-1][0] >= WINDOW_NS // 20:
+            self._counts.append((t_ns, samples, pings))
+        span_s = (t_ns - begin_ns) * 1e-9
+        if span_s < SHORTEST_S:
+            return None, None
+        return (samples - first_samples) / span_s, (pings - first_pings) / span_s
 
-def _wrong(tracker: Tracker, mtx_hz: float | None, pings_hz: float | None) -> str:
+
+def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None) -> str:
+    """The gravest finding and what to do about it."""
     if mtx_hz == 0.0:
         return "the MTx is silent: look at its plug and its power"
-    found = [finding for finding in board_findings(tracker.intake.words) if finding.severity > Severity.NOTE]
-    if not found and pings_hz == 0.0:
+    findings = [finding for finding in board_findings(streams.reports) if finding.severity > Severity.NOTE]
+    if not findings and pings_hz == 0.0:
         return "no pings: look at the board's plug and at the rangers"
-    return str(found[0]) if found else ""
+    return str(findings[0]) if findings else ""
