@@ -192,7 +192,7 @@ def test_unreachable_and_outside_places_are_named() -> None:
         plan, levels=(replace(plan.levels[0], walls=np.vstack([plan.levels[0].walls, box])),), connectors=()
     )
     routes = Routes(closed)
-    with pytest.raises(EchostepError, match="no way leads"):
+    with pytest.raises(EchostepError, match="there is no route"):
         routes.way(RoutePlace(2.0, 5.0), RoutePlace(10.0, 5.0))
     with pytest.raises(EchostepError, match="outside the plan"):
         routes.way(RoutePlace(2.0, 5.0), RoutePlace(90.0, 5.0))

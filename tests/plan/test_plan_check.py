@@ -62,10 +62,10 @@ def test_an_open_room() -> None:
     (finding,) = check_plan(flat(box(), rooms=[ROOM]))
     assert finding.kind == "open room"
     assert "is 1 m wide or less" in finding.text
-    assert finding.at_m == pytest.approx((1.5, 0.0), abs=0.3)
+    assert finding.position_m == pytest.approx((1.5, 0.0), abs=0.3)
     assert kinds(flat([], rooms=[ROOM])) == ["open room"]
     (finding,) = check_plan(flat([[0, 0, 4, 0], [4, 0, 4, 2.6], [4, 3, 0, 3], [0, 3, 0, 0]], rooms=[ROOM]))
-    assert finding.at_m == pytest.approx((4.0, 2.8), abs=0.3)
+    assert finding.position_m == pytest.approx((4.0, 2.8), abs=0.3)
     assert "is 0.5 m wide or less" in finding.text
 
 
@@ -74,8 +74,8 @@ def test_walls_that_almost_meet() -> None:
     walls[2] = [4, 0.04, 4, 3]
     (finding,) = check_plan(flat(walls, doors=[door()]))
     assert finding.kind == "gap"
-    assert finding.at_m[0] == 4.0
-    assert 0.0 <= finding.at_m[1] <= 0.04
+    assert finding.position_m[0] == 4.0
+    assert 0.0 <= finding.position_m[1] <= 0.04
     assert "0.040 m" in finding.text
     assert len(finding.lines_m) == 2
     walls[2] = [4, 0.004, 4, 3]
@@ -112,7 +112,7 @@ def test_rooms_that_no_door_joins() -> None:
     (finding,) = check_plan(flat(closed, doors=[door()], rooms=[*rooms, {"name": "C", "at": [1, 1]}]))
     assert finding.kind == "unreachable"
     assert "'B'" in finding.text
-    assert finding.at_m == (12.0, 1.0)
+    assert finding.position_m == (12.0, 1.0)
 
 
 def test_reached_from_the_start() -> None:

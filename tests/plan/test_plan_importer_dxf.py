@@ -145,7 +145,7 @@ def test_storeys_with_stairs_and_names(tmp_path: Path) -> None:
         space.add_text("Hall " + name, dxfattribs={"layer": "A-ROOM", "insert": (5, 3)})
         space.add_mtext("Store\\P2", dxfattribs={"layer": "A-ROOM", "insert": (8, 3)})
         doc.saveas(tmp_path / f"{name}.dxf")
-    plan = import_plan(tmp_path / "ground.dxf", Hints(storey_m=3.0), [tmp_path / "first.dxf"])
+    plan = import_plan(tmp_path / "ground.dxf", Hints(storey_height_m=3.0), [tmp_path / "first.dxf"])
     assert [(level.name, level.height_m) for level in plan.levels] == [("ground", 0.0), ("first", 3.0)]
     assert [room.name for room in plan.levels[1].rooms] == ["Hall first", "Store 2"]
     assert [(c.kind, c.levels) for c in plan.connectors] == [("stairs", (0, 1))]

@@ -99,7 +99,7 @@ def write(folder: Path, features: Any, main: dict[str, Any] | None = None) -> Pa
 
 
 def test_a_wall_and_its_place(tmp_path: Path) -> None:
-    plan = import_plan(write(tmp_path, [feature("wall")]), Hints(storey_m=4.0))
+    plan = import_plan(write(tmp_path, [feature("wall")]), Hints(storey_height_m=4.0))
     walls = plan.levels[0].walls
     assert len(walls) == 4
     assert np.ptp(walls[:, [0, 2]]) == pytest.approx(6.24, abs=0.01)  # 0.0001 degrees at latitude 56

@@ -97,7 +97,7 @@ def check(
     plan = open_plan(file)
     findings = check_plan(plan)
     for finding in findings[:MOST_LINES]:
-        x, y = finding.at_m
+        x, y = finding.position_m
         print(f"{finding.number}. {plan.levels[finding.level].name}, x {x:.2f} m, y {y:.2f} m: {finding.text}")
     if len(findings) > MOST_LINES:
         print(f"... and {len(findings) - MOST_LINES} more")

@@ -1,7 +1,7 @@
-"""The building's plan: plan.json, its checks, its drawing, ways through it, and what other programs call a plan.
+"""The building's plan: plan.json, its checks, its drawing, routes through it, and importers of other formats.
 
-In: plan files. Out: `Plan`: levels of walls, doors, rooms and connectors, in metres (map frame). Owns the file format and everything that
-needs shapely. `importers` turns drawings and maps of other programs into such files.
+In: plan files; drawings and maps of other programs (`importers`). Out: `Plan`: levels of walls, doors, rooms and connectors, in metres (map frame).
+Owns the file format and everything that needs shapely.
 """
 
 from echostep.plan.model import (

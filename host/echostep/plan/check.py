@@ -1,4 +1,4 @@
-"""What is wrong with a plan.
+"""Checks of a plan: gaps, overlaps, loose doors, open rooms, unreachable rooms, stairs and lifts without access.
 
 In: a `Plan`. Out: `PlanFinding`s, numbered from 1, level by level. Owns the tolerances.
 """
@@ -13,44 +13,59 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
-from echostep.plan.faces import JAMB_M, OUTSIDE, TOUCH_M, Face, Faces, faces_of, groups, lead, longer, shared
-from echostep.plan.leaks import leak
+from echostep.plan.faces import (
+    JAMB_M,
+    OUTSIDE,
+    TOUCH_M,
+    Face,
+    Faces,
+    connected_groups,
+    extend,
+    faces_under,
+    find_faces,
+    leader_of,
+)
+from echostep.plan.leaks import narrowest_opening
 from echostep.plan.model import Level, Plan
 
-NEAR_M = 0.1  # walls that end so near to each other were meant to meet
-OVERLAP_M = 0.02
-ELBOW_M2 = 1.0  # less room than this beside stairs is no way out
-MOST_WAYS_OUT = 20  # are looked for in one plan
+# Tolerances, by reason:
+NEAR_M = 0.1  # a wall's end that is nearer than this to a wall was meant to touch it
+OVERLAP_M = 0.02  # shorter overlaps are not reported
+ELBOW_M2 = 1.0  # stairs with less free area beside them than this have no access
+MOST_LEAKS = 20  # searches for the opening of a room in one plan, because each takes a while
 NOT_ENCLOSED = "is not enclosed by walls and doors"
-PARALLEL = 0.02  # sine of the angle
+PARALLEL = 0.02  # sine of the angle below which walls count as parallel
 
 Lines = tuple[tuple[float, float, float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class PlanFinding:
-    """One thing that is wrong: its kind, where, and what it says in words."""
+    """One error in a plan: its kind, level (index), position, description, and the lines that it concerns."""
 
     kind: str
     level: int
-    at_m: tuple[float, float]
+    position_m: tuple[float, float]
     text: str
     lines_m: Lines = ()
     number: int = 0
 
 
 def check_plan(plan: Plan) -> list[PlanFinding]:
-    """All findings."""
-    asked = bool(plan.connectors) or any(level.rooms for level in plan.levels)  # does anything ask for enclosed spaces?
-    faces = [faces_of(level if asked else Level(level.name, level.height_m, level.walls[:0])) for level in plan.levels]
-    found = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
-    found += _unreachable(plan, faces)
-    found += _ways(plan, faces)
-    found.sort(key=lambda finding: finding.level)
-    opened = [k for k, finding in enumerate(found) if finding.text.endswith(NOT_ENCLOSED)]
-    for k in opened[:MOST_WAYS_OUT]:
-        found[k] = _way_out(found[k], plan.levels[found[k].level])
-    return [replace(finding, number=number) for number, finding in enumerate(found, 1)]
+    """All findings of a plan, sorted by level and numbered from 1."""
+    needs_faces = bool(plan.connectors) or any(level.rooms for level in plan.levels)
+    faces = [
+        find_faces(level if needs_faces else Level(level.name, level.height_m, level.walls[:0]))
+        for level in plan.levels
+    ]
+    findings = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
+    findings += _unreachable(plan, faces)
+    findings += _connectors(plan, faces)
+    findings.sort(key=lambda finding: finding.level)
+    not_enclosed = [k for k, finding in enumerate(findings) if finding.text.endswith(NOT_ENCLOSED)]
+    for k in not_enclosed[:MOST_LEAKS]:
+        findings[k] = _with_leak(findings[k], plan.levels[findings[k].level])
+    return [replace(finding, number=number) for number, finding in enumerate(findings, 1)]
 
 
 def _level(level: Level, i: int, faces: Faces) -> Iterator[PlanFinding]:
@@ -64,7 +79,7 @@ def _level(level: Level, i: int, faces: Faces) -> Iterator[PlanFinding]:
 
 
 def _gaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]:
-    """Ends that touch nothing, but have a wall within reach that does not run beside them."""
+    """Ends of walls that touch no wall, but are within `NEAR_M` of one that does not run parallel beside them."""
     ends = solid.reshape(-1, 2)
     if not len(ends):
         return
@@ -87,7 +102,7 @@ def _gaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
 
 
 def _overlaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]:
-    """Pairs of walls that share a stretch."""
+    """Pairs of walls on one line that overlap."""
     if not len(solid):
         return
     one, other = tree.query(tree.geometries, predicate="dwithin", distance=TOUCH_M / 2)
@@ -107,7 +122,7 @@ def _overlaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFind
 
 
 def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]:
-    """Doors that hang in the air, and doors that a wall runs through."""
+    """Doors with an end that is not at a wall, and doors that a wall runs through."""
     for number, door in enumerate(level.doors):
         name = f"door {door.name or number}"
         line = shapely.LineString((door.line[:2], door.line[2:]))
@@ -124,52 +139,55 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
 
 
 def _distance(tree: shapely.STRtree, point: shapely.Point) -> float:
+    """Distance to the nearest wall; infinity when it is more than 1 m."""
     found = tree.query_nearest(point, max_distance=1.0, return_distance=True, all_matches=False)[1]
     return float(found[0]) if len(found) else float("inf")
 
 
 def _open_rooms(level: Level, faces: Faces, i: int) -> Iterator[PlanFinding]:
-    """Rooms whose walls leave a gap to the outside."""
-    at = faces.at(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
+    """Rooms whose position lies in no enclosed space."""
+    at = faces.indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
     for room, face in zip(level.rooms, at, strict=True):
         if face == OUTSIDE:
             yield PlanFinding("open room", i, room.at_m, f"room {room.name!r} {NOT_ENCLOSED}")
 
 
-def _way_out(finding: PlanFinding, level: Level) -> PlanFinding:
-    """A finding about a place that should be enclosed, with its narrowest way out where that can be found."""
+def _with_leak(finding: PlanFinding, level: Level) -> PlanFinding:
+    """The finding "not enclosed", moved to the narrowest opening when one is found."""
     doors = np.array([door.line for door in level.doors]).reshape(-1, 4)
-    gap = leak(np.concatenate((level.solid, longer(doors, JAMB_M))), finding.at_m)
+    gap = narrowest_opening(np.concatenate((level.solid, extend(doors, JAMB_M))), finding.position_m)
     if gap is None:
         return finding
     x, y, width = gap
     text = f"{finding.text}; the narrowest way out is {width:g} m wide or less"
-    return replace(finding, at_m=(x, y), text=text, lines_m=((*finding.at_m, x, y),))
+    return replace(finding, position_m=(x, y), text=text, lines_m=((*finding.position_m, x, y),))
 
 
 def _unreachable(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
-    """Enclosed rooms that no door or stairs join to the part of the building with the start, or else with most rooms."""
-    leader = groups(plan, faces)
+    """Enclosed rooms without a connection by doors, stairs or lifts to the start; without a start: to the group with most rooms."""
+    leader = connected_groups(plan, faces)
     rooms: list[tuple[int, str, tuple[float, float], Face]] = []
     for i, level in enumerate(plan.levels):
-        at = faces[i].at(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
+        at = faces[i].indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
         rooms += [
-            (i, r.name, r.at_m, lead(leader, (i, int(f)))) for r, f in zip(level.rooms, at, strict=True) if f != OUTSIDE
+            (i, r.name, r.at_m, leader_of(leader, (i, int(f))))
+            for r, f in zip(level.rooms, at, strict=True)
+            if f != OUTSIDE
         ]
     if not rooms:
         return
     ends = [face for *_, face in rooms]
     home = max(ends, key=ends.count)
     if plan.start is not None:
-        at = faces[plan.start.level].at(np.array([[plan.start.x_m, plan.start.y_m]]))
-        home = lead(leader, (plan.start.level, int(at[0])))
+        at = faces[plan.start.level].indices_of(np.array([[plan.start.x_m, plan.start.y_m]]))
+        home = leader_of(leader, (plan.start.level, int(at[0])))
     for i, name, at_m, face in rooms:
         if face != home:
             yield PlanFinding("unreachable", i, at_m, f"room {name!r} cannot be reached by doors, stairs or lifts")
 
 
-def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
-    """Stairs and lifts outside the building; levels that none of them reaches."""
+def _connectors(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
+    """Stairs, lifts and ramps that are outside the building or without access; levels without any of them."""
     for connector in plan.connectors:
         area = shapely.Polygon(connector.outline_m)
         middle = area.representative_point() if area.is_valid else shapely.Point(connector.outline_m.mean(axis=0))
@@ -179,7 +197,7 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
                 "way", connector.levels[0], at, f"{connector.kind} {connector.name!r}: its outline crosses itself"
             )
         for i in connector.levels:
-            if faces[i].at(np.array([at]))[0] == OUTSIDE:
+            if faces[i].indices_of(np.array([at]))[0] == OUTSIDE:
                 yield PlanFinding("way", i, at, f"{connector.kind} {connector.name!r} {NOT_ENCLOSED}")
             elif _sealed(shapely.make_valid(area), plan.levels[i], faces[i]):
                 yield PlanFinding(
@@ -194,8 +212,8 @@ def _ways(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
 
 
 def _sealed(area: BaseGeometry, level: Level, faces: Faces) -> bool:
-    """Whether walls close stairs or a lift off from all that is about them."""
-    held = shared(area, faces)
+    """Whether stairs or a lift fill an enclosed space that has no door and no free area beside them."""
+    held = faces_under(area, faces)
     if OUTSIDE in held or held[1:]:
         return False
     room = faces.areas[held[0]]
@@ -204,7 +222,7 @@ def _sealed(area: BaseGeometry, level: Level, faces: Faces) -> bool:
 
 
 def _beside(a: Floats, b: Floats) -> Bools:
-    """Which pairs run beside each other: the faces of a wall whose end is left open."""
+    """Which pairs (n,) of walls are parallel but not on one line, as the two faces of a wall whose end is open."""
     u, v = a[:, 2:] - a[:, :2], b[:, 2:] - b[:, :2]
     lengths = np.hypot(*u.T) * np.hypot(*v.T)
     parallel = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) < PARALLEL * lengths
@@ -214,7 +232,7 @@ def _beside(a: Floats, b: Floats) -> Bools:
 
 
 def _shared_m(a: Floats, b: Floats) -> Floats:
-    """How long the stretch is that two walls share; nought when they are not on one line."""
+    """Length of the overlap of pairs of walls (n, 4); 0 for pairs that are not on one line."""
     u = a[:, 2:] - a[:, :2]
     length = np.hypot(*u.T)
     u = u / length[:, None]

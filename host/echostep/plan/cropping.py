@@ -1,6 +1,6 @@
-"""The walls of a part of a level, for pictures and pages that show a city by tiles.
+"""Cropping: the walls that lie in a rectangle, and the rectangle around walls.
 
-In: segments (n, 4), a rectangle. Out: those that may be seen in it. Owns nothing.
+In: segments (n, 4), a rectangle. Out: segments, or a rectangle. Owns nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
 
 
 def within(segments: Floats, bounds: Bounds, least_m: float = 0.0) -> Floats:
-    """Segments whose own rectangle touches this one, without those shorter than `least_m` both ways (less than a pixel). 10 ms for a million."""
+    """Segments whose bounding box touches the rectangle; not those shorter than `least_m` in x and in y (less than a pixel).
+
+    Takes 10 ms for a million segments.
+    """
     x0, y0, x1, y1 = bounds
     ax, ay, bx, by = segments.T
     seen = (
@@ -28,7 +31,7 @@ def within(segments: Floats, bounds: Bounds, least_m: float = 0.0) -> Floats:
 
 
 def extent(segments: Floats) -> Bounds:
-    """The rectangle about all segments; 10 m by 10 m when there is none."""
+    """The bounding box of all segments; 10 m by 10 m when there are none."""
     if not len(segments):
         return 0.0, 0.0, 10.0, 10.0
     x0, y0 = segments.reshape(-1, 2).min(axis=0)

@@ -1,6 +1,6 @@
-"""Pictures of plans, PNG or SVG: rooms, walls, windows, doors, ways between levels, and what the check has found.
+"""Pictures of plans, PNG or SVG: rooms, walls, windows, doors, stairs and lifts, and the findings of the check.
 
-In: a `Plan`, a place to look at, findings. Out: a file. Owns the colours.
+In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
 """
 
 from __future__ import annotations
@@ -15,28 +15,24 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent, within
-from echostep.plan.model import Level, Plan, Room
+from echostep.plan.model import Connector, Level, Plan, Pose, Room
 
 if TYPE_CHECKING:
     from echostep.plan.check import PlanFinding
 
-WALL, WINDOW, DOOR, ROOM, WAY, OBSTACLE, WRONG = (
-    "#333333",
-    "#56b4e9",
-    "#d55e00",
-    "#f3efe6",
-    "#009e73",
-    "#bbbbbb",
-    "#d0021b",
-)
-WIDTH_PX = 1500  # of a picture; a level has 900 at least
-MANY = 20_000  # more lines than these are drawn as pixels
-MOST_NAMES = 500  # of rooms in one picture, after which none could be read
+WALL, WINDOW, DOOR, OBSTACLE = "#333333", "#56b4e9", "#d55e00", "#bbbbbb"
+ROOM, ROOM_NAME = "#f3efe6", "#555555"
+WAY, WAY_NAME = "#009e73", "#00553e"  # stairs, lifts and ramps
+WRONG = "#d0021b"
+WIDTH_PX = 1500  # least width of a picture
+LEVEL_WIDTH_PX = 900  # least width of a level
+MANY = 20_000  # with more lines than these, pixels are drawn instead of lines
+MOST_NAMES = 500  # names of rooms on one level; with more of them none is drawn, because they cannot be read
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A part of the map on paper: how many points (1/72 inch) a metre has, how many metres a pixel."""
+    """A rectangle of the map on paper. `points_m`: points (1/72 inch) per metre; `pixel_m`: metres per pixel."""
 
     bounds: Bounds
     points_m: float
@@ -46,14 +42,14 @@ class View:
 def draw_plan(
     plan: Plan, path: Path, levels: Sequence[int], bounds: Bounds | None = None, findings: Sequence[PlanFinding] = ()
 ) -> None:
-    """The levels side by side, or what lies within the bounds; raises EchostepError when the file cannot be written."""
+    """Draw levels side by side, all of them or the part within the bounds; raises EchostepError when the file cannot be written."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     if path.suffix.casefold() not in (".png", ".svg"):
-        raise EchostepError(f"{path}: pictures are .png or .svg")
+        raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
     columns = math.ceil(math.sqrt(len(levels)))
-    wide_px = max(WIDTH_PX, 900 * columns)
+    wide_px = max(WIDTH_PX, LEVEL_WIDTH_PX * columns)
     rows = math.ceil(len(levels) / columns)
     x0, y0, x1, y1 = bounds or _about([plan.levels[i] for i in levels])
     shape = min(max((y1 - y0) / (x1 - x0), 0.3), 2.5)
@@ -75,7 +71,7 @@ def draw_plan(
 
 
 def _about(levels: Sequence[Level]) -> Bounds:
-    """All of these levels with a margin."""
+    """The rectangle around these levels, with a margin."""
     boxes = np.array([extent(level.solid) for level in levels])
     x0, y0 = boxes[:, :2].min(axis=0)
     x1, y1 = boxes[:, 2:].max(axis=0)
@@ -83,60 +79,61 @@ def _about(levels: Sequence[Level]) -> Bounds:
     return x0 - edge, y0 - edge, x1 + edge, y1 + edge
 
 
-def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[PlanFinding]) -> None:
-    from matplotlib.collections import PolyCollection
-
-    x0, y0, x1, y1 = view.bounds
-    level = plan.levels[i]
-    outlines = [room.outline_m for room in level.rooms if room.outline_m is not None]
-    ways = [connector for connector in plan.connectors if i in connector.levels]
-    axes.add_collection(PolyCollection(outlines, facecolors=ROOM, edgecolors="none", zorder=0))
-    axes.add_collection(
-        PolyCollection([way.outline_m for way in ways], facecolors=WAY, alpha=0.3, edgecolors="none", zorder=1)
-    )
-    axes.add_collection(
-        PolyCollection(list(level.obstacles), facecolors=OBSTACLE, edgecolors=WALL, linewidths=0.5, zorder=1)
-    )
+def _draw_level(axes: Any, plan: Plan, level_index: int, view: View, findings: Sequence[PlanFinding]) -> None:
+    """One level with its findings, from the lowest layer to the highest."""
+    level = plan.levels[level_index]
+    connectors = [connector for connector in plan.connectors if level_index in connector.levels]
+    _draw_areas(axes, level, connectors)
     _lines(axes, level.walls, view, WALL, 0.9)
     _lines(axes, level.windows, view, WINDOW, 0.9)
     _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
-    for way in ways:
-        axes.text(
-            *way.outline_m.mean(axis=0),
-            shown(way.name),
-            parse_math=False,
-            size=6,
-            ha="center",
-            va="center",
-            color="#00553e",
-            clip_on=True,
-            zorder=5,
-        )
-    named = [room for room in level.rooms if x0 <= room.at_m[0] <= x1 and y0 <= room.at_m[1] <= y1]
-    for room in named if len(named) <= MOST_NAMES else ():
-        size = _letter_pt(room, view.points_m)
-        axes.text(
-            *room.at_m,
-            shown(room.name),
-            parse_math=False,
-            size=size,
-            ha="center",
-            va="center",
-            color="#555555",
-            clip_on=True,
-            zorder=5,
-        )
-    if plan.start is not None and plan.start.level == i:
-        axes.plot(
-            plan.start.x_m,
-            plan.start.y_m,
-            marker=(3, 0, math.degrees(plan.start.heading_rad) - 90),
-            color=WAY,
-            markersize=9,
-            zorder=6,
-        )
+    _draw_names(axes, level, connectors, view)
+    if plan.start is not None and plan.start.level == level_index:
+        _draw_start(axes, plan.start)
     for finding in findings:
         _mark(axes, finding)
+    _draw_frame(axes, level, view)
+
+
+def _draw_areas(axes: Any, level: Level, connectors: Sequence[Connector]) -> None:
+    """Rooms, then stairs, lifts and ramps, then obstacles, as filled outlines."""
+    from matplotlib.collections import PolyCollection
+
+    rooms = [room.outline_m for room in level.rooms if room.outline_m is not None]
+    ways = [connector.outline_m for connector in connectors]
+    axes.add_collection(PolyCollection(rooms, facecolors=ROOM, edgecolors="none", zorder=0))
+    axes.add_collection(PolyCollection(ways, facecolors=WAY, alpha=0.3, edgecolors="none", zorder=1))
+    obstacles = PolyCollection(list(level.obstacles), facecolors=OBSTACLE, edgecolors=WALL, linewidths=0.5, zorder=1)
+    axes.add_collection(obstacles)
+
+
+def _draw_names(axes: Any, level: Level, connectors: Sequence[Connector], view: View) -> None:
+    """Names of connectors, and of the rooms in view unless there are too many to read."""
+    x0, y0, x1, y1 = view.bounds
+    for connector in connectors:
+        x_m, y_m = connector.outline_m.mean(axis=0)
+        _draw_name(axes, (x_m, y_m), connector.name, 6, WAY_NAME)
+    rooms = [room for room in level.rooms if x0 <= room.at_m[0] <= x1 and y0 <= room.at_m[1] <= y1]
+    for room in rooms if len(rooms) <= MOST_NAMES else ():
+        _draw_name(axes, room.at_m, room.name, _font_size_pt(room, view.points_m), ROOM_NAME)
+
+
+def _draw_name(axes: Any, position_m: tuple[float, float], name: str, size_pt: float, colour: str) -> None:
+    axes.text(
+        *position_m, shown(name), parse_math=False, size=size_pt, ha="center", va="center", color=colour,
+        clip_on=True, zorder=5,
+    )  # fmt: skip
+
+
+def _draw_start(axes: Any, start: Pose) -> None:
+    """A triangle at the start that points along its heading."""
+    marker = (3, 0, math.degrees(start.heading_rad) - 90)
+    axes.plot(start.x_m, start.y_m, marker=marker, color=WAY, markersize=9, zorder=6)
+
+
+def _draw_frame(axes: Any, level: Level, view: View) -> None:
+    """Limits, title and ticks."""
+    x0, y0, x1, y1 = view.bounds
     axes.set_xlim(x0, x1)
     axes.set_ylim(y0, y1)
     axes.set_title(shown(f"{level.name}, {level.height_m:g} m"), size=9, parse_math=False)
@@ -146,12 +143,12 @@ def _draw_level(axes: Any, plan: Plan, i: int, view: View, findings: Sequence[Pl
 
 
 def shown(name: str) -> str:
-    """A name in a picture: one line, without what is not printed, not too long."""
+    """A name as it is drawn: unprintable characters become spaces, and only the first 80 characters are kept."""
     return "".join(letter if letter.isprintable() else " " for letter in name)[:80]
 
 
-def _letter_pt(room: Room, points_m: float) -> float:
-    """Letters that let the name fit between the room's walls, where that can be read."""
+def _font_size_pt(room: Room, points_m: float) -> float:
+    """Font size with which a room's name fits into its outline, between 3 and 8 points; 6 points without an outline."""
     if room.outline_m is None:
         return 6.0
     x, y = room.outline_m.T
@@ -177,7 +174,7 @@ def _lines(axes: Any, segments: Any, view: View, colour: str, width: float) -> N
 
 
 def _pixels(segments: Any, view: View) -> Any:
-    """Which pixels have a wall: points along every segment, a pixel apart."""
+    """Boolean image (rows, columns) of the pixels that segments (n, 4) pass through: points along each segment, one pixel apart."""
     x0, y0, x1, y1 = view.bounds
     width, height = (max(1, math.ceil((high - low) / view.pixel_m)) for low, high in ((x0, x1), (y0, y1)))
     image = np.zeros((height, width), dtype=bool)
@@ -196,15 +193,21 @@ def _pixels(segments: Any, view: View) -> Any:
 
 
 def _mark(axes: Any, finding: PlanFinding) -> None:
-    """A ring about the place, and the wrong lines themselves."""
+    """A numbered ring at the finding's position, and the lines that are wrong."""
     for x0, y0, x1, y1 in finding.lines_m:
         axes.plot((x0, x1), (y0, y1), color=WRONG, linewidth=2.0, alpha=0.6, zorder=7)
     axes.plot(
-        *finding.at_m, "o", markersize=11, markerfacecolor="none", markeredgecolor=WRONG, markeredgewidth=1.2, zorder=8
+        *finding.position_m,
+        "o",
+        markersize=11,
+        markerfacecolor="none",
+        markeredgecolor=WRONG,
+        markeredgewidth=1.2,
+        zorder=8,
     )
     axes.annotate(
         str(finding.number),
-        finding.at_m,
+        finding.position_m,
         (5, 5),
         textcoords="offset points",
         size=7,

@@ -1,6 +1,6 @@
-"""The spaces between the walls of a level, and which of them doors and stairs join.
+"""Faces: the enclosed spaces of a level, and which of them doors and stairs connect.
 
-In: a `Plan`. Out: `Faces` of each level, and groups of faces that one can walk between. Owns nothing.
+In: a `Plan`. Out: `Faces` of each level, and groups of connected faces. Owns nothing.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ from shapely.geometry.base import BaseGeometry
 from echostep.arrays import Floats
 from echostep.plan.model import Door, Level, Plan
 
-TOUCH_M = 0.01  # walls so near to each other meet
-JAMB_M = 0.1  # a door's end is so near to a wall
-BESIDE_M = 0.1  # in front of a door
-SMALLEST_M2 = 0.02
+# By reason:
+TOUCH_M = 0.01  # walls with a smaller distance touch
+JAMB_M = 0.1  # greatest distance of a door's end from its wall
+BESIDE_M = 0.1  # distance from a door at which the faces on its two sides are looked up
+SMALLEST_M2 = 0.02  # smaller faces are slivers
 OUTSIDE = -1
-Face = tuple[int, int]  # level, number of the face (OUTSIDE for none)
+Face = tuple[int, int]  # index of the level, index of the face (or OUTSIDE)
 
 
 @dataclass(frozen=True, slots=True)
 class Faces:
-    """The enclosed spaces of a level; doors are taken as closed."""
+    """The enclosed spaces of a level with all doors closed: polygons (n,) and an index of them."""
 
     areas: NDArray[np.object_]
     tree: shapely.STRtree
 
-    def at(self, points: Floats) -> NDArray[np.intp]:
-        """(n, 2) metres -> the face that each lies in, OUTSIDE when in none."""
+    def indices_of(self, points: Floats) -> NDArray[np.intp]:
+        """Points (n, 2) in metres -> (n,) index of the face around each, OUTSIDE where there is none."""
         found = np.full(len(points), OUTSIDE, dtype=np.intp)
         which, face = (
             self.tree.query(shapely.points(points), predicate="intersects")
@@ -44,39 +45,39 @@ class Faces:
         return found
 
 
-def faces_of(level: Level) -> Faces:
-    """Cut the level at its walls, windows, obstacles and doors."""
+def find_faces(level: Level) -> Faces:
+    """The faces between the walls, windows, obstacles and doors of a level."""
     doors = np.array([door.line for door in level.doors]).reshape(-1, 4)
-    lines = np.concatenate((longer(level.solid, TOUCH_M), longer(doors, JAMB_M)))
+    lines = np.concatenate((extend(level.solid, TOUCH_M), extend(doors, JAMB_M)))
     noded = shapely.union_all(shapely.linestrings(lines.reshape(-1, 2, 2))) if len(lines) else shapely.MultiLineString()
     areas = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     areas = areas[shapely.area(areas) > SMALLEST_M2]
     return Faces(areas, shapely.STRtree(areas))
 
 
-def longer(segments: Floats, by_m: float) -> Floats:
-    """Segments with both ends pulled out."""
+def extend(segments: Floats, by_m: float) -> Floats:
+    """Segments (n, 4), each made longer by `by_m` at both ends."""
     along = segments[:, 2:] - segments[:, :2]
     along = along / np.hypot(*along.T)[:, None] * by_m
     return np.concatenate((segments[:, :2] - along, segments[:, 2:] + along), axis=1)
 
 
-def groups(plan: Plan, faces: Sequence[Faces]) -> dict[Face, Face]:
-    """For each face that a door or a way touches, the face that stands for all those that one can walk to from it."""
+def connected_groups(plan: Plan, faces: Sequence[Faces]) -> dict[Face, Face]:
+    """For each face with a door or a connector: the representative of its connected group (union-find)."""
     leader: dict[Face, Face] = {}
     for i, level in enumerate(plan.levels):
-        for a, b in both_sides(level.doors, faces[i]):
+        for a, b in _door_faces(level.doors, faces[i]):
             _join(leader, (i, a), (i, b))
     for connector in plan.connectors:
         area = shapely.make_valid(shapely.Polygon(connector.outline_m))
-        touched = [(i, face) for i in connector.levels for face in shared(area, faces[i])]
+        touched = [(i, face) for i in connector.levels for face in faces_under(area, faces[i])]
         for face in touched[1:]:
             _join(leader, touched[0], face)
-    return {face: lead(leader, face) for face in list(leader)}
+    return {face: leader_of(leader, face) for face in list(leader)}
 
 
-def lead(leader: dict[Face, Face], face: Face) -> Face:
-    """The face that stands for its group."""
+def leader_of(leader: dict[Face, Face], face: Face) -> Face:
+    """The representative of a face's group; shortens the chain on the way."""
     while leader.get(face, face) != face:
         leader[face] = leader.get(leader[face], leader[face])
         face = leader[face]
@@ -84,28 +85,29 @@ def lead(leader: dict[Face, Face], face: Face) -> Face:
 
 
 def _join(leader: dict[Face, Face], one: Face, other: Face) -> None:
-    a, b = lead(leader, one), lead(leader, other)
+    a, b = leader_of(leader, one), leader_of(leader, other)
     leader.setdefault(a, a)
     leader.setdefault(b, b)
     leader[a] = b
 
 
-def both_sides(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
-    """The faces in front of and behind each door."""
+def _door_faces(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
+    """The two faces that each door separates."""
     sides = np.array([_beside(door) for door in doors]).reshape(-1, 2)
-    found = faces.at(sides).reshape(-1, 2)
+    found = faces.indices_of(sides).reshape(-1, 2)
     return [(int(a), int(b)) for a, b in found]
 
 
 def _beside(door: Door) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The points `BESIDE_M` from a door's middle, on its two sides."""
     x0, y0, x1, y1 = door.line
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     u, v = BESIDE_M * (y1 - y0) / math.dist((x0, y0), (x1, y1)), BESIDE_M * (x0 - x1) / math.dist((x0, y0), (x1, y1))
     return (x + u, y + v), (x - u, y - v)
 
 
-def shared(area: BaseGeometry, faces: Faces) -> list[int]:
-    """The faces that hold a tenth of a way's area or more; OUTSIDE when there is none."""
+def faces_under(area: BaseGeometry, faces: Faces) -> list[int]:
+    """The faces that contain more than a tenth of a connector's area; OUTSIDE when there is none."""
     near = faces.tree.query(area)
     held = [int(i) for i in near if faces.areas[i].intersection(area).area > 0.1 * area.area]
     return held or [OUTSIDE]

@@ -1,6 +1,7 @@
-"""Checks on the fields of a JSON tree that somebody else wrote.
+"""Checks of fields in untrusted JSON.
 
-In: a value and the name of its place, `levels[0].doors[2].line`. Out: the value in its type, or a ValueError that names the place. Owns nothing.
+In: a value and its path in the file, as `levels[0].doors[2].line`. Out: the value with its type, or a ValueError that begins with the path.
+Owns nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-LIMIT_M = 1e5
+LIMIT_M = 1e5  # greatest coordinate. By reason: 100 km, more than any site
 
 
 def number(value: Any, where: str, limit: float = LIMIT_M, unit: str = "m") -> float:
@@ -24,7 +25,7 @@ def number(value: Any, where: str, limit: float = LIMIT_M, unit: str = "m") -> f
 
 
 def text(value: Any, where: str) -> str:
-    """A text."""
+    """A string that can be written as UTF-8."""
     if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
         raise ValueError(f"{where}: {_short(value)} is not a text")
     return value
@@ -38,7 +39,7 @@ def choice(value: Any, where: str, words: Sequence[str]) -> str:
 
 
 def typed(value: Any, where: str, kind: type) -> Any:
-    """A list, or an object (dict)."""
+    """A value of type `kind`: list, or dict (an object)."""
     if not isinstance(value, kind):
         raise ValueError(f"{where}: expected {'a list' if kind is list else 'an object'}, found {type(value).__name__}")
     return value
@@ -52,24 +53,24 @@ def point(value: Any, where: str) -> tuple[float, float]:
 
 
 def outline(value: Any, where: str) -> Floats:
-    """At least three corners; (n, 2) float64, the first is not repeated at the end."""
+    """An outline of at least three corners -> (n, 2) float64; a repeated first corner at the end is removed."""
     corners = [point(row, f"{where}[{i}]") for i, row in enumerate(typed(value, where, list))]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()
     if len(set(corners)) < 3:
-        raise ValueError(f"{where}: an outline needs three corners")
+        raise ValueError(f"{where}: an outline needs at least three different corners")
     return np.array(corners, dtype=np.float64)
 
 
 def segments(rows: Any, where: str) -> Floats:
-    """Lists of x0 y0 x1 y1 -> (n, 4) float64, none without length."""
+    """Lists [x0, y0, x1, y1] -> (n, 4) float64; each segment must have a length."""
     rows = typed(rows, where, list)
-    sound = _sound(rows)
-    return _checked(rows, where) if sound is None else sound
+    valid = _all_valid(rows)
+    return _checked(rows, where) if valid is None else valid
 
 
-def _sound(rows: list[Any]) -> Floats | None:
-    """All segments at once if nothing is wrong with any; a city has a million walls."""
+def _all_valid(rows: list[Any]) -> Floats | None:
+    """All segments when all are valid, else None. Checks them at once, because a plan of a city has a million walls."""
     if set(map(type, rows)) != {list} or set(map(len, rows)) != {4}:
         return None
     if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
@@ -83,7 +84,7 @@ def _sound(rows: list[Any]) -> Floats | None:
 
 
 def _checked(rows: list[Any], where: str) -> Floats:
-    """One segment after the other, to name the one that is wrong."""
+    """Check one segment after the other, so that the error names the invalid one."""
     for i, row in enumerate(rows):
         segment(row, f"{where}[{i}]")
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
@@ -95,12 +96,12 @@ def segment(row: Any, where: str) -> tuple[float, float, float, float]:
         raise ValueError(f"{where}: expected [x0, y0, x1, y1] in metres")
     x0, y0, x1, y1 = (number(value, where) for value in row)
     if (x0, y0) == (x1, y1):
-        raise ValueError(f"{where}: a wall without length")
+        raise ValueError(f"{where}: a wall without length: both ends are the same point")
     return x0, y0, x1, y1
 
 
 def _short(value: Any) -> str:
-    """The value as it is shown in one line."""
+    """The value as shown in an error, at most 60 characters."""
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 1000:
         return "a huge number"
     shown = repr(value)

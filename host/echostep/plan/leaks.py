@@ -1,6 +1,7 @@
-"""The narrowest way out of a room that should be enclosed.
+"""The narrowest opening of a room that should be enclosed.
 
-In: the walls and doors about a place. Out: where it is and about how wide. Found by making the walls thicker until the room closes.
+In: walls and doors around a point. Out: position and width of the opening. The walls are made thicker until the room is closed; the width is found by
+bisection.
 """
 
 from __future__ import annotations
@@ -12,19 +13,19 @@ from shapely.geometry.base import BaseGeometry
 from echostep.arrays import Floats
 from echostep.plan.cropping import within
 
-REACH_M = 20.0
+REACH_M = 20.0  # half the side of the square that is searched
 WIDTHS_M = (0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 
 
-def leak(segments: Floats, at_m: tuple[float, float]) -> tuple[float, float, float] | None:
-    """X and y of the narrowest way out, and its width at most, in metres; None when it is wider than 6 m, or the room than 20 m."""
+def narrowest_opening(segments: Floats, at_m: tuple[float, float]) -> tuple[float, float, float] | None:
+    """x, y and an upper bound of the width of the narrowest opening, in metres; None when it is wider than 6 m or further than 20 m."""
     x, y = at_m
     window = shapely.box(x - REACH_M, y - REACH_M, x + REACH_M, y + REACH_M)
     walls = shapely.union_all(shapely.linestrings(within(segments, window.bounds).reshape(-1, 2, 2)))
     if walls.is_empty or walls.distance(Point(at_m)) < WIDTHS_M[0]:
         return None
     low, high, found = 0, len(WIDTHS_M) - 1, None
-    while low <= high:  # the narrowest width that closes it, by halving
+    while low <= high:  # bisection for the smallest thickness that closes the room
         middle = (low + high) // 2
         free = _free(window, walls, at_m, WIDTHS_M[middle])
         if free is not None and free[0].intersects(window.boundary):
@@ -34,14 +35,16 @@ def leak(segments: Floats, at_m: tuple[float, float]) -> tuple[float, float, flo
             found = (free, WIDTHS_M[middle])
     if found is None or found[0] is None:
         return None
-    way = shapely.shortest_line(*found[0])  # shorter where an opening has closed than through a wall
-    return None if way.intersects(walls) else (float(way.centroid.x), float(way.centroid.y), found[1])
+    across = shapely.shortest_line(
+        *found[0]
+    )  # from the room to the outside: through the opening that the thickness has closed
+    return None if across.intersects(walls) else (float(across.centroid.x), float(across.centroid.y), found[1])
 
 
 def _free(
     window: Polygon, walls: BaseGeometry, at_m: tuple[float, float], width_m: float
 ) -> tuple[Polygon, BaseGeometry] | None:
-    """The piece of free space with the place, and all pieces that reach the window's edge; None when walls so thick bury the place."""
+    """Free space with walls `width_m` thick: the part around the point, and all parts at the window's edge; None when the point is covered."""
     thick = shapely.union_all(shapely.buffer(shapely.get_parts(walls), width_m / 2, quad_segs=4))
     parts = shapely.get_parts(window.difference(thick))
     inside = parts[shapely.intersects(parts, Point(at_m))]

@@ -1,4 +1,4 @@
-"""The building's plan: a JSON file in metres -> levels with walls, doors, windows, obstacles and rooms, and the ways between levels.
+"""The building's plan: a JSON file in metres -> levels with walls, doors, windows, obstacles and rooms, and connectors between levels.
 
 In: plan.json (format in host/README.md). Out: `Plan`. Owns nothing; every error names the file and the field.
 """
@@ -29,7 +29,7 @@ def _no_segments() -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """A name at a place, for people; its outline (n, 2) where the plan knows it."""
+    """A room's name and its position; its outline (n, 2) in metres, None where the plan has none."""
 
     name: str
     at_m: tuple[float, float]
@@ -38,7 +38,7 @@ class Room:
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """A gap in the walls, from one jamb to the other (x0, y0, x1, y1 in metres)."""
+    """A gap in the walls; `line`: x0, y0, x1, y1 in metres, from one jamb to the other."""
 
     line: tuple[float, float, float, float]
     state: DoorState = "unknown"
@@ -46,14 +46,14 @@ class Door:
 
     @property
     def width_m(self) -> float:
-        """From jamb to jamb."""
+        """Distance between the jambs."""
         x0, y0, x1, y1 = self.line
         return math.hypot(x1 - x0, y1 - y0)
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One storey: `walls` (n, 4) and `windows` (k, 4) are x0 y0 x1 y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2)."""
+    """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2)."""
 
     name: str
     height_m: float
@@ -65,7 +65,7 @@ class Level:
 
     @property
     def solid(self) -> Floats:
-        """All that stops people and echoes, (n + k + ..., 4): walls, then windows, then the sides of obstacles."""
+        """All segments that block people and echoes, (n + k + ..., 4): walls, then windows, then the sides of obstacles."""
         if not len(self.windows) and not self.obstacles:
             return self.walls
         return np.concatenate((self.walls, self.windows, *(sides(corners) for corners in self.obstacles)))
@@ -73,7 +73,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """Where people change levels: the same outline (n, 2) on all its levels (indices into Plan.levels, ascending)."""
+    """Stairs, a lift or a ramp: the same outline (n, 2) on all its levels (indices into Plan.levels, ascending)."""
 
     kind: ConnectorKind
     name: str
@@ -83,7 +83,7 @@ class Connector:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A place and a heading on the map: metres, radians counter-clockwise from x (east); `level` is an index into Plan.levels."""
+    """Position in metres and heading in radians, counter-clockwise from the map's x axis; `level` is an index into Plan.levels."""
 
     x_m: float
     y_m: float
@@ -93,7 +93,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Georeference:
-    """Where the map's origin lies on Earth; the map's x axis points `rotation_rad` counter-clockwise from east."""
+    """Position of the map's origin on the Earth; the map's x axis points `rotation_rad` counter-clockwise from east."""
 
     longitude_deg: float
     latitude_deg: float
@@ -103,7 +103,7 @@ class Georeference:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A building; `digest` identifies the file's content, `uncertainty_m` is the standard deviation of its walls where known."""
+    """A building. `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None where unknown."""
 
     name: str
     levels: tuple[Level, ...]
@@ -120,7 +120,7 @@ def sides(corners: Floats) -> Floats:
 
 
 def load_plan(path: Path | str) -> Plan:
-    """The plan in a file; raises EchostepError that names the file and the field."""
+    """Read a plan file; raises EchostepError that names the file and the field."""
     path = Path(path)
     try:
         raw = path.read_bytes()
@@ -133,7 +133,7 @@ def load_plan(path: Path | str) -> Plan:
 
 
 def parse_plan(raw: bytes) -> Plan:
-    """The plan in the bytes of a file; raises ValueError that names the field."""
+    """Parse the bytes of a plan file; raises ValueError that names the field."""
     try:
         tree = json.loads(raw)
     except (ValueError, RecursionError) as error:
@@ -197,9 +197,10 @@ def _door(row: Any, where: str) -> Door:
 
 def _connector(row: Any, where: str, names: list[str]) -> Connector:
     row = typed(row, where, dict)
-    levels = sorted({_index(at, f"{where}.levels", names) for at in typed(row.get("levels"), f"{where}.levels", list)})
+    references = typed(row.get("levels"), f"{where}.levels", list)
+    levels = sorted({_level_index(reference, f"{where}.levels", names) for reference in references})
     if len(levels) < 2:
-        raise ValueError(f"{where}.levels: a connector needs two levels")
+        raise ValueError(f"{where}.levels: a connector needs two levels or more")
     return Connector(
         cast(ConnectorKind, choice(row.get("kind"), f"{where}.kind", get_args(ConnectorKind))),
         text(row.get("name", ""), f"{where}.name"),
@@ -208,8 +209,8 @@ def _connector(row: Any, where: str, names: list[str]) -> Connector:
     )
 
 
-def _index(value: Any, where: str, names: list[str]) -> int:
-    """The index of a level that is given by its name or its index."""
+def _level_index(value: Any, where: str, names: list[str]) -> int:
+    """The index of a level that the file gives by its name or its index."""
     if isinstance(value, str):
         if names.count(value) != 1:
             raise ValueError(f"{where}: {'two levels are' if value in names else 'no level is'} named {value[:40]!r}")
@@ -222,7 +223,7 @@ def _index(value: Any, where: str, names: list[str]) -> int:
 def _start(row: Any, names: list[str]) -> Pose:
     row = typed(row, "start", dict)
     x, y, heading = (number(row.get(key), f"start.{key}") for key in ("x", "y", "heading_deg"))
-    return Pose(x, y, math.radians(heading), _index(row.get("level", 0), "start.level", names))
+    return Pose(x, y, math.radians(heading), _level_index(row.get("level", 0), "start.level", names))
 
 
 def _georeference(row: Any) -> Georeference:
@@ -239,6 +240,6 @@ def _georeference(row: Any) -> Georeference:
 
 
 def _uncertainty(value: Any) -> float:
-    if (found := number(value, "uncertainty_m")) < 0.0:
-        raise ValueError(f"uncertainty_m: {found} is negative")
-    return found
+    if (sd_m := number(value, "uncertainty_m")) < 0.0:
+        raise ValueError(f"uncertainty_m: {sd_m} is negative")
+    return sd_m

@@ -1,6 +1,6 @@
-"""Ways as polylines (k, 2) in metres: how long, what lies so far along, what is nearest.
+"""Polylines (k, 2) in metres: length, the point at a distance along them, the nearest point.
 
-Kernels for the guidance, the routes and the simulation. Owns nothing.
+In: polylines, points. Out: lengths, points, distances. Used by guidance, routing and simulation. Owns nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def way_m(line: Floats) -> float:
 
 @kernel
 def along(line: Floats, s_m: float) -> tuple[float, float, float]:
-    """Place (m) and heading (rad) on a polyline (k, 2), `s_m` from its beginning; its ends are held."""
+    """x, y (m) and heading (rad) at the distance `s_m` along a polyline (k, 2); beyond its ends: at the end."""
     rest = max(s_m, 0.0)
     x, y, heading = line[0, 0], line[0, 1], 0.0
     for k in range(len(line) - 1):
@@ -38,7 +38,10 @@ def along(line: Floats, s_m: float) -> tuple[float, float, float]:
 
 @kernel
 def nearest(line: Floats, x: float, y: float, from_m: float, to_m: float) -> tuple[float, float]:
-    """How far along a polyline (k, 2) the point nearest to (x, y) is, and its distance; only points between `from_m` and `to_m` along it count."""
+    """Distance along a polyline (k, 2) of the point nearest to (x, y), and that point's distance from (x, y).
+
+    Only points between the distances `from_m` and `to_m` along the polyline count.
+    """
     best_s, best = from_m, np.inf
     begin = 0.0
     for k in range(len(line) - 1):

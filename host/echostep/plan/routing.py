@@ -1,7 +1,7 @@
-"""Ways through a building: the shortest that a person can walk, through doors, stairs and lifts.
+"""Routes through a building: the shortest walk through doors, stairs and lifts.
 
-In: a plan, and where from and where to. Out: a `Route`, a line a level. Owns the grids of a plan's levels. Doors are gaps in the walls. The way is
-found on a grid [Dijkstra 1959] and then drawn tight, so that it bends at corners only.
+In: a plan, start and destination. Out: a `Route`: one polyline per level. Owns the grids of a plan's levels. Doors are gaps in the walls.
+The route is found on a grid [Dijkstra 1959] and then straightened, so that it bends only at corners.
 """
 
 from __future__ import annotations
@@ -18,18 +18,19 @@ from echostep.jit import kernel
 from echostep.plan.model import Plan
 from echostep.plan.polyline import way_m
 
-CELL_M = 0.15
-BODY_M = 0.25  # half a person's width: nearer to a wall nobody walks
-MARGIN_M = 1.5
-ASIDE_M = 2.0  # a place that is too near to a wall counts as the nearest free one within this
-MOST_CELLS = 60_000_000
-CLIMB = 3.0  # a metre of stairs costs as much as so many on the level
-LIFT_M = 20.0  # waiting for a lift costs as much as this way
+# By reason, all of them:
+CELL_M = 0.15  # side of a grid cell
+BODY_M = 0.25  # half a person's width: shortest distance of a route from a wall
+MARGIN_M = 1.5  # of the grid around the walls
+ASIDE_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
+MOST_CELLS = 60_000_000  # on all levels together
+CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
+LIFT_M = 20.0  # cost of waiting for a lift, in metres of level walk
 
 
 @dataclass(frozen=True, slots=True)
 class RoutePlace:
-    """A place in the map on a level (an index into the plan's)."""
+    """A position in the map on a level (an index into the plan's levels)."""
 
     x_m: float
     y_m: float
@@ -38,7 +39,7 @@ class RoutePlace:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """The part of a way on one level: `line_m` (k, 2); at its end `by` (name or kind of stairs, lift or ramp) goes on to the next stretch."""
+    """The part of a route on one level: `line_m` (k, 2). `by`: name or kind of the connector to the next stretch, empty at the destination."""
 
     level: int
     line_m: Floats
@@ -47,21 +48,21 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A way from place to place."""
+    """A route from start to destination."""
 
     stretches: tuple[Stretch, ...]
 
     @property
     def length_m(self) -> float:
-        """Way on all levels, without climbing."""
+        """Length on all levels, without the heights of stairs and lifts."""
         return sum(way_m(stretch.line_m) for stretch in self.stretches)
 
 
 class Routes:
-    """Ways through one plan."""
+    """Finds routes through one plan."""
 
     def __init__(self, plan: Plan) -> None:
-        """Raises EchostepError for a plan too large for its grid."""
+        """Lay the grids; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
         ends = np.concatenate([level.solid.reshape(-1, 2) for level in plan.levels])
         low = ends.min(0) if len(ends) else np.zeros(2)
         high = ends.max(0) if len(ends) else np.zeros(2)
@@ -69,57 +70,59 @@ class Routes:
         columns, rows = (int(n) for n in np.ceil((high + MARGIN_M - self._low) / CELL_M))
         if columns * rows * len(plan.levels) > MOST_CELLS:
             raise EchostepError(
-                f"plan {plan.name}: too large to find ways in: {columns} x {rows} cells on {len(plan.levels)} levels"
+                f"plan {plan.name}: too large to find routes in: {columns} x {rows} cells on {len(plan.levels)} levels"
             )
         self._plan = plan
         self._blocked = np.zeros((len(plan.levels), rows, columns), np.bool_)
         for k, level in enumerate(plan.levels):
-            _block(
-                (np.asarray(level.solid, np.float64) - np.tile(self._low, 2)) / CELL_M,
-                BODY_M / CELL_M,
-                self._blocked[k],
-            )
+            walls_cells = (np.asarray(level.solid, np.float64) - np.tile(self._low, 2)) / CELL_M
+            _block(walls_cells, BODY_M / CELL_M, self._blocked[k])
+        self._lay_connectors(plan)
+        self._height = np.array([level.height_m for level in plan.levels])
+        self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
+
+    def _lay_connectors(self, plan: Plan) -> None:
+        """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free."""
         self._connector = np.full(self._blocked.shape, -1, np.int64)
         self._serves = np.zeros((len(plan.connectors), len(plan.levels)), np.bool_)
         for c, connector in enumerate(plan.connectors):
             cells = self._inside(connector.outline_m)
-            for storey in connector.levels:
-                self._serves[c, storey] = True
-                self._connector[storey][cells] = c
-                self._blocked[storey][cells] = False
-        self._height = np.array([level.height_m for level in plan.levels])
-        self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
+            for level_index in connector.levels:
+                self._serves[c, level_index] = True
+                self._connector[level_index][cells] = c
+                self._blocked[level_index][cells] = False
 
     def way(self, start: RoutePlace, end: RoutePlace) -> Route:
-        """The shortest way; raises EchostepError when a place is outside the plan or no way leads there."""
+        """The cheapest route; raises EchostepError when a position is outside the plan, or when there is no route."""
         a, b = self._cell(start, "the start"), self._cell(end, "the destination")
         trail = _search(self._blocked, self._connector, self._serves, self._height, self._lift, a, b)
         if not len(trail):
             raise EchostepError(
-                f"no way leads from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
+                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
             )
         return Route(tuple(self._stretches(trail, start, end)))
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
-        found = []
+        """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end."""
+        stretches = []
         cuts = [0, *(np.flatnonzero(np.diff(trail[:, 0])) + 1).tolist(), len(trail)]
         for first, beyond in zip(cuts[:-1], cuts[1:], strict=True):
             part, level = trail[first:beyond], int(trail[first, 0])
             if len(part) == 1 and first > 0 and beyond < len(trail):
-                continue  # a level that the stairs only pass
-            kept = _tight(self._blocked[level], part[:, 1:])
+                continue  # a level that the connector only passes
+            kept = _straighten(self._blocked[level], part[:, 1:])
             line = self._low + (part[kept][:, [2, 1]] + 0.5) * CELL_M
             by = ""
             if beyond < len(trail):
                 connector = self._plan.connectors[int(self._connector[level, part[-1, 1], part[-1, 2]])]
                 by = connector.name or connector.kind
-            found.append(Stretch(level, line, by))
-        found[0].line_m[0] = start.x_m, start.y_m
-        found[-1].line_m[-1] = end.x_m, end.y_m
-        return found
+            stretches.append(Stretch(level, line, by))
+        stretches[0].line_m[0] = start.x_m, start.y_m
+        stretches[-1].line_m[-1] = end.x_m, end.y_m
+        return stretches
 
     def _cell(self, place: RoutePlace, what: str) -> tuple[int, int, int]:
-        """The free cell nearest to a place."""
+        """Level, row and column of the free cell nearest to a position. `what`: its name in errors."""
         levels, rows, columns = self._blocked.shape
         if not (0 <= place.level < levels and math.isfinite(place.x_m) and math.isfinite(place.y_m)):
             raise EchostepError(f"{what} is on level {place.level}, the plan has {levels}, counted from 0")
@@ -139,7 +142,7 @@ class Routes:
         return place.level, int(best[0]), int(best[1])
 
     def _inside(self, outline: Floats) -> Bools:
-        """Cells whose middle lies in an outline (n, 2)."""
+        """Mask (rows, columns) of the cells whose centre lies in an outline (n, 2)."""
         import shapely
 
         _, rows, columns = self._blocked.shape
@@ -150,7 +153,7 @@ class Routes:
 
 @kernel
 def _block(walls: Floats, reach: float, blocked: Bools) -> None:
-    """Mark the cells whose middle is nearer than `reach` to a wall; all in cells."""
+    """Mark the cells whose centre is nearer than `reach` to a wall (n, 4); all lengths in cells."""
     rows, columns = blocked.shape
     for k in range(len(walls)):
         ax, ay, bx, by = walls[k]
@@ -169,7 +172,10 @@ def _search(
     blocked: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
     start: tuple[int, int, int], end: tuple[int, int, int],
 ) -> Ints:  # fmt: skip
-    """The cheapest trail of cells (k, 3): level, row, column; (0, 3) when there is none."""
+    """The cheapest trail of cells (k, 3): level, row, column; (0, 3) when there is none [Dijkstra 1959].
+
+    `connector` (levels, rows, columns): connector of each cell, -1 for none. `serves` (connectors, levels).
+    """
     levels, rows, columns = blocked.shape
     size = rows * columns
     cost = np.full(levels * size, np.inf)
@@ -209,21 +215,21 @@ def _search(
 
 @kernel
 def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints:
-    """The trail to `last`, from what came before each cell; (0, 3) when it was not reached."""
-    count, at = 1, last
-    while at != first and at >= 0:
-        at, count = before[at], count + 1
-    trail = np.empty((count if at == first else 0, 3), np.int64)
-    at = last
+    """The trail to cell `last`, followed back through each cell's predecessor; (0, 3) when it was not reached."""
+    count, cell = 1, last
+    while cell != first and cell >= 0:
+        cell, count = before[cell], count + 1
+    trail = np.empty((count if cell == first else 0, 3), np.int64)
+    cell = last
     for i in range(len(trail) - 1, -1, -1):
-        trail[i] = at // (rows * columns), at % (rows * columns) // columns, at % columns
-        at = before[at]
+        trail[i] = cell // (rows * columns), cell % (rows * columns) // columns, cell % columns
+        cell = before[cell]
     return trail
 
 
 @kernel
-def _tight(blocked: Bools, trail: Ints) -> Ints:
-    """Indices of the cells (k, 2) at which a trail must bend: from each, the furthest one that is in sight."""
+def _straighten(blocked: Bools, trail: Ints) -> Ints:
+    """Indices of the cells (k, 2) at which the straightened trail bends: after each, the furthest visible cell."""
     kept = np.empty(len(trail), np.int64)
     kept[0] = 0
     n, here = 1, 0
@@ -243,7 +249,7 @@ def _tight(blocked: Bools, trail: Ints) -> Ints:
 
 @kernel
 def _sees(blocked: Bools, a: Ints, b: Ints) -> bool:
-    """Whether the straight line between the middles of two cells stays on free ones."""
+    """Whether the straight line between the centres of two cells crosses free cells only."""
     steps = 2 * max(abs(b[0] - a[0]), abs(b[1] - a[1])) + 1
     for k in range(steps + 1):
         s = k / steps

@@ -1,6 +1,6 @@
-"""A plan as plan.json again, so that reading it loses nothing.
+"""Writes a plan as plan.json without loss.
 
-In: a `Plan`. Out: the text or file, one wall a line. Owns nothing.
+In: a `Plan`. Out: the text or the file, with one wall per line. Owns nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from echostep.plan.model import FORMAT_VERSION, Connector, Door, Georeference, L
 
 
 def save_plan(plan: Plan, path: Path | str) -> None:
-    """Write the plan; what `load_plan` reads back differs in the digest alone. Raises EchostepError when the file cannot be written."""
+    """Write a plan; `load_plan` reads back an equal plan with another digest. Raises EchostepError when the file cannot be written."""
     try:
         Path(path).write_text(plan_json(plan), encoding="utf-8")
     except OSError as error:
@@ -87,7 +87,7 @@ def _corners(corners: Floats) -> list[list[float]]:
 
 
 def _degrees(angle_rad: float) -> float:
-    """The shortest number of degrees that reads back to the same bits, where there is one."""
+    """The shortest number of degrees that is read back as the same radians; the nearest one where there is none."""
     angle = math.degrees(angle_rad)
     below, above = math.nextafter(angle, -math.inf), math.nextafter(angle, math.inf)
     tried = [*(round(angle, digits) for digits in range(16)), angle, below, above]
@@ -95,7 +95,7 @@ def _degrees(angle_rad: float) -> float:
 
 
 def _lines(tree: Any, depth: int = 0) -> str:
-    """JSON with one row of a list a line: short to read, quick to write."""
+    """JSON text with one row of a list per line."""
     inner = " " * (depth + 1)
     if isinstance(tree, dict):
         rows = [f"{json.dumps(key)}: {_lines(value, depth + 1)}" for key, value in tree.items()]

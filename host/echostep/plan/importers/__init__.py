@@ -1,4 +1,4 @@
-"""Plans that people have -> plan.json: one module a format, and the geometry that they share.
+"""Importers of drawings and maps of other programs: one module per format, and the geometry that they share.
 
-In: a file or folder of another program, and hints about its unit and layers. Out: `Plan`. Owns nothing; every byte read here is hostile.
+In: a file or folder, and hints about its units and layers. Out: `Plan`. Owns nothing. The files are untrusted: sizes and values are limited.
 """

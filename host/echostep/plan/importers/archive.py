@@ -1,6 +1,6 @@
-"""A folder or a zip file with a few JSON files, read within bounds.
+"""A folder or a zip file with some JSON files, read within limits.
 
-In: a path. Out: texts by name. Owns the limits: a zip may not grow beyond them, whatever its directory says.
+In: a path. Out: texts by file name. Owns the limits; they hold for the unpacked bytes, whatever sizes the zip file states.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ MOST_FILES = 1000
 
 
 class Archive:
-    """Files by their last names; close it, or use it in a with statement."""
+    """Files by the last part of their path. Use it in a with statement."""
 
     def __init__(self, path: Path) -> None:
-        """Open it; raises EchostepError when it is neither a folder nor a zip file."""
+        """Open `path`; raises EchostepError when it is neither a folder nor a zip file."""
         self.path = path
         self._zip: zipfile.ZipFile | None = None
         self._names: dict[str, str] = {}
@@ -33,7 +33,7 @@ class Archive:
             raise EchostepError(f"{path}: not a zip file: {error}") from error
         if len(names) > MOST_FILES:
             self._zip.close()
-            raise EchostepError(f"{path}: {len(names)} files in it; expected {MOST_FILES} at most")
+            raise EchostepError(f"{path}: the zip file has {len(names)} files; expected {MOST_FILES} at most")
         self._names = {name.rsplit("/", 1)[-1]: name for name in names if "__MACOSX" not in name}
 
     def __enter__(self) -> Archive:
@@ -45,12 +45,12 @@ class Archive:
         if self._zip is not None:
             self._zip.close()
 
-    def place(self, name: str) -> str:
-        """How a mistake names the file."""
+    def label(self, name: str) -> str:
+        """The name of a file in error messages: the archive and the file in it."""
         return f"{self.path}: {name}"
 
     def has(self, name: str) -> bool:
-        """Whether the file is there."""
+        """Whether the archive contains the file."""
         return name in self._names if self._zip is not None else (self.path / name).is_file()
 
     def text(self, name: str) -> str:
@@ -58,12 +58,12 @@ class Archive:
         if self._zip is None:
             return read_text(self.path / name)
         if name not in self._names:
-            raise EchostepError(f"{self.place(name)}: not in the archive")
+            raise EchostepError(f"{self.label(name)}: the archive has no such file: export it again")
         try:
             with self._zip.open(self._names[name]) as file:
                 raw = file.read(LARGEST_BYTES + 1)
         except (OSError, zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, EOFError) as error:
-            raise EchostepError(f"{self.place(name)}: cannot be read: {error}") from error
+            raise EchostepError(f"{self.label(name)}: cannot be read: {error}") from error
         if len(raw) > LARGEST_BYTES:
-            raise EchostepError(f"{self.place(name)}: larger than {LARGEST_BYTES // 2**20} MiB when unpacked")
-        return decode(raw, self.place(name))
+            raise EchostepError(f"{self.label(name)}: larger than {LARGEST_BYTES // 2**20} MiB when unpacked")
+        return decode(raw, self.label(name))

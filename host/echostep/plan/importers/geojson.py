@@ -1,6 +1,7 @@
 """GeoJSON features -> shapes in map metres.
 
-In: a parsed FeatureCollection [RFC 7946]. Out: (name of the place in the file, properties, shape). Errors are ValueErrors that name the feature.
+In: a parsed FeatureCollection [RFC 7946]. Out: features with their path in the file, properties, shapes. Owns nothing. Errors are ValueErrors that
+name the feature.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from echostep.plan.json_fields import LIMIT_M, text, typed
 
 
 def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Each feature with its place in the file."""
+    """Each feature with its path in the file, as `features[3]`."""
     tree = typed(tree, "the file", dict)
     if tree.get("type") != "FeatureCollection":
         raise ValueError(f"type: {str(tree.get('type'))[:40]!r} is not a FeatureCollection")
@@ -28,13 +29,13 @@ def features(tree: Any) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def properties(feature: dict[str, Any], where: str) -> dict[str, Any]:
-    """The feature's properties, perhaps none."""
-    found: dict[str, Any] = typed(feature.get("properties") or {}, f"{where}.properties", dict)
-    return found
+    """The feature's properties; empty when it has none."""
+    values: dict[str, Any] = typed(feature.get("properties") or {}, f"{where}.properties", dict)
+    return values
 
 
 def label(value: Any, where: str) -> str:
-    """A name: a text, a text in several languages (English preferred), a number, or nothing."""
+    """A name as text: given as a string, as strings by language (English preferred), as a number, or not at all (empty)."""
     if isinstance(value, dict) and value:
         value = value.get("en") or next(iter(value.values()))
     if isinstance(value, int) and not isinstance(value, bool):
@@ -43,7 +44,7 @@ def label(value: Any, where: str) -> str:
 
 
 def shape(feature: dict[str, Any], where: str, earth: EarthTransform) -> BaseGeometry:
-    """The feature's geometry in map metres; an empty one when it has none."""
+    """The feature's geometry in map metres; an empty polygon when it has none."""
     if feature.get("geometry") is None:
         return Polygon()
     where = f"{where}.geometry"
@@ -61,10 +62,13 @@ def shape(feature: dict[str, Any], where: str, earth: EarthTransform) -> BaseGeo
             return _polygon(nested, where, earth)
         case "MultiPolygon":
             return MultiPolygon([_polygon(rings, where, earth) for rings in typed(nested, where, list)])
-    raise ValueError(f"{where}: {str(kind)[:40]!r} is no kind of geometry that a plan uses")
+    raise ValueError(
+        f"{where}: {str(kind)[:40]!r} is not a type of geometry that plans use: expected a point, lines or polygons"
+    )
 
 
 def _polygon(rings: Any, where: str, earth: EarthTransform) -> Polygon:
+    """A polygon from its rings; of one that crosses itself, the largest valid part."""
     rings = [_metres(corners, where, earth) for corners in typed(rings, where, list)]
     if not rings or any(len(corners) < 4 for corners in rings):
         raise ValueError(f"{where}: a polygon needs rings of four positions or more")

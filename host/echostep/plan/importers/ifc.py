@@ -1,7 +1,7 @@
 """Building models (IFC; needs `pip install echostep[ifc]`) -> `Plan`.
 
-In: an .ifc file. Out: `Plan`. Each storey is cut level, a metre above its floor: what the cut meets of walls, columns and curtain walls are walls,
-so that doors are gaps. Windows are closed by their own outlines; doors, stairs and lifts are seen from above.
+In: an .ifc file. Out: `Plan`. Owns nothing. Each storey is cut by a horizontal plane one metre above its floor: the sections of walls, columns and
+curtain walls become walls, so that doors are gaps. Windows, doors, stairs and lifts are rectangles, seen from above.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from shapely.geometry import MultiPoint, Polygon
 
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
+from echostep.plan.importers.connector_shapes import join_connectors
+from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep.plan.importers.parsing import read_bytes
-from echostep.plan.importers.storey import Storey, Way, areas, opening, room
-from echostep.plan.importers.walkways import connect
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Door, Georeference, Plan
 
-CUT_M = 1.0  # above the floor, about where the rangers are
+CUT_M = 1.0  # height of the cut above the floor: about that of the rangers
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
-WAYS: dict[str, ConnectorKind] = {
+CONNECTOR_KINDS: dict[str, ConnectorKind] = {
     "IfcStair": "stairs", "IfcStairFlight": "stairs", "IfcRamp": "ramp", "IfcRampFlight": "ramp", "IfcTransportElement": "lift",
 }  # fmt: skip
-SEEN = (*WALLS, *WAYS, "IfcWindow", "IfcDoor", "IfcSpace")
+SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcDoor", "IfcSpace")
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An element as triangles: corners (n, 3) in metres, faces (m, 3)."""
+    """An element as triangles: corners (n, 3) in metres, faces (m, 3) as indices of corners."""
 
     element: Any
     corners: Floats
     faces: Ints
 
     def cut(self, z_m: float) -> list[Polygon]:
-        """Its section with a level plane."""
+        """Its section with the horizontal plane at `z_m`."""
         three = self.corners[self.faces]
         above = three[:, :, 2] > z_m
         crossed = three[above.any(axis=1) & ~above.all(axis=1)]
@@ -52,32 +52,35 @@ class Body:
         return areas(shapely.get_parts(shapely.build_area(shapely.union_all(lines, grid_size=1e-4))))
 
     def above(self) -> Polygon:
-        """The rectangle about it, seen from above."""
+        """The smallest rectangle around it, seen from above."""
         hull = MultiPoint(self.corners[:, :2]).minimum_rotated_rectangle
         return hull if isinstance(hull, Polygon) else hull.buffer(0.01)
 
     @property
     def z_m(self) -> tuple[float, float]:
-        """Lowest and highest corner."""
+        """Heights of its lowest and its highest corner."""
         return float(self.corners[:, 2].min()), float(self.corners[:, 2].max())
 
 
 def import_ifc(path: Path) -> Plan:
-    """The building of a model; raises EchostepError that names the file and the element."""
+    """Import the building of a model; raises EchostepError that names the file and the element."""
     model = _open(path)
     floors = _floors(model, path)
-    storeys = [Storey(name, height) for name, height in floors]
+    drawn_levels = [DrawnLevel(name, height) for name, height in floors]
     count = 0
     for body in _bodies(model, path):
         count += 1
-        _place(storeys, body)
-    if not any(storey.walls for storey in storeys):
+        _place(drawn_levels, body)
+    if not any(drawn.walls for drawn in drawn_levels):
         raise EchostepError(
-            f"{path}: no walls a metre above any of its {len(storeys)} storeys ({count} elements with a shape)"
+            f"{path}: no walls one metre above any of its {len(drawn_levels)} storeys ({count} elements with a shape): "
+            "export the model with the geometry of its walls"
         )
     projects = model.by_type("IfcProject")
     name = str((projects[0].LongName or projects[0].Name) if projects else "") or path.stem
-    return Plan(name[:80], tuple(s.level() for s in storeys), None, "", connect(storeys), _georeference(model))
+    return Plan(
+        name[:80], tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels), _georeference(model)
+    )
 
 
 def _open(path: Path) -> Any:
@@ -87,7 +90,7 @@ def _open(path: Path) -> Any:
         raise EchostepError(f"{path}: IFC needs ifcopenshell: pip install 'echostep[ifc]'") from error
     start = read_bytes(path)[:2000]
     if b"ISO-10303-21" not in start:
-        raise EchostepError(f"{path}: not an IFC file (no ISO-10303-21 at its beginning)")
+        raise EchostepError(f"{path}: not an IFC file (no ISO-10303-21 at its beginning): export it as IFC (STEP)")
     try:
         return ifcopenshell.open(str(path))
     except Exception as error:  # a damaged model breaks its reader in many ways
@@ -95,7 +98,7 @@ def _open(path: Path) -> Any:
 
 
 def _floors(model: Any, path: Path) -> list[tuple[str, float]]:
-    """Names and heights of the storeys, from below."""
+    """Names and heights (m) of the model's storeys, from the lowest."""
     elevation: Any = import_module("ifcopenshell.util.placement").get_storey_elevation
     try:
         scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
@@ -106,12 +109,14 @@ def _floors(model: Any, path: Path) -> list[tuple[str, float]]:
     except Exception as error:
         raise EchostepError(f"{path}: its storeys cannot be read: {' '.join(str(error).split())[:200]}") from error
     if not found or not all(abs(height) <= LIMIT_M for _, height in found):
-        raise EchostepError(f"{path}: {'a storey has no sane height' if found else 'no IfcBuildingStorey'}")
+        raise EchostepError(
+            f"{path}: {'a storey has no sane height' if found else 'no IfcBuildingStorey'}: export the model with its storeys"
+        )
     return sorted(((name, round(height, 6)) for name, height in found), key=lambda floor: floor[1])
 
 
 def _bodies(model: Any, path: Path) -> Iterator[Body]:
-    """All elements that a plan shows, in metres of the model's world; one without a usable shape is left out."""
+    """All elements that a plan shows, in the model's world coordinates in metres; elements without a usable shape are left out."""
     geometry: Any = import_module("ifcopenshell.geom")
     settings = geometry.settings()
     settings.set("use-world-coords", True)
@@ -133,29 +138,29 @@ def _bodies(model: Any, path: Path) -> Iterator[Body]:
         yield Body(element, corners, faces)
 
 
-def _place(storeys: list[Storey], body: Body) -> None:
+def _place(drawn_levels: list[DrawnLevel], body: Body) -> None:
     kind = next(kind for kind in SEEN if body.element.is_a(kind))
     low, high = body.z_m
     name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
-    if kind in WAYS:
-        _place_way(storeys, body, WAYS[kind], name)
+    if kind in CONNECTOR_KINDS:
+        _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
         return
-    for storey in storeys:
-        z = storey.height_m + CUT_M
+    for drawn in drawn_levels:
+        z = drawn.height_m + CUT_M
         if not low <= z <= high:
             continue
         if kind in WALLS:
-            storey.walls += body.cut(z)
+            drawn.walls += body.cut(z)
         elif kind == "IfcWindow":
-            storey.windows.append(body.above())
+            drawn.windows.append(body.above())
         elif kind == "IfcDoor":
-            storey.doors.append(Door(opening(body.above()), name=name))
+            drawn.doors.append(Door(opening(body.above()), name=name))
         else:
-            storey.rooms += [room(name or "room", area) for area in body.cut(z)]
+            drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
 
 
-def _place_way(storeys: list[Storey], body: Body, kind: ConnectorKind, name: str) -> None:
-    """Stairs lead from the storey at their foot to the one at their head; a lift stops wherever it passes."""
+def _place_way(drawn_levels: list[DrawnLevel], body: Body, kind: ConnectorKind, name: str) -> None:
+    """Add stairs, a ramp or a lift to all levels between its lowest and its highest corner."""
     if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in (
         "ELEVATOR",
         "None",
@@ -163,13 +168,13 @@ def _place_way(storeys: list[Storey], body: Body, kind: ConnectorKind, name: str
     ):
         return
     low, high = body.z_m
-    passed = [i for i, storey in enumerate(storeys) if low - 0.5 <= storey.height_m <= high + 0.5]
+    passed = [i for i, drawn in enumerate(drawn_levels) if low - 0.5 <= drawn.height_m <= high + 0.5]
     for i in passed:
-        storeys[i].ways.append(Way(kind, name, body.above(), tuple(passed)))
+        drawn_levels[i].connectors.append(ConnectorShape(kind, name, body.above(), tuple(passed)))
 
 
 def _crossings(three: Floats, z_m: float) -> Floats:
-    """Where triangles (n, 3, 3) cross the plane: (n, 2, 2). One corner lies alone on its side; both its edges cross."""
+    """Sections of triangles (n, 3, 3) with the plane: (n, 2, 2). One corner lies alone on its side; both its edges cross the plane."""
     above = three[:, :, 2] > z_m
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
     rows = np.arange(len(three))
@@ -181,7 +186,7 @@ def _crossings(three: Floats, z_m: float) -> Floats:
 
 
 def _georeference(model: Any) -> Georeference | None:
-    """The site's longitude and latitude, and true north, where the model has them."""
+    """Longitude, latitude and true north of the model's site; None where the model does not state them."""
     sites = [site for site in model.by_type("IfcSite") if site.RefLatitude and site.RefLongitude]
     if not sites:
         return None
@@ -198,5 +203,5 @@ def _georeference(model: Any) -> Georeference | None:
 
 
 def _degrees(parts: Any) -> float:
-    """Degrees, minutes, seconds, millionths of a second."""
+    """Degrees from degrees, minutes, seconds and millionths of a second."""
     return float(sum(part / unit for part, unit in zip(parts, (1, 60, 3600, 3600e6), strict=False)))

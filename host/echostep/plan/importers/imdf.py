@@ -1,8 +1,8 @@
 """Indoor Mapping Data Format (zip or folder) -> `Plan`.
 
-In: an archive [OGC 20-094]. Out: `Plan`. IMDF draws no walls: the boundaries of enclosed units are taken as walls, open at the `opening`s; units
-of brick, concrete or glass are walls with a thickness. Walkways and unenclosed areas have no walls of their own, nor have stairs, lifts and ramps
-without an opening. Storeys are `storey_m` apart, by their ordinals.
+In: an archive [OGC 20-094]. Out: `Plan`. Owns nothing. IMDF has no walls: the boundaries of enclosed units become walls, with gaps at the `opening`s;
+units of brick, concrete or glass become walls with a thickness. Walkways and unenclosed areas get no walls, nor do stairs, lifts and ramps without an
+opening. Levels are `storey_height_m` apart, by their ordinals.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from shapely.geometry.base import BaseGeometry
 from echostep.errors import EchostepError
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.archive import Archive
+from echostep.plan.importers.connector_shapes import join_connectors
+from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
 from echostep.plan.importers.geojson import features, label, properties, shape
 from echostep.plan.importers.parsing import parse_json
-from echostep.plan.importers.storey import Storey, Way, areas, pieces, room
-from echostep.plan.importers.walkways import connect
 from echostep.plan.json_fields import number, text, typed
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 
@@ -39,7 +39,7 @@ OPEN = {
     "terrace",
 }
 FILLED = {"structure", "column", "opentobelow", "brick", "concrete", "drywall", "wood", "glass"}
-WAYS: dict[str, ConnectorKind] = {
+CONNECTOR_KINDS: dict[str, ConnectorKind] = {
     "stairs": "stairs",
     "steps": "stairs",
     "escalator": "stairs",
@@ -56,12 +56,12 @@ SOLID_FIXTURES = {
     "waterfeature",
     "vegetation",
 }
-ON_M = 0.2  # an opening lies so near to the boundary that it opens
+ON_M = 0.2  # greatest distance of an opening from the boundary that it opens. By reason: no source
 
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A feature with its place in the archive."""
+    """A feature with its path in the archive (`where`), its id (`key`), its properties and its shape."""
 
     where: str
     key: str
@@ -70,7 +70,7 @@ class Feature:
 
     @property
     def category(self) -> str:
-        """Its category, "" without one."""
+        """Its category; "" without one."""
         return text(self.about.get("category") or "", f"{self.where}.properties.category")
 
     @property
@@ -87,53 +87,58 @@ class Feature:
         )[:80]
 
 
-def import_imdf(path: Path, storey_m: float) -> Plan:
-    """The venue of an archive; raises EchostepError that names the file in it and the feature."""
+def import_imdf(path: Path, storey_height_m: float) -> Plan:
+    """Import the venue of an archive; raises EchostepError that names the file in it and the feature."""
     with Archive(path) as archive:
         if not archive.has("manifest.json"):
-            raise EchostepError(f"{path}: no manifest.json: is this an IMDF archive?")
-        return _venue(archive, path, storey_m)
+            raise EchostepError(f"{path}: no manifest.json in it: give a folder or zip file of IMDF")
+        return _venue(archive, path, storey_height_m)
 
 
-def _venue(archive: Archive, path: Path, storey_m: float) -> Plan:
+def _venue(archive: Archive, path: Path, storey_height_m: float) -> Plan:
     georeference = _origin(archive)
     earth = EarthTransform(georeference)
     levels = sorted(_features(archive, "level", earth), key=_ordinal)
     if not levels:
-        raise EchostepError(f"{path}: level.geojson: no levels")
-    storeys = {
-        level.key: Storey(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_m, 6))
+        raise EchostepError(f"{path}: level.geojson: it has no levels: export the archive again with its levels")
+    drawn_levels = {
+        level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
         for level in levels
     }
-    openings = _by_level(_features(archive, "opening", earth), storeys)
-    units = _by_level(_features(archive, "unit", earth), storeys)
-    order = list(storeys)
-    for key, storey in storeys.items():
-        storey.doors = [door for one in openings[key] for door in _doors(one)]
-        _outline(storey, next(level for level in levels if level.key == key))
+    openings = _by_level(_features(archive, "opening", earth), drawn_levels)
+    units = _by_level(_features(archive, "unit", earth), drawn_levels)
+    order = list(drawn_levels)
+    for key, drawn in drawn_levels.items():
+        drawn.doors = [door for one in openings[key] for door in _doors(one)]
+        _outline(drawn, next(level for level in levels if level.key == key))
         for unit in units[key]:
-            _unit(storey, unit, [one.shape for one in openings[key]])
-    fixtures = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), storeys)
-    for key, storey in storeys.items():
+            _unit(drawn, unit, [one.shape for one in openings[key]])
+    fixtures = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels)
+    for key, drawn in drawn_levels.items():
         for fixture in fixtures[key]:
             if "kiosk" in fixture.where or fixture.category in SOLID_FIXTURES:
-                storey.obstacles += areas([fixture.shape])
+                drawn.obstacles += areas([fixture.shape])
     _relationships(
         archive,
         earth,
         {unit.key: (order.index(key), unit) for key in order for unit in units[key]},
-        list(storeys.values()),
+        list(drawn_levels.values()),
     )
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
     return Plan(
-        name, tuple(s.level() for s in storeys.values()), None, "", connect(list(storeys.values())), georeference
+        name,
+        tuple(s.level() for s in drawn_levels.values()),
+        None,
+        "",
+        join_connectors(list(drawn_levels.values())),
+        georeference,
     )
 
 
 def _origin(archive: Archive) -> Georeference:
-    """The first corner of the first level, to a hundred thousandth of a degree."""
+    """The plan's origin: the first corner of the first level, rounded to 1e-5 degrees (about 1 m)."""
     name = "level.geojson"
-    tree = parse_json(archive.text(name), archive.place(name))
+    tree = parse_json(archive.text(name), archive.label(name))
     found: Any = tree
     try:
         for where, feature in features(tree):
@@ -145,18 +150,18 @@ def _origin(archive: Archive) -> Georeference:
             lon, lat = number(found[0], where, 180.0, "degrees"), number(found[1], where, 90.0, "degrees")
             return Georeference(round(lon, 5), round(lat, 5))
     except ValueError as error:
-        raise EchostepError(f"{archive.place(name)}: {error}") from error
-    raise EchostepError(f"{archive.place(name)}: no levels")
+        raise EchostepError(f"{archive.label(name)}: {error}") from error
+    raise EchostepError(f"{archive.label(name)}: it has no levels: export the archive again with its levels")
 
 
 def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Feature]:
-    """All features of a kind; none when the archive has no such file."""
+    """All features of a kind; an empty list when the archive has no file of this kind."""
     name = f"{kind}.geojson"
     if not archive.has(name):
         return []
     found = []
     try:
-        for where, feature in features(parse_json(archive.text(name), archive.place(name))):
+        for where, feature in features(parse_json(archive.text(name), archive.label(name))):
             place = f"{kind} {where}"
             found.append(
                 Feature(
@@ -168,7 +173,7 @@ def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Featur
             )
             _ = found[-1].category, found[-1].name
     except ValueError as error:
-        raise EchostepError(f"{archive.place(name)}: {error}") from error
+        raise EchostepError(f"{archive.label(name)}: {error}") from error
     return found
 
 
@@ -179,21 +184,23 @@ def _ordinal(level: Feature) -> float:
         raise EchostepError(f"level.geojson: {error}") from error
 
 
-def _by_level(found: list[Feature], storeys: dict[str, Storey]) -> dict[str, list[Feature]]:
-    """Features of each level; those of unknown levels are mistakes."""
-    sorted_: dict[str, list[Feature]] = {key: [] for key in storeys}
+def _by_level(found: list[Feature], drawn_levels: dict[str, DrawnLevel]) -> dict[str, list[Feature]]:
+    """Features by the id of their level; raises EchostepError for an unknown level."""
+    sorted_: dict[str, list[Feature]] = {key: [] for key in drawn_levels}
     for feature in found:
         try:
             sorted_[feature.level].append(feature)
         except KeyError as error:
-            raise EchostepError(f"{feature.where}: there is no level {feature.level[:50]!r}") from error
+            raise EchostepError(
+                f"{feature.where}: there is no level {feature.level[:50]!r} in level.geojson"
+            ) from error
         except ValueError as error:
             raise EchostepError(str(error)) from error
     return sorted_
 
 
 def _doors(one: Feature) -> list[Door]:
-    """An opening as a door from its first to its last point; one without a door leaf stands open."""
+    """An opening as a door from its first to its last point; without a door leaf its state is open."""
     about = one.about.get("door")
     state: DoorState = "unknown" if isinstance(about, dict) and about.get("type") not in (None, "open") else "open"
     found = []
@@ -205,26 +212,26 @@ def _doors(one: Feature) -> list[Door]:
     return found
 
 
-def _outline(storey: Storey, level: Feature) -> None:
-    """Where the floor ends there is a wall, unless the level is outdoors."""
+def _outline(drawn: DrawnLevel, level: Feature) -> None:
+    """The outline of a level becomes a wall, unless the level is outdoors."""
     if level.about.get("outdoor") is not True:
-        storey.walls += [area.boundary for area in areas([level.shape])]
+        drawn.walls += [area.boundary for area in areas([level.shape])]
 
 
-def _unit(storey: Storey, unit: Feature, openings: list[BaseGeometry]) -> None:
+def _unit(drawn: DrawnLevel, unit: Feature, openings: list[BaseGeometry]) -> None:
     kind = unit.category
     for area in areas([unit.shape]):
         if kind in FILLED:
-            (storey.windows if kind == "glass" else storey.filled).append(area)
+            (drawn.windows if kind == "glass" else drawn.filled).append(area)
             continue
-        way = next((WAYS[word] for word in (kind, kind.split(".")[0]) if word in WAYS), None)
+        way = next((CONNECTOR_KINDS[word] for word in (kind, kind.split(".")[0]) if word in CONNECTOR_KINDS), None)
         opened = any(_opens(area, one) for one in openings)
         if kind not in OPEN and (way is None or opened):
-            storey.walls.append(area.boundary)
+            drawn.walls.append(area.boundary)
         if way is not None:
-            storey.ways.append(Way(way, unit.name, area))
+            drawn.connectors.append(ConnectorShape(way, unit.name, area))
         elif unit.name or (kind not in OPEN and kind != "unspecified"):
-            storey.rooms.append(room(unit.name or kind, area))
+            drawn.rooms.append(room(unit.name or kind, area))
 
 
 def _opens(area: Polygon, one: BaseGeometry) -> bool:
@@ -235,11 +242,11 @@ def _opens(area: Polygon, one: BaseGeometry) -> bool:
 
 
 def _relationships(
-    archive: Archive, earth: EarthTransform, units: dict[str, tuple[int, Feature]], storeys: list[Storey]
+    archive: Archive, earth: EarthTransform, units: dict[str, tuple[int, Feature]], drawn_levels: list[DrawnLevel]
 ) -> None:
-    """Stairs and lifts that lead to places which do not lie over each other."""
+    """Levels of stairs and lifts whose units do not lie above each other: from the archive's relationships."""
     for one in _features(archive, "relationship", earth):
-        if one.category not in WAYS:
+        if one.category not in CONNECTOR_KINDS:
             continue
         between = one.about.get("intermediary")
         ends = [one.about.get("origin"), one.about.get("destination"), *(between if isinstance(between, list) else [])]
@@ -248,6 +255,6 @@ def _relationships(
         for key in keys:
             if key in units and len(found) > 1:
                 i, unit = units[key]
-                for way in storeys[i].ways:
+                for way in drawn_levels[i].connectors:
                     if any(way.area.equals(area) for area in areas([unit.shape])):
                         way.levels = tuple(found)

@@ -1,8 +1,8 @@
 """Node and link text (`biba`): core.txt, node.txt, link.txt, arrow.txt, polygon.txt -> `Plan`.
 
-In: core.txt or its folder. Out: `Plan`. Nodes are pixels of a picture, y down, `scale` metres each; links are walls; an arrow is a flight of stairs
-(0 down, 1 up, 2 both), and the zone of type 1 about it is where people change floors. Zones of type 0, where nobody is, are fenced off by links and
-left out; so is the start, because the format does not say from where its angle counts.
+In: core.txt. Out: `Plan`. Owns nothing. Nodes are pixels of a picture, y down, `scale` metres each; links are walls; an arrow is a flight of stairs
+(0 down, 1 up, 2 both), and the zone of type 1 around it is its outline. Zones of type 0 have no access; their links are walls already, so they are
+left out. The start is left out too, because the format does not state the direction of its angle 0.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import NamedTuple
 from shapely.geometry import LineString, Polygon
 
 from echostep.errors import EchostepError
+from echostep.plan.importers.connector_shapes import join_connectors
+from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep.plan.importers.parsing import read_text
-from echostep.plan.importers.storey import Storey, Way, areas
-from echostep.plan.importers.walkways import connect
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import Plan
 
@@ -27,7 +27,7 @@ ZONE_WITH_STAIRS = "1"
 
 
 class Node(NamedTuple):
-    """A corner: which floor, where in metres."""
+    """A corner of a wall: `layer` (index of the level), x and y in metres."""
 
     layer: int
     x_m: float
@@ -35,24 +35,24 @@ class Node(NamedTuple):
 
 
 def import_nodelink(core: Path) -> Plan:
-    """The building of a core.txt; raises EchostepError that names file and line."""
+    """Import the building of a core.txt; raises EchostepError that names the file and the line."""
     settings = {row[0]: row[1:] for _, row in _rows(core, 1)}
     floors = int(_setting(core, settings, "floor", MOST_FLOORS))
     height_m = _setting(core, settings, "height", 100.0)
     nodes = _nodes(_beside(core, settings, "node"), floors, _setting(core, settings, "scale", 1000.0))
-    storeys = [Storey(f"floor {i}", i * height_m) for i in range(floors)]
+    drawn_levels = [DrawnLevel(f"floor {i}", i * height_m) for i in range(floors)]
     for where, row in _rows(_beside(core, settings, "link"), 4, skip=1):
         a, b = (_node(nodes, text, where) for text in row[2:4])
         if a.layer != b.layer:
             raise EchostepError(f"{where}: a wall from floor {a.layer} to floor {b.layer}")
         if a[1:] != b[1:]:
-            storeys[a.layer].walls.append(LineString((a[1:], b[1:])))
-    _stairs(core, settings, nodes, storeys)
-    return Plan(core.parent.name, tuple(s.level() for s in storeys), None, "", connect(storeys))
+            drawn_levels[a.layer].walls.append(LineString((a[1:], b[1:])))
+    _stairs(core, settings, nodes, drawn_levels)
+    return Plan(core.parent.name, tuple(s.level() for s in drawn_levels), None, "", join_connectors(drawn_levels))
 
 
 def _nodes(path: Path, floors: int, scale_m: float) -> dict[str, Node]:
-    """All nodes; y is turned up, from the lowest node."""
+    """All nodes in metres; y points up and is 0 at the lowest node."""
     nodes = {}
     for where, row in _rows(path, 4, skip=1):
         layer, x, y = (_number(text, where) for text in row[1:4])
@@ -65,8 +65,8 @@ def _nodes(path: Path, floors: int, scale_m: float) -> dict[str, Node]:
     return {key: node._replace(y_m=round(node.y_m - lowest, 3)) for key, node in nodes.items()}
 
 
-def _stairs(core: Path, settings: dict[str, list[str]], nodes: dict[str, Node], storeys: list[Storey]) -> None:
-    """A way for each zone with an arrow, to the floors that the arrows point to."""
+def _stairs(core: Path, settings: dict[str, list[str]], nodes: dict[str, Node], drawn_levels: list[DrawnLevel]) -> None:
+    """Stairs for each arrow inside a zone, to the levels that the arrow points to."""
     zones: list[tuple[int, Polygon]] = []
     for where, row in _rows(_beside(core, settings, "polygon"), 3, skip=1):
         corners = [_node(nodes, text, where) for text in row[3:]]
@@ -81,13 +81,13 @@ def _stairs(core: Path, settings: dict[str, list[str]], nodes: dict[str, Node], 
         steps = {"0": (-1,), "1": (1,), "2": (-1, 1)}.get(row[1])
         if steps is None:
             raise EchostepError(f"{where}: type {row[1][:20]!r}: expected 0 (down), 1 (up) or 2 (both)")
-        levels = tuple(a.layer + step for step in steps if 0 <= a.layer + step < len(storeys))
+        levels = tuple(a.layer + step for step in steps if 0 <= a.layer + step < len(drawn_levels))
         if zone is not None:
-            storeys[a.layer].ways.append(Way("stairs", "", zone, levels))
+            drawn_levels[a.layer].connectors.append(ConnectorShape("stairs", "", zone, levels))
 
 
 def _rows(path: Path, least: int, skip: int = 0) -> Iterator[tuple[str, list[str]]]:
-    """Rows of a file with their places; none is shorter than `least` fields."""
+    """Rows of a CSV file with their file and line; raises EchostepError for a row with less than `least` fields."""
     try:
         for number, row in enumerate(csv.reader(read_text(path).splitlines()), 1):
             if number > skip and row:
@@ -99,7 +99,7 @@ def _rows(path: Path, least: int, skip: int = 0) -> Iterator[tuple[str, list[str
 
 
 def _setting(core: Path, settings: dict[str, list[str]], key: str, most: float) -> float:
-    """A number from core.txt that is above nought."""
+    """A number from core.txt, greater than 0 and at most `most`."""
     text = (settings.get(key) or [""])[0]
     value = _number(text, f"{core}: {key}")
     if not 0.0 < value <= most:
@@ -108,7 +108,7 @@ def _setting(core: Path, settings: dict[str, list[str]], key: str, most: float) 
 
 
 def _beside(core: Path, settings: dict[str, list[str]], key: str) -> Path:
-    """The file that core.txt names for it; it lies in the same folder."""
+    """The file that core.txt names for `key`; it must be in the same folder."""
     name = (settings.get(key) or [f"{key}.txt"])[0]
     if Path(name).name != name or "\x00" in name:
         raise EchostepError(f"{core}: {key}: {name[:60]!r} is not a file beside core.txt")

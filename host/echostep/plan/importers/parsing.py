@@ -1,6 +1,6 @@
-"""Files of strangers, read within bounds.
+"""Reads untrusted files within limits.
 
-In: a path. Out: text, or JSON as a tree; every mistake is an EchostepError that names the file. Owns the limits.
+In: a path. Out: bytes, text, or parsed JSON; every error is an EchostepError that names the file. Owns the limits.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ LARGEST_BYTES = 512 * 2**20
 
 
 def read_bytes(path: Path) -> bytes:
-    """The bytes of a file of a sane size."""
+    """The bytes of a file that is not larger than `LARGEST_BYTES`."""
     try:
         if not path.is_file():
             raise EchostepError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
         if path.stat().st_size > LARGEST_BYTES:
-            raise EchostepError(f"{path}: larger than {LARGEST_BYTES // 2**20} MiB")
+            raise EchostepError(f"{path}: larger than {LARGEST_BYTES // 2**20} MiB: export one building only")
         return path.read_bytes()
     except OSError as error:
         raise EchostepError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def read_text(path: Path) -> str:
-    """UTF-8 (with or without a byte order mark), or UTF-16 with one."""
+    """The text of a file in UTF-8 (with or without a byte order mark) or UTF-16 (with one)."""
     return decode(read_bytes(path), str(path))
 
 
 def decode(raw: bytes, name: str) -> str:
-    """Bytes as text."""
+    """Decode bytes as UTF-8 or UTF-16; `name`: of the file, for the error."""
     try:
         return raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise EchostepError(f"{name}: not UTF-8 text (byte {error.start})") from error
+        raise EchostepError(f"{name}: not UTF-8 text (byte {error.start}): save it as UTF-8") from error
 
 
 def parse_json(text: str, name: str) -> Any:
-    """A JSON tree; NaN and infinities are refused."""
+    """Parse JSON; NaN and infinities are errors."""
     try:
         return json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:

@@ -1,6 +1,6 @@
-"""Pieces of one straight wall -> one segment.
+"""Merges the pieces of a straight wall into one segment.
 
-In: segments (n, 4) in metres, in any order, overlapping or doubled. Out: fewer segments that cover the same. Owns nothing.
+In: segments (n, 4) in metres, in any order, overlapping or repeated. Out: fewer segments that cover the same points. Owns nothing.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import shapely
 
 from echostep.arrays import Bools, Floats
 
-OFF_M = 0.003  # pieces of one wall lie so close to its line
-GAP_M = 0.003  # and so close to each other along it
+OFF_M = 0.003  # greatest distance of a piece from the wall's line
+GAP_M = 0.003  # greatest gap between two pieces along it
 
 
 def merge_collinear(segments: Floats) -> Floats:
-    """Join pieces that continue or cover each other. Ends of the joined walls are ends of pieces; the order is that of the longest pieces."""
+    """Join pieces that continue or cover each other. Ends of joined walls are ends of pieces; walls are ordered by their longest piece."""
     if not len(segments):
         return segments
     segments = segments[np.argsort(-np.hypot(*(segments[:, 2:] - segments[:, :2]).T), kind="stable")]
@@ -26,7 +26,7 @@ def merge_collinear(segments: Floats) -> Floats:
 
 
 def _grown(i: int, segments: Floats, tree: shapely.STRtree, free: Bools) -> Floats:
-    """The wall that begins with piece i and takes every free piece on its line that it touches."""
+    """The wall that grows from piece i by every free piece (mask `free`) that lies on its line and touches it."""
     wall, fresh = segments[i], True
     free[i] = False
     while fresh:
@@ -46,7 +46,7 @@ def _bounds(wall: Floats) -> tuple[float, float, float, float]:
 
 
 def _on_line(wall: Floats, others: Floats) -> Bools:
-    """Which pieces lie on the wall's line and touch it."""
+    """Mask (n,) of the pieces that lie on the wall's line and touch the wall."""
     start, along = wall[:2], wall[2:] - wall[:2]
     length = np.hypot(*along)
     along = along / length
@@ -60,7 +60,7 @@ def _on_line(wall: Floats, others: Floats) -> Bools:
 
 
 def _span(wall: Floats, others: Floats) -> Floats:
-    """From the first end to the last one."""
+    """The segment between the two outermost ends along the wall."""
     ends = np.concatenate((wall.reshape(2, 2), others.reshape(-1, 2)))
     way = (ends - wall[:2]) @ (wall[2:] - wall[:2])
     return np.concatenate((ends[way.argmin()], ends[way.argmax()]))

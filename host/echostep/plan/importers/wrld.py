@@ -1,7 +1,7 @@
-"""Indoor maps of WRLD (`westport-house`): main.json, and one GeoJSON a floor -> `Plan`.
+"""Indoor maps of WRLD (as `westport-house`): main.json and one GeoJSON file per level -> `Plan`.
 
-In: main.json or its folder. Out: `Plan`. Walls, windows and doors are areas; stairs and elevators become connectors where
-floors show them at the same place. The format has no heights: the caller gives that of a storey.
+In: main.json. Out: `Plan`. Owns nothing. Walls, windows and doors are areas; stairs and elevators become connectors where levels have them at the
+same position. The format has no heights: the caller gives the height of a storey.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
 from echostep.plan.georeference import EarthTransform
+from echostep.plan.importers.connector_shapes import join_connectors, same_place
+from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep.plan.importers.geojson import features, label, properties, shape
 from echostep.plan.importers.parsing import parse_json, read_text
-from echostep.plan.importers.storey import Storey, Way, areas, opening, room
-from echostep.plan.importers.walkways import connect, same_place
 from echostep.plan.json_fields import number, text, typed
 from echostep.plan.model import Door, Georeference, Plan
 
-WAYS = {"stairs": "stairs", "elevator": "lift", "escalator": "stairs", "ramp": "ramp"}
+CONNECTOR_KINDS = {"stairs": "stairs", "elevator": "lift", "escalator": "stairs", "ramp": "ramp"}
 OPEN_PLAN = {"room", "bathroom", "no_geometry", "hallway", "pathway"}  # areas without walls of their own
 
 
-def import_wrld(path: Path, storey_m: float) -> Plan:
-    """The building of a main.json; raises EchostepError that names file and feature."""
+def import_wrld(path: Path, storey_height_m: float) -> Plan:
+    """Import the building of a main.json; raises EchostepError that names the file and the feature."""
     tree = parse_json(read_text(path), str(path))
     try:
         tree = typed(tree, "the file", dict)
@@ -44,9 +44,11 @@ def import_wrld(path: Path, storey_m: float) -> Plan:
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
     earth = EarthTransform(georeference)
-    storeys = [_storey(file, floor_name, round(z * storey_m, 6), earth) for z, floor_name, file in floors]
-    _open_floors(storeys)
-    return Plan(name, tuple(storey.level() for storey in storeys), None, "", connect(storeys), georeference)
+    drawn_levels = [_storey(file, floor_name, round(z * storey_height_m, 6), earth) for z, floor_name, file in floors]
+    _open_floors(drawn_levels)
+    return Plan(
+        name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
+    )
 
 
 def _georeference(tree: dict[str, Any]) -> Georeference:
@@ -58,7 +60,7 @@ def _georeference(tree: dict[str, Any]) -> Georeference:
 
 
 def _floor(row: Any, where: str, folder: Path) -> tuple[int, str, Path]:
-    """Order, name and file of a floor; the file lies beside main.json."""
+    """Order, name and file of a level; the file must be in the folder of main.json."""
     row = typed(row, where, dict)
     name = text(row.get("readable_name", row.get("name")), f"{where}.name")
     file = text(row.get("filename"), f"{where}.filename")
@@ -67,44 +69,44 @@ def _floor(row: Any, where: str, folder: Path) -> tuple[int, str, Path]:
     return int(number(row.get("z_order"), f"{where}.z_order", 1000, "floors")), name, folder / file
 
 
-def _storey(file: Path, name: str, height_m: float, earth: EarthTransform) -> Storey:
-    storey = Storey(name, height_m)
+def _storey(file: Path, name: str, height_m: float, earth: EarthTransform) -> DrawnLevel:
+    drawn = DrawnLevel(name, height_m)
     tree = parse_json(read_text(file), str(file))
     try:
         for where, feature in features(tree):
             about = properties(feature, where)
             kind = text(about.get("type"), f"{where}.properties.type")
-            _place(storey, kind, label(about.get("name"), f"{where}.properties.name"), shape(feature, where, earth))
+            _place(drawn, kind, label(about.get("name"), f"{where}.properties.name"), shape(feature, where, earth))
     except ValueError as error:
         raise EchostepError(f"{file}: {error}") from error
-    return storey
+    return drawn
 
 
-def _place(storey: Storey, kind: str, name: str, found: BaseGeometry) -> None:
-    """One feature into the storey; what a plan does not know (outlines, landscaping) is left out."""
+def _place(drawn: DrawnLevel, kind: str, name: str, found: BaseGeometry) -> None:
+    """Add a feature to a level; kinds that plans do not have (outlines, landscaping) are left out."""
     for area in areas([found]):
         if kind == "wall":
-            storey.walls.append(area)
+            drawn.walls.append(area)
         elif kind == "window":
-            storey.windows.append(area)
+            drawn.windows.append(area)
         elif kind == "door":
-            storey.doors.append(Door(opening(area), name=name))
+            drawn.doors.append(Door(opening(area), name=name))
         elif kind == "inaccessible_space":
-            storey.filled.append(area)
-        elif kind in WAYS:
-            storey.ways.append(Way(WAYS[kind], name, area))  # type: ignore[arg-type]
+            drawn.filled.append(area)
+        elif kind in CONNECTOR_KINDS:
+            drawn.connectors.append(ConnectorShape(CONNECTOR_KINDS[kind], name, area))  # type: ignore[arg-type]
         elif kind == "floor_opening":
-            storey.openings.append(area)
+            drawn.openings.append(area)
         elif kind in OPEN_PLAN and (name or kind not in ("no_geometry", "pathway")):
-            storey.rooms.append(room(name or kind.replace("_", " ").capitalize(), area))
+            drawn.rooms.append(room(name or kind.replace("_", " ").capitalize(), area))
 
 
-def _open_floors(storeys: list[Storey]) -> None:
-    """An opening over stairs is where they arrive; nobody walks over any other."""
-    for below, storey in pairwise([Storey("", 0.0), *storeys]):
-        for area in storey.openings:
-            arrives = any(way.kind == "stairs" and same_place(way.area, area) for way in below.ways)
+def _open_floors(drawn_levels: list[DrawnLevel]) -> None:
+    """An opening in the floor above stairs is their upper end; any other opening cannot be walked on."""
+    for below, drawn in pairwise([DrawnLevel("", 0.0), *drawn_levels]):
+        for area in drawn.openings:
+            arrives = any(way.kind == "stairs" and same_place(way.area, area) for way in below.connectors)
             if arrives:
-                storey.ways.append(Way("stairs", "", area))
+                drawn.connectors.append(ConnectorShape("stairs", "", area))
             else:
-                storey.filled.append(area)
+                drawn.filled.append(area)

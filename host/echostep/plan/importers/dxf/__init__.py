@@ -1,4 +1,4 @@
 """Drawings (DXF): entities to lines, lines to walls, arcs to doors.
 
-In: a DXF file. Out: `Plan`. Owns nothing.
+In: DXF files, one per level. Out: `Plan`. Owns nothing.
 """

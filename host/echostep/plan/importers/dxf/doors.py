@@ -1,7 +1,11 @@
-"""Doors of a drawing: the line across the gap, told from how doors are drawn.
+"""Doors of a drawing: the line from jamb to jamb, derived from the door's symbol.
 
-In: blocks, arcs and lines on the layers of doors; walls. Out: `Door`s. A swing is an arc about the hinge: the gap goes from the hinge to that end of
-the arc which lies on a wall. Two swings of one block are a double door. What has no swing is as long as its longest side.
+In: blocks, arcs and lines on the layers of doors; walls. Out: `Door`s. Owns nothing. A swing is an arc about the hinge: the door goes from the hinge
+to the end of the arc that is nearer to a wall. Two swings of one block are a double door. A door without a swing goes along its longest side.
+
+            ,-'| leaf
+          ,'   |        arc: from the leaf's end to the jamb
+    =====+.....o=====   o: hinge, +: end of the arc at the wall, .....: the door's line
 """
 
 from __future__ import annotations
@@ -16,17 +20,17 @@ import shapely
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
+from echostep.plan.importers.drawn_level import opening
 from echostep.plan.importers.dxf.entities import DrawingFrame, parts
-from echostep.plan.importers.storey import opening
 from echostep.plan.model import Door
 
 NARROWEST_M, WIDEST_M = 0.3, 12.0
-LEAF_M = 0.1  # a leaf's line begins so near to the hinge
+LEAF_M = 0.1  # greatest distance of a leaf's line from the hinge. By reason: no source
 Line = tuple[float, float, float, float]
 
 
 def doors_of(found: Sequence[Any], walls: Sequence[BaseGeometry], frame: DrawingFrame, file: Path) -> list[Door]:
-    """One door for each block; one for each loose swing, and for each loose drawing without one."""
+    """Doors of blocks, then of swings outside blocks, then of other lines outside blocks that belong to no swing."""
     stone = shapely.STRtree(list(walls))
     blocks = [entity for entity in found if entity.dxftype() == "INSERT"]
     lines: list[Line] = []
@@ -42,7 +46,7 @@ def doors_of(found: Sequence[Any], walls: Sequence[BaseGeometry], frame: Drawing
 
 
 def _drawn(block: Any, file: Path, depth: int = 4) -> list[Any]:
-    """All that a block draws, blocks inside it too."""
+    """All entities of a block and of the blocks inside it, `depth` levels deep."""
     inner = parts(block, file)
     deeper = [part for part in inner if part.dxftype() == "INSERT"] if depth else []
     return [part for part in inner if part.dxftype() != "INSERT"] + [
@@ -54,7 +58,7 @@ Swing = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]  # 
 
 
 def _shapes(drawn: Sequence[Any], frame: DrawingFrame, file: Path) -> tuple[list[Swing], list[LineString]]:
-    """Swings and all other lines."""
+    """Swings (arcs with hinge), and all other lines."""
     swings, rest = [], []
     for entity in drawn:
         line = frame.line(entity, file)
@@ -69,7 +73,7 @@ def _shapes(drawn: Sequence[Any], frame: DrawingFrame, file: Path) -> tuple[list
 
 
 def _double(swings: list[Swing]) -> list[Line]:
-    """From hinge to hinge, where two swings meet in the middle."""
+    """A double door from hinge to hinge, when two swings meet in the middle; else empty."""
     if len(swings) != 2:
         return []
     (a, *ends_a), (b, *ends_b) = swings
@@ -91,7 +95,7 @@ def _distance(point: tuple[float, float], stone: shapely.STRtree) -> float:
 
 
 def _longest(lines: list[LineString], join_m: float) -> list[Line]:
-    """The middle line of each drawing that hangs together, along its longer side."""
+    """The centre line of each group of connected lines, along its longer side."""
     blots = shapely.get_parts(shapely.union_all([line.buffer(join_m) for line in lines]))
     found = []
     for blot in blots:

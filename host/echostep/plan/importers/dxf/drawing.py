@@ -1,7 +1,7 @@
-"""Drawings (DXF, one a storey) -> `Plan`.
+"""Drawings (DXF, one file per level) -> `Plan`.
 
-In: files, patterns of layers, units. Out: `Plan`. Lines, polylines, arcs, circles, ellipses and splines on a layer of walls become walls, also those
-inside blocks; what a layer means is told by its name.
+In: files, patterns of layer names, units. Out: `Plan`. Owns the default patterns. Lines, polylines, arcs, circles, ellipses and splines on a layer of
+walls become walls, also inside blocks; the meaning of a layer is recognised by its name.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import shapely
 from shapely.geometry import LineString, MultiLineString
 
 from echostep.errors import EchostepError
+from echostep.plan.importers.connector_shapes import join_connectors
+from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas
 from echostep.plan.importers.dxf.doors import doors_of
 from echostep.plan.importers.dxf.entities import METRES, DrawingFrame, entities, read_drawing
-from echostep.plan.importers.storey import Storey, Way, areas
-from echostep.plan.importers.walkways import connect
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Plan, Room
 
@@ -33,24 +33,26 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "obstacles": ("*obstacle*", "*hindernis*"),
 }
 INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
-REACH_M = 0.3  # lines of one staircase are so near to each other, twice
+REACH_M = 0.3  # half the greatest distance between neighbouring lines of one staircase. By reason: a tread
 
 
-def import_dxf(files: Sequence[Path], storey_m: float, layers: Mapping[str, Sequence[str]], units: str | None) -> Plan:
-    """The building of drawings, the lowest storey first; raises EchostepError that names the file and the layer."""
+def import_dxf(
+    files: Sequence[Path], storey_height_m: float, layers: Mapping[str, Sequence[str]], units: str | None
+) -> Plan:
+    """Import a building from drawings, the lowest level first; raises EchostepError that names the file and the layer."""
     patterns = {kind: tuple(name.casefold() for name in (layers.get(kind) or LAYERS[kind])) for kind in LAYERS}
-    storeys, frame = [], None
+    drawn_levels, frame = [], None
     for i, file in enumerate(files):
         drawing = read_drawing(file)
         found = _sorted(drawing, patterns, file)
         scale_m = METRES[units or _units(drawing, file)]
         frame = replace(frame, scale_m=scale_m) if frame else DrawingFrame.about(found["walls"], scale_m)
-        storeys.append(_storey(found, frame, Storey(file.stem, round(i * storey_m, 6)), file))
-    return Plan(files[0].stem, tuple(storey.level() for storey in storeys), None, "", connect(storeys))
+        drawn_levels.append(_storey(found, frame, DrawnLevel(file.stem, round(i * storey_height_m, 6)), file))
+    return Plan(files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels))
 
 
 def _sorted(drawing: Any, patterns: Mapping[str, Sequence[str]], file: Path) -> dict[str, list[Any]]:
-    """Entities by what their layers mean."""
+    """Entities by the meaning of their layers; raises EchostepError when there are no walls."""
     found: dict[str, list[Any]] = {kind: [] for kind in patterns}
     seen: dict[str, str | None] = {}
     for entity, layer in entities(drawing.modelspace(), file, lambda layer: meaning(layer, patterns) == "doors"):
@@ -68,7 +70,7 @@ def _sorted(drawing: Any, patterns: Mapping[str, Sequence[str]], file: Path) -> 
 
 
 def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
-    """What a layer of this name holds, None if nothing that a plan has."""
+    """The kind of element on a layer of this name; None when the name matches no pattern."""
     name = layer.casefold()
     return next(
         (kind for kind, names in patterns.items() if any(fnmatchcase(name, pattern) for pattern in names)), None
@@ -87,27 +89,27 @@ def _units(drawing: Any, file: Path) -> str:
     return INSUNITS[code]
 
 
-def _storey(found: Mapping[str, list[Any]], frame: DrawingFrame, storey: Storey, file: Path) -> Storey:
+def _storey(found: Mapping[str, list[Any]], frame: DrawingFrame, drawn: DrawnLevel, file: Path) -> DrawnLevel:
     lines = {
         kind: [line for entity in found[kind] if (line := frame.line(entity, file))]
         for kind in found
         if kind not in ("doors", "rooms")
     }
     if not lines["walls"]:
-        raise EchostepError(f"{file}: the layers of walls hold no lines")
-    storey.walls, storey.windows = list(lines["walls"]), list(lines["windows"])
-    storey.doors = doors_of(found["doors"], [*storey.walls, *storey.windows], frame, file)
-    storey.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(lines["obstacles"]))))
-    storey.rooms = [room for entity in found["rooms"] if (room := _room(entity, frame))]
+        raise EchostepError(f"{file}: the layers of walls have no lines: give the right ones with --layer walls=NAME")
+    drawn.walls, drawn.windows = list(lines["walls"]), list(lines["windows"])
+    drawn.doors = doors_of(found["doors"], [*drawn.walls, *drawn.windows], frame, file)
+    drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(lines["obstacles"]))))
+    drawn.rooms = [room for entity in found["rooms"] if (room := _room(entity, frame))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
         blots = shapely.union_all([line.buffer(REACH_M) for line in lines[layer]])
         hulls = [blot.convex_hull.buffer(-REACH_M) for blot in shapely.get_parts(blots)]
-        storey.ways += [Way(cast(ConnectorKind, kind), "", area) for area in areas(hulls)]
-    return storey
+        drawn.connectors += [ConnectorShape(cast(ConnectorKind, kind), "", area) for area in areas(hulls)]
+    return drawn
 
 
 def _room(entity: Any, frame: DrawingFrame) -> Room | None:
-    """A text as the name of a room."""
+    """A text entity as a room; None when it is empty, far away, or not a text."""
     if entity.dxftype() not in ("TEXT", "MTEXT", "ATTRIB"):
         return None
     words = " ".join((entity.plain_text() if entity.dxftype() == "MTEXT" else entity.dxf.text).split())[:80]

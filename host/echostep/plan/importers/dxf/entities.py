@@ -1,6 +1,6 @@
-"""Entities of a DXF drawing, blocks taken apart, and their lines in metres.
+"""Entities of a DXF drawing with blocks expanded, and their lines in metres.
 
-In: a file. Out: entities with the layers that they really lie on; chains of straight pieces. Owns the limits against hostile drawings.
+In: a file. Out: entities with their effective layers; polylines. Owns the limits for untrusted drawings.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from echostep.plan.importers.parsing import read_bytes
 from echostep.plan.json_fields import LIMIT_M
 
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
-FLAT_M = 0.005  # arcs are cut into straight pieces that are so close
-FAR_M = 1e4  # beyond it lie national grids: they move to the first wall
-MOST_PARTS = 300_000  # of blocks
+FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
+FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
+MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
 
 
@@ -37,7 +37,7 @@ class DrawingFrame:
 
     @classmethod
     def about(cls, walls: Sequence[Any], scale_m: float) -> DrawingFrame:
-        """The drawing's own origin, or the first wall's whole metres when the drawing lies in a national grid."""
+        """The drawing's own origin, or the first wall's position in whole metres when the drawing is in a national grid."""
         line = next((line for entity in walls if (line := cls(scale_m).raw(entity))), None)
         if line is None or np.abs(shapely.get_coordinates(line)).max() < FAR_M:
             return cls(scale_m)
@@ -45,11 +45,11 @@ class DrawingFrame:
         return cls(scale_m, float(x), float(y))
 
     def metres(self, point: Any) -> tuple[float, float]:
-        """A point of the drawing."""
+        """A point of the drawing in map metres."""
         return float(point.x) * self.scale_m - self.x0_m, float(point.y) * self.scale_m - self.y0_m
 
     def raw(self, entity: Any) -> LineString | None:
-        """The entity as a chain of straight pieces; None for what has no line."""
+        """The entity as a polyline in metres; None for an entity without a line."""
         from ezdxf import path
 
         try:
@@ -59,7 +59,7 @@ class DrawingFrame:
         return LineString(points) if len(set(points)) > 1 and np.isfinite(points).all() else None
 
     def line(self, entity: Any, file: Path) -> LineString | None:
-        """The same; raises EchostepError when it is further away than a plan can be."""
+        """As `raw`; raises EchostepError when the line is beyond the limit of plans."""
         line = self.raw(entity)
         if line is not None and np.abs(shapely.get_coordinates(line)).max() > LIMIT_M:
             raise EchostepError(
@@ -69,12 +69,12 @@ class DrawingFrame:
 
 
 def read_drawing(file: Path) -> Any:
-    """The drawing, mended where ezdxf can; raises EchostepError when it is none."""
+    """Read a drawing, repaired where ezdxf can; raises EchostepError when the file is not a drawing."""
     from ezdxf import recover
     from ezdxf.lldxf.const import DXFError
 
     raw = read_bytes(file)
-    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # its words about single values; the audit counts them
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # no messages about single values; the audit counts them
     try:
         drawing, auditor = recover.read(io.BytesIO(raw))
     except Exception as error:  # a damaged drawing breaks ezdxf in many ways
@@ -86,7 +86,7 @@ def read_drawing(file: Path) -> Any:
 
 
 def entities(space: Any, file: Path, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
-    """Each entity with its layer ("0" in a block is the block's), blocks taken apart, but not those on layers that are kept whole."""
+    """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
     stack = [(entity, "0", 0) for entity in reversed(list(space))]
     count = 0
     while stack:
@@ -103,7 +103,7 @@ def entities(space: Any, file: Path, whole: Callable[[str], bool]) -> Iterator[t
 
 
 def parts(insert: Any, file: Path) -> list[Any]:
-    """What a block reference draws, one level deep; a damaged one draws nothing."""
+    """The entities of a block reference, one level deep; empty for a damaged one."""
     if insert.mcount > MOST_PARTS // 10:
         raise EchostepError(
             f"{file}: layer {insert.dxf.layer!r}: block {insert.dxf.name!r} is repeated {insert.mcount} times"

@@ -1,4 +1,4 @@
-"""Simple Indoor Tagging of OpenStreetMap (.osm).
+"""OpenStreetMap with Simple Indoor Tagging: elements, level tags, and the building made of them.
 
 In: an OSM file. Out: `Plan`. Owns nothing.
 """

@@ -1,7 +1,7 @@
 """OpenStreetMap Simple Indoor Tagging (XML, or JSON of Overpass) -> `Plan`.
 
-In: an .osm, .xml or .json file. Out: `Plan`. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a building's outline is a wall
-on each of its levels; a door is a node on a wall. Levels are `storey_m` apart, level 0 at 0 m.
+In: an .osm, .xml or .json file. Out: `Plan`. Owns nothing. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a building's
+outline is a wall on each of its levels; a door is a node on a wall. Levels are `storey_height_m` apart, level 0 at 0 m.
 """
 
 from __future__ import annotations
@@ -17,63 +17,67 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.errors import EchostepError
 from echostep.plan.georeference import EarthTransform
+from echostep.plan.importers.connector_shapes import join_connectors
+from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
 from echostep.plan.importers.osm.elements import Elements, Tags, read_osm
 from echostep.plan.importers.osm.levels import levels_of
-from echostep.plan.importers.storey import Storey, Way, areas, room
-from echostep.plan.importers.walkways import connect
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 
-DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map has none
+DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none. By reason: usual sizes
 MOST_LEVELS = 200
 
 
 @dataclass(slots=True)
 class OsmSite:
-    """Storeys by their level numbers, and the walls that each node lies on."""
+    """Levels by their OSM level numbers, these numbers in order, and the walls that each node lies on."""
 
-    storeys: dict[float, Storey]
+    drawn_levels: dict[float, DrawnLevel]
     order: list[float]
     walls_at: dict[tuple[float, int], list[LineString]] = field(default_factory=dict)
 
-    def on(self, levels: list[float]) -> Iterator[Storey]:
-        """The storeys with these numbers."""
-        return (self.storeys[level] for level in levels if level in self.storeys)
+    def on(self, levels: list[float]) -> Iterator[DrawnLevel]:
+        """The levels with these OSM numbers."""
+        return (self.drawn_levels[level] for level in levels if level in self.drawn_levels)
 
 
-def import_osm(path: Path, storey_m: float) -> Plan:
-    """The building in a file; raises EchostepError that names the file and the element."""
+def import_osm(path: Path, storey_height_m: float) -> Plan:
+    """Import the building in a file; raises EchostepError that names the file and the element."""
     elements = read_osm(path)
     levels = sorted({level for tags in elements.indoor_tags() for level in levels_of(tags)})
     if not levels:
-        raise EchostepError(f"{path}: nothing is tagged indoor=* with a level")
+        raise EchostepError(f"{path}: nothing is tagged indoor=* with a level: choose an area that is mapped indoors")
     if len(levels) > MOST_LEVELS:
-        raise EchostepError(f"{path}: {len(levels)} levels; a plan has {MOST_LEVELS} at most")
+        raise EchostepError(f"{path}: {len(levels)} levels; a plan has {MOST_LEVELS} at most: cut out one building")
     georeference = _origin(elements, path)
     elements.project(EarthTransform(georeference).metres)
     if np.abs(np.array(list(elements.at_m.values()))).max() > LIMIT_M:
         raise EchostepError(f"{path}: nodes are further than {LIMIT_M / 1000:.0f} km apart: cut out one building")
-    site = OsmSite({level: Storey(f"level {level:g}", round(level * storey_m, 6)) for level in levels}, levels)
+    site = OsmSite(
+        {level: DrawnLevel(f"level {level:g}", round(level * storey_height_m, 6)) for level in levels}, levels
+    )
     _outlines(site, elements)
     _spaces(site, elements)
     _doors(site, elements)
     _lifts(site, elements)
-    storeys = [site.storeys[level] for level in levels]
+    drawn_levels = [site.drawn_levels[level] for level in levels]
     name = next((tags["name"] for *_, tags in elements.lines() if "building" in tags and "name" in tags), path.stem)
-    return Plan(name, tuple(storey.level() for storey in storeys), None, "", connect(storeys), georeference)
+    return Plan(
+        name, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels), georeference
+    )
 
 
 def _origin(elements: Elements, path: Path) -> Georeference:
-    """The middle of the nodes of all that is indoors, to a hundred thousandth of a degree."""
+    """The plan's origin: the mean position of the nodes of indoor elements and buildings, rounded to 1e-5 degrees (about 1 m)."""
     used = [node for _, nodes, tags in elements.lines() if "indoor" in tags or "building" in tags for node in nodes]
     if not used:
-        raise EchostepError(f"{path}: no way is tagged indoor=*")
+        raise EchostepError(f"{path}: no way is tagged indoor=*: choose an area that is mapped indoors")
     lon, lat = np.array([elements.degrees[node] for node in used]).mean(axis=0).round(5)
     return Georeference(float(lon), float(lat))
 
 
 def _outlines(site: OsmSite, elements: Elements) -> None:
-    """The outside walls of buildings."""
+    """Add the outlines of buildings as walls, on each of their levels."""
     for where, nodes, tags in elements.lines():
         if tags.get("building", "no") != "no":
             own = levels_of(tags, where) or [
@@ -92,7 +96,7 @@ def _within(level: float, least: str | None, most: str | None) -> bool:
 
 
 def _spaces(site: OsmSite, elements: Elements) -> None:
-    """Rooms, areas, corridors, walls, stairs and lifts that are drawn as lines or areas."""
+    """Add rooms, areas, corridors, walls, stairs and lifts that are mapped as lines or areas."""
     for where, nodes, tags in elements.lines():
         levels, kind = levels_of(tags, where), tags.get("indoor", "no")
         line = elements.line(nodes)
@@ -102,32 +106,32 @@ def _spaces(site: OsmSite, elements: Elements) -> None:
         if kind in ("room", "wall"):
             _wall(site, elements, nodes, levels, tags)
         if kind in ("column", "pillar") and area is not None:
-            for storey in site.on(levels):
-                storey.filled += areas([area])
+            for drawn in site.on(levels):
+                drawn.filled += areas([area])
         if way is not None and line is not None:
             where_to = area or line.buffer(_metres(tags, STAIRS_M) / 2, cap_style="flat")
             _ways(site, way, tags, where_to, levels)
         name = tags.get("name") or tags.get("ref") or ""
         if name and area is not None and kind in ("room", "area", "corridor") and way is None:
-            for storey in site.on(levels):
-                storey.rooms += [room(name[:80], part) for part in areas([area])]
+            for drawn in site.on(levels):
+                drawn.rooms += [room(name[:80], part) for part in areas([area])]
 
 
 def _wall(site: OsmSite, elements: Elements, nodes: list[int], levels: list[float], tags: Tags) -> None:
-    """A line of wall on each of its levels; glass is a window."""
+    """Add a line as a wall, or as a window when it is of glass, on each of its levels."""
     line = elements.line(nodes)
     if line is None:
         return
     glass = "glass" in (tags.get("material"), tags.get("wall"))
     for level in levels:
-        if level in site.storeys:
-            (site.storeys[level].windows if glass else site.storeys[level].walls).append(line)
+        if level in site.drawn_levels:
+            (site.drawn_levels[level].windows if glass else site.drawn_levels[level].walls).append(line)
             for node in set(nodes):
                 site.walls_at.setdefault((level, node), []).append(line)
 
 
 def _doors(site: OsmSite, elements: Elements) -> None:
-    """Nodes with a door, on each level where they lie on a wall."""
+    """Add a door for each node with a door tag, on each level where the node lies on a wall."""
     for node, tags in elements.nodes():
         if "door" not in tags and "entrance" not in tags and tags.get("indoor") != "door":
             continue
@@ -135,13 +139,13 @@ def _doors(site: OsmSite, elements: Elements) -> None:
         for level in own:
             for line in site.walls_at.get((level, node), [])[:1]:
                 found = _gap(line, Point(elements.at_m[node]), _metres(tags, DOOR_M))
-                site.storeys[level].doors.append(
+                site.drawn_levels[level].doors.append(
                     Door(found, _state(tags), (tags.get("name") or tags.get("ref") or "")[:80])
                 )
 
 
 def _gap(line: LineString, at: Point, wide_m: float) -> tuple[float, float, float, float]:
-    """The door's line along the wall's longer piece at the node, moved off the corner where it would not fit."""
+    """A door's line along the longer side of the wall at its node; moved along the side when it would extend beyond the corner."""
     corners = list(line.coords)
     sides = [LineString(pair) for pair in zip(corners, corners[1:], strict=False) if pair[0] != pair[1]]
     near = [side for side in sides if side.distance(at) < 0.01]
@@ -158,7 +162,7 @@ def _state(tags: Tags) -> DoorState:
 
 
 def _lifts(site: OsmSite, elements: Elements) -> None:
-    """Lifts that are drawn as one node."""
+    """Add lifts and stairs that are mapped as one node, as squares."""
     for node, tags in elements.nodes():
         way = _way(tags)
         if way is not None:
@@ -172,24 +176,24 @@ def _lifts(site: OsmSite, elements: Elements) -> None:
 
 
 def _way(tags: Tags) -> ConnectorKind | None:
-    """What kind of way between levels this is."""
-    said = {tags.get("highway"), tags.get("room"), tags.get("indoor"), tags.get("buildingpart:verticalpassage")}
-    if "elevator" in said or tags.get("elevator") == "yes":
+    """The kind of connector that the tags state; None for other elements."""
+    values = {tags.get("highway"), tags.get("room"), tags.get("indoor"), tags.get("buildingpart:verticalpassage")}
+    if "elevator" in values or tags.get("elevator") == "yes":
         return "lift"
-    if said & {"steps", "stairs", "stairway", "escalator"} or tags.get("stairs") == "yes":
+    if values & {"steps", "stairs", "stairway", "escalator"} or tags.get("stairs") == "yes":
         return "stairs"
-    return "ramp" if "ramp" in said or tags.get("ramp") == "yes" else None
+    return "ramp" if "ramp" in values or tags.get("ramp") == "yes" else None
 
 
 def _ways(site: OsmSite, kind: ConnectorKind, tags: Tags, area: BaseGeometry, levels: list[float]) -> None:
-    """The way on each of its levels; where it leads when it has several."""
-    known = tuple(site.order.index(level) for level in levels if level in site.storeys)
-    for storey in site.on(levels):
-        storey.ways += [Way(kind, tags.get("name", "")[:80], part, known) for part in areas([area])]
+    """Add a connector's shape to each of its levels."""
+    known = tuple(site.order.index(level) for level in levels if level in site.drawn_levels)
+    for drawn in site.on(levels):
+        drawn.connectors += [ConnectorShape(kind, tags.get("name", "")[:80], part, known) for part in areas([area])]
 
 
 def _metres(tags: Tags, otherwise: float) -> float:
-    """The width in metres, within reason."""
+    """The tagged width in metres; `otherwise` when it is absent or not between 0.3 m and 20 m."""
     try:
         width = float(tags.get("width", "").removesuffix("m").strip())
     except ValueError:

@@ -1,6 +1,6 @@
 """Nodes, ways and multipolygons of an OpenStreetMap file.
 
-In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`). Out: `Elements`. An entity or a DTD in the XML is refused.
+In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`). Out: `Elements`. Owns nothing. XML with an entity or a DTD is refused.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Tags = dict[str, str]
 
 @dataclass(slots=True)
 class Elements:
-    """What a file holds; `degrees` longitude and latitude of nodes, `at_m` their places once they are projected."""
+    """The elements of a file by id. `degrees`: longitude and latitude of nodes; `at_m`: their map positions, filled by `project`."""
 
     degrees: dict[int, tuple[float, float]] = field(default_factory=dict)
     node_tags: dict[int, Tags] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Elements:
     at_m: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     def lines(self) -> Iterator[tuple[str, list[int], Tags]]:
-        """Ways, and the member ways of tagged multipolygons, with their names and tags; at least two nodes each."""
+        """Name, nodes and tags of ways, and of the member ways of multipolygons; only lines of two nodes or more."""
         for key, nodes in self.ways.items():
             if len(nodes) > 1:
                 yield f"way {key}", nodes, self.way_tags[key]
@@ -49,28 +49,28 @@ class Elements:
         return ((key, tags) for key, tags in self.node_tags.items() if tags)
 
     def indoor_tags(self) -> Iterator[Tags]:
-        """Tags of all that is indoors."""
+        """Tags of all lines with an indoor tag."""
         return (tags for _, _, tags in self.lines() if "indoor" in tags)
 
     def project(self, metres: Callable[[Floats], Floats]) -> None:
-        """Find all places."""
-        places = metres(np.array(list(self.degrees.values())).reshape(-1, 2))
-        self.at_m = {key: (float(x), float(y)) for key, (x, y) in zip(self.degrees, places, strict=True)}
+        """Fill `at_m` by the projection `metres`: (n, 2) degrees -> (n, 2) map metres."""
+        positions = metres(np.array(list(self.degrees.values())).reshape(-1, 2))
+        self.at_m = {key: (float(x), float(y)) for key, (x, y) in zip(self.degrees, positions, strict=True)}
 
     def line(self, nodes: list[int]) -> LineString | None:
-        """The places of nodes as a line, None when they are one place."""
-        places = [self.at_m[node] for node in nodes]
-        return LineString(places) if len(set(places)) > 1 else None
+        """The line through nodes in map metres; None when all are at one position."""
+        positions = [self.at_m[node] for node in nodes]
+        return LineString(positions) if len(set(positions)) > 1 else None
 
 
 def read_osm(path: Path) -> Elements:
-    """The elements of a file; raises EchostepError that names the file and the element."""
+    """Read the elements of a file; raises EchostepError that names the file and the element."""
     text = read_text(path)
     try:
         rows = _json_rows(text, path) if text.lstrip()[:1] == "{" else _xml_rows(text)
         elements = Elements()
         for row in rows:
-            _take(elements, row)
+            _add(elements, row)
         _resolve(elements)
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
@@ -83,15 +83,15 @@ def _json_rows(text: str, path: Path) -> list[Any]:
 
 
 def _xml_rows(text: str) -> list[dict[str, Any]]:
-    """Elements of the XML in the form of Overpass JSON."""
+    """The elements of XML, in the form of Overpass JSON."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError("an OSM file has no DTD and no entities")
+        raise ValueError("it has a DTD or entities, which OSM files do not have: download it again")
     try:
         root = ET.fromstring(text)
     except ET.ParseError as error:
         raise ValueError(f"not XML: {error}") from error
     if root.tag != "osm":
-        raise ValueError(f"<{root.tag[:40]}> is not <osm>")
+        raise ValueError(f"<{root.tag[:40]}> instead of <osm>: is this an OpenStreetMap file?")
     return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
 
 
@@ -108,14 +108,15 @@ def _xml_row(element: ET.Element) -> dict[str, Any]:
 
 
 def _json_number(text: str | None) -> Any:
-    """An attribute as JSON would have it."""
+    """An attribute as the JSON value that its text stands for; the text itself when it is not JSON."""
     try:
         return None if text is None else json.loads(text, parse_constant=str)
     except (ValueError, RecursionError):
         return text
 
 
-def _take(elements: Elements, row: Any) -> None:
+def _add(elements: Elements, row: Any) -> None:
+    """Check an element (as in Overpass JSON) and add it; relations other than multipolygons are left out."""
     row = typed(row, "elements", dict)
     kind, key = row.get("type"), row.get("id")
     if isinstance(key, bool) or not isinstance(key, int):
@@ -155,6 +156,6 @@ def _tags(value: Any, where: str) -> Tags:
 
 
 def _resolve(elements: Elements) -> None:
-    """Ways keep the nodes that the file holds: an extract cuts ways at its edge."""
+    """Remove nodes that the file does not contain from ways: an extract cuts ways at its edge."""
     for key, nodes in elements.ways.items():
         elements.ways[key] = [node for node in nodes if node in elements.degrees]

@@ -12,18 +12,18 @@ from collections.abc import Mapping
 from echostep.errors import EchostepError
 
 RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
-MOST = 300
+MOST = 300  # greatest level number, and most levels in a range
 
 
 def levels_of(tags: Mapping[str, str], where: str = "") -> list[float]:
-    """The levels of an element, none if it has no tag that can be read; raises EchostepError for a range without sense."""
+    """The level numbers of an element; empty when no tag can be read. Raises EchostepError for an impossible range."""
     texts = f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";")
     found: set[float] = set()
     for text in (text.strip() for text in texts):
         if match := RANGE.match(text):
             low, high = float(match[1]), float(match[2])
             if not 0 <= high - low <= MOST:
-                raise EchostepError(f"{where}: level {text[:40]!r} is no range of levels")
+                raise EchostepError(f"{where}: level {text[:40]!r} is no range of levels: expected LOW-HIGH, as 0-5")
             found |= {low + step for step in range(int(high - low) + 1)}
         else:
             try:

@@ -1,7 +1,7 @@
-"""One storey as its drawing gives it -> a `Level`.
+"""The shapes of one level as they are drawn -> a `Level`.
 
-In: shapes of walls, windows, doors, obstacles, rooms and stairs, in map metres. Out: `Level`. Walls with a thickness become both faces and their
-ends, because these are what a ranger hears and what a person can touch; walls drawn as one line stay one line, open at the doors.
+In: shapes of walls, windows, doors, obstacles, rooms and stairs, in map metres. Out: `Level`. Owns nothing. A wall with a thickness becomes both its
+faces and its ends, because these reflect echoes; a wall drawn as one line stays one line, with gaps at the doors.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ from echostep.arrays import Floats
 from echostep.plan.importers.straight import merge_collinear
 from echostep.plan.model import ConnectorKind, Door, Level, Room
 
-CLOSE_M = 0.01  # half of the widest crack between two pieces of a wall that is closed
-FLAT_M = 0.005  # a curve may be drawn so far off
-SLIVER_M2 = 1e-3
-GRID_M = 1e-3
-TOUCH_M = 2e-3  # a face so near to a wall is the wall's
-FLECK_M = 0.02  # a shorter piece of glass is not one
+# By reason, all of them:
+CLOSE_M = 0.01  # half the width of the widest crack between two pieces of a wall that is closed
+FLAT_M = 0.005  # greatest distance of a curve from the straight pieces that replace it
+SLIVER_M2 = 1e-3  # smaller areas are dropped
+GRID_M = 1e-3  # coordinates are rounded to it
+TOUCH_M = 2e-3  # a face nearer to a wall than this belongs to the wall, not to a window
+FLECK_M = 0.02  # shorter pieces of window count as wall
 
 
 @dataclass(slots=True)
-class Way:
-    """A shape of stairs, a lift or a ramp on one storey; on `levels` when the drawing says where it leads."""
+class ConnectorShape:
+    """The shape of stairs, a lift or a ramp on one level; `levels`: all levels that it reaches, where the drawing states them."""
 
     kind: ConnectorKind
     name: str
@@ -37,22 +38,22 @@ class Way:
 
 
 @dataclass(slots=True)
-class Storey:
-    """What was drawn of one storey."""
+class DrawnLevel:
+    """The shapes of one level."""
 
     name: str
     height_m: float
     walls: list[BaseGeometry] = field(default_factory=list)
     windows: list[BaseGeometry] = field(default_factory=list)
-    filled: list[Polygon] = field(default_factory=list)  # nobody gets in: shafts, cores
+    filled: list[Polygon] = field(default_factory=list)  # without access: shafts, cores
     doors: list[Door] = field(default_factory=list)
     obstacles: list[Polygon] = field(default_factory=list)
     rooms: list[Room] = field(default_factory=list)
-    ways: list[Way] = field(default_factory=list)
+    connectors: list[ConnectorShape] = field(default_factory=list)
     openings: list[Polygon] = field(default_factory=list)  # holes in the floor
 
     def level(self) -> Level:
-        """The storey in the plan's terms; coordinates are rounded to a millimetre."""
+        """These shapes as a level of a plan; coordinates are rounded to a millimetre."""
         wall_faces, window_faces = _faces([*self.walls, *self.filled], self.windows)
         return Level(
             self.name,
@@ -65,7 +66,7 @@ class Storey:
         )
 
     def _lines(self, shapes: Iterable[BaseGeometry]) -> Floats:
-        """Walls drawn as one line, without the doors' openings."""
+        """Segments (n, 4) of the shapes that are lines, cut at the doors."""
         lines = [part for part in pieces(shapes) if isinstance(part, LineString)]
         if not lines:
             return np.zeros((0, 4))
@@ -75,19 +76,19 @@ class Storey:
 
 
 def cut(line: BaseGeometry, openings: list[BaseGeometry]) -> BaseGeometry:
-    """What is left of a line."""
+    """A line without its parts inside the openings."""
     return line if not openings else line.difference(shapely.union_all(openings))
 
 
 def pieces(shapes: Iterable[BaseGeometry]) -> list[BaseGeometry]:
-    """Lines and areas, out of collections; nothing that is empty."""
+    """The lines and areas inside collections; empty ones are dropped."""
     parts = (part for shape in shapes for part in shapely.get_parts(shape, return_index=False))
     flat = [inner for part in parts for inner in (pieces(part.geoms) if hasattr(part, "geoms") else [part])]
     return [part for part in flat if not part.is_empty]
 
 
 def areas(shapes: Iterable[BaseGeometry]) -> list[Polygon]:
-    """The areas among the shapes, made valid."""
+    """The areas among the shapes, made valid, without slivers."""
     sound = (part if part.is_valid else shapely.make_valid(part) for part in pieces(shapes))
     return [part for part in pieces(sound) if isinstance(part, Polygon) and part.area > SLIVER_M2]
 
@@ -99,9 +100,9 @@ def ring(area: Polygon) -> Floats:
 
 
 def room(name: str, area: Polygon) -> Room:
-    """A room with its outline, its name where there is space for it."""
-    at = area.representative_point()
-    return Room(name, (round(at.x, 3), round(at.y, 3)), ring(area))
+    """A room with its outline; its position is a point inside the area."""
+    inside = area.representative_point()
+    return Room(name, (round(inside.x, 3), round(inside.y, 3)), ring(area))
 
 
 def opening(area: Polygon) -> tuple[float, float, float, float]:
@@ -115,7 +116,7 @@ def opening(area: Polygon) -> tuple[float, float, float, float]:
 
 
 def _faces(walls: Iterable[BaseGeometry], windows: Iterable[BaseGeometry]) -> tuple[Floats, Floats]:
-    """Faces of all that has a thickness: of walls, and of windows where no wall covers them."""
+    """Segments (n, 4) of the faces of walls, and of the faces of windows where no wall covers them."""
     stone, glass = _solid(areas(walls)), _solid(areas(windows))
     both = _solid(pieces([stone, glass]))
     outside = shapely.union_all([part.boundary for part in pieces([both])])
@@ -130,12 +131,12 @@ def _faces(walls: Iterable[BaseGeometry], windows: Iterable[BaseGeometry]) -> tu
 
 
 def joined(lines: BaseGeometry) -> BaseGeometry:
-    """Lines that continue each other as one."""
+    """Merge lines that continue each other."""
     return lines if lines.is_empty or isinstance(lines, LineString) else shapely.line_merge(lines)
 
 
 def _solid(parts: list[BaseGeometry]) -> BaseGeometry:
-    """One shape without cracks and slivers."""
+    """The union of areas, without cracks and slivers."""
     if not parts:
         return Polygon()
     one = shapely.union_all(parts, grid_size=GRID_M)
@@ -144,7 +145,7 @@ def _solid(parts: list[BaseGeometry]) -> BaseGeometry:
 
 
 def _segments(lines: Iterable[BaseGeometry]) -> Floats:
-    """Straight pieces, (n, 4), rounded to a millimetre, curves within 5 mm."""
+    """The straight pieces (n, 4) of lines, rounded to a millimetre; curves are simplified within `FLAT_M`."""
     rows = [np.zeros((0, 4))]
     for line in pieces(lines):
         points = np.asarray(line.simplify(FLAT_M).coords)[:, :2].round(3)
