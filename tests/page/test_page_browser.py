@@ -336,7 +336,7 @@ def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
 
 GUIDED = """({
     cue: document.querySelector('#cue').textContent, left: document.querySelector('#left').textContent,
-    sign: document.querySelector('#turn').dataset.sign, end: document.querySelector('#nowhere').offsetParent !== null,
+    sign: document.querySelector('#turn').dataset.sign, end: document.querySelector('#end-guidance').offsetParent !== null,
     sentence: document.querySelector('#sentence').textContent, beacons: document.querySelector('#beacons').textContent })"""
 SPEECH = """
     window.said = [];
@@ -365,7 +365,7 @@ def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp
         page.select_option("#goal", label="Store")
         wait_for(page, "echostep.scene.frame.guidance.own")
         wait_for(page, f"{GUIDED}.end")
-        page.click("#nowhere")
+        page.click("#end-guidance")
         wait_for(page, "!echostep.scene.frame.guidance.own")
         assert not page.wrong
         page.context.close()

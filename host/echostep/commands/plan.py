@@ -1,6 +1,6 @@
 """`echostep plan import | check | show | edit`.
 
-In: what the user typed. Out: plans, pictures, findings. Heavy imports wait until a command runs.
+In: command-line arguments. Out: plans, pictures, findings. Owns the options. Heavy modules are imported when a command runs.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from echostep.errors import EchostepError
 if TYPE_CHECKING:
     from echostep.plan.model import Plan
 
-MOST_LINES, MOST_MARKS = 200, 300  # in a terminal, in a picture
+MOST_LINES, MOST_MARKS = 200, 300  # findings that are printed, and that are drawn
 
 app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show, edit.")
 

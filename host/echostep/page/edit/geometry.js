@@ -1,8 +1,8 @@
-// Geometry of the plan's page: pure functions on a level of plan.json {walls, doors, windows, rooms, ...} that give a new level. Metres, x east, y north.
+// Geometry of the plan editor: pure functions from a level of plan.json {walls, doors, windows, rooms, ...} to a new level. Metres, x east, y north.
 
 export const GRID_M = 0.05;
-export const JOINT_M = 1e-3; // ends that are nearer are one joint
-const IN_LINE = 1e-3; // sine of the angle between two that are in line
+export const JOINT_M = 1e-3; // ends with a smaller distance are one joint
+const IN_LINE = 1e-3; // sine of the angle below which two segments are in line
 
 export const round = (v) => Math.round(v * 1e4) / 1e4;
 export const onGrid = (v) => round(Math.round(v / GRID_M) * GRID_M);
@@ -13,7 +13,7 @@ export const length = (s) => distance(...ends(s));
 const unit = ([ax, ay], [bx, by]) => { const l = Math.hypot(bx - ax, by - ay); return [(bx - ax) / l, (by - ay) / l]; };
 const spot = ([x, y]) => [round(x), round(y)];
 
-// Nearest point of a segment, and how far along it lies (0 to 1).
+// The point of a segment nearest to p: its position `at`, its share `t` of the segment (0 to 1), its distance `away` from p.
 export function foot(p, [x0, y0, x1, y1]) {
   const dx = x1 - x0, dy = y1 - y0, t = Math.min(Math.max(((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy), 0), 1);
   const at = [x0 + t * dx, y0 + t * dy];
@@ -29,7 +29,7 @@ function nearest(p, rows, reach) {
   return found;
 }
 
-// What lies at a place: {kind: 'end' | 'door' | 'room' | 'wall', ...} or null. Small things win.
+// The element within reach of p: {kind: 'end' | 'door' | 'room' | 'wall', k: index, ...} or null. Small elements have precedence.
 export function hit(level, p, reach) {
   const doors = level.doors ?? [], lines = doors.map((door) => door.line);
   const room = (level.rooms ?? []).findIndex((r) => distance(r.at, p) <= reach);
@@ -42,7 +42,7 @@ export function hit(level, p, reach) {
   return wall && { kind: 'wall', k: wall.k };
 }
 
-// Where a point goes: to the end of a wall, at a right angle to the last stretch (or along x or y), onto a wall, or to the grid.
+// Snap a point: to the end of a wall, to a right angle with the last wall of the chain (or along x or y), onto a wall, or to the grid.
 export function snap(p, { walls = [], from = null, before = null, reach = 0.2 } = {}) {
   const near = walls.flatMap(ends).filter((e) => distance(e, p) <= reach && !(from && same(e, from))).sort((a, b) => distance(a, p) - distance(b, p))[0];
   if (near) return { at: near, kind: 'end' };
@@ -62,7 +62,7 @@ export function snap(p, { walls = [], from = null, before = null, reach = 0.2 } 
   return { at: [onGrid(p[0]), onGrid(p[1])], kind: 'grid' };
 }
 
-// Where a line through a point meets a segment, or null.
+// The intersection of a line (point, unit vector) with a segment, or null.
 export function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
   const vx = x1 - x0, vy = y1 - y0, d = ux * vy - uy * vx;
   if (Math.abs(d) < IN_LINE * Math.hypot(vx, vy)) return null;
@@ -70,7 +70,7 @@ export function crossing([px, py], [ux, uy], [x0, y0, x1, y1]) {
   return t < 0 || t > 1 ? null : [x0 + t * vx, y0 + t * vy];
 }
 
-// Wall k with a gap of a width about the point nearest to p; null where the wall is too short. What would be left shorter than a joint is no wall.
+// Cut a door of a width into wall k at the point nearest to p; null where the wall is too short. Remaining pieces shorter than a joint are dropped.
 export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
   const wall = level.walls[k], [a, b] = ends(wall), long = length(wall);
   if (!(width > JOINT_M) || long < width - JOINT_M) return null;
@@ -83,18 +83,18 @@ export function cutDoor(level, k, p, width, kept = { state: 'unknown' }) {
   return { ...level, walls: level.walls.toSpliced(k, 1, ...parts), doors: [...(level.doors ?? []), { ...kept, line: jambs.flat() }] };
 }
 
-// Whether two segments lie in one line and share an end.
-function follows(a, b) {
+// Whether two segments are in line and share an end.
+function continues(a, b) {
   const [[p, q], [r, s]] = [ends(a), ends(b)];
   const [ux, uy] = unit(p, q), [vx, vy] = unit(r, s);
   return Math.abs(ux * vy - uy * vx) < IN_LINE && [p, q].some((e) => same(e, r) || same(e, s));
 }
 
-// The level without door k, its gap closed: the walls on both sides and the gap become one wall. {level, wall: index or -1 when no wall was beside it}.
+// Remove door k: the walls on both sides and the gap become one wall. Returns {level, wall: its index, or -1 when no wall was beside the door}.
 export function fillDoor(level, k) {
   const door = level.doors[k].line, doors = level.doors.toSpliced(k, 1), sides = [];
   for (const end of ends(door)) {
-    const i = level.walls.findIndex((w, j) => !sides.includes(j) && follows(door, w) && ends(w).some((e) => same(e, end)));
+    const i = level.walls.findIndex((w, j) => !sides.includes(j) && continues(door, w) && ends(w).some((e) => same(e, end)));
     if (i >= 0) sides.push(i);
   }
   if (!sides.length) return { level: { ...level, doors }, wall: -1 };
@@ -105,7 +105,7 @@ export function fillDoor(level, k) {
   return { level: { ...level, walls, doors }, wall: walls.length - 1 };
 }
 
-// Door k with its middle at p: along its wall, or freely where it has none. Null where it does not fit.
+// Move the centre of door k to p: along its wall, or freely where it has none. Null where it does not fit.
 export function moveDoor(level, k, p) {
   const { line, ...kept } = level.doors[k], filled = fillDoor(level, k);
   if (filled.wall >= 0) return cutDoor(filled.level, filled.wall, p, length(line), kept);
@@ -113,7 +113,7 @@ export function moveDoor(level, k, p) {
   return { ...filled.level, doors: [...filled.level.doors, { ...kept, line: [line[0] + dx, line[1] + dy, line[2] + dx, line[3] + dy].map(round) }] };
 }
 
-// All ends of walls, windows and doors at some joints, moved to other places ([from, to] pairs); what has no length left is gone.
+// Move all ends of walls, windows and doors at some joints ([from, to] pairs); segments that have no length then are dropped.
 export function moveJoints(level, moves) {
   const to = (e) => moves.find(([from]) => same(from, e))?.[1] ?? e;
   const moved = (row) => { const [a, b] = ends(row).map(to); return [...a, ...b]; };
@@ -125,12 +125,12 @@ export function moveJoints(level, moves) {
   };
 }
 
-// The joints of wall k and of all doors and walls that go on in its line: they move together.
+// The joints of wall k and of all doors and walls that continue it in line: they move together.
 export function runOf(level, k) {
   const doors = (level.doors ?? []).map((d) => d.line), rows = [level.walls[k]], tried = new Set([level.walls[k]]);
   for (let i = 0; i < rows.length; i++) {
-    const others = doors.includes(rows[i]) ? level.walls : doors; // a wall goes on through a door only
-    for (const row of others) if (!tried.has(row) && follows(rows[i], row)) { tried.add(row); rows.push(row); }
+    const others = doors.includes(rows[i]) ? level.walls : doors; // walls are connected by doors only
+    for (const row of others) if (!tried.has(row) && continues(rows[i], row)) { tried.add(row); rows.push(row); }
   }
   const joints = [];
   for (const e of rows.flatMap(ends)) if (!joints.some((j) => same(j, e))) joints.push(e);
@@ -141,7 +141,7 @@ export function moveWall(level, k, [dx, dy]) {
   return moveJoints(level, runOf(level, k).map(([x, y]) => [[x, y], [round(x + dx), round(y + dy)]]));
 }
 
-// A picture {x, y, perPx} (lower left corner in metres, metres a pixel) so that two places on it are so far apart; the first stays where it is.
+// Scale a picture {x, y, perPx} (lower left corner in metres, metres per pixel) so that a and b are `metres` apart; a keeps its position.
 export function scaled(picture, a, b, metres) {
   const factor = metres / distance(a, b);
   return { x: a[0] + (picture.x - a[0]) * factor, y: a[1] + (picture.y - a[1]) * factor, perPx: picture.perPx * factor };

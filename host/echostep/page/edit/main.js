@@ -1,4 +1,4 @@
-// The plan's page: loads the plan and the picture, joins sheet, tools, view and buttons, saves.
+// The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
 import { box } from './geometry.js';
 import { paint } from './paint.js';
@@ -10,7 +10,7 @@ import { View } from './view.js';
 
 const byId = (id) => document.getElementById(id);
 const KEYS = { v: 'select', w: 'wall', d: 'door', x: 'erase', n: 'room', s: 'scale', o: 'origin' };
-const FIRST_WIDTH_M = 20; // of a picture whose scale nobody has set
+const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
 let sheet, tools, stamp, waiting = false;
 
@@ -22,8 +22,8 @@ function ask(question, answer) {
   byId('answer').value = answer;
   byId('ask').showModal();
   byId('answer').select();
-  return new Promise((told) => {
-    const end = (value) => { byId('ask').onclose = null; byId('ask').close(); map.focus(); told(value); };
+  return new Promise((resolve) => {
+    const end = (value) => { byId('ask').onclose = null; byId('ask').close(); map.focus(); resolve(value); };
     byId('ask').querySelector('form').onsubmit = (e) => { e.preventDefault(); end(byId('answer').value); };
     byId('no').onclick = () => end(null);
     byId('ask').onclose = () => end(null);
@@ -60,10 +60,10 @@ function show() {
   changed();
 }
 
-function goLevel(k) {
-  if (k < 0 || k >= sheet.tree.levels.length) return;
+function goLevel(level) {
+  if (level < 0 || level >= sheet.tree.levels.length) return;
   tools.choose(tools.name);
-  sheet.k = k;
+  sheet.k = level;
   say(`Level ${sheet.level.name}, ${sheet.level.height_m} m`);
   changed();
 }
@@ -83,13 +83,13 @@ async function save(over = false) {
   try {
     const headers = { 'content-type': 'application/json', ...(over ? {} : { 'if-match': stamp }) };
     const answer = await fetch('plan', { method: 'POST', headers, body: JSON.stringify(tree), signal: AbortSignal.timeout(30000) });
-    const told = await answer.json().catch(() => ({}));
-    if (answer.status === 409 && confirm(`${told.error}. Write over it? It stays as .bak.`)) { await save(true); return; }
-    if (!answer.ok) { wrong(`Not saved: ${told.error ?? answer.status}`); return; }
+    const reply = await answer.json().catch(() => ({}));
+    if (answer.status === 409 && confirm(`${reply.error}. Write over it? It stays as .bak.`)) { await save(true); return; }
+    if (!answer.ok) { wrong(`Not saved: ${reply.error ?? answer.status}`); return; }
     stamp = answer.headers.get('etag');
     sheet.saved = tree;
     wrong('');
-    say(`Saved ${told.saved}`);
+    say(`Saved ${reply.saved}`);
   } catch { wrong('Not saved: echostep does not answer. Is it still running?'); }
   changed();
 }
@@ -131,7 +131,7 @@ function key(e) {
 }
 
 const HINTS = {
-  select: 'Drag walls, ends of walls, doors and names', wall: 'Click from corner to corner; Escape or End ends a wall', door: 'Click on a wall', erase: 'Click on what shall go',
+  select: 'Drag walls, ends of walls, doors and names', wall: 'Click from corner to corner; Escape or End ends a wall', door: 'Click on a wall', erase: 'Click on an element to delete it',
   room: 'Click into a room', scale: 'Click two points whose distance you know', origin: 'Drag the picture',
 };
 

@@ -1,4 +1,4 @@
-// The sheet in SVG. In: a level, the picture's place, the view, what is chosen and drafted. Owns nothing but the elements.
+// The sheet in SVG. In: a level, the picture's position, the view, the selected element and the draft. Owns the SVG elements.
 
 import { ends, length } from './geometry.js';
 
@@ -33,10 +33,10 @@ export function paint({ level, picture, view, chosen, draft, measure, cross, poi
   for (const p of [...(row ? ends(row) : []), ...points]) marks.push(mark('circle', view.toScreen(...p)));
   byId('marks').replaceChildren(...marks);
   byId('cross').setAttribute('transform', `translate(${view.toScreen(...cross).join(' ')})`);
-  const told = draft ?? (measure ? row : null), text = byId('measure');
-  text.textContent = told && length(told) > 0 ? `${length(told).toFixed(2)} m` : '';
-  if (told) {
-    const [x, y] = view.toScreen((told[0] + told[2]) / 2, (told[1] + told[3]) / 2);
+  const measured = draft ?? (measure ? row : null), text = byId('measure');
+  text.textContent = measured && length(measured) > 0 ? `${length(measured).toFixed(2)} m` : '';
+  if (measured) {
+    const [x, y] = view.toScreen((measured[0] + measured[2]) / 2, (measured[1] + measured[3]) / 2);
     text.setAttribute('x', x);
     text.setAttribute('y', y - 12);
   }

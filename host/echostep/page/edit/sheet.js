@@ -1,6 +1,6 @@
-// The sheet: the plan and the picture's place as they are, were and will be again. Owns the history; every change is a new tree.
+// The sheet: the plan and the picture's position, with undo and redo. Owns the history; every change makes a new tree.
 
-const MOST_KEPT = 300;
+const MOST_KEPT = 300; // changes that can be undone
 
 export class Sheet {
   constructor(tree) { Object.assign(this, { tree, picture: null, k: 0, past: [], future: [], saved: tree }); }

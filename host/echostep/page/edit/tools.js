@@ -1,11 +1,11 @@
-// The tools: what a press, a move and a click on the sheet do. In: places in metres. Out: changes of the sheet. Owns what is held, drafted and chosen.
+// The tools: what a press, a move and a click on the sheet do. In: positions in metres. Out: changes of the sheet. Owns the held element, the draft and the selection.
 
 import { cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
 
 const REACH_PX = 14;
 
 export class Tools {
-  // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), doorWidth()
+  // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), doorWidth() in metres
   constructor(sheet, view, desk) {
     Object.assign(this, { sheet, view, desk, name: 'select', held: null, live: null, chosen: null, draft: null, chain: null, points: [], cross: [0, 0] });
   }
@@ -21,7 +21,7 @@ export class Tools {
     this.chosen = null;
   }
 
-  // End a chain of walls, let go of what is held.
+  // End a chain of walls, release the held element.
   stop() { Object.assign(this, { held: null, live: null, draft: null, chain: null, points: [] }); }
 
   down(p) {
@@ -115,9 +115,9 @@ export class Tools {
   }
 
   async room(p) {
-    const { level, k: storey } = this.sheet, rooms = level.rooms ?? [], found = hit({ ...level, walls: [], doors: [] }, p, this.reach);
+    const { level, k: levelIndex } = this.sheet, rooms = level.rooms ?? [], found = hit({ ...level, walls: [], doors: [] }, p, this.reach);
     const name = (await this.desk.ask('Name of the room', found ? rooms[found.k].name : ''))?.trim();
-    if (!name || this.sheet.k !== storey) return;
+    if (!name || this.sheet.k !== levelIndex) return;
     const at = [onGrid(p[0]), onGrid(p[1])];
     this.sheet.setLevel({ ...level, rooms: found ? rooms.with(found.k, { ...rooms[found.k], name }) : [...rooms, { name, at }] });
     this.desk.say(`Room ${name}`);

@@ -1,4 +1,4 @@
-// The link to the server: opens the socket again when it closes, takes frames apart, says what the page wants.
+// The WebSocket to the server: reconnects when it closes, parses frames, sends requests.
 
 const LONGEST_WAIT_MS = 5000;
 
@@ -13,7 +13,7 @@ export class Link {
     url.protocol = url.protocol.replace('http', 'ws');
     this.socket = new WebSocket(url);
     this.socket.binaryType = 'arraybuffer';
-    this.socket.onmessage = ({ data }) => (typeof data === 'string' ? this.told(JSON.parse(data)) : this.onFrame(parseFrame(data)));
+    this.socket.onmessage = ({ data }) => (typeof data === 'string' ? this.onText(JSON.parse(data)) : this.onFrame(parseFrame(data)));
     this.socket.onclose = () => {
       this.onState(false);
       setTimeout(() => this.open(), this.wait);
@@ -21,7 +21,7 @@ export class Link {
     };
   }
 
-  told(message) {
+  onText(message) {
     if (message.kind === 'hello') {
       this.wait = 250;
       this.onState(true);
@@ -29,24 +29,24 @@ export class Link {
     } else if (message.kind === 'refused') this.onRefused(message.what);
   }
 
-  say(kind, fields = {}) {
+  send(kind, fields = {}) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ kind, ...fields }));
   }
 }
 
-// Header, the trail's new points, and the cloud as grid columns: see wire.py.
+// A frame's header with the new points of the trail and the columns of the cloud; the layout is in page/protocol.py.
 export function parseFrame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  let at = 4 + length;
-  header.trail.points = new Float32Array(buffer, at, 3 * header.trail.count);
-  at += 12 * header.trail.count;
+  let offset = 4 + length;
+  header.trail.points = new Float32Array(buffer, offset, 3 * header.trail.count);
+  offset += 12 * header.trail.count;
   if (header.cloud) {
     const n = header.cloud.count;
-    header.cloud.x = new Uint16Array(buffer, at, n);
-    header.cloud.y = new Uint16Array(buffer, at + 2 * n, n);
-    header.cloud.weight = new Uint8Array(buffer, at + 4 * n, n);
-    header.cloud.level = new Uint8Array(buffer, at + 5 * n, n);
+    header.cloud.x = new Uint16Array(buffer, offset, n);
+    header.cloud.y = new Uint16Array(buffer, offset + 2 * n, n);
+    header.cloud.weight = new Uint8Array(buffer, offset + 4 * n, n);
+    header.cloud.level = new Uint8Array(buffer, offset + 5 * n, n);
   }
   return header;
 }

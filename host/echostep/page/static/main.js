@@ -1,4 +1,4 @@
-// The page: joins the link to the server, the map, the panel and what people do.
+// The live page: connects the link to the server, the map, the panel and the user's actions. *Level*: index into the plan's levels; *floor*: its name on the page.
 
 import { Gestures } from './gestures.js';
 import { Link } from './link.js';
@@ -11,40 +11,40 @@ import { startTheme } from './theme.js';
 import { View } from './view.js';
 
 const $ = (id) => document.getElementById(id);
-const FINGER_PX = 20;
-const LEAST_SD_M = 0.3;
+const FINGER_PX = 20;  // standard deviation of a tap on the screen
+const LEAST_SD_M = 0.3;  // of a check-in
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
-const panel = new Panel((k) => { setFollows(false); showFloor(k); });
+const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetAt = null, turned = 0, fitted = false, wanted = 0, invited = false;
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetPosition = null, turned = 0, fitted = false, wantedLevel = 0, invited = false;
 
-const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('Not taken: this is a replay, or it is too busy.', 3000), onState: connection });
+const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('Not accepted: this is a replay, or the tracker is too busy.', 3000), onState: connection });
 const speech = new Speech($('speech'), $('sentence'));
-const replay = new Replay((kind, fields) => link.say(kind, fields));
+const replay = new Replay((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
-painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.say('drawn', { seq }));
-const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // what tests look at
+painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
+const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
 
-async function hello(said) {
-  plan = said.plan;
+async function hello(message) {
+  plan = message.plan;
   scene.trail.count = 0;
   invited = false;
-  panel.hello(said);
-  replay.show(said.replay);
-  $('here').hidden = $('sheet-here').hidden = said.replay;
-  await showFloor(Math.min(scene.level, plan.levels.length - 1));
+  panel.hello(message);
+  replay.show(message.replay);
+  $('here').hidden = $('sheet-here').hidden = message.replay;
+  await showLevel(Math.min(scene.level, plan.levels.length - 1));
 }
 
-async function showFloor(k) {
-  wanted = k;
-  const walls = await fetch(new URL(`walls/${k}`, document.baseURI)).then((answer) => answer.arrayBuffer());
-  if (k !== wanted) return;
-  scene.level = k;
-  planView.show(new Float32Array(walls), plan.levels[k].rooms);
+async function showLevel(level) {
+  wantedLevel = level;
+  const walls = await fetch(new URL(`walls/${level}`, document.baseURI)).then((answer) => answer.arrayBuffer());
+  if (level !== wantedLevel) return;
+  scene.level = level;
+  planView.show(new Float32Array(walls), plan.levels[level].rooms);
   if (!fitted) view.fit(planView.box);
   fitted = true;
-  panel.floors(k, scene.frame?.told);
+  panel.floors(level, scene.frame?.told);
   view.changed();
 }
 
@@ -52,13 +52,13 @@ function connection(open) {
   if (!open) panel.status('waiting', 'not connected');
 }
 
-// Catch up with what the server sent; draw with the next picture. A page that is not seen draws nothing and says so by its silence.
-function frame(got) {
-  scene.frame = got;
-  if (got.cloud) scene.cloud = got.cloud;
-  extend(scene.trail, got.trail);
-  undrawn.push(got.seq);
-  speech.hear(got.guidance);
+// Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.
+function frame(received) {
+  scene.frame = received;
+  if (received.cloud) scene.cloud = received.cloud;
+  extend(scene.trail, received.trail);
+  undrawn.push(received.seq);
+  speech.update(received.guidance);
   dirty = true;
 }
 
@@ -75,10 +75,10 @@ function extend(trail, { from, count, points }) {
 
 function draw() {
   requestAnimationFrame(draw);
-  const { told } = scene.frame ?? {};
-  if (dirty && told && follows && !mode) {
-    if (!view.shows(planView.box)) view.keep(told.x_m, told.y_m);
-    if (told.level !== scene.level && told.level !== wanted) showFloor(told.level);
+  const { told: estimate } = scene.frame ?? {};
+  if (dirty && estimate && follows && !mode) {
+    if (!view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
+    if (estimate.level !== scene.level && estimate.level !== wantedLevel) showLevel(estimate.level);
   }
   const moved = drawnStamp !== view.stamp;
   if (!dirty && !moved) return;
@@ -91,9 +91,9 @@ function draw() {
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
     panel.frame(scene.frame, plan.levels[scene.level].rooms);
-    panel.floors(scene.level, told);
+    panel.floors(scene.level, estimate);
     replay.frame(scene.frame.play);
-    if (!told && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
+    if (!estimate && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
   }
   dirty = false;
   if (undrawn.length) {
@@ -103,7 +103,7 @@ function draw() {
   }
 }
 
-// Modes: null, 'here' (a tap says where I am, a drag where I look), 'go' (a tap says where I want to go).
+// Modes: null, 'here' (a tap gives the wearer's position, a drag the heading too), 'go' (a tap gives the destination).
 function enter(next, byKey = false) {
   mode = next;
   closeSheet();
@@ -112,7 +112,7 @@ function enter(next, byKey = false) {
   $('map').classList.toggle('takes', mode !== null);
   $('cross').hidden = !(mode && byKey);
   $('goal').value = mode === 'go' ? 'map' : scene.frame?.guidance?.own ? $('goal').value : '';
-  hint(mode === 'here' ? 'Stand still. Tap where you are, drag to where you look.' : mode === 'go' ? 'Tap where you want to go.' : '');
+  hint(mode === 'here' ? 'Stand still. Tap where you are, drag in the direction you face.' : mode === 'go' ? 'Tap where you want to go.' : '');
   view.changed();
 }
 
@@ -124,28 +124,28 @@ function hint(text, for_ms = 0) {
   if (for_ms) hintEnds = setTimeout(() => hint(''), for_ms);
 }
 
-function posing(place, heading_rad) {
-  scene.tapped = place && { x_m: place[0], y_m: place[1], heading_rad };
+function posing(position, heading_rad) {
+  scene.tapped = position && { x_m: position[0], y_m: position[1], heading_rad };
   dirty = true;
 }
 
 function posed([x_m, y_m], heading_rad) {
-  const meant = mode;
+  const before = mode;
   enter(null);
-  if (meant === 'go') {
-    link.say('go_to', { x_m, y_m, level: scene.level });
+  if (before === 'go') {
+    link.send('go_to', { x_m, y_m, level: scene.level });
     return;
   }
   const sd_m = Math.max(LEAST_SD_M, FINGER_PX / view.scale);
-  link.say('check_in', { x_m, y_m, heading_rad, sd_m, level: scene.level });
+  link.send('check_in', { x_m, y_m, heading_rad, sd_m, level: scene.level });
   posing([x_m, y_m], heading_rad);
-  hint(heading_rad === null ? 'Taken. Where you look is found while you walk.' : 'Taken.', 2500);
+  hint(heading_rad === null ? 'Sent. Your direction is found while you walk.' : 'Sent.', 2500);
   setTimeout(() => { if (!mode) posing(null, null); }, 1500);
 }
 
-function tapped(place, [sx, sy]) {
-  sheetAt = place;
-  posing(place, null);
+function tapped(position, [sx, sy]) {
+  sheetPosition = position;
+  posing(position, null);
   const sheet = $('sheet');
   sheet.hidden = false;
   sheet.style.left = `${Math.min(Math.max(sx - sheet.offsetWidth / 2, 4), view.width - sheet.offsetWidth - 4)}px`;
@@ -154,20 +154,20 @@ function tapped(place, [sx, sy]) {
 
 function closeSheet() {
   $('sheet').hidden = true;
-  sheetAt = null;
+  sheetPosition = null;
 }
 
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
-  const deeds = {
+  const actions = {
     n: () => view.rotate(-view.turn), w: () => { setFollows(false); view.fit(planView.box); }, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
     Escape: () => { enter(null); posing(null, null); },
     Enter: () => mode && posed(middle, mode === 'here' ? turned : null),
     ',': () => { turned += Math.PI / 12; dirty = true; }, '.': () => { turned -= Math.PI / 12; dirty = true; },
   };
-  deeds[name]?.();
-  return name in deeds;
+  actions[name]?.();
+  return name in actions;
 }
 
 function setFollows(on) {
@@ -177,30 +177,30 @@ function setFollows(on) {
 }
 
 function toggleFollow() {
-  const { told } = scene.frame ?? {};
+  const { told: estimate } = scene.frame ?? {};
   setFollows(!follows);
-  if (follows && told && !view.shows(planView.box)) view.centre(told.x_m, told.y_m);
+  if (follows && estimate && !view.shows(planView.box)) view.centre(estimate.x_m, estimate.y_m);
 }
 
-new Gestures($('map'), view, { takes: () => mode !== null, tapped, posing, posed, key, moved: () => { setFollows(false); closeSheet(); } });
+new Gestures($('map'), view, { takesPose: () => mode !== null, tapped, posing, posed, key, moved: () => { setFollows(false); closeSheet(); } });
 $('here').onclick = (e) => enter(mode === 'here' ? null : 'here', e.detail === 0);
 $('follow').onclick = () => toggleFollow();
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = () => { setFollows(false); view.fit(planView.box); };
 $('north').onclick = () => view.rotate(-view.turn);
-$('nowhere').onclick = () => { link.say('go_nowhere'); $('goal').value = ''; };
+$('end-guidance').onclick = () => { link.send('go_nowhere'); $('goal').value = ''; };
 $('goal').onchange = () => {
   const { value } = $('goal');
   if (value === 'map') return enter('go', true);
   enter(null);
-  if (!value) return link.say('go_nowhere');
-  const [floor, k] = value.split(' ').map(Number), [x_m, y_m] = plan.levels[floor].rooms[k].at_m;
+  if (!value) return link.send('go_nowhere');
+  const [level, room] = value.split(' ').map(Number), [x_m, y_m] = plan.levels[level].rooms[room].at_m;
   $('goal').value = value;
-  return link.say('go_to', { x_m, y_m, level: floor });
+  return link.send('go_to', { x_m, y_m, level });
 };
-$('sheet-here').onclick = () => { const place = sheetAt; mode = 'here'; posed(place, null); };
-$('sheet-go').onclick = () => { const place = sheetAt; mode = 'go'; posed(place, null); };
+$('sheet-here').onclick = () => { const position = sheetPosition; mode = 'here'; posed(position, null); };
+$('sheet-go').onclick = () => { const position = sheetPosition; mode = 'go'; posed(position, null); };
 $('sheet-close').onclick = () => { closeSheet(); posing(null, null); };
 startTheme($('theme'), () => { painter.recolour(); dirty = true; view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);

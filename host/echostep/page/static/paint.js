@@ -1,7 +1,7 @@
-// Paints what moves on a canvas: cloud, trail, beacons, echoes, position with its ellipse, heading, destination, a pose that is being tapped.
+// Paints the moving things on a canvas: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
 
-const GRADES = 4;  // of weight
-const SPECK_PX = 2.5;
+const GRADES = 4;  // shades of the particles' weight
+const PARTICLE_PX = 2.5;
 
 export class Painter {
   constructor(canvas) {
@@ -23,30 +23,30 @@ export class Painter {
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
-    if (scene.cloud) this.specks(view, scene.cloud, scene.level);
+    if (scene.cloud) this.particles(view, scene.cloud, scene.level);
     this.trail(view, scene.trail, scene.level);
-    const { told } = scene.frame ?? {};
-    if (scene.frame?.guidance?.path.length && told?.level === scene.level) this.way(view, scene.frame.guidance.path);
+    const { told: estimate } = scene.frame ?? {};
+    if (scene.frame?.guidance?.path.length && estimate?.level === scene.level) this.route(view, scene.frame.guidance.path);
     this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
-    if (told && told.level === scene.level) {
-      for (const beam of scene.frame.beams) this.beam(view, beam);
-      this.ellipse(view, told);
-      this.wearer(view, told);
+    if (estimate && estimate.level === scene.level) {
+      for (const line of scene.frame.beams) this.echoLine(view, line);
+      this.ellipse(view, estimate);
+      this.wearer(view, estimate);
     }
     if (scene.tapped) this.pose(view, scene.tapped);
   }
 
-  specks(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shown) {
-    const [a, b, c, d, e, f] = view.matrix(), { pen } = this, half = SPECK_PX / 2;
+  particles(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shownLevel) {
+    const [a, b, c, d, e, f] = view.matrix(), { pen } = this, half = PARTICLE_PX / 2;
     pen.fillStyle = this.colour.cloud;
     const e0 = a * x0_m + c * y0_m + e - half, f0 = b * x0_m + d * y0_m + f - half;
     const [as, bs, cs, ds] = [a * step_m, b * step_m, c * step_m, d * step_m];
     for (let grade = 0; grade < GRADES; grade++) {
       pen.globalAlpha = 0.12 + (0.5 * grade) / (GRADES - 1);
       for (let k = 0; k < count; k++) {
-        if (weight[k] >> 6 !== grade || level[k] !== shown) continue;
+        if (weight[k] >> 6 !== grade || level[k] !== shownLevel) continue;
         const sx = as * x[k] + cs * y[k] + e0, sy = bs * x[k] + ds * y[k] + f0;
-        if (sx > -4 && sy > -4 && sx < view.width && sy < view.height) pen.fillRect(sx, sy, SPECK_PX, SPECK_PX);
+        if (sx > -4 && sy > -4 && sx < view.width && sy < view.height) pen.fillRect(sx, sy, PARTICLE_PX, PARTICLE_PX);
       }
     }
     pen.globalAlpha = 1;
@@ -63,27 +63,27 @@ export class Painter {
     pen.setLineDash([]);
   }
 
-  // A point that is no number is a break: somebody checked in.
-  trail(view, { points, count }, shown) {
+  // A point with NaN coordinates breaks the line: there was a check-in.
+  trail(view, { points, count }, shownLevel) {
     const [a, b, c, d, e, f] = view.matrix(), { pen } = this;
     pen.beginPath();
-    let on = false;
+    let drawing = false;
     for (let k = 0; k < 3 * count; k += 3) {
-      const x = points[k], y = points[k + 1], here = points[k + 2] === shown && x === x;
-      if (here) pen[on ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
-      on = here;
+      const x = points[k], y = points[k + 1], visible = points[k + 2] === shownLevel && !Number.isNaN(x);
+      if (visible) pen[drawing ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
+      drawing = visible;
     }
     pen.strokeStyle = this.colour.trail;
     pen.lineWidth = 2;
     pen.stroke();
   }
 
-  // Measured: a line with a bar across its end. Expected: a ring where the plan would send the echo from.
-  beam(view, { ranger, x_m, y_m, axis_rad, measured_m, expected_m }) {
-    const { pen } = this, at = (r) => view.toScreen(x_m + r * Math.cos(axis_rad), y_m + r * Math.sin(axis_rad));
-    const colour = ranger ? this.colour.right : this.colour.left, from = at(0);
+  // Measured range: a line with a bar across its end. Range expected from the plan: a dotted line with a ring at its end.
+  echoLine(view, { ranger, x_m, y_m, axis_rad, measured_m, expected_m }) {
+    const { pen } = this, pixelAt = (range_m) => view.toScreen(x_m + range_m * Math.cos(axis_rad), y_m + range_m * Math.sin(axis_rad));
+    const colour = ranger ? this.colour.right : this.colour.left, from = pixelAt(0);
     if (expected_m !== null) {
-      const end = at(expected_m);
+      const end = pixelAt(expected_m);
       this.line([from, end], this.colour.expected, 1.5, [2, 5]);
       pen.beginPath();
       pen.arc(...end, 6, 0, 2 * Math.PI);
@@ -92,16 +92,16 @@ export class Painter {
       pen.stroke();
     }
     if (measured_m !== null) {
-      const end = at(measured_m), across = view.toScreen(x_m, y_m), ux = end[0] - across[0], uy = end[1] - across[1];
+      const end = pixelAt(measured_m), ux = end[0] - from[0], uy = end[1] - from[1];
       const length = Math.hypot(ux, uy) || 1, bx = (-uy / length) * 7, by = (ux / length) * 7;
       this.line([from, end], colour, 2.5);
       this.line([[end[0] - bx, end[1] - by], [end[0] + bx, end[1] + by]], colour, 3.5);
     } else {
-      this.line([from, at(0.6)], colour, 2.5, [1, 6]);
+      this.line([from, pixelAt(0.6)], colour, 2.5, [1, 6]);
     }
   }
 
-  // Those that speak lie on top; a number that would cover another is left out.
+  // Beacons that are heard are drawn on top; a number that would cover another is left out.
   beacons(view, shown) {
     const { pen } = this, taken = [], order = [...shown].sort((a, b) => a.heard - b.heard);
     for (const beacon of order) this.beacon(view, beacon);
@@ -119,12 +119,12 @@ export class Painter {
     }
   }
 
-  // A triangle in the circle of its spread. Full: well, with waves while it speaks. Hollow: moved (it has a tail), or silent (it is struck out).
+  // A triangle in the circle of its spread. Filled: well; with waves while it is heard. Hollow: moved (with a dotted tail) or silent (crossed out).
   beacon(view, { x_m, y_m, radius95_m, state, heard }) {
     const { pen } = this, [sx, sy] = view.toScreen(x_m, y_m), colour = state === 'well' ? this.colour.beacon : this.colour.bad;
     pen.strokeStyle = pen.fillStyle = colour;
     pen.lineWidth = 1.5;
-    if (radius95_m * view.scale > 9) {  // else the triangle covers it
+    if (radius95_m * view.scale > 9) {  // a smaller circle is covered by the triangle
       pen.beginPath();
       pen.arc(sx, sy, radius95_m * view.scale, 0, 2 * Math.PI);
       pen.globalAlpha = 0.12;
@@ -170,7 +170,7 @@ export class Painter {
     pen.stroke();
   }
 
-  // An arrow along the heading; a circle when nobody knows it.
+  // An arrow along the heading; a circle when the heading is not known.
   wearer(view, { x_m, y_m, heading_rad, heading_known }) {
     const { pen } = this;
     pen.save();
@@ -187,7 +187,7 @@ export class Painter {
     pen.restore();
   }
 
-  way(view, path) {
+  route(view, path) {
     const points = path.map(([x, y]) => view.toScreen(x, y)), { pen } = this;
     if (points.length > 1) this.line(points, this.colour.goal, 3, [8, 7]);
     const [sx, sy] = points[points.length - 1];

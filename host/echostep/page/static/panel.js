@@ -1,18 +1,18 @@
-// Words and numbers around the map: status, place, health of the streams, beacons, guidance, floors, scale bar; and what a screen reader is told.
+// Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕' };
 const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
-const SPOKEN_MS = 8000;  // a screen reader hears a new place no sooner
-const FASTEST_RAD_S = Math.PI;  // as the arrow of the guide turns
-const LEAST_RAD = 0.01;
+const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
+const FASTEST_RAD_S = Math.PI;  // of the guidance arrow's turn
+const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
 const $ = (id) => document.getElementById(id);
-const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // what stays is not laid out again
+const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
 
 export class Panel {
   constructor(onFloor) {
     this.onFloor = onFloor;
     this.spoken = { at: -Infinity, status: '', text: '' };
-    this.turn = 0;  // of the arrow, in turns without end, so that it goes the short way
+    this.turn = 0;  // angle of the arrow in radians, not wrapped, so that the transition takes the short way
   }
 
   hello({ title, plan }) {
@@ -26,27 +26,27 @@ export class Panel {
       button.textContent = level.name;
       share.className = 'share';
       button.append(share);
-      button.onclick = () => this.onFloor(k);
+      button.onclick = () => this.onFloor(k);  // with the index of the level
       return button;
     }));
   }
 
-  frame({ told, words, streams, guidance, beams, beacons }, rooms) {
-    const status = told?.status ?? 'waiting';
+  frame({ told: estimate, words, streams, guidance, beams, beacons }, rooms) {
+    const status = estimate?.status ?? 'waiting';
     this.status(status, words);
-    put('place', told ? whereabouts(told, rooms) : '');
-    put('echoes', told ? echoes(beams) : '');
-    put('health', streams ? rates(streams) : 'no bytes yet');
+    put('place', estimate ? positionText(estimate, rooms) : '');
+    put('echoes', estimate ? echoText(beams) : '');
+    put('health', streams ? rateText(streams) : 'no bytes yet');
     put('wrong', streams?.wrong ?? '');
     $('wrong').hidden = !streams?.wrong;
-    put('beacons', census(beacons));
+    put('beacons', beaconText(beacons));
     $('beacons').hidden = !beacons.length;
-    this.guide(guidance);
-    this.speak(`${status} ${streams?.wrong ?? ''}`, [words, told ? near(told, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
+    this.guidance(guidance);
+    this.announce(`${status} ${streams?.wrong ?? ''}`, [words, estimate ? nearestRoom(estimate, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
   }
 
-  // The arrow points from where he looks: up is straight ahead.
-  guide(guidance) {
+  // The arrow is relative to the heading: up is straight ahead.
+  guidance(guidance) {
     $('guidance').hidden = !guidance;
     if (!guidance) return;
     const { kind, text, arrow_rad, left_m, own } = guidance;
@@ -60,19 +60,20 @@ export class Panel {
     }
     put('cue', text);
     put('left', left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`);
-    $('nowhere').hidden = !own;
+    $('end-guidance').hidden = !own;
   }
 
   status(status, words) {
     $('words').dataset.status = status;
     $('mark').textContent = MARKS[status];
-    put('said', words);
+    put('status-text', words);
   }
 
-  floors(shown, told) {
-    [...$('floors').children].forEach((button, k) => {
-      const share = told?.levels?.[k] ?? 0;
-      button.setAttribute('aria-pressed', String(k === shown));
+  // One button per level of the plan, with the level's share of the particles.
+  floors(shownLevel, estimate) {
+    [...$('floors').children].forEach((button, level) => {
+      const share = estimate?.levels?.[level] ?? 0;
+      button.setAttribute('aria-pressed', String(level === shownLevel));
       button.setAttribute('aria-label', `${button.firstChild.textContent}, ${Math.round(100 * share)} % likely`);
       button.lastChild.style.width = `${100 * share}%`;
     });
@@ -85,7 +86,8 @@ export class Panel {
     $('needle').style.transform = `rotate(${-view.turn}rad)`;
   }
 
-  speak(status, text) {
+  // Text for screen readers: at once when the status has changed, else not more often than every SPOKEN_MS.
+  announce(status, text) {
     const now = performance.now(), { spoken } = this;
     if (text === spoken.text || (status === spoken.status && now - spoken.at < SPOKEN_MS)) return;
     this.spoken = { at: now, status, text };
@@ -93,25 +95,25 @@ export class Panel {
   }
 }
 
-function near({ x_m, y_m }, rooms) {
+function nearestRoom({ x_m, y_m }, rooms) {
   const away = rooms.map(({ name, at_m: [x, y] }) => [Math.hypot(x - x_m, y - y_m), name]).sort((a, b) => a[0] - b[0]);
   return away.length ? `near ${away[0][1]}` : '';
 }
 
-function whereabouts(told, rooms) {
-  const degrees = ((told.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((told.heading_sd_rad * 180) / Math.PI);
-  const heading = told.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
-  return [near(told, rooms), `x ${told.x_m.toFixed(1)}, y ${told.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
+function positionText(estimate, rooms) {
+  const degrees = ((estimate.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((estimate.heading_sd_rad * 180) / Math.PI);
+  const heading = estimate.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
+  return [nearestRoom(estimate, rooms), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
 }
 
-function echoes(beams) {
-  const one = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
-  const heard = beams.map((beam) => `${beam.ranger ? 'right' : 'left'} ${one(beam)}`);
-  return heard.length ? heard.join(' · ') : 'no echoes';
+function echoText(lines) {
+  const ranges = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
+  const texts = lines.map((line) => `${line.ranger ? 'right' : 'left'} ${ranges(line)}`);
+  return texts.length ? texts.join(' · ') : 'no echoes';
 }
 
-// Beacons in words, those that are not well by number.
-function census(beacons) {
+// How many beacons are heard, and the numbers of those that are silent or moved.
+function beaconText(beacons) {
   const of = (state) => beacons.filter((beacon) => beacon.state === state).map(({ number }) => number).join(', ');
   const heard = `beacons: ${beacons.filter((beacon) => beacon.heard).length} of ${beacons.length} heard`;
   return [heard, of('silent') && `silent: ${of('silent')}`, of('moved') && `moved: ${of('moved')}`].filter(Boolean).join(' · ');
@@ -119,7 +121,7 @@ function census(beacons) {
 
 const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
 
-function rates({ mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
+function rateText({ mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
   const rate = (value, unit) => (value === null ? '…' : `${Math.round(value)}${unit}`);
   const late = late_pings ? ` · ${late_pings} late` : '';
   return `MTx ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected} · ${synchronised ? 'SyncOut' : 'no SyncOut'}`;

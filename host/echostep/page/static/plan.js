@@ -1,7 +1,7 @@
-// The plan of a floor in SVG: walls as paths, a tile each, of which only those on the screen are in the document; names of rooms, upright.
+// One level of the plan in SVG: walls as paths by tiles, of which only those on the screen are in the document; names of rooms, always upright.
 
 const SVG = 'http://www.w3.org/2000/svg';
-const TILE_M = 30;
+const TILE_M = 30;  // side of a tile
 
 export class PlanView {
   constructor(wallsGroup, roomsGroup) {
@@ -25,7 +25,7 @@ export class PlanView {
     const [x, y] = [view.x, view.y], reach = Math.hypot(view.width, view.height) / 2 / view.scale;
     for (const tile of this.tiles) {
       const seen = tile.box[0] < x + reach && tile.box[2] > x - reach && tile.box[1] < y + reach && tile.box[3] > y - reach;
-      for (const part of tile.parts) place(part, seen && part.longest * view.scale > 1, this.wallsGroup);
+      for (const part of tile.parts) setShown(part, seen && part.longest * view.scale > 1, this.wallsGroup);
     }
     const taken = [];
     for (const room of this.rooms) {
@@ -39,8 +39,8 @@ export class PlanView {
   }
 }
 
-// Put a part's path into the document, or take it out.
-function place(part, shown, group) {
+// Put a part's path into the document, or remove it.
+function setShown(part, shown, group) {
   if (shown === part.shown) return;
   part.shown = shown;
   if (!part.path) {
@@ -52,7 +52,7 @@ function place(part, shown, group) {
   else part.path.remove();
 }
 
-// Walls by tile and by length: short ones are not drawn where they would be less than a pixel.
+// Walls by tile and by length, so that walls shorter than a pixel can be left out.
 function tilesOf(walls) {
   const tiles = new Map();
   for (let k = 0; k < walls.length; k += 4) {
@@ -69,8 +69,8 @@ function tilesOf(walls) {
 
 function boxOf(walls, rooms) {
   const box = [Infinity, Infinity, -Infinity, -Infinity];
-  const take = (x, y) => { box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y); };
-  for (let k = 0; k < walls.length; k += 2) take(walls[k], walls[k + 1]);
-  for (const room of rooms) take(...room.at_m);
+  const add = (x, y) => { box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y); };
+  for (let k = 0; k < walls.length; k += 2) add(walls[k], walls[k + 1]);
+  for (const room of rooms) add(...room.at_m);
   return box[0] > box[2] ? [0, 0, 10, 10] : box;
 }

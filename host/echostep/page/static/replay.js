@@ -3,14 +3,15 @@
 const $ = (id) => document.getElementById(id);
 
 export class Replay {
-  constructor(say) {
+  // `send(kind, fields)`: sends a request to the server
+  constructor(send) {
     this.holding = false;
     this.playing = true;
-    $('play').onclick = () => say('play', { playing: !this.playing });
-    $('back').onclick = () => say('skip', { by: -1 });
-    $('on').onclick = () => say('skip', { by: 1 });
-    $('times').onchange = () => say('speed', { times: Number($('times').value) });
-    $('time').oninput = () => { this.holding = true; say('seek', { t_s: Number($('time').value) }); };
+    $('play').onclick = () => send('play', { playing: !this.playing });
+    $('back').onclick = () => send('skip', { by: -1 });
+    $('on').onclick = () => send('skip', { by: 1 });
+    $('times').onchange = () => send('speed', { times: Number($('times').value) });
+    $('time').oninput = () => { this.holding = true; send('seek', { t_s: Number($('time').value) }); };
     $('time').onchange = () => { this.holding = false; };
   }
 

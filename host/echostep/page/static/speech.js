@@ -1,11 +1,11 @@
-// Speech: says the newest sentence of the guidance, when that is switched on; a newer one takes the place of an older. A screen reader hears it in any case.
+// Speech: speaks the newest sentence of the guidance when switched on; a newer sentence replaces an older one. A screen reader gets it in any case.
 
 export class Speech {
   constructor(button, region) {
     Object.assign(this, { button, region, last: null });
     button.hidden = !window.speechSynthesis;
     button.onclick = () => this.set(!this.on, true);
-    this.set(kept() === 'on', false);
+    this.set(stored() === 'on', false);
   }
 
   set(on, chosen) {
@@ -17,8 +17,8 @@ export class Speech {
     else if (this.last) this.say(this.last.text);
   }
 
-  // What the guidance says now; the same sentence of the same moment is not said again.
-  hear(guidance) {
+  // Take the guidance of a frame; the same sentence of the same time is not spoken again.
+  update(guidance) {
     const now = guidance?.spoken ? { text: guidance.spoken, at_s: guidance.spoken_s, own: guidance.own } : null, { last } = this;
     if (now?.text === last?.text && now?.at_s === last?.at_s && now?.own === last?.own) return;
     this.last = now;
@@ -29,12 +29,12 @@ export class Speech {
   say(text) {
     window.speechSynthesis.cancel();
     if (!text) return;
-    this.sentence = new SpeechSynthesisUtterance(text);  // held: browsers forget one that nobody holds
+    this.sentence = new SpeechSynthesisUtterance(text);  // kept in a field: browsers drop a sentence without a reference
     this.sentence.lang = 'en';
     window.speechSynthesis.speak(this.sentence);
   }
 }
 
-function kept() {
+function stored() {
   try { return localStorage.getItem('speech'); } catch { return null; }
 }

@@ -1,11 +1,11 @@
-// Colours: bright, dark or high contrast; by default as the system likes it.
+// Colours: bright, dark or high contrast; by default those of the system.
 
-const LIKES = { contrast: '(prefers-contrast: more)', dark: '(prefers-color-scheme: dark)' };
+const SYSTEM_QUERIES = { contrast: '(prefers-contrast: more)', dark: '(prefers-color-scheme: dark)' };
 
 export function startTheme(select, onChange) {
   const kept = () => { try { return localStorage.getItem('look'); } catch { return null; } };
   const apply = () => {
-    const liked = Object.keys(LIKES).find((look) => matchMedia(LIKES[look]).matches) ?? 'bright';
+    const liked = Object.keys(SYSTEM_QUERIES).find((look) => matchMedia(SYSTEM_QUERIES[look]).matches) ?? 'bright';
     document.documentElement.dataset.look = select.value === 'auto' ? liked : select.value;
     onChange();
   };
@@ -15,6 +15,6 @@ export function startTheme(select, onChange) {
     try { localStorage.setItem('look', select.value); } catch { /* private browsing */ }
     apply();
   };
-  for (const query of Object.values(LIKES)) matchMedia(query).addEventListener('change', apply);
+  for (const query of Object.values(SYSTEM_QUERIES)) matchMedia(query).addEventListener('change', apply);
   apply();
 }

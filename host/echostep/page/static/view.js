@@ -1,4 +1,4 @@
-// The view: which part of the map is on the screen. Map metres (x east, y north) to CSS pixels and back.
+// The view: the part of the map on the screen. Converts map metres (x east, y north) to CSS pixels and back.
 
 export class View {
   constructor() {
@@ -13,7 +13,7 @@ export class View {
     this.changed();
   }
 
-  // [a b c d e f] as SVG and canvas take it.
+  // Map metres to CSS pixels as [a b c d e f], the form of SVG and canvas.
   matrix() {
     const c = this.scale * Math.cos(this.turn), s = this.scale * Math.sin(this.turn);
     return [c, -s, -s, -c, this.width / 2 - c * this.x + s * this.y, this.height / 2 + s * this.x + c * this.y];
@@ -30,7 +30,7 @@ export class View {
     return [this.x + c * u + s * v, this.y - s * u + c * v];
   }
 
-  // Change scale and turn, and move so that the map's point under (from) is then under (to).
+  // Change scale and turn, and move so that the map's point at the pixel `from` is then at the pixel `to`.
   grip(from, to, factor = 1, turned = 0) {
     const [mx, my] = this.toMap(...from);
     this.scale = Math.min(Math.max(this.scale * factor, 0.02), 2000);
@@ -74,7 +74,7 @@ export class View {
     });
   }
 
-  // Keep a place of the map in the inner part of the screen.
+  // Pan so that a map point is in the inner part of the screen.
   keep(x, y) {
     const [sx, sy] = this.toScreen(x, y), mx = 0.3 * this.width, my = 0.3 * this.height;
     const dx = Math.min(this.width - mx - sx, 0) + Math.max(mx - sx, 0), dy = Math.min(this.height - my - sy, 0) + Math.max(my - sy, 0);
