@@ -220,7 +220,7 @@ def _picture(path: Path) -> tuple[bytes, str]:
         return raw, "image/jpeg"
     if b"<svg" in raw[:4096]:
         return raw, "image/svg+xml"
-    raise EchostepError(f"{path}: the picture is not PNG, JPEG or SVG: convert it to one of these")
+    raise EchostepError(f"{path}: neither PNG, JPEG nor SVG: convert the picture to one of these")
 
 
 def edit_plan(plan: Path, picture: Path | None, port: int | None, *, browser: bool) -> None:

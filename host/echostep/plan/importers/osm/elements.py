@@ -91,7 +91,7 @@ def _xml_rows(text: str) -> list[dict[str, Any]]:
     except ET.ParseError as error:
         raise ValueError(f"not XML: {error}") from error
     if root.tag != "osm":
-        raise ValueError(f"<{root.tag[:40]}> instead of <osm>: is this an OpenStreetMap file?")
+        raise ValueError(f"<{root.tag[:40]}> is not <osm>: is this an OpenStreetMap file?")
     return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
 
 
