@@ -26,16 +26,16 @@ from pathlib import Path
 
 from echostep.plan.model import Plan, load_plan
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.mqtt import MqttLine
+from echostep.team.mqtt import MqttTransport
 from echostep.team.outbox import Outbox
-from echostep.team.publish import blank
+from echostep.team.publish import empty_report
 from echostep.team.report import Motion, Position, Report, StreamReport
 
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def report_at(base: Report, k: int, t_s: float) -> Report:
-    """Somebody who walks in a circle."""
+    """A report of a wearer who walks in a circle."""
     x_m, y_m = 10.0 + 5.0 * math.cos(0.2 * t_s + k), 5.0 + 3.0 * math.sin(0.2 * t_s + k)
     position = Position(t_s, 0.0, x_m, y_m, 0.04, 0.0, 0.04, 0.5, 0.0, 0.1, 0, "Ground floor", 1.0, 0.0, 0.1)
     motion, streams = Motion(int(t_s), t_s, 1.0, 0.0), StreamReport(100.0, 360.0, 0, 0, 0, True, ())
@@ -44,8 +44,8 @@ def report_at(base: Report, k: int, t_s: float) -> Report:
 
 def publish(url: str, plan: Plan, trackers: int, rate_hz: float, seconds: float) -> list[str]:
     """Run all trackers in this process; returns their summaries."""
-    bases = [blank(plan, f"tracker {k:02d}", "load", f"{k:08x}", "simulated") for k in range(trackers)]
-    boxes = [Outbox(MqttLine(parse_endpoint(url), b.team, b.name, b.run), b.name, print) for b in bases]
+    bases = [empty_report(plan, f"tracker {k:02d}", "load", f"{k:08x}", "simulated") for k in range(trackers)]
+    boxes = [Outbox(MqttTransport(parse_endpoint(url), b.team, b.name, b.run), b.name, print) for b in bases]
     began = time.monotonic()
     for n in range(int(rate_hz * seconds)):
         for k, (box, base) in enumerate(zip(boxes, bases, strict=True)):
@@ -55,7 +55,7 @@ def publish(url: str, plan: Plan, trackers: int, rate_hz: float, seconds: float)
 
 
 def flood(port: int, rate_hz: float, ended: threading.Event) -> None:
-    """Somebody sends the same nonsense so many times a second, at QoS 0, past every queue of ours [MQTT 3.1.1, 3.1 and 3.3]."""
+    """Send the same invalid report `rate_hz` times a second until `ended`, at QoS 0, by a plain socket [MQTT 3.1.1, 3.1 and 3.3]."""
     payload, topic = b'{"echostep_report":1,"team":"evil"}' + b" " * 700, b"echostep/evil/eve/estimate"
     rest = struct.pack(">H", len(topic)) + topic + payload
     packets = (b"\x30" + bytes([len(rest) & 127 | 128, len(rest) >> 7]) + rest) * 100
@@ -123,7 +123,7 @@ def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: f
         print(f"publishing, each tracker: {100.0 * (ours_s - mine_s) / span_s / trackers:.2f} % of one core")
     followed = [m for m in roster["members"] if m["team"] == "load"]
     missed, refused = sum(m["missed"] for m in followed), sum(roster["not_believed"].values())
-    print(f"{roster['heard']} messages heard, {refused} not believed")
+    print(f"{roster['heard']} messages heard, {refused} rejected")
     print(
         f"{len(followed)} trackers followed, {missed} of their reports missed; {late} overtook some or left some unsent"
     )

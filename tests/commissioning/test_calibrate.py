@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.calibration import GyroSettings, gyro_rates
-from echostep.commissioning.fitting import find_compass, find_gyros, find_legs, find_mounting, still_bias
+from echostep.commissioning.fitting import fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
 from echostep.commissioning.probe import ProbeResult
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
@@ -68,14 +68,14 @@ def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
 @pytest.mark.parametrize("reversed_", [False, True])
 @pytest.mark.parametrize("degrees", [360.0, -400.0, 330.0])
 def test_the_way_round_the_belt_gyro_is_worn(reversed_: bool, degrees: float) -> None:
-    found, line = find_mounting(turn(20.0, degrees, reversed_), GyroSettings())
+    found, line = fit_mounting(turn(20.0, degrees, reversed_), GyroSettings())
     assert found == {"gyro": {"belt_reversed": reversed_}}
     assert ("upside down" in line) == reversed_
 
 
 def test_half_a_turn_is_refused() -> None:
     with pytest.raises(EchostepError, match="turn once round"):
-        find_mounting(turn(20.0, 170.0), GyroSettings())
+        fit_mounting(turn(20.0, 170.0), GyroSettings())
 
 
 @pytest.mark.parametrize("reversed_", [False, True])
@@ -87,7 +87,7 @@ def test_the_iron_of_the_wearer_is_found(reversed_: bool) -> None:
     rng = np.random.default_rng(3)
     counts = np.gradient(heading, t_s) / COUNT_RAD_S * (-1 if reversed_ else 1) + 15 + rng.normal(0, 2.5, len(t_s))
     bearing = np.degrees(np.pi / 2 - shown[::20]) * 10 + rng.normal(0.0, 10.0, 200)
-    found, line = find_compass(heard(counts, np.floor(bearing % 3600)), GyroSettings(belt_bias_rad_s=12 * COUNT_RAD_S))
+    found, line = fit_compass(heard(counts, np.floor(bearing % 3600)), GyroSettings(belt_bias_rad_s=12 * COUNT_RAD_S))
     values = found["compass"]
     assert math.degrees(values["sin1"]) == pytest.approx(12.0, abs=0.7)
     assert math.degrees(values["cos1"]) == pytest.approx(0.0, abs=0.7)
@@ -98,7 +98,7 @@ def test_the_iron_of_the_wearer_is_found(reversed_: bool) -> None:
 
 def test_a_compass_that_stands_still_is_told() -> None:
     with pytest.raises(EchostepError, match="do it again"):
-        find_compass(heard(np.full(4_000, 80.0), np.full(200, 900.0)), GyroSettings())
+        fit_compass(heard(np.full(4_000, 80.0), np.full(200, 900.0)), GyroSettings())
 
 
 def walked(metres: float, *, swapped: bool = False) -> ProbeResult:
@@ -119,9 +119,9 @@ def walked(metres: float, *, swapped: bool = False) -> ProbeResult:
 def test_the_scale_of_the_legs_follows_the_walk() -> None:
     leg = Person().leg
     segments = LegLengths(leg.thigh_m, leg.shank_m)
-    found, line = find_legs(walked(10.0), GyroSettings(), segments, 10.0)
+    found, line = fit_legs(walked(10.0), GyroSettings(), segments, 10.0)
     assert found["wearer"]["leg_scale"] == pytest.approx(1.0, abs=0.06)
-    twice, _ = find_legs(walked(10.0), GyroSettings(), segments, 11.0)
+    twice, _ = fit_legs(walked(10.0), GyroSettings(), segments, 11.0)
     assert twice["wearer"]["leg_scale"] == pytest.approx(1.1 * found["wearer"]["leg_scale"], abs=0.001)
     assert "10 m was seen as" in line
     assert parse_settings("[wearer]\nleg_scale = 1.02\nthigh_m = 0.4\n", "x").wearer.leg_scale == 1.02
@@ -129,22 +129,22 @@ def test_the_scale_of_the_legs_follows_the_walk() -> None:
 
 def test_a_walk_that_cannot_be_is_told() -> None:
     with pytest.raises(EchostepError, match="swapped"):
-        find_legs(walked(10.0, swapped=True), GyroSettings(), LegLengths(), 10.0)
+        fit_legs(walked(10.0, swapped=True), GyroSettings(), LegLengths(), 10.0)
     with pytest.raises(EchostepError, match="walk 80 m straight on"):
-        find_legs(walked(10.0), GyroSettings(), LegLengths(), 80.0)
+        fit_legs(walked(10.0), GyroSettings(), LegLengths(), 80.0)
     with pytest.raises(EchostepError, match="gives no values"):
-        find_legs(ProbeResult(), GyroSettings(), LegLengths(), 10.0)
+        fit_legs(ProbeResult(), GyroSettings(), LegLengths(), 10.0)
 
 
 def test_who_moves_is_told() -> None:
     rng = np.random.default_rng(1)
     swaying = 60.0 * np.sin(np.arange(2_000) * 0.02) + rng.normal(0, 2.5, 2_000)
     with pytest.raises(EchostepError, match=r"belt gyro: it moved: stand still"):
-        find_gyros(heard(swaying))
+        fit_gyros(heard(swaying))
     with pytest.raises(EchostepError, match="degrees/s at rest"):
-        find_gyros(heard(rng.normal(400.0, 2.5, 2_000)))
+        fit_gyros(heard(rng.normal(400.0, 2.5, 2_000)))
     with pytest.raises(EchostepError, match="no gyro gives values"):
-        find_gyros(ProbeResult())
+        fit_gyros(ProbeResult())
 
 
 def test_a_start_or_a_cough_in_between_does_no_harm() -> None:
@@ -157,7 +157,7 @@ def test_a_start_or_a_cough_in_between_does_no_harm() -> None:
 
 
 def test_a_gyro_that_does_not_answer_is_named_and_left_out() -> None:
-    found, line = find_gyros(heard(np.full(2_000, 5.0)))
+    found, line = fit_gyros(heard(np.full(2_000, 5.0)))
     assert set(found["gyro"]) == {"thigh_bias_rad_s", "belt_bias_rad_s"}
     assert "calf none" in line
 

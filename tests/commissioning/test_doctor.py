@@ -101,7 +101,7 @@ def test_an_mtx_that_is_silent_is_a_finding() -> None:
 def test_nothing_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("echostep.commissioning.doctor.list_seen", list)
     report = examine(None, None, 0.1)
-    assert "no sensor board is plugged in, nor anything else" in str(report.findings[0])
+    assert "no sensor board is plugged in, and no other serial port" in str(report.findings[0])
     assert not report.fine
 
 

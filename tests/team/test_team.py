@@ -18,16 +18,16 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.model import Georeference, load_plan
 from echostep.team import outbox
-from echostep.team.commander import as_tree, look, table
+from echostep.team.commander import as_tree, table, update_roster
 from echostep.team.cot import event, uid
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.georeference import GroundPlane
-from echostep.team.inbox import PER_TOPIC, Inbox
+from echostep.team.inbox import MESSAGES_PER_TOPIC, Inbox
 from echostep.team.outbox import Outbox, aged, stamped
 from echostep.team.picture import draw_team
-from echostep.team.publish import PublishedTrail
+from echostep.team.publish import ReportHistory
 from echostep.team.report import BadReportError, Presence, Report, check_name, decode, encode, schema
-from echostep.team.roster import MOST_MEMBERS, MOST_REASONS, Need, Roster
+from echostep.team.roster import MAX_MEMBERS, MAX_REASONS, MemberState, Roster
 from team.team_reports import PLACE, PLAN, POSITION, report
 
 NOW, UNIX = 1000.0, 1.8e9
@@ -36,7 +36,7 @@ NOW, UNIX = 1000.0, 1.8e9
 def heard(*reports: Report, at_s: float = NOW, retained: bool = False) -> Roster:
     roster = Roster()
     for r in reports:
-        roster.hear(f"echostep/{r.team}/{r.name}/estimate", encode(r), retained, at_s, UNIX)
+        roster.receive(f"echostep/{r.team}/{r.name}/estimate", encode(r), retained, at_s, UNIX)
     return roster
 
 
@@ -117,8 +117,8 @@ def test_a_report_with_one_field_replaced_is_believed_only_as_the_schema_says(dr
     inside[draw.draw(st.sampled_from(sorted(inside)))] = draw.draw(JSON)
     payload = json.dumps(tree).encode("utf-8", "surrogatepass")
     roster = Roster()
-    roster.hear("echostep/red/anna/estimate", payload, False, NOW, UNIX)
-    assert len(roster.members(NOW)) + sum(roster.counts.values()) == 1
+    roster.receive("echostep/red/anna/estimate", payload, False, NOW, UNIX)
+    assert len(roster.members(NOW)) + sum(roster.rejected.values()) == 1
     table(roster, load_plan(PLAN), NOW, connected=True)
     json.dumps(as_tree(roster, load_plan(PLAN), NOW), allow_nan=False)
     if roster.members(NOW):
@@ -129,7 +129,7 @@ def test_a_report_with_one_field_replaced_is_believed_only_as_the_schema_says(dr
 def test_a_damaged_report_never_stops_the_roster(garbage: bytes, at: int, cut: int) -> None:
     payload = encode(said())
     roster = Roster()
-    roster.hear("echostep/red/anna/estimate", payload[:at] + garbage + payload[at + cut :], True, NOW, UNIX)
+    roster.receive("echostep/red/anna/estimate", payload[:at] + garbage + payload[at + cut :], True, NOW, UNIX)
     for member in roster.members(NOW):
         assert math.isfinite(member.silent_s(NOW))
 
@@ -142,9 +142,9 @@ def test_a_damaged_report_never_stops_the_roster(garbage: bytes, at: int, cut: i
 def test_no_sequence_of_messages_stops_the_commander(letters: list[tuple[str | None, bytes, bool]]) -> None:
     inbox, roster = Inbox(), Roster()
     for letter in letters:
-        inbox.hear(*letter)
-    look(inbox, roster)
-    assert roster.heard == len(letters)
+        inbox.put(*letter)
+    update_roster(inbox, roster)
+    assert roster.received == len(letters)
     assert len(roster.members(time.monotonic())) <= 1
     table(roster, load_plan(PLAN), time.monotonic(), connected=False, columns=60)
 
@@ -162,10 +162,11 @@ def test_lost_and_stale_come_first() -> None:
     lost = said("zoe", status="lost", position=replace(POSITION, radius95_m=9.0))
     unsure = said("bob", status="uncertain", position=replace(POSITION, radius95_m=2.0))
     roster = heard(said("anna"), unsure, lost, said("waits", status="waiting", position=None))
-    roster.hear("echostep/red/gone/estimate", encode(said("gone")), False, NOW - 30.0, UNIX - 30.0)
-    order = [(m.report.name, m.need(NOW)) for m in roster.members(NOW)]
+    roster.receive("echostep/red/gone/estimate", encode(said("gone")), False, NOW - 30.0, UNIX - 30.0)
+    order = [(m.report.name, m.state(NOW)) for m in roster.members(NOW)]
     assert order == [
-        ("zoe", Need.LOST), ("gone", Need.STALE), ("bob", Need.UNCERTAIN), ("waits", Need.WAITING), ("anna", Need.TRACKING),
+        ("zoe", MemberState.LOST), ("gone", MemberState.STALE), ("bob", MemberState.UNCERTAIN), ("waits", MemberState.WAITING),
+        ("anna", MemberState.TRACKING),
     ]  # fmt: skip
 
 
@@ -173,31 +174,31 @@ def test_only_the_commanders_clock_makes_somebody_stale() -> None:
     roster = Roster()
     for k, off_s in enumerate((-86_400.0, 86_400.0, 0.0)):
         name = f"n{k}"
-        roster.hear(f"echostep/red/{name}/estimate", encode(report(name, 1, UNIX + off_s)), False, NOW, UNIX)
-    assert {m.need(NOW + 9.0) for m in roster.members(NOW + 9.0)} == {Need.TRACKING}
-    assert {m.need(NOW + 11.0) for m in roster.members(NOW + 11.0)} == {Need.STALE}
+        roster.receive(f"echostep/red/{name}/estimate", encode(report(name, 1, UNIX + off_s)), False, NOW, UNIX)
+    assert {m.state(NOW + 9.0) for m in roster.members(NOW + 9.0)} == {MemberState.TRACKING}
+    assert {m.state(NOW + 11.0) for m in roster.members(NOW + 11.0)} == {MemberState.STALE}
 
 
 def test_no_tracker_may_ask_for_endless_patience() -> None:
     patient = replace(said(), stale=said().stale.replace("2027", "2027")[:8] + "16T08:00:00.000Z")
     roster = heard(patient)
     assert patient.stale_after_s > 3600.0
-    assert roster.members(NOW)[0].need(NOW + 61.0) is Need.STALE
+    assert roster.members(NOW)[0].state(NOW + 61.0) is MemberState.STALE
 
 
 def test_what_a_broker_remembers_is_as_old_as_it_says() -> None:
     roster = Roster()
-    roster.hear("echostep/red/anna/estimate", encode(report(at_s=UNIX - 300.0)), True, NOW, UNIX)
+    roster.receive("echostep/red/anna/estimate", encode(report(at_s=UNIX - 300.0)), True, NOW, UNIX)
     (member,) = roster.members(NOW)
-    assert member.need(NOW) is Need.STALE
+    assert member.state(NOW) is MemberState.STALE
     assert member.silent_s(NOW) == pytest.approx(300.0)
 
 
 def test_what_is_of_another_day_is_not_shown() -> None:
     roster = heard(report(at_s=UNIX - 90_000.0), retained=True)
-    assert (roster.members(NOW), list(roster.counts)) == ([], ["remembered by the broker for more than a day"])
+    assert (roster.members(NOW), list(roster.rejected)) == ([], ["remembered by the broker for more than a day"])
     roster = heard(report(at_s=UNIX - 3000.0), retained=True)
-    roster.hear("echostep/red/anna/presence", encode(Presence(1, "0123abcd", "ended")), True, NOW, UNIX)
+    roster.receive("echostep/red/anna/presence", encode(Presence(1, "0123abcd", "ended")), True, NOW, UNIX)
     assert len(roster.members(NOW)) == 1
     assert len(roster.members(NOW + 700.0)) == 0
 
@@ -212,17 +213,19 @@ def test_two_trackers_of_one_name_are_both_shown_and_named() -> None:
 
 def test_a_restarted_tracker_replaces_its_former_run() -> None:
     roster = heard(said())
-    roster.hear("echostep/red/anna/presence", encode(Presence(1, "0123abcd", "broken")), False, NOW + 1.0, UNIX + 1.0)
-    roster.hear("echostep/red/anna/estimate", encode(said(run="ffffffff")), False, NOW + 2.0, UNIX + 2.0)
+    roster.receive(
+        "echostep/red/anna/presence", encode(Presence(1, "0123abcd", "broken")), False, NOW + 1.0, UNIX + 1.0
+    )
+    roster.receive("echostep/red/anna/estimate", encode(said(run="ffffffff")), False, NOW + 2.0, UNIX + 2.0)
     assert [m.report.run for m in roster.members(NOW + 2.0)] == ["ffffffff"]
 
 
 def test_old_reports_and_clocks_that_jump_are_counted() -> None:
     roster = heard(said(sequence=4), said(sequence=3), said(sequence=4))
-    assert roster.counts == {"older than what was heard before": 2}
-    roster.hear("echostep/red/anna/estimate", encode(said(sequence=4)), True, NOW, UNIX)  # after a new connection
-    assert roster.counts == {"older than what was heard before": 2}
-    roster.hear("echostep/red/anna/estimate", encode(report(sequence=8, at_s=UNIX + 3600.0)), False, NOW, UNIX)
+    assert roster.rejected == {"older than what was heard before": 2}
+    roster.receive("echostep/red/anna/estimate", encode(said(sequence=4)), True, NOW, UNIX)  # after a new connection
+    assert roster.rejected == {"older than what was heard before": 2}
+    roster.receive("echostep/red/anna/estimate", encode(report(sequence=8, at_s=UNIX + 3600.0)), False, NOW, UNIX)
     (member,) = roster.members(NOW)
     assert (member.missed, member.notes["clock jumped"]) == (3, 1)
 
@@ -235,29 +238,29 @@ def test_a_position_that_jumps_is_noted() -> None:
 
 def test_strangers_fill_neither_roster_nor_reasons() -> None:
     roster = heard(said())
-    for k in range(MOST_MEMBERS + 50):
-        roster.hear(f"echostep/red/n{k}/estimate", encode(said(f"n{k}")), False, NOW, UNIX)
-        roster.hear(f"echostep/red/x/{k}", b"", False, NOW, UNIX)
-        roster.hear("echostep/red/anna/estimate", b'{"team": %d' % k, False, NOW, UNIX)
-    assert len(roster.members(NOW)) == MOST_MEMBERS
+    for k in range(MAX_MEMBERS + 50):
+        roster.receive(f"echostep/red/n{k}/estimate", encode(said(f"n{k}")), False, NOW, UNIX)
+        roster.receive(f"echostep/red/x/{k}", b"", False, NOW, UNIX)
+        roster.receive("echostep/red/anna/estimate", b'{"team": %d' % k, False, NOW, UNIX)
+    assert len(roster.members(NOW)) == MAX_MEMBERS
     assert roster.members(NOW)[0].report.name == "anna"
     for k in range(100):
-        roster.refuse(f"made up {k}")
-    assert len(roster.counts) <= MOST_REASONS + 1
-    assert roster.counts[f"more than {MOST_MEMBERS} trackers"] == 51
+        roster.count_rejected(f"made up {k}")
+    assert len(roster.rejected) <= MAX_REASONS + 1
+    assert roster.rejected[f"more than {MAX_MEMBERS} trackers"] == 51
 
 
 def test_a_flood_on_one_topic_costs_the_others_nothing() -> None:
     inbox, roster = Inbox(), Roster()
     for k in range(1, 10_001):
-        inbox.hear("echostep/red/anna/estimate", encode(said(sequence=k)) if k > 9_990 else b"?", False)
-    inbox.hear("echostep/red/bob/estimate", encode(said("bob")), False)
-    inbox.hear("echostep/red/bob/estimate", b"x" * 1_000_000, False)
-    inbox.hear(None, b"", False)
-    look(inbox, roster)
+        inbox.put("echostep/red/anna/estimate", encode(said(sequence=k)) if k > 9_990 else b"?", False)
+    inbox.put("echostep/red/bob/estimate", encode(said("bob")), False)
+    inbox.put("echostep/red/bob/estimate", b"x" * 1_000_000, False)
+    inbox.put(None, b"", False)
+    update_roster(inbox, roster)
     assert {(m.report.name, m.report.sequence) for m in roster.members(NOW)} == {("anna", 10_000), ("bob", 1)}
-    assert roster.counts == {"flood": 10_000 - PER_TOPIC, "too long": 1, "unknown topic": 1}
-    assert roster.heard == 10_003
+    assert roster.rejected == {"flood": 10_000 - MESSAGES_PER_TOPIC, "too long": 1, "unknown topic": 1}
+    assert roster.received == 10_003
 
 
 # the outbox
@@ -327,7 +330,7 @@ def test_a_slow_line_sends_the_newest_and_counts_the_rest(monkeypatch: pytest.Mo
 
 
 def test_a_broken_line_is_opened_again_and_no_later_report_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outbox, "BACKOFF_S", (0.02, 0.05))
+    monkeypatch.setattr(outbox, "RETRY_PAUSES_S", (0.02, 0.05))
     line, words = Recorded(), list[str]()
     box = Outbox(line, "line", words.append)
     box.offer(report())
@@ -391,7 +394,7 @@ def test_a_heartbeat_repeats_the_last_report(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_motion_knows_steps_way_pace_and_rest() -> None:
-    trail = PublishedTrail()
+    trail = ReportHistory()
     walk = [
         Estimate(0.5 * k, 0.6 * min(k, 10), 0.0, 0.1, 0.0, 0.1, 0.0, 0.1, min(k, 10), TrackStatus.TRACKING)
         for k in range(21)

@@ -23,14 +23,14 @@ from paho.mqtt.enums import CallbackAPIVersion
 from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.team import outbox
-from echostep.team.commander import look
-from echostep.team.cot import StreamLine, UdpLine
+from echostep.team.commander import update_roster
+from echostep.team.cot import StreamTransport, UdpTransport
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.inbox import Inbox, Reception
-from echostep.team.mqtt import Listener, MqttLine
+from echostep.team.inbox import Inbox, Receiver
+from echostep.team.mqtt import Listener, MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.report import Presence, Report, encode
-from echostep.team.roster import Member, Need, Roster
+from echostep.team.roster import Member, MemberState, Roster
 from team.team_broker import Broker, Certificates, needs_broker
 from team.team_reports import PLAN, POSITION, report
 
@@ -44,7 +44,7 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outbox, "BACKOFF_S", (0.05, 0.1, 0.2))
+    monkeypatch.setattr(outbox, "RETRY_PAUSES_S", (0.05, 0.1, 0.2))
 
 
 def until(true: Callable[[], object], seconds: float = 15.0) -> None:
@@ -64,15 +64,15 @@ class Ear:
     def __init__(self, url: str) -> None:
         self.inbox, self.roster, self.times = Inbox(), Roster(), list[float]()
         self.words: list[str] = []
-        self.reception = Reception(Listener(parse_endpoint(url), "echostep/+/+/+", self.hear), self.words.append)
+        self.reception = Receiver(Listener(parse_endpoint(url), "echostep/+/+/+", self.hear), self.words.append)
 
     def hear(self, topic: str | None, payload: bytes, retained: bool) -> None:
-        self.inbox.hear(topic, payload, retained)
+        self.inbox.put(topic, payload, retained)
         if topic and topic.endswith("/estimate") and payload.startswith(b'{"echostep_report"'):
             self.times.append((json.loads(payload)["position"] or {}).get("t_s", -1.0))
 
     def members(self) -> list[Member]:
-        look(self.inbox, self.roster)
+        update_roster(self.inbox, self.roster)
         return self.roster.members(time.monotonic())
 
     def only(self) -> Member:
@@ -93,7 +93,7 @@ def listening(url: str) -> Iterator[Ear]:
 def box_to(url: str, words: list[str] | None = None, name: str = "anna", run: str = "0123abcd") -> Outbox:
     said: list[str] = [] if words is None else words
     endpoint = parse_endpoint(url)
-    return Outbox(MqttLine(endpoint, "red", name, run), str(endpoint), said.append)
+    return Outbox(MqttTransport(endpoint, "red", name, run), str(endpoint), said.append)
 
 
 @needs_broker
@@ -114,9 +114,9 @@ def test_a_broker_that_dies_and_returns_loses_no_later_report(tmp_path: Path) ->
             box.offer(at(float(k)))
         until(lambda: 249.0 in ear.times)
         assert [t for t in ear.times if t >= 200.0] == [float(k) for k in range(200, 250)]
-        assert ear.only().need(time.monotonic()) is Need.TRACKING
+        assert ear.only().state(time.monotonic()) is MemberState.TRACKING
         summary = box.close()
-        until(lambda: ear.only().need(time.monotonic()) is Need.ENDED)
+        until(lambda: ear.only().state(time.monotonic()) is MemberState.ENDED)
     assert "broken 1 times" in summary
     assert words[-1].endswith("connected again")
 
@@ -148,14 +148,14 @@ def test_a_frozen_broker_neither_slows_the_tracker_nor_keeps_old_reports(
 @needs_broker
 def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
-        line = MqttLine(parse_endpoint(broker.url), "red", "anna", "0123abcd")
+        line = MqttTransport(parse_endpoint(broker.url), "red", "anna", "0123abcd")
         line.open()
         line.send(at(7.0))
         line.close(ended=False)
         with listening(broker.url) as ear:
             until(lambda: ear.members() and ear.only().presence == "broken")
             member = ear.only()
-            assert (member.retained, member.need(time.monotonic())) == (True, Need.STALE)
+            assert (member.retained, member.state(time.monotonic())) == (True, MemberState.STALE)
             assert member.report.position
             assert member.report.position.t_s == 7.0
 
@@ -171,11 +171,11 @@ def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
             time.sleep(0.05)
         until(lambda: [m.report.position.t_s for m in ear.members() if m.report.position] == [19.0] * 20)
         first = ear.members()[0]
-        assert (first.report.name, first.need(time.monotonic())) == ("n07", Need.LOST)
+        assert (first.report.name, first.state(time.monotonic())) == ("n07", MemberState.LOST)
         assert sum(m.missed for m in ear.members()) == 0
-        assert ear.roster.counts == {}
+        assert ear.roster.rejected == {}
         for box in boxes:
-            box.end()
+            box.begin_close()
         assert [box.close().split(", ")[0].rpartition(": ")[2] for box in boxes] == ["20 of 20 reports sent"] * 20
 
 
@@ -253,15 +253,15 @@ def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_pat
         enemy.publish("echostep/red/\u202eeve/estimate", right)
         enemy.publish("echostep/red/bob/estimate", right)
         enemy.publish("echostep/red/eve/presence", b"{}")
-        until(lambda: ear.members() is not None and sum(ear.roster.counts.values()) >= 5)
-        assert {"not JSON", "too long", "name and topic contradict each other"} <= set(ear.roster.counts)
+        until(lambda: ear.members() is not None and sum(ear.roster.rejected.values()) >= 5)
+        assert {"not JSON", "too long", "name and topic contradict each other"} <= set(ear.roster.rejected)
         box = box_to(broker.url)
         began = time.monotonic()
         for k in range(10_000):
             enemy.publish("echostep/red/eve/estimate", rng.randbytes(40))
             if k % 500 == 0:
                 box.offer(at(float(k)))
-        until(lambda: ear.members() is not None and ear.roster.heard > 10_000)
+        until(lambda: ear.members() is not None and ear.roster.received > 10_000)
         assert time.monotonic() - began < 15.0
         until(lambda: 9500.0 in ear.times)
         assert ear.only().report.name == "anna"
@@ -328,7 +328,7 @@ def test_events_go_out_as_datagrams() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.bind(("127.0.0.1", 0))
         ear.settimeout(5.0)
-        box = Outbox(UdpLine(parse_endpoint(f"cot+udp://127.0.0.1:{ear.getsockname()[1]}")), "udp", print)
+        box = Outbox(UdpTransport(parse_endpoint(f"cot+udp://127.0.0.1:{ear.getsockname()[1]}")), "udp", print)
         for k in range(5):
             box.offer(report(f"n{k}"))
         uids = [ElementTree.fromstring(ear.recv(65_536)).get("uid") for _ in range(5)]
@@ -340,7 +340,7 @@ def test_nobody_listening_for_datagrams_is_no_fault() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.bind(("127.0.0.1", 0))
         port = ear.getsockname()[1]
-    box = Outbox(UdpLine(parse_endpoint(f"cot+udp://127.0.0.1:{port}")), "udp", print)
+    box = Outbox(UdpTransport(parse_endpoint(f"cot+udp://127.0.0.1:{port}")), "udp", print)
     for _ in range(20):
         box.offer(report())
         time.sleep(0.01)
@@ -357,7 +357,7 @@ def test_a_multicast_group_is_reached() -> None:
             pytest.skip(f"no multicast here: {error}")
         ear.settimeout(3.0)
         words: list[str] = []
-        box = Outbox(UdpLine(parse_endpoint(f"cot+udp://{group}:{ear.getsockname()[1]}")), "udp", words.append)
+        box = Outbox(UdpTransport(parse_endpoint(f"cot+udp://{group}:{ear.getsockname()[1]}")), "udp", words.append)
         box.offer(report())
         try:
             heard = ear.recv(65_536)
@@ -417,7 +417,7 @@ class Server:
 
 def test_events_go_out_on_a_stream_through_a_restart_of_the_server() -> None:
     server, words = Server(greeting=b"<event/>" * 20_000), list[str]()
-    box = Outbox(StreamLine(parse_endpoint(f"cot+tcp://127.0.0.1:{server.port}")), "tcp", words.append)
+    box = Outbox(StreamTransport(parse_endpoint(f"cot+tcp://127.0.0.1:{server.port}")), "tcp", words.append)
     box.offer(report("first"))
     until(lambda: server.lines)
     server.stop()
@@ -439,7 +439,9 @@ def test_a_stream_server_that_stops_reading_does_not_hold_old_positions() -> Non
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         words: list[str] = []
-        box = Outbox(StreamLine(parse_endpoint(f"cot+tcp://127.0.0.1:{server.getsockname()[1]}")), "tcp", words.append)
+        box = Outbox(
+            StreamTransport(parse_endpoint(f"cot+tcp://127.0.0.1:{server.getsockname()[1]}")), "tcp", words.append
+        )
         slowest = 0.0
         for k in range(2000):
             began = time.perf_counter()
@@ -459,12 +461,12 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
     context.verify_mode = ssl.CERT_REQUIRED
     server = Server(context)
     url = f"cot+tls://127.0.0.1:{server.port}"
-    box = Outbox(StreamLine(parse_endpoint(url + c.query(c.client))), "tls", print)
+    box = Outbox(StreamTransport(parse_endpoint(url + c.query(c.client))), "tls", print)
     box.offer(report())
     until(lambda: server.lines)
     box.close()
     words: list[str] = []
-    distrusting = Outbox(StreamLine(parse_endpoint(url)), "tls", words.append)
+    distrusting = Outbox(StreamTransport(parse_endpoint(url)), "tls", words.append)
     distrusting.offer(report())
     until(lambda: words)
     distrusting.close()

@@ -117,7 +117,7 @@ class Session:
             self.page.publish(portion)
         self.estimates += estimates
         if self._publishing:
-            self._publishing.tell(estimates)
+            self._publishing.publish(estimates)
         return estimates
 
     def _show(self, estimates: list[Estimate], view: TerminalView | None) -> None:

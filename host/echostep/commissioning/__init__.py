@@ -1,4 +1,4 @@
 """Before the first walk: find the ports, flash, diagnose and calibrate a board.
 
-In: ports. Out: findings in words, settings, a flashed board. Owns nothing after it ends.
+In: ports. Out: findings with remedies, settings, a flashed board. Owns the ports while a command runs.
 """

@@ -1,6 +1,6 @@
-"""What is found of a wearer from a few seconds of the board's samples: biases, which way round a gyro is worn, iron, the scale of his legs.
+"""Calibration values from a few seconds of the board's samples: gyro biases, mounting of the belt gyro, compass errors, leg scale.
 
-In: `ProbeResult`. Out: values for the settings, and a line for him; EchostepError says what he has to do again. Owns nothing.
+In: `ProbeResult`. Out: settings by section and a line for the wearer; EchostepError says which measurement to repeat, and how. Owns nothing.
 """
 
 from __future__ import annotations
@@ -20,44 +20,49 @@ from echostep.legs.strides import StrideEstimator, StrideSettings
 from echostep.offline.leg_csv import calibrated_scale
 
 Values = dict[str, float | bool]
-Found = tuple[dict[str, Values], str]
+Fit = tuple[dict[str, Values], str]
 
-PIECE_S = 1.0
-STILL_SD_RAD_S = math.radians(2.0)  # noise of an ADIS16100 is 0.6 degrees/s in 40 Hz; who sways does more
-STILL_SPREAD_RAD_S = math.radians(1.0)  # between the means of still pieces
+PIECE_S = 1.0  # a recording is divided into pieces of this length to find those at rest
+LEAST_PIECE_SAMPLES = 20
+STILL_SD_RAD_S = math.radians(
+    2.0
+)  # of a piece at rest; noise of an ADIS16100 is 0.6 degrees/s in 40 Hz, a swaying wearer gives more
+STILL_SPREAD_RAD_S = math.radians(1.0)  # largest distance of a piece's mean from the median of the means
 BIAS_MAX_RAD_S = math.radians(30.0)
-LEAST_STILL = 0.6  # share of the pieces
-FULL_TURN_RAD = math.radians(300.0)
-SWAPPED = 1.15  # a walking shank turns faster than the thigh
-LEAST_READINGS = 100
+LEAST_STILL = 0.6  # share of pieces at rest
+FULL_TURN_RAD = math.radians(300.0)  # by reason: a turn of 360 degrees, not quite finished
+SWAPPED_RATIO = 1.15  # of the rates' sd, thigh to calf; in walking the shank turns faster than the thigh
+LEAST_READINGS = 100  # of a gyro
+LEAST_BEARINGS = 20
+INVALID_BEARING = 3600  # tenths of a degree; this and larger values are not bearings
 
 
-def gyro_rates(heard: ProbeResult, settings: GyroSettings | None = None) -> tuple[Floats, Floats]:
+def gyro_rates(probed: ProbeResult, settings: GyroSettings | None = None) -> tuple[Floats, Floats]:
     """Times (n,) s and rates (n, 3) rad/s of thigh, calf and belt without their biases; NaN where a gyro gave none."""
-    known = settings or GyroSettings()
-    t_s = np.array(heard.ticks.get("Gyros", []), float) / TICKS_PER_S
-    counts = np.array([g[1:] for g in heard.gyros], float).reshape(-1, len(GYROS))
+    biases = settings or GyroSettings()
+    t_s = np.array(probed.ticks.get("Gyros", []), float) / TICKS_PER_S
+    counts = np.array([g[1:] for g in probed.gyros], float).reshape(-1, len(GYROS))
     counts[counts == GYROS_INVALID] = np.nan
     return t_s, ADIS16100_RAD_S * counts - np.array(
-        [known.thigh_bias_rad_s, known.calf_bias_rad_s, known.belt_bias_rad_s]
+        [biases.thigh_bias_rad_s, biases.calf_bias_rad_s, biases.belt_bias_rad_s]
     )
 
 
-def bearings(heard: ProbeResult) -> tuple[Floats, Floats]:
+def bearings(probed: ProbeResult) -> tuple[Floats, Floats]:
     """Times (n,) s and compass bearings (n,) rad, clockwise; invalid ones left out."""
-    t_s = np.array(heard.ticks.get("Compass", []), float) / TICKS_PER_S
-    bearing = np.array([c.bearing for c in heard.compass], float)
-    good = bearing < 3600
+    t_s = np.array(probed.ticks.get("Compass", []), float) / TICKS_PER_S
+    bearing = np.array([c.bearing for c in probed.compass], float)
+    good = bearing < INVALID_BEARING
     return t_s[good], np.radians(0.1 * bearing[good])
 
 
 def still_bias(t_s: Floats, rate: Floats) -> tuple[float, float]:
-    """Bias and noise (rad/s) of a gyro that stood still for most of the time; raises ValueError that says what was wrong."""
-    there = np.isfinite(rate)
-    if there.sum() < LEAST_READINGS:
+    """Bias and noise (sd), rad/s, of a gyro that was at rest for most of the time; raises ValueError with what to repeat."""
+    valid = np.isfinite(rate)
+    if valid.sum() < LEAST_READINGS:
         raise ValueError("it gave no values: run echostep doctor")
-    piece = ((t_s[there] - t_s[there][0]) / PIECE_S).astype(int)
-    pieces = [rate[there][piece == k] for k in range(piece[-1] + 1) if (piece == k).sum() >= 20]
+    piece = ((t_s[valid] - t_s[valid][0]) / PIECE_S).astype(int)
+    pieces = [rate[valid][piece == k] for k in range(piece[-1] + 1) if (piece == k).sum() >= LEAST_PIECE_SAMPLES]
     quiet = [values for values in pieces if values.std() <= STILL_SD_RAD_S]
     means = np.array([values.mean() for values in quiet])
     kept = [v for v, mean in zip(quiet, means, strict=True) if abs(mean - np.median(means)) <= STILL_SPREAD_RAD_S]
@@ -71,42 +76,42 @@ def still_bias(t_s: Floats, rate: Floats) -> tuple[float, float]:
     return float(still.mean()), float(still.std())
 
 
-def find_gyros(heard: ProbeResult) -> Found:
-    """Biases of the gyros that answer."""
-    t_s, rate = gyro_rates(heard)
+def fit_gyros(probed: ProbeResult) -> Fit:
+    """Biases of the gyros that deliver samples."""
+    t_s, rate = gyro_rates(probed)
     values: Values = {}
-    said = []
+    parts = []
     for k, name in enumerate(GYROS):
         if not np.isfinite(rate[:, k]).any():
-            said.append(f"{name} none (it does not answer)")
+            parts.append(f"{name} none (it does not answer)")
             continue
         try:
             bias, noise = still_bias(t_s, rate[:, k])
         except ValueError as error:
             raise EchostepError(f"{name} gyro: {error}") from error
         values[f"{name}_bias_rad_s"] = round(bias, 6)
-        said.append(f"{name} {math.degrees(bias):+.2f} degrees/s (noise {math.degrees(noise):.2f})")
+        parts.append(f"{name} {math.degrees(bias):+.2f} degrees/s (noise {math.degrees(noise):.2f})")
     if not values:
         raise EchostepError("no gyro gives values: run echostep doctor")
-    return {"gyro": values}, "Bias: " + ", ".join(said)
+    return {"gyro": values}, "Bias: " + ", ".join(parts)
 
 
-def _turn(heard: ProbeResult, settings: GyroSettings) -> tuple[Floats, Floats, Floats, Floats]:
-    """Times and rates of the belt gyro, times and bearings of the compass, of somebody who turned; raises EchostepError."""
-    t_s, rate = gyro_rates(heard, settings)
+def _turn(probed: ProbeResult, settings: GyroSettings) -> tuple[Floats, Floats, Floats, Floats]:
+    """Times (n,) s and rates (n,) rad/s of the belt gyro, times (k,) s and bearings (k,) rad of the compass; raises EchostepError."""
+    t_s, rate = gyro_rates(probed, settings)
     belt = rate[:, GYROS.index("belt")]
-    there = np.isfinite(belt)
-    at_s, bearing = bearings(heard)
-    if there.sum() < LEAST_READINGS or len(bearing) < 20:
+    valid = np.isfinite(belt)
+    bearing_s, bearing = bearings(probed)
+    if valid.sum() < LEAST_READINGS or len(bearing) < LEAST_BEARINGS:
         raise EchostepError("belt gyro or compass gives no values: run echostep doctor")
-    return t_s[there], belt[there], at_s, bearing
+    return t_s[valid], belt[valid], bearing_s, bearing
 
 
-def find_mounting(heard: ProbeResult, settings: GyroSettings) -> Found:
-    """Which way round the belt's gyro is worn: the compass tells in a turn on the spot."""
-    t_s, belt, at_s, bearing = _turn(heard, settings)
+def fit_mounting(probed: ProbeResult, settings: GyroSettings) -> Fit:
+    """Whether the belt gyro is worn upside down: the sign of its correlation with the compass in a turn on the spot."""
+    t_s, belt, bearing_s, bearing = _turn(probed, settings)
     turned = np.concatenate([[0.0], np.cumsum(np.diff(t_s) * 0.5 * (belt[1:] + belt[:-1]))])
-    by_gyro = np.interp(at_s, t_s, turned)
+    by_gyro = np.interp(bearing_s, t_s, turned)
     by_compass = -np.unwrap(bearing)  # counter-clockwise
     if np.ptp(by_compass) < FULL_TURN_RAD or np.ptp(by_gyro) < 0.5 * FULL_TURN_RAD:
         seen = f"{math.degrees(np.ptp(by_compass)):.0f} by the compass, {math.degrees(np.ptp(by_gyro)):.0f} by the belt gyro"
@@ -119,42 +124,43 @@ def find_mounting(heard: ProbeResult, settings: GyroSettings) -> Found:
     }, f"The belt gyro is worn {'upside down' if upside_down else 'upright'}."
 
 
-def find_compass(heard: ProbeResult, settings: GyroSettings) -> Found:
-    """Hard and soft iron of the wearer, from a turn on the spot."""
-    t_s, belt, at_s, bearing = _turn(heard, settings)
-    shown = np.full(len(t_s), np.nan)
-    shown[np.clip(np.searchsorted(t_s, at_s), 0, len(t_s) - 1)] = compass_heading(bearing)
+def fit_compass(probed: ProbeResult, settings: GyroSettings) -> Fit:
+    """Hard- and soft-iron errors of the compass, from a turn on the spot."""
+    t_s, belt, bearing_s, bearing = _turn(probed, settings)
+    heading = np.full(len(t_s), np.nan)
+    heading[np.clip(np.searchsorted(t_s, bearing_s), 0, len(t_s) - 1)] = compass_heading(bearing)
     try:
-        iron = fit_compass_errors(t_s, belt, shown)
+        iron = fit_compass_errors(t_s, belt, heading)
     except ValueError as error:
         raise EchostepError(f"compass: {error}, and do it again") from error
     names = ("sin1", "cos1", "sin2", "cos2", "rms_rad")
     values: Values = {name: round(float(getattr(iron, name)), 5) for name in names}
     hard, soft = math.hypot(iron.sin1, iron.cos1), math.hypot(iron.sin2, iron.cos2)
     return {"compass": values}, (
-        f"Iron turns the compass by up to {math.degrees(hard):.1f} degrees once and {math.degrees(soft):.1f} degrees twice a turn; "
+        f"Iron disturbs the compass by up to {math.degrees(hard):.1f} degrees once a turn (hard iron) "
+        f"and {math.degrees(soft):.1f} degrees twice a turn (soft iron); "
         f"{math.degrees(iron.rms_rad):.1f} degrees are left"
     )
 
 
-def find_legs(heard: ProbeResult, settings: GyroSettings, segments: LegLengths, walked_m: float) -> Found:
-    """The scale of the wearer's legs, from a straight walk of known length."""
-    t_s, rate = gyro_rates(heard, settings)
-    there = np.isfinite(rate[:, :2]).all(axis=1)
-    if there.sum() < LEAST_READINGS:
+def fit_legs(probed: ProbeResult, settings: GyroSettings, segments: LegLengths, walked_m: float) -> Fit:
+    """Scale between computed and true stride lengths, from a straight walk of known length."""
+    t_s, rate = gyro_rates(probed, settings)
+    valid = np.isfinite(rate[:, :2]).all(axis=1)
+    if valid.sum() < LEAST_READINGS:
         raise EchostepError("thigh or calf gyro gives no values: run echostep doctor")
-    thigh, calf = rate[there, 0], rate[there, 1]
-    if thigh.std() > SWAPPED * calf.std() > 0.0:
+    thigh, calf = rate[valid, 0], rate[valid, 1]
+    if thigh.std() > SWAPPED_RATIO * calf.std() > 0.0:
         raise EchostepError(
-            "the thigh turns faster than the calf: are the two gyros swapped? swap them, and do it again"
+            "the thigh turns faster than the calf: the two gyros may be swapped: swap them, and do it again"
         )
     legs = StrideEstimator(StrideSettings(segments))
-    strides = (*legs.feed(t_s[there], thigh, calf), *legs.finish())
+    strides = (*legs.feed(t_s[valid], thigh, calf), *legs.finish())
     distance_m = sum(stride.length_m for stride in strides)
     if distance_m < 0.3 * walked_m or distance_m > 3.0 * walked_m:
-        seen = f"{distance_m:.1f} m in {len(strides)} strides were seen"
+        seen = f"{distance_m:.1f} m in {len(strides)} strides were measured"
         raise EchostepError(f"{seen}: walk {walked_m:g} m straight on, stand still before and after, and do it again")
     scale = calibrated_scale(distance_m, walked_m)
     values: Values = {"thigh_m": segments.thigh_m, "shank_m": segments.shank_m, "leg_scale": round(scale, 4)}
-    line = f"The walk of {walked_m:g} m was seen as {distance_m:.2f} m in {len(strides)} strides: scale {scale:.3f}"
+    line = f"The walk of {walked_m:g} m was measured as {distance_m:.2f} m in {len(strides)} strides: scale {scale:.3f}"
     return {"wearer": values}, line

@@ -1,7 +1,7 @@
 """`echostep flash`: writes the firmware to a board through its Caterina bootloader.
 
-In: a port and a hex file, or the ones that are found and shipped. Out: a board that runs the firmware, or one line that says why not. Owns the
-conversation with avrdude, which speaks the bootloader's protocol (avr109).
+In: a port and a hex file, or the port found on this computer and the firmware of this package. Out: a board that runs the firmware, or an error.
+Owns the process of avrdude, which implements the bootloader's protocol (avr109).
 """
 
 from __future__ import annotations
@@ -21,36 +21,38 @@ import serial
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from echostep.commissioning.probe import listen
+from echostep.commissioning.probe import probe
 from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD
 
-TOUCH_BAUD = 1200  # opened at this rate and closed, the board restarts in its bootloader
-BOOTLOADER_S = 10.0  # Windows and busy hubs take some seconds; the bootloader itself waits for eight
-BACK_S = 10.0
+TOUCH_BAUD = 1200  # opening the port at this rate and closing it starts the bootloader
+BOOTLOADER_S = 10.0  # longest wait for its port; the bootloader runs for eight seconds
+RESTART_S = 10.0  # longest wait for the port and the first message of the firmware
+PROBE_S = 1.2
+ACCESS_S = 2.0  # longest wait for udev to set the permissions of the port
 POLL_S = 0.05
 AVRDUDE_S = 120.0
-FLASH_MAX = 32768 - 4096  # the bootloader has the rest
-FULL_BAR = 50  # avrdude's
+FLASH_MAX = 32768 - 4096  # bytes; the bootloader occupies the rest of the ATmega32U4
+FULL_BAR = 50  # characters of avrdude's progress bar
 PRESS = "press its reset button (Pro Micro: twice, quickly) and run this again within eight seconds"
 
 
 def flash(port: str | None, hex_file: Path | None, console: Console) -> None:
-    """Write the firmware and see it answer; raises EchostepError with what is missing and what to do."""
+    """Write the firmware and wait for its first message; raises EchostepError with what to do."""
     avrdude = shutil.which("avrdude")
     if avrdude is None:
         raise EchostepError("avrdude is not installed: sudo apt install avrdude (macOS: brew install avrdude)")
     with _hex(hex_file) as path:
         size = check_hex(path)
-        wanted = port or _find_board()
-        for finding in access_findings("board", wanted):
+        board_port = port or _find_board()
+        for finding in access_findings("board", board_port):
             raise EchostepError(str(finding))
-        console.print(f"{path.name}, {size} bytes, to {wanted}")
-        bootloader = enter_bootloader(wanted)
+        console.print(f"{path.name}, {size} bytes, to {board_port}")
+        bootloader = enter_bootloader(board_port)
         console.print(f"bootloader at {bootloader}")
         write(avrdude, bootloader, path)
-    console.print(_confirm(wanted))
+    console.print(_confirm(board_port))
 
 
 @contextmanager
@@ -96,11 +98,11 @@ def _find_board() -> str:
 
 
 def enter_bootloader(port: str) -> str:
-    """The port of the bootloader, which the board is made to enter unless it is there already."""
+    """Start the board's bootloader unless it runs already; returns its port."""
     if any(seen.path == os.path.realpath(port) and seen.role is Role.BOOTLOADER for seen in list_seen()):
         return port
     before = {seen.path for seen in list_seen()}
-    was = os.path.realpath(port)
+    device = os.path.realpath(port)
     try:
         touched = serial.Serial(port, TOUCH_BAUD, timeout=0.1)
         with suppress(OSError):  # a port without modem lines
@@ -111,31 +113,31 @@ def enter_bootloader(port: str) -> str:
 
     gone = False
 
-    def found() -> str | None:
+    def bootloader_port() -> str | None:
         nonlocal gone
         seen = list_seen()
-        gone = gone or not Path(port).exists() or os.path.realpath(port) != was
+        gone = gone or not Path(port).exists() or os.path.realpath(port) != device
         fresh = next((s.path for s in seen if s.role is Role.BOOTLOADER or s.path not in before), None)
         return fresh or (port if gone and Path(port).exists() else None)
 
-    where = _await(found, BOOTLOADER_S)
-    if where is None:
+    bootloader = _await(bootloader_port, BOOTLOADER_S)
+    if bootloader is None:
         raise EchostepError(f"{port}: the board did not enter its bootloader in {BOOTLOADER_S:.0f} s: {PRESS}")
-    _await(lambda: where if os.access(where, os.R_OK | os.W_OK) else None, 2.0)  # udev is still setting it up
-    return where
+    _await(lambda: bootloader if os.access(bootloader, os.R_OK | os.W_OK) else None, ACCESS_S)
+    return bootloader
 
 
-def _await(look: Callable[[], str | None], seconds: float) -> str | None:
+def _await(poll: Callable[[], str | None], seconds: float) -> str | None:
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
-        if (found := look()) is not None:
-            return found
+        if (result := poll()) is not None:
+            return result
         time.sleep(POLL_S)
     return None
 
 
 def write(avrdude: str, port: str, path: Path) -> None:
-    """Let avrdude write and verify, with a bar; raises EchostepError with its own last words."""
+    """Let avrdude write and verify, with a progress bar; raises EchostepError with avrdude's error line."""
     command = [avrdude, "-p", "atmega32u4", "-c", "avr109", "-P", port, "-b", "57600", "-D", "-U", f"flash:w:{path}:i"]
     columns = (TextColumn("{task.description:10}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
     with Progress(*columns) as bars:
@@ -143,18 +145,18 @@ def write(avrdude: str, port: str, path: Path) -> None:
             "Writing": bars.add_task("writing", total=FULL_BAR),
             "Reading": bars.add_task("verifying", total=FULL_BAR),
         }
-        said = ""
-        for said in _output(command):
+        output = ""
+        for output in _output(command):
             for phase, task in tasks.items():
-                if marks := re.findall(rf"{phase} \|\s*(#+)", said):
+                if marks := re.findall(rf"{phase} \|\s*(#+)", output):
                     bars.update(task, completed=len(marks[-1]))
 
 
 def _output(command: list[str]) -> Iterator[str]:
-    """All that the program has said so far, each time that it says more; raises EchostepError when it fails."""
+    """The whole output of the program so far, each time it grows; raises EchostepError when the program fails."""
     child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert child.stdout is not None
-    said, deadline = b"", time.monotonic() + AVRDUDE_S
+    output, deadline = b"", time.monotonic() + AVRDUDE_S
     try:
         while True:
             ready, _, _ = select.select([child.stdout], [], [], max(0.0, deadline - time.monotonic()))
@@ -163,11 +165,11 @@ def _output(command: list[str]) -> Iterator[str]:
             received = os.read(child.stdout.fileno(), 4096)
             if not received:
                 break
-            said += received
-            yield said.decode(errors="replace")
+            output += received
+            yield output.decode(errors="replace")
         if status := child.wait(timeout=5.0):
             raise EchostepError(
-                f"avrdude failed (status {status}): {_last_words(said.decode(errors='replace'))}; {PRESS}"
+                f"avrdude failed (status {status}): {_error_line(output.decode(errors='replace'))}; {PRESS}"
             )
     finally:
         if child.poll() is None:
@@ -176,30 +178,32 @@ def _output(command: list[str]) -> Iterator[str]:
         child.stdout.close()
 
 
-def _last_words(said: str) -> str:
-    """The line that says what went wrong."""
-    lines = [line.strip() for line in said.splitlines() if line.strip() and "Thank you" not in line and "#" not in line]
+def _error_line(output: str) -> str:
+    """The first line of avrdude's output that names an error, else the last line."""
+    lines = [
+        line.strip() for line in output.splitlines() if line.strip() and "Thank you" not in line and "#" not in line
+    ]
     telling = [line for line in lines if re.search("error|not responding|mismatch|cannot|can't|fail", line, re.I)]
-    return (telling or lines or ["it said nothing"])[0 if telling else -1].removeprefix("avrdude: ")
+    return (telling or lines or ["it printed nothing"])[0 if telling else -1].removeprefix("avrdude: ")
 
 
 def _confirm(port: str) -> str:
-    """Wait for the board to come back, and for its first word."""
-    back = _await(lambda: port if Path(port).exists() else find(list_seen(), Role.BOARD, BOARD_NAME), BACK_S)
+    """Wait for the board's port, and for the first message of its firmware."""
+    back = _await(lambda: port if Path(port).exists() else find(list_seen(), Role.BOARD, BOARD_NAME), RESTART_S)
     if back is None:
         raise EchostepError(
-            f"written and verified, but the board did not come back in {BACK_S:.0f} s: unplug it and plug it in again"
+            f"written and verified, but the board did not come back in {RESTART_S:.0f} s: unplug it and plug it in again"
         )
-    deadline = time.monotonic() + BACK_S
+    deadline = time.monotonic() + RESTART_S
     while time.monotonic() < deadline:
         try:
-            heard = listen({BOARD: back}, 1.2)
-        except EchostepError:  # it is still changing from the bootloader to the board
+            probed = probe({BOARD: back}, PROBE_S)
+        except EchostepError:  # the bootloader's port is going away
             time.sleep(POLL_S)
             continue
-        if heard.stale:
-            return f"written and verified; {heard.stale}"
-        if i := heard.words.identity:
+        if probed.stale_firmware:
+            return f"written and verified; {probed.stale_firmware}"
+        if i := probed.reports.identity:
             return f"written and verified; firmware {i.version_major}.{i.version_minor}.{i.version_patch} answers at {back}"
     raise EchostepError(
         f"written and verified, but {back} is silent: unplug the board and plug it in again, then: echostep doctor"

@@ -1,4 +1,4 @@
-"""The serial ports of this computer: which is the board, which the MTx, and whether we may use them.
+"""The serial ports of this computer: which is the board, which the MTx, and whether this user may open them.
 
 In: the system's list of ports, /sys and /proc. Out: `PortSeen`s, and `Finding`s about them. Opens nothing.
 """
@@ -16,7 +16,7 @@ from serial.tools import list_ports
 
 from echostep.board.health import Finding, Severity
 
-BOARD_NAME, MTX_NAME = Path("/dev/echostep"), Path("/dev/echostep-mtx")  # by the udev rules
+BOARD_NAME, MTX_NAME = Path("/dev/echostep"), Path("/dev/echostep-mtx")  # links made by the udev rules
 RULES = "99-echostep.rules"
 RULE_FOLDERS = tuple(
     map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"))
@@ -30,7 +30,7 @@ LATENCY_MAX_MS = 1
 
 
 class Role(Enum):
-    """What hangs on a port, as far as its USB identifiers tell."""
+    """The device on a port, by its USB identifiers."""
 
     BOARD = "sensor board"
     BOOTLOADER = "sensor board in its bootloader"
@@ -41,7 +41,7 @@ class Role(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PortSeen:
-    """A serial port and what hangs on it."""
+    """A serial port, and the device on it."""
 
     path: str
     role: Role
@@ -65,19 +65,19 @@ def _role(vendor: int, product: int) -> Role:
 
 
 def find(seen: list[PortSeen], role: Role, name: Path) -> str | None:
-    """The port with the stable name, else the first one in this role."""
+    """The stable name if it exists, else the first port in this role; None when there is none."""
     if name.exists():
         return str(name)
     return next((port.path for port in seen if port.role is role), None)
 
 
 def is_url(port: str) -> bool:
-    """Whether it is a pyserial URL and no file."""
+    """Whether it is a pyserial URL, not a device file."""
     return "://" in port
 
 
 def access_findings(subject: str, port: str) -> list[Finding]:
-    """Why this port cannot be opened, if it cannot; raises nothing."""
+    """Why this user cannot open the port; empty when it can be opened. Raises nothing."""
     path = Path(port)
     if is_url(port):
         return []
@@ -85,7 +85,7 @@ def access_findings(subject: str, port: str) -> list[Finding]:
         remedy = "plug it in and look again; see which ports there are: ls /dev/serial/by-id"
         return [Finding(Severity.FAULT, subject, f"{port}: there is no such port", remedy)]
     if not path.is_char_device():
-        return [Finding(Severity.FAULT, subject, f"{port} is no serial port", "name one as /dev/ttyACM0")]
+        return [Finding(Severity.FAULT, subject, f"{port} is no serial port", "name one such as /dev/ttyACM0")]
     if os.access(path, os.R_OK | os.W_OK):
         return []
     what = f"{port}: this user may not open it (it belongs to {path.owner()}:{path.group()})"
@@ -94,7 +94,7 @@ def access_findings(subject: str, port: str) -> list[Finding]:
 
 
 def holder_findings(subject: str, port: str, processes: Path = Path("/proc")) -> list[Finding]:
-    """Other programs that have the port open: they steal its bytes. A pseudo terminal is always held by whoever plays the device."""
+    """Other programs that have the port open: each byte reaches only one of them. A pseudo terminal is always open in its simulator."""
     if is_url(port) or os.path.realpath(port).startswith("/dev/pts/"):
         return []
     held = []
@@ -108,11 +108,11 @@ def holder_findings(subject: str, port: str, processes: Path = Path("/proc")) ->
     if not held:
         return []
     what = f"{port} is also open in {', '.join(held)}"
-    return [Finding(Severity.WARNING, subject, what, "close that program: it takes bytes away")]
+    return [Finding(Severity.WARNING, subject, what, "close that program: it takes bytes of the port")]
 
 
 def latency_findings(subject: str, port: str, system: Path = Path("/sys")) -> list[Finding]:
-    """The latency timer of an FTDI adapter, 16 ms unless somebody set it."""
+    """Whether the latency timer of an FTDI adapter is above LATENCY_MAX_MS; its default is 16 ms."""
     name = Path(os.path.realpath(port)).name
     try:
         latency_ms = int((system / "bus/usb-serial/devices" / name / "latency_timer").read_text())
@@ -120,7 +120,7 @@ def latency_findings(subject: str, port: str, system: Path = Path("/sys")) -> li
         return []
     if latency_ms <= LATENCY_MAX_MS:
         return []
-    what = f"its adapter waits up to {latency_ms} ms before it passes bytes on"
+    what = f"its adapter delays bytes by up to {latency_ms} ms"
     remedy = f"install the udev rules (echostep doctor --udev), or now: echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
     return [Finding(Severity.WARNING, subject, what, remedy)]
 
@@ -131,7 +131,7 @@ def rules_text() -> str:
 
 
 def rules_findings(folders: tuple[Path, ...] = RULE_FOLDERS) -> list[Finding]:
-    """Whether the udev rules are installed, and these ones."""
+    """Whether the udev rules of this version are installed."""
     found = next((folder / RULES for folder in folders if (folder / RULES).exists()), None)
     remedy = f"echostep doctor --udev | sudo tee /etc/udev/rules.d/{RULES} && sudo udevadm control --reload && sudo udevadm trigger"
     if found is None:
@@ -140,4 +140,4 @@ def rules_findings(folders: tuple[Path, ...] = RULE_FOLDERS) -> list[Finding]:
     with contextlib.suppress(OSError, UnicodeDecodeError):
         if found.read_text().strip() == rules_text().strip():
             return []
-    return [Finding(Severity.NOTE, "udev rules", f"{found} is not this version's", remedy)]
+    return [Finding(Severity.NOTE, "udev rules", f"{found} is of another version", remedy)]

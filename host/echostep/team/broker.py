@@ -1,6 +1,6 @@
 """A connection to a broker, run by the thread that uses it.
 
-In: an endpoint. Out: a connected client of paho, and its turns. Owns nothing. Every fault, also nonsense from the other side, is an OSError.
+In: an endpoint. Out: a connected paho client. Owns nothing. Every fault is raised as an OSError, malformed packets of the broker included.
 """
 
 from __future__ import annotations
@@ -18,19 +18,28 @@ from paho.mqtt.properties import Properties
 
 from echostep.team.endpoint import Endpoint
 
-ANSWER_S = 5.0  # the broker's answers are waited for so long
-KEEPALIVE_S = 6
-LOOP_S = 0.05
-MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends us nothing longer
-FAULTS = (OSError, ValueError, RuntimeError, struct.error, IndexError, AttributeError, TypeError, KeyError)
+ANSWER_S = 5.0  # longest wait for an answer of the broker
+KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
+LOOP_S = 0.05  # longest wait for a packet in one call of `run_once`
+MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this
+CLIENT_ERRORS = (  # what paho raises on broken connections and malformed packets
+    OSError,
+    ValueError,
+    RuntimeError,
+    struct.error,
+    IndexError,
+    AttributeError,
+    TypeError,
+    KeyError,
+)
 
 
 class RefusedError(ConnectionError):
-    """Somebody is there, but no broker that speaks as we do or lets us in."""
+    """The host answers, but it is no broker of this MQTT version, or it refuses the connection."""
 
 
 def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = False) -> paho.Client:
-    """A client that is not connected yet, of MQTT 3.1.1, or of the `newest`, MQTT 5."""
+    """A client that is not connected yet: for MQTT 5 if `newest`, else for MQTT 3.1.1."""
     protocol = paho.MQTTv5 if newest else paho.MQTTv311
     client = paho.Client(CallbackAPIVersion.VERSION2, identity, protocol=protocol, reconnect_on_failure=False)
     client.connect_timeout = ANSWER_S
@@ -42,7 +51,7 @@ def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = F
 
 
 def connect(client: paho.Client, endpoint: Endpoint) -> None:
-    """Connect and wait until the broker agrees; raises OSError, RefusedError when somebody is there."""
+    """Connect and wait for the broker's acceptance; raises OSError, which is a RefusedError when the host answers."""
     refused: list[str] = []
 
     def answered(_client: paho.Client, _user: Any, _flags: Any, code: Any, _properties: Any) -> None:
@@ -59,37 +68,37 @@ def connect(client: paho.Client, endpoint: Endpoint) -> None:
     except (OSError, ValueError) as error:
         raise ConnectionError((isinstance(error, OSError) and error.strerror) or str(error)) from error
     try:
-        pump(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
+        run_until(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
     except OSError as error:
         raise RefusedError(refused[0] if refused else str(error)) from error
     if refused:
         raise RefusedError(f"the broker refuses: {refused[0]}")
 
 
-def pump(client: paho.Client, done: Callable[[], bool], otherwise: str) -> None:
-    """Run the connection until something is done; raises OSError when it breaks or takes too long."""
+def run_until(client: paho.Client, done: Callable[[], bool], timeout_message: str) -> None:
+    """Run the connection until `done`; raises OSError when it breaks or when that takes longer than ANSWER_S."""
     end_s = time.monotonic() + ANSWER_S
     while not done():
-        turn(client, LOOP_S)
+        run_once(client, LOOP_S)
         if time.monotonic() > end_s:
-            raise TimeoutError(otherwise)
+            raise TimeoutError(timeout_message)
 
 
-def turn(client: paho.Client, timeout_s: float) -> None:
-    """Wait for the connection and run it once, which takes in one packet; raises OSError when it is broken."""
+def run_once(client: paho.Client, timeout_s: float) -> None:
+    """Wait for one packet, for at most `timeout_s`, and process it; raises OSError when the connection is broken."""
     try:
         code = client.loop(timeout_s)
     except OSError:
         raise
-    except FAULTS as error:
-        raise ConnectionError(f"the broker sends nonsense: {error}") from error
+    except CLIENT_ERRORS as error:
+        raise ConnectionError(f"the broker sends a malformed packet: {error}") from error
     if code != paho.MQTT_ERR_SUCCESS:
         raise ConnectionError(f"the connection broke: {paho.error_string(code)}")
 
 
-def drop(client: paho.Client) -> None:
-    """Close the socket without a word, whatever state it is in."""
-    with suppress(*FAULTS):
+def close_socket(client: paho.Client) -> None:
+    """Close the socket without a disconnect packet, in any state."""
+    with suppress(*CLIENT_ERRORS):
         sock = client.socket()
         if sock is not None:
             sock.close()

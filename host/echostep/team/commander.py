@@ -1,6 +1,6 @@
-"""The commander's view: a team on one plan, those in need first.
+"""The commander's view: a team on one plan, the most urgent states first.
 
-In: a plan, a broker's URL. Out: a table on the terminal, a picture, or the roster as JSON. Owns nothing but the loop.
+In: a plan, a broker's URL. Out: a table on the terminal, a picture, or the roster as JSON. Owns the loop.
 """
 
 from __future__ import annotations
@@ -23,30 +23,32 @@ from rich.text import Text
 from echostep.errors import EchostepError
 from echostep.plan.model import Plan, load_plan
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.inbox import Inbox, Reception
+from echostep.team.inbox import Inbox, Receiver
 from echostep.team.mqtt import Listener
 from echostep.team.picture import draw_team
 from echostep.team.report import checked_name
-from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, Need, Roster, nearest
+from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
 
-LOOK_S = 0.25
-WIDE = 110  # columns of a terminal that has room for all
-WIDEST = 24  # of one of them
+REFRESH_S = 0.25
+ALL_COLUMNS_WIDTH = 110  # characters; a narrower terminal shows fewer columns
+MAX_COLUMN_WIDTH = 24  # characters
+LOW_BATTERY_PERCENT = 20
+NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
 COLUMNS = {
     "who": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "to start": "right",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
-SPARED = ("looks", "nearest m", "walked m")  # in a narrow terminal
+OPTIONAL_COLUMNS = ("looks", "nearest m", "walked m")  # not shown on a narrow terminal
 STYLES = {
-    Need.LOST: "bold white on red", Need.STALE: "bold red", Need.UNCERTAIN: "yellow",
-    Need.WAITING: "cyan", Need.TRACKING: "green", Need.ENDED: "grey62",
+    MemberState.LOST: "bold white on red", MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
+    MemberState.WAITING: "cyan", MemberState.TRACKING: "green", MemberState.ENDED: "grey62",
 }  # fmt: skip
 
 
 def command(
     plan_path: Path, url: str, team: str | None, seconds: float | None, picture: Path | None, *, as_json: bool
 ) -> None:
-    """Follow a team until Ctrl-C, or for so long."""
+    """Show a team until Ctrl-C, or for `seconds`; then draw `picture` and print JSON if asked for."""
     plan = load_plan(plan_path)
     endpoint = parse_endpoint(url, ("mqtt", "mqtts"))
     if picture and picture.suffix not in (".png", ".svg"):
@@ -54,25 +56,25 @@ def command(
     console = Console(soft_wrap=True, stderr=as_json)
     inbox, roster = Inbox(), Roster()
     topic = f"echostep/{checked_name('--team', team) if team else '+'}/+/+"
-    reception = Reception(
-        Listener(endpoint, topic, inbox.hear), lambda said: console.print(f"{endpoint}: {said}", markup=False)
+    receiver = Receiver(
+        Listener(endpoint, topic, inbox.put), lambda text: console.print(f"{endpoint}: {text}", markup=False)
     )
     end_s = math.inf if seconds is None else time.monotonic() + seconds
     try:
         with Live(console=console, auto_refresh=False, transient=False, redirect_stdout=False) as shown:
             while time.monotonic() < end_s:
-                time.sleep(min(LOOK_S, max(end_s - time.monotonic(), 0.0)))
-                look(inbox, roster)
+                time.sleep(min(REFRESH_S, max(end_s - time.monotonic(), 0.0)))
+                update_roster(inbox, roster)
                 if not as_json:
                     shown.update(
-                        table(roster, plan, time.monotonic(), connected=reception.connected, columns=console.width),
+                        table(roster, plan, time.monotonic(), connected=receiver.connected, columns=console.width),
                         refresh=True,
                     )
     except KeyboardInterrupt:
         pass
     finally:
-        reception.close()
-    look(inbox, roster)
+        receiver.close()
+    update_roster(inbox, roster)
     now_s = time.monotonic()
     if picture:
         draw_team(picture, plan, roster.members(now_s), now_s)
@@ -81,50 +83,50 @@ def command(
         sys.stdout.write("\n")
 
 
-def look(inbox: Inbox, roster: Roster) -> None:
-    """Everything that has come goes into the roster."""
-    letters, refused = inbox.take()
-    for letter in letters:
-        roster.hear(letter.topic, letter.payload, letter.retained, letter.heard_s, letter.unix_s)
-    for why, count in refused.items():
-        roster.heard += count
-        roster.refuse(why, count)
+def update_roster(inbox: Inbox, roster: Roster) -> None:
+    """Move all messages and drop counts of the inbox into the roster."""
+    messages, dropped = inbox.take_all()
+    for message in messages:
+        roster.receive(*message)
+    for reason, count in dropped.items():
+        roster.received += count
+        roster.count_rejected(reason, count)
 
 
-def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns: int = WIDE) -> Group:
-    """The roster for people, a line for each, in so many columns."""
+def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns: int = ALL_COLUMNS_WIDTH) -> Group:
+    """The roster as a table, a line per member, `columns` characters wide."""
     members = roster.members(now_s)
-    made = Table(
+    grid = Table(
         title=f"{plan.name}: {summary(members, now_s)}", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
     )
-    names = [name for name in COLUMNS if columns >= WIDE or name not in SPARED]
+    names = [name for name in COLUMNS if columns >= ALL_COLUMNS_WIDTH or name not in OPTIONAL_COLUMNS]
     duplicates = roster.duplicates(now_s)
     rows = [_cells(m, members, plan, now_s, duplicates) for m in members]
     left = columns - 2
     for name in names:
         longest = max([len(name)] + [cell_len(row[name]) for row in rows])
-        width = max(left, 8) if name == "note" else min(longest, WIDEST)
+        width = max(left, 8) if name == "note" else min(longest, MAX_COLUMN_WIDTH)
         left -= width + 2
-        made.add_column(name, justify=COLUMNS[name], no_wrap=True, width=width)  # type: ignore[arg-type]
+        grid.add_column(name, justify=COLUMNS[name], no_wrap=True, width=width)  # type: ignore[arg-type]
     for m, row in zip(members, rows, strict=True):
-        made.add_row(*(Text(row[name]) for name in names), style=STYLES[m.need(now_s)])
+        grid.add_row(*(Text(row[name]) for name in names), style=STYLES[m.state(now_s)])
     below = [] if connected else [Text("no connection to the broker", style="bold red")]
-    if roster.counts:
-        below.append(Text(f"not believed: {refused(roster)}", style="grey62"))
-    return Group(made, *below)
+    if roster.rejected:
+        below.append(Text(f"rejected: {rejected(roster)}", style="grey62"))
+    return Group(grid, *below)
 
 
 def summary(members: Sequence[Member], now_s: float) -> str:
-    """How many of them are in which state."""
-    needs = [m.need(now_s) for m in members]
+    """Number of members, and of those in each state."""
+    states = [m.state(now_s) for m in members]
     return f"{len(members)} tracker{'s' * (len(members) != 1)}" + "".join(
-        f", {needs.count(n)} {n}" for n in Need if n in needs
+        f", {states.count(s)} {s}" for s in MemberState if s in states
     )
 
 
-def refused(roster: Roster) -> str:
-    """What was not believed, most frequent first."""
-    return ", ".join(f"{count} x {why}" for why, count in roster.counts.most_common(6))
+def rejected(roster: Roster) -> str:
+    """Reasons of rejected payloads with counts, the most frequent first."""
+    return ", ".join(f"{count} x {why}" for why, count in roster.rejected.most_common(6))
 
 
 def _cells(
@@ -147,45 +149,45 @@ def _cells(
 
 
 def _state(m: Member, now_s: float) -> str:
-    """His state, and for how long nothing has been heard of him or of his sensors."""
-    need, silent_s, p = m.need(now_s), m.silent_s(now_s), m.report.position
-    quiet = need not in (Need.STALE, Need.ENDED) and silent_s <= m.patience_s
-    if quiet:
-        return f"{need}, no estimate {p.age_s:.0f} s" if p and p.age_s > 3.0 else need.value
-    return f"{need} {silent_s:.0f} s" if need is Need.STALE else f"{need}, silent {silent_s:.0f} s"
+    """State, and for how long no report or no estimate has come."""
+    state, silent_s, p = m.state(now_s), m.silent_s(now_s), m.report.position
+    is_current = state not in (MemberState.STALE, MemberState.ENDED) and silent_s <= m.stale_after_s
+    if is_current:
+        return f"{state}, no estimate {p.age_s:.0f} s" if p and p.age_s > NO_ESTIMATE_S else state.value
+    return f"{state} {silent_s:.0f} s" if state is MemberState.STALE else f"{state}, silent {silent_s:.0f} s"
 
 
 def notes(m: Member, plan: Plan, duplicates: set[tuple[str, str]]) -> list[str]:
-    """What else the commander should know of him."""
-    said, r = [], m.report
+    """Remarks on a member: name used twice, broken connection, rest, other plan, clock, battery, faults, losses."""
+    remarks, r = [], m.report
     if m.key[:2] in duplicates:
-        said.append(f"name used twice (run {r.run})")
+        remarks.append(f"name used twice (run {r.run})")
     if m.presence == "broken":
-        said.append("connection broke")
+        remarks.append("connection broke")
     if r.motion and r.motion.still_s > STILL_S:
-        said.append(f"still for {r.motion.still_s:.0f} s")
+        remarks.append(f"still for {r.motion.still_s:.0f} s")
     if r.source != "live":
-        said.append(r.source)
+        remarks.append(r.source)
     if r.plan_sha256 != plan.digest:
-        said.append(f"tracked on another plan ({r.plan})")
-    if not m.retained and abs(m.clock_off_s) > CLOCK_OFF_S:
-        said.append(f"clock {'ahead' if m.clock_off_s > 0 else 'behind'} by {abs(m.clock_off_s):.0f} s")
-    if r.battery_percent is not None and r.battery_percent < 20:
-        said.append(f"battery {r.battery_percent} %")
-    said += r.streams.findings if r.streams else ()
+        remarks.append(f"tracked on another plan ({r.plan})")
+    if not m.retained and abs(m.clock_ahead_s) > CLOCK_OFF_S:
+        remarks.append(f"clock {'ahead' if m.clock_ahead_s > 0 else 'behind'} by {abs(m.clock_ahead_s):.0f} s")
+    if r.battery_percent is not None and r.battery_percent < LOW_BATTERY_PERCENT:
+        remarks.append(f"battery {r.battery_percent} %")
+    remarks += r.streams.findings if r.streams else ()
     if r.streams and r.streams.dropped + r.streams.lost + r.streams.bad:
-        said.append(f"{r.streams.bad} bad, {r.streams.lost} lost, {r.streams.dropped} dropped frames")
-    said += [f"{why} {count} x" for why, count in m.notes.items()]
-    return said
+        remarks.append(f"{r.streams.bad} bad, {r.streams.lost} lost, {r.streams.dropped} dropped frames")
+    remarks += [f"{event} {count} x" for event, count in m.notes.items()]
+    return remarks
 
 
 def as_tree(roster: Roster, plan: Plan, now_s: float) -> dict[str, Any]:
-    """The roster for programs."""
+    """The roster as JSON objects."""
     members, duplicates = roster.members(now_s), roster.duplicates(now_s)
     return {
         "plan": plan.name,
-        "heard": roster.heard,
-        "not_believed": dict(roster.counts.most_common()),
+        "heard": roster.received,
+        "not_believed": dict(roster.rejected.most_common()),
         "members": [_member(m, members, plan, now_s, duplicates) for m in members],
     }
 
@@ -199,13 +201,13 @@ def _member(
     return {
         "team": m.report.team,
         "name": m.report.name,
-        "state": m.need(now_s).value,
+        "state": m.state(now_s).value,
         "silent_s": round(m.silent_s(now_s), 3),
-        "stale": m.silent_s(now_s) > m.patience_s or m.presence == "broken",
+        "stale": m.silent_s(now_s) > m.stale_after_s or m.presence == "broken",
         "presence": m.presence,
         "remembered": m.retained,
         "radius95_m": p.radius95_m if (p := m.position(now_s)) else None,
-        "clock_ahead_s": round(m.clock_off_s, 3),
+        "clock_ahead_s": round(m.clock_ahead_s, 3),
         "missed": m.missed,
         "from_start_m": _from_start(m, plan),
         "nearest": {"name": near[1].report.name, "distance_m": near[0]} if near else None,
@@ -215,7 +217,7 @@ def _member(
 
 
 def _from_start(m: Member, plan: Plan) -> float | None:
-    """Straight distance from the plan's start, on its floor."""
+    """Straight distance from the plan's start, m; None on another floor or without a start."""
     p = m.report.position
     if p is None or plan.start is None or p.floor != plan.start.level:
         return None

@@ -1,10 +1,11 @@
 """Cursor on Target: a report as an event for TAK, over UDP, TCP or TLS.
 
-In: reports with a place on Earth. Out: `event` elements [CoT Event 2.0 schema, MITRE], one a datagram, or one after the other on a stream. Owns one
-socket, used by one thread. XML by the standard library: pytak brings an asyncio client with queues of its own, where the newest position must win.
+In: reports with a position on Earth. Out: `event` elements [CoT Event 2.0 schema, MITRE], one per datagram, or one after the other on a
+stream. Owns one socket, used by one thread. XML is made by the standard library; pytak is not used, because its client queues events, and
+the newest position must go first.
 
-`ce` and `le` are what the schema says: one standard deviation, `ce` along the worst direction, the plan's own uncertainty included. The remarks
-tell the 95 % radius.
+`ce` and `le` follow the schema: one standard deviation, `ce` along the direction of the largest variance, the plan's uncertainty included.
+The remarks contain the 95 % radius.
 """
 
 from __future__ import annotations
@@ -20,25 +21,31 @@ from echostep.team.endpoint import Endpoint, tls_context
 from echostep.team.report import Report
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
-UNKNOWN = "9999999.0"  # of the schema
-HOW = {"live": "m-f", "replay": "m-f", "simulated": "m-s"}  # machine: fused, simulated
-PATIENCE_S = 3.0
+UNKNOWN = "9999999.0"  # value of `hae` and `le` when they are not known [CoT Event 2.0 schema]
+HOW = {"live": "m-f", "replay": "m-f", "simulated": "m-s"}  # made by a machine: by fusion, by simulation
+SOCKET_TIMEOUT_S = 3.0  # for connecting and for sending
 GROUPS = {
     "White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple",
     "Dark Blue", "Blue", "Cyan", "Teal", "Green", "Dark Green", "Brown",
-}  # of TAK  # fmt: skip
-HOPS = 4  # of multicast
+}  # names of the team colours that TAK shows  # fmt: skip
+MULTICAST_HOPS = 4
 
 
 def event(report: Report) -> bytes | None:
-    """The event, one line of XML in UTF-8; None without a place on Earth."""
+    """A report as an event, one line of XML in UTF-8; None when it has no position on Earth."""
     place, position, motion = report.place, report.position, report.motion
     if place is None or position is None:
         return None
     top = ElementTree.Element("event", version="2.0", uid=uid(report.team, report.name), type=FRIEND_ON_FOOT)
     top.attrib |= {"time": report.time, "start": report.time, "stale": report.stale, "how": HOW[report.source]}
     hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
-    point = {"lat": f"{place.lat_deg:.8f}", "lon": f"{place.lon_deg:.8f}", "hae": hae, "ce": _up(place.sd_m), "le": le}
+    point = {
+        "lat": f"{place.lat_deg:.8f}",
+        "lon": f"{place.lon_deg:.8f}",
+        "hae": hae,
+        "ce": _rounded_up(place.sd_m),
+        "le": le,
+    }
     ElementTree.SubElement(top, "point", point)
     detail = ElementTree.SubElement(top, "detail")
     ElementTree.SubElement(detail, "contact", callsign=report.name)
@@ -56,13 +63,13 @@ def event(report: Report) -> bytes | None:
 
 
 def uid(team: str, name: str) -> str:
-    """One for each wearer; where a hyphen in a name makes it ambiguous, with a part of a hash."""
+    """Unique identifier of a wearer; a part of a hash is appended when a hyphen in a name makes it ambiguous."""
     plain = f"echostep-{team}-{name}"
     return plain if plain.count("-") == 2 else f"{plain}-{uuid5(NAMESPACE_URL, f'{team}/{name}').hex[:8]}"
 
 
 def remarks(report: Report) -> str:
-    """What the event's fields cannot say, in words."""
+    """Status, 95 % radius, floor, age, and other facts for which the event has no field."""
     p = report.position
     words = [f"{report.status}, 95 % within {p.radius95_m:.1f} m" if p else report.status]
     if p:
@@ -77,20 +84,20 @@ def remarks(report: Report) -> str:
     return "; ".join(words)
 
 
-def _up(metres: float) -> str:
-    """An error is never rounded to less than it is."""
+def _rounded_up(metres: float) -> str:
+    """Metres with two decimals, rounded up, so that no error is written smaller than it is."""
     return f"{math.ceil(metres * 100.0) / 100.0:.2f}"
 
 
-class UdpLine:
-    """A `Line` of datagrams, to a host or to a multicast group (TAK: 239.2.3.1:6969)."""
+class UdpTransport:
+    """A `Transport` of datagrams, to a host or to a multicast group (TAK: 239.2.3.1:6969)."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         self._socket: socket.socket | None = None
 
     def open(self) -> None:
-        """Look the host up and make a socket."""
+        """Resolve the host and make a socket."""
         family, kind, number, _, address = _address(self._endpoint, socket.SOCK_DGRAM)
         self._socket = socket.socket(family, kind, number)
         self._socket.setblocking(False)
@@ -100,11 +107,11 @@ class UdpLine:
                 if family == socket.AF_INET6
                 else (socket.IPPROTO_IP, socket.IP_MULTICAST_TTL)
             )
-            self._socket.setsockopt(level, option, HOPS)
+            self._socket.setsockopt(level, option, MULTICAST_HOPS)
         self._socket.connect(address)
 
     def send(self, report: Report) -> None:
-        """One datagram; that nobody listens (port unreachable) is no fault of ours."""
+        """Send one datagram; an unreachable port is ignored, since the receiver may start later."""
         made = event(report)
         if made is None or self._socket is None:
             return
@@ -120,8 +127,8 @@ class UdpLine:
             self._socket = None
 
 
-class StreamLine:
-    """A `Line` of events on TCP or TLS, as a TAK server takes them."""
+class StreamTransport:
+    """A `Transport` of events on TCP or TLS, to a TAK server."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
@@ -129,24 +136,26 @@ class StreamLine:
         self._socket: socket.socket | None = None
 
     def open(self) -> None:
-        """Connect, and shake hands."""
-        plain = socket.create_connection((self._endpoint.host, self._endpoint.port), PATIENCE_S)
+        """Connect, with the TLS handshake for cot+tls."""
+        plain = socket.create_connection((self._endpoint.host, self._endpoint.port), SOCKET_TIMEOUT_S)
         try:
             plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384)  # what waits in there grows old
+            plain.setsockopt(
+                socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384
+            )  # bytes; small, because events in the buffer get outdated
             self._socket = self._tls.wrap_socket(plain, server_hostname=self._endpoint.host) if self._tls else plain
         except OSError:
             plain.close()
             raise
 
     def send(self, report: Report) -> None:
-        """Write the event; what the server sends is read and forgotten."""
+        """Send the event; bytes from the server are read and discarded."""
         made = event(report)
         if self._socket is None:
             raise ConnectionError("not connected")
         self._drain(self._socket)
         if made is not None:
-            self._socket.settimeout(PATIENCE_S)
+            self._socket.settimeout(SOCKET_TIMEOUT_S)
             self._socket.sendall(made + b"\n")
 
     def _drain(self, sock: socket.socket) -> None:
@@ -174,5 +183,4 @@ class StreamLine:
 
 
 def _address(endpoint: Endpoint, kind: int) -> tuple[int, int, int, str, tuple[str, int]]:
-    found = socket.getaddrinfo(endpoint.host, endpoint.port, type=kind)
-    return found[0]  # type: ignore[return-value]
+    return socket.getaddrinfo(endpoint.host, endpoint.port, type=kind)[0]  # type: ignore[return-value]

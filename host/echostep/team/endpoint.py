@@ -1,6 +1,6 @@
-"""Where reports go: the URL of a broker or of a TAK listener -> `Endpoint`.
+"""The URL of a broker or of a TAK receiver, parsed into an `Endpoint`.
 
-In: a URL. Out: an `Endpoint`, its TLS context. Owns nothing; every error names the URL (without its password) and what to do.
+In: a URL. Out: an `Endpoint`, its TLS context. Owns nothing. Errors name the URL without its password, and what to do.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FILES = ("ca", "cert", "key")
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A parsed URL; `files` are the PEM files of TLS: `ca` (else the system's), `cert` and `key` of the client."""
+    """A parsed URL; `files` are the PEM files for TLS by name: `ca` (default: the system's), `cert` and `key` of the client."""
 
     scheme: str
     host: str
@@ -51,8 +51,8 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
         raise EchostepError(f"{shown}: expected one of {', '.join(f'{s}://' for s in schemes)}")
     if not host or port == 0 or parts.path not in ("", "/") or parts.fragment:
         raise EchostepError(f"{shown}: expected {parts.scheme}://HOST[:PORT]")
-    if not _lookable(host):
-        raise EchostepError(f"{shown}: the name of the host is damaged")
+    if not _is_resolvable(host):
+        raise EchostepError(f"{shown}: the host name is not valid: check its spelling")
     if unknown := set(asked) - set(FILES):
         raise EchostepError(f"{shown}: {', '.join(sorted(unknown))}: unknown; there are {', '.join(FILES)}")
     endpoint = Endpoint(
@@ -70,8 +70,8 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
     return endpoint
 
 
-def _lookable(host: str) -> bool:
-    """Whether the resolver would take the name."""
+def _is_resolvable(host: str) -> bool:
+    """Whether the name is well-formed enough to be passed to the resolver."""
     try:
         host.encode("idna")
     except UnicodeError:
@@ -81,7 +81,7 @@ def _lookable(host: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Outlet:
-    """Where a tracker's estimates go, and under what name."""
+    """Where a tracker publishes its estimates, and under which names."""
 
     endpoints: tuple[Endpoint, ...]
     name: str
@@ -89,7 +89,7 @@ class Outlet:
 
 
 def parse_outlet(urls: Sequence[str], name: str, team: str) -> Outlet:
-    """What `--publish`, `--name` and `--team` say; raises EchostepError."""
+    """The outlet of `--publish`, `--name` and `--team`; raises EchostepError."""
     if not name:
         raise EchostepError("--publish needs the wearer's name: --name NAME")
     return Outlet(
@@ -98,7 +98,7 @@ def parse_outlet(urls: Sequence[str], name: str, team: str) -> Outlet:
 
 
 def tls_context(endpoint: Endpoint) -> ssl.SSLContext:
-    """Verifies the server's certificate and name, always; raises EchostepError that names the file."""
+    """A TLS context that always verifies the server's certificate and name; raises EchostepError that names the file."""
     for name, path in endpoint.files.items():
         if not Path(path).is_file():
             raise EchostepError(f"{endpoint}: {name}={path}: there is no such file")
@@ -113,5 +113,5 @@ def tls_context(endpoint: Endpoint) -> ssl.SSLContext:
 
 
 def _no_password() -> str:
-    """Never ask on the terminal."""
+    """Called by OpenSSL for an encrypted key: an error instead of a prompt on the terminal."""
     raise ValueError("the key is encrypted; give it without a passphrase")

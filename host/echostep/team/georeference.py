@@ -1,4 +1,4 @@
-"""From the plan to the EarthTransform: a position on the plan -> latitude and longitude.
+"""A position on the plan as latitude and longitude.
 
 In: a plan with a georeference, a position, a heading. Out: `ReportedPlace`. Owns the projection.
 """
@@ -16,7 +16,7 @@ from echostep.team.report import ReportedPlace
 
 
 class GroundPlane:
-    """Where a plan with a georeference lies; `place` of a position on it, in WGS 84."""
+    """Transforms positions on a georeferenced plan to WGS 84."""
 
     def __init__(self, plan: Plan) -> None:
         """Raises ValueError when the plan has no georeference that can be used."""
@@ -27,9 +27,9 @@ class GroundPlane:
         self._earth = EarthTransform(replace(plan.georeference, crs="EPSG:4326"))
 
     def place(self, x_m: float, y_m: float, sd_m: float, heading_rad: float | None) -> ReportedPlace:
-        """Where a position is on EarthTransform.
+        """A position on the plan, on Earth.
 
-        `sd_m` is widened by the plan's own uncertainty. The height stays unknown: a plan's heights are not tied to the ellipsoid.
+        `sd_m` is combined with the plan's uncertainty. The height stays unknown: a plan's heights do not refer to the ellipsoid.
         """
         ((lon, lat),) = self._earth.degrees(np.array([[x_m, y_m]]))
         course = None if heading_rad is None else (90.0 - math.degrees(heading_rad + self._rotation_rad)) % 360.0

@@ -1,7 +1,7 @@
-"""The inbox: what a broker brings, kept short, for a commander who looks a few times a second.
+"""The inbox: a bounded buffer between the broker's messages and the commander's view, which empties it a few times a second.
 
-In: messages from a listener, in a thread of its own. Out: for each topic the newest few, on demand. Owns the thread and the bounds: a flood on one
-topic costs that topic its older messages, never the others theirs, and never memory.
+In: messages from a `Listener`, in its own thread. Out: the newest messages of each topic, on demand. Owns the thread and the limits: a flood on one
+topic drops older messages of that topic only, and memory stays bounded.
 """
 
 from __future__ import annotations
@@ -13,68 +13,68 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from echostep.team.mqtt import Listener
-from echostep.team.outbox import BACKOFF_S
+from echostep.team.outbox import RETRY_PAUSES_S
 from echostep.team.report import MAX_PAYLOAD
 
-PER_TOPIC = 8
-MOST_TOPICS = 1024
-TURN_S = 0.1
+MESSAGES_PER_TOPIC = 8  # kept until the next look; by reason: trackers send about two a second
+MAX_TOPICS = 1024
+PACKET_WAIT_S = 0.1
 
 
-class Letter(NamedTuple):
-    """A payload as it came; `heard_s` by the monotonic clock, `unix_s` by the wall clock."""
+class ReceivedMessage(NamedTuple):
+    """A payload as it was received; `received_s` on the monotonic clock, `unix_s` in Unix time."""
 
     topic: str | None
     payload: bytes
     retained: bool
-    heard_s: float
+    received_s: float
     unix_s: float
 
 
 class Inbox:
-    """`take` what has come since the last time, and how many messages were refused for what reason."""
+    """`put` keeps a message; `take_all` returns the kept ones, and how many were dropped, by reason."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._letters: dict[str | None, deque[Letter]] = {}
-        self._refused: Counter[str] = Counter()
+        self._messages: dict[str | None, deque[ReceivedMessage]] = {}
+        self._dropped: Counter[str] = Counter()
 
-    def hear(self, topic: str | None, payload: bytes, retained: bool) -> None:
-        """Keep a message; microseconds."""
+    def put(self, topic: str | None, payload: bytes, retained: bool) -> None:
+        """Keep a message; never blocks for longer than microseconds."""
         with self._lock:
             if len(payload) > MAX_PAYLOAD:
-                self._refused["too long"] += 1
+                self._dropped["too long"] += 1
                 return
-            letters = self._letters.get(topic)
-            if letters is None:
-                if len(self._letters) >= MOST_TOPICS:
-                    self._refused["flood of topics"] += 1
+            messages = self._messages.get(topic)
+            if messages is None:
+                if len(self._messages) >= MAX_TOPICS:
+                    self._dropped["flood of topics"] += 1
                     return
-                letters = self._letters[topic] = deque(maxlen=PER_TOPIC)
-            if len(letters) == PER_TOPIC:
-                self._refused["flood"] += 1
-            letters.append(Letter(topic, payload, retained, time.monotonic(), time.time()))
+                messages = self._messages[topic] = deque(maxlen=MESSAGES_PER_TOPIC)
+            if len(messages) == MESSAGES_PER_TOPIC:
+                self._dropped["flood"] += 1
+            messages.append(ReceivedMessage(topic, payload, retained, time.monotonic(), time.time()))
 
-    def take(self) -> tuple[list[Letter], Counter[str]]:
-        """Everything kept, oldest first within a topic."""
+    def take_all(self) -> tuple[list[ReceivedMessage], Counter[str]]:
+        """The kept messages, oldest first within each topic, and the counts of dropped ones; both are reset."""
         with self._lock:
-            letters, self._letters = self._letters, {}
-            refused, self._refused = self._refused, Counter()
-        return [letter for of_topic in letters.values() for letter in of_topic], refused
+            messages, self._messages = self._messages, {}
+            dropped, self._dropped = self._dropped, Counter()
+        return [message for of_topic in messages.values() for message in of_topic], dropped
 
 
-class Reception:
-    """Runs a listener in a thread, through every break, until `close`."""
+class Receiver:
+    """Runs a listener in a thread until `close`, and connects again after each break."""
 
-    def __init__(self, listener: Listener, say: Callable[[str], None]) -> None:
+    def __init__(self, listener: Listener, print_line: Callable[[str], None]) -> None:
         self.connected = False
-        self._listener, self._say = listener, say
+        self._listener, self._print_line = listener, print_line
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="reception", daemon=True)
+        self._thread = threading.Thread(target=self._work, name="receiver", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread."""
+        """Disconnect and end the thread."""
         self._closing.set()
         self._thread.join(12.0)
 
@@ -84,15 +84,15 @@ class Reception:
             try:
                 self._listener.open()
                 if failures:
-                    self._say("connected again")
+                    self._print_line("connected again")
                 failures, self.connected = 0, True
                 while not self._closing.is_set():
-                    self._listener.turn(TURN_S)
-            except Exception as error:  # whatever it is, it is said and tried again
+                    self._listener.run_once(PACKET_WAIT_S)
+            except Exception as error:  # any fault is printed, then the connection is tried again
                 self.connected = False
                 self._listener.close()
                 if failures == 0:
-                    self._say(f"{error}; trying again")
-                self._closing.wait(BACKOFF_S[min(failures, len(BACKOFF_S) - 1)])
+                    self._print_line(f"{error}; trying again")
+                self._closing.wait(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
                 failures += 1
         self._listener.close()

@@ -1,8 +1,8 @@
-"""MQTT: reports to a broker, and reports of others from it.
+"""MQTT: sends reports to a broker, and receives the reports of a team from it.
 
-In: reports, or an endpoint to listen to. Out: messages on `echostep/<team>/<wearer>/estimate` (retained, QoS 1: a late commander sees the last known
-place) and `.../presence` (retained, with a last will); or what the broker brings. Owns one connection, used by one thread: paho's own thread and its
-queue are not used, for they would keep old estimates.
+In: reports; or an endpoint to subscribe at. Out: messages on `echostep/<team>/<wearer>/estimate` (retained, QoS 1: a commander that
+connects late gets the last report) and `.../presence` (retained, with a last will); or the messages of the broker. Owns one connection,
+used by one thread. The thread and the queue of paho are not used, because that queue would keep outdated reports.
 """
 
 from __future__ import annotations
@@ -14,13 +14,22 @@ from typing import Any
 
 import paho.mqtt.client as paho
 
-from echostep.team.broker import FAULTS, LOOP_S, RefusedError, connect, drop, make_client, pump, turn
+from echostep.team.broker import (
+    CLIENT_ERRORS,
+    LOOP_S,
+    RefusedError,
+    close_socket,
+    connect,
+    make_client,
+    run_once,
+    run_until,
+)
 from echostep.team.endpoint import Endpoint, tls_context
 from echostep.team.report import Presence, Report, encode
 
 
-class MqttLine:
-    """A `Line` to a broker; a presence is left behind when it breaks."""
+class MqttTransport:
+    """A `Transport` to a broker; when the connection breaks, the broker publishes the presence `broken`."""
 
     def __init__(self, endpoint: Endpoint, team: str, name: str, run: str) -> None:
         self._endpoint, self._run = endpoint, run
@@ -41,7 +50,7 @@ class MqttLine:
         self._publish("estimate", encode(report))
 
     def close(self, *, ended: bool) -> None:
-        """Disconnect; without an end the broker tells the last will."""
+        """Disconnect; unless the run has `ended`, the broker publishes the last will."""
         client, self._client = self._client, None
         if client is None:
             return
@@ -51,11 +60,11 @@ class MqttLine:
                 self._publish("presence", self._presence("ended"))
                 client.disconnect()
                 client.loop(LOOP_S)
-        except FAULTS:
+        except CLIENT_ERRORS:
             pass
         finally:
             self._client = None
-            drop(client)
+            close_socket(client)
 
     def _presence(self, presence: Any) -> bytes:
         return encode(Presence(1, self._run, presence))
@@ -66,54 +75,54 @@ class MqttLine:
             raise ConnectionError("not connected")
         try:
             info = client.publish(f"{self._topic}/{leaf}", payload, qos=1, retain=True)
-            pump(client, info.is_published, "the broker does not acknowledge")
+            run_until(client, info.is_published, "the broker does not acknowledge")
         except (ValueError, RuntimeError) as error:
             raise ConnectionError(f"cannot publish: {error}") from error
 
 
 class Listener:
-    """What a broker brings: `turn` runs the connection and hands every message to `hear(topic, payload, retained)`."""
+    """A subscription: `run_once` runs the connection and passes each message to `put(topic, payload, retained)`."""
 
-    def __init__(self, endpoint: Endpoint, topic: str, hear: Callable[[str | None, bytes, bool], None]) -> None:
-        self._endpoint, self._topic, self._hear = endpoint, topic, hear
+    def __init__(self, endpoint: Endpoint, topic: str, put: Callable[[str | None, bytes, bool], None]) -> None:
+        self._endpoint, self._topic, self._put = endpoint, topic, put
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
-        self._newest = True
+        self._use_mqtt5 = True
 
     def open(self) -> None:
-        """Connect and subscribe; raises OSError. A broker that knows no MQTT 5 is asked in MQTT 3.1.1 the next time."""
-        client = make_client(self._endpoint, self._tls, "", newest=self._newest)
+        """Connect and subscribe; raises OSError. After a refusal the next call uses the other version of MQTT (5 or 3.1.1)."""
+        client = make_client(self._endpoint, self._tls, "", newest=self._use_mqtt5)
         client.on_message = self._message
         self._client = client
         try:
             connect(client, self._endpoint)
         except RefusedError:
-            self._newest = not self._newest
+            self._use_mqtt5 = not self._use_mqtt5
             raise
         subscribed: list[bool] = []
         client.on_subscribe = lambda _c, _u, _m, codes, _p: subscribed.append(not codes[0].is_failure)
         client.subscribe(self._topic, qos=0)
-        pump(client, lambda: bool(subscribed), "the broker does not answer")
+        run_until(client, lambda: bool(subscribed), "the broker does not answer")
         if not subscribed[0]:
-            raise ConnectionError(f"the broker does not let us read {self._topic}")
+            raise ConnectionError(f"the broker refuses the subscription to {self._topic}: check user and password")
 
-    def turn(self, timeout_s: float) -> None:
-        """Bring what has come; raises OSError when the connection is broken."""
+    def run_once(self, timeout_s: float) -> None:
+        """Wait for one packet and process it; raises OSError when the connection is broken."""
         if self._client is None:
             raise ConnectionError("not connected")
-        turn(self._client, timeout_s)
+        run_once(self._client, timeout_s)
 
     def close(self) -> None:
-        """End the connection; raises nothing."""
+        """Disconnect; raises nothing."""
         client, self._client = self._client, None
         if client is not None:
-            with suppress(*FAULTS):
+            with suppress(*CLIENT_ERRORS):
                 client.disconnect()
-            drop(client)
+            close_socket(client)
 
     def _message(self, _client: paho.Client, _user: Any, message: paho.MQTTMessage) -> None:
         try:
             topic: str | None = message.topic
         except UnicodeDecodeError:
             topic = None
-        self._hear(topic, bytes(message.payload), bool(message.retain))
+        self._put(topic, bytes(message.payload), bool(message.retain))

@@ -1,7 +1,8 @@
-"""The outbox: reports leave the tracker's thread at once, and the machine when the network allows.
+"""The outbox: a bounded queue of reports between the tracker's thread and a network connection.
 
-In: reports, from the tracker's thread. Out: the same, stamped, through a `Line`, from a thread of its own. Owns that thread, a bounded queue and the
-counts. When the line is slow or broken the newest report goes first and overtaken ones are counted; the tracker never waits.
+In: reports, from the tracker's thread. Out: the same reports, numbered and dated, through a `Transport`, from a thread of its own. Owns
+that thread, the queue and the counts. When the connection is slow or broken, the newest report is sent first and older ones are counted as
+overtaken. The tracker never waits.
 """
 
 from __future__ import annotations
@@ -18,46 +19,48 @@ from typing import Protocol
 from echostep.localization.estimate import WALKER_M_S, ellipse95, trust
 from echostep.team.report import Position, Report, moment
 
-HEARTBEAT_S = 2.0  # without a new estimate the last one is told again, older and wider
-STALE_S = 10.0
-WAITING = 1024  # reports
-FRESH_S = 1.0  # what has waited longer than this is overtaken by the newest
-SETTLED_S = 2.0  # the tracker speaks twice a second, or at each stride; beyond this it is silent
-FARTHEST_S = 1e5  # after a day's walk nothing is left to say
-BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0)
-CLOSING_S = 3.0
+HEARTBEAT_S = (
+    2.0  # after so long without a new estimate the last one is sent again, with its age and a larger covariance
+)
+STALE_S = 10.0  # a report is valid for so long
+MAX_QUEUED = 1024  # reports
+FRESH_S = 1.0  # a report that has waited longer is dropped when a newer one waits too
+SETTLED_S = 2.0  # largest normal age of an estimate: the tracker gives two a second, or one per stride
+MAX_WALK_S = 1e5  # the covariance stops to grow after so long, about a day
+RETRY_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # after the first, second, ... failure in a row
+CLOSING_S = 3.0  # for sending the last reports at the end
 
 
-class Line(Protocol):
-    """A way out; everything raises OSError when it is broken and waits a few seconds at most."""
+class Transport(Protocol):
+    """A connection that sends reports; `open` and `send` raise OSError when it is broken, and block for a few seconds at most."""
 
     def open(self) -> None:
         """Connect."""
 
     def send(self, report: Report) -> None:
-        """Return when the other side has it, or as near to that as the protocol tells."""
+        """Send a report, and wait for its acknowledgement if the protocol has one."""
 
     def close(self, *, ended: bool) -> None:
-        """Say good-bye when the run has `ended`; raises nothing."""
+        """Close the connection, in order if the run has `ended`; raises nothing."""
 
 
 @dataclass(slots=True)
 class OutboxCounts:
-    """What became of the reports; `offered` = `estimates sent` + `overtaken` + those that still wait."""
+    """Counts of reports; `offered` = `sent` + `overtaken` + those still in the queue."""
 
     offered: int = 0
-    sent: int = 0  # estimates, each once
+    sent: int = 0  # without heartbeats
     heartbeats: int = 0
     overtaken: int = 0
     breaks: int = 0
 
 
 class Outbox:
-    """`offer` never blocks; `close` ends with the newest report sent, if the line holds."""
+    """`offer` never blocks; `close` sends the newest report before it ends, if the connection works."""
 
-    def __init__(self, line: Line, name: str, say: Callable[[str], None]) -> None:
+    def __init__(self, transport: Transport, name: str, print_line: Callable[[str], None]) -> None:
         self.counts = OutboxCounts()
-        self._line, self._name, self._say = line, name, say
+        self._transport, self._name, self._print_line = transport, name, print_line
         self._queue: deque[tuple[float, Report]] = deque()
         self._last: tuple[float, Report] | None = None
         self._sequence = 0
@@ -69,24 +72,24 @@ class Outbox:
         self._thread.start()
 
     def offer(self, report: Report) -> None:
-        """Put a report in the queue; the oldest gives way when it is full."""
+        """Append a report to the queue; the oldest is dropped when it is full."""
         with self._changed:
             self.counts.offered += 1
             self._queue.append((time.monotonic(), report))
-            if len(self._queue) > WAITING:
+            if len(self._queue) > MAX_QUEUED:
                 self._queue.popleft()
                 self.counts.overtaken += 1
             self._changed.notify()
 
-    def end(self) -> None:
-        """Begin to close: send what is fresh, then end the thread."""
+    def begin_close(self) -> None:
+        """Let the thread send the newest reports, then end; returns at once."""
         with self._changed:
             self._closing_s = self._closing_s or time.monotonic() + CLOSING_S
             self._changed.notify()
 
     def close(self) -> str:
-        """Wait for the end, some seconds at most, and tell how it went."""
-        self.end()
+        """Wait for the thread to end, some seconds at most; returns a line with the counts."""
+        self.begin_close()
         self._thread.join(CLOSING_S + 6.0)
         c = self.counts
         unsent = c.offered - c.sent - c.overtaken
@@ -99,24 +102,24 @@ class Outbox:
         while not self._over():
             try:
                 if not self._open:
-                    self._line.open()
+                    self._transport.open()
                     self._open = True
                     if self._failures:
-                        self._tell("connected again")
+                        self._print_state("connected again")
                     self._failures = 0
-                self._step()
-            except Exception as error:  # whatever it is, it is said, and tracking goes on
-                self._broken(error)
-        self._line.close(ended=True)
+                self._send_next()
+            except Exception as error:  # any fault is printed, and tracking goes on
+                self._handle_break(error)
+        self._transport.close(ended=True)
 
-    def _step(self) -> None:
-        """Send the next report; on failure it waits again, unless a newer one has come."""
+    def _send_next(self) -> None:
+        """Send the next report; after a failure it returns to the queue."""
         entry, heartbeat = self._next()
         if entry is None:
             return
         self._last = entry
         try:
-            self._line.send(self._stamped(entry))
+            self._transport.send(self._stamped(entry))
         except OSError:
             if not heartbeat:
                 with self._changed:
@@ -128,7 +131,7 @@ class Outbox:
             self.counts.sent += 1
 
     def _next(self) -> tuple[tuple[float, Report] | None, bool]:
-        """The next report and whether it is a heartbeat; None when it is time to end."""
+        """The next report, and whether it is a heartbeat; None when there is nothing to send."""
         with self._changed:
             self._changed.wait_for(lambda: bool(self._queue) or self._closing_s is not None, HEARTBEAT_S)
             if not self._queue:
@@ -151,19 +154,19 @@ class Outbox:
             given_up = self._failures > 0 or time.monotonic() > self._closing_s
             return given_up or not self._queue
 
-    def _tell(self, words: str) -> None:
-        with suppress(OSError, ValueError):  # a terminal that is gone
-            self._say(f"{self._name}: {words}")
+    def _print_state(self, text: str) -> None:
+        with suppress(OSError, ValueError):  # the terminal may be closed
+            self._print_line(f"{self._name}: {text}")
 
-    def _broken(self, error: Exception) -> None:
-        """Say it once, then wait longer and longer."""
-        self._line.close(ended=False)
+    def _handle_break(self, error: Exception) -> None:
+        """Close the connection and wait before the next try; the first failure of a series is printed."""
+        self._transport.close(ended=False)
         if self._open:
             self.counts.breaks += 1
         self._open = False
         if self._failures == 0:
-            self._tell(f"{_reason(error)}; tracking goes on, trying again")
-        pause_s = BACKOFF_S[min(self._failures, len(BACKOFF_S) - 1)] * random.uniform(0.8, 1.2)
+            self._print_state(f"{_reason(error)}; tracking goes on, trying again")
+        pause_s = RETRY_PAUSES_S[min(self._failures, len(RETRY_PAUSES_S) - 1)] * random.uniform(0.8, 1.2)
         self._failures += 1
         with self._changed:
             self._changed.wait_for(lambda: self._closing_s is not None, pause_s)
@@ -174,7 +177,7 @@ def _reason(error: Exception) -> str:
 
 
 def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtaken: int) -> Report:
-    """The report as it is sent: with its number, its time, and its position as wide as its age makes it."""
+    """The report with its number, the time of sending, and a covariance that grows with the age of its position."""
     position = report.position and aged(report.position, max(age_s, 0.0))
     return replace(
         report,
@@ -185,19 +188,19 @@ def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtake
         position=position,
         status=report.status if position is None or position.age_s <= SETTLED_S else trust(position.radius95_m).value,
         place=report.place if position is None or report.place is None else replace(
-            report.place, sd_m=(report.place.sd_m**2 + _walked2(position.age_s)) ** 0.5
+            report.place, sd_m=(report.place.sd_m**2 + _walk_variance_m2(position.age_s)) ** 0.5
         ),
     )  # fmt: skip
 
 
 def aged(position: Position, age_s: float) -> Position:
-    """A position so many seconds later, when nothing more was heard: he may have walked any way at a walker's speed."""
-    more = _walked2(age_s)
+    """A position `age_s` after its estimate: the covariance grows as if the wearer had walked in any direction at WALKER_M_S."""
+    more = _walk_variance_m2(age_s)
     xx, yy = position.xx_m2 + more, position.yy_m2 + more
     radius = ellipse95(xx, position.xy_m2, yy).major_m if more else position.radius95_m
     return replace(position, age_s=age_s, xx_m2=xx, yy_m2=yy, radius95_m=radius)
 
 
-def _walked2(age_s: float) -> float:
-    """Variance of a walk that nobody watched, m2."""
-    return (WALKER_M_S * min(age_s, FARTHEST_S)) ** 2 if age_s > SETTLED_S else 0.0
+def _walk_variance_m2(age_s: float) -> float:
+    """Variance per axis of an unobserved walk of so many seconds, m2; 0 up to SETTLED_S."""
+    return (WALKER_M_S * min(age_s, MAX_WALK_S)) ** 2 if age_s > SETTLED_S else 0.0

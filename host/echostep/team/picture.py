@@ -1,4 +1,4 @@
-"""The team on its plan, as a picture.
+"""A picture of the team on its plan.
 
 In: a plan, members. Out: a PNG or SVG. Owns nothing.
 """
@@ -13,17 +13,17 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import ellipse95
 from echostep.plan.model import Plan
 from echostep.team.report import Position
-from echostep.team.roster import Member, Need
+from echostep.team.roster import Member, MemberState
 
-CROWD_M = 1.5
-COLOURS = {  # told apart by the colour-blind [Okabe and Ito 2008]
-    Need.LOST: "#d55e00", Need.STALE: "#cc79a7", Need.UNCERTAIN: "#e69f00",
-    Need.WAITING: "#56b4e9", Need.TRACKING: "#009e73", Need.ENDED: "#888888",
+LABEL_DISTANCE_M = 1.5  # labels of members closer than this are stacked
+COLOURS = {  # distinguishable with colour blindness [Okabe and Ito 2008]
+    MemberState.LOST: "#d55e00", MemberState.STALE: "#cc79a7", MemberState.UNCERTAIN: "#e69f00",
+    MemberState.WAITING: "#56b4e9", MemberState.TRACKING: "#009e73", MemberState.ENDED: "#888888",
 }  # fmt: skip
 
 
 def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -> None:
-    """Every floor that somebody is on, everybody with his 95 % ellipse, heading and state."""
+    """Draw each floor with members on it, and each member with 95 % ellipse, heading and state; raises EchostepError."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
@@ -41,13 +41,13 @@ def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -
         for room in level.rooms:
             axes.text(*room.at_m, room.name.replace("$", r"\$"), ha="center", va="center", color="#888888", fontsize=8)
         axes.autoscale_view()
-        axes.autoscale(enable=False)  # the ellipse of somebody lost may be larger than the plan
+        axes.autoscale(enable=False)  # the ellipse of a lost member may be larger than the plan
         labels: list[tuple[float, float]] = []
         for m in placed:
             if (p := m.position(now_s)) and p.floor == floor:
-                crowd = sum(math.dist(at, (p.x_m, p.y_m)) < CROWD_M for at in labels)
+                stacked = sum(math.dist(label, (p.x_m, p.y_m)) < LABEL_DISTANCE_M for label in labels)
                 labels.append((p.x_m, p.y_m))
-                _draw_member(axes, m.report.name, p, m.need(now_s), crowd)
+                _draw_member(axes, m.report.name, p, m.state(now_s), stacked)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         figure.savefig(path)
@@ -55,18 +55,20 @@ def draw_team(path: Path, plan: Plan, members: Sequence[Member], now_s: float) -
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
 
 
-def _draw_member(axes, name: str, p: Position, need: Need, crowd: int) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """One member; his name stands above those of the `crowd` that are at the same place."""
+def _draw_member(axes, name: str, p: Position, need: MemberState, stacked: int) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Draw one member; its label is moved up by `stacked` lines, one for each label near it."""
     from matplotlib.patches import Ellipse as Patch
 
     colour, ellipse = COLOURS[need], ellipse95(p.xx_m2, p.xy_m2, p.yy_m2)
     wide, high, turn = 2 * ellipse.major_m, 2 * ellipse.minor_m, math.degrees(ellipse.angle_rad)
-    axes.add_patch(Patch((p.x_m, p.y_m), wide, high, angle=turn, color=colour, fill=need is not Need.STALE, alpha=0.25))
+    axes.add_patch(
+        Patch((p.x_m, p.y_m), wide, high, angle=turn, color=colour, fill=need is not MemberState.STALE, alpha=0.25)
+    )
     axes.plot(p.x_m, p.y_m, "o", color=colour, markersize=6)
     if p.heading_rad is not None:
         c, s = math.cos(p.heading_rad), math.sin(p.heading_rad)
         axes.annotate("", (p.x_m + c, p.y_m + s), (p.x_m, p.y_m), arrowprops={"arrowstyle": "->", "color": colour})
-    said = (name if need is Need.TRACKING else f"{name}: {need}").replace("$", r"\$")
+    label = (name if need is MemberState.TRACKING else f"{name}: {need}").replace("$", r"\$")
     axes.annotate(
-        said, (p.x_m, p.y_m), xytext=(8, 8 + 11 * crowd), textcoords="offset points", fontsize=8, color=colour
+        label, (p.x_m, p.y_m), xytext=(8, 8 + 11 * stacked), textcoords="offset points", fontsize=8, color=colour
     )

@@ -1,7 +1,7 @@
-"""The report: what a tracker tells its commander, as JSON.
+"""The report that a tracker sends to its commander, as JSON.
 
-In: the facts, or the bytes of a payload from anybody. Out: `Report`, or the bytes. Owns nothing. Every field has its limits beside it; the JSON
-Schema is made of them (`schema`), and `decode` believes nothing outside them.
+In: a `Report`, or the bytes of a payload from an untrusted sender. Out: the bytes, or the `Report`. Owns nothing. The limits of each field
+stand beside it; the JSON Schema is generated from them (`schema`), and `decode` rejects values outside them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from msgspec import Meta
 
 from echostep.errors import EchostepError
 
-MAX_PAYLOAD = 8192  # bytes; ours have about 900
+MAX_PAYLOAD = 8192  # bytes; a report has about 900
 LIMIT_M = 1e5
 
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="m, on the plan (x east, y north)")]
@@ -30,7 +30,7 @@ Heading = Annotated[float, Meta(ge=-7.0, le=7.0, description="rad counter-clockw
 
 
 class BadReportError(ValueError):
-    """A payload that is not a report; the text says in a few words why."""
+    """A payload that is not a valid report; the text is the reason in a few words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,12 @@ class Position:
 
     t_s: Annotated[float, Meta(ge=-1e9, le=1e12, description="the tracker's own clock at the estimate, s")]
     age_s: Annotated[
-        float, Meta(ge=0.0, le=1e9, description="seconds since the estimate was made; it has been widened by as many")
+        float,
+        Meta(
+            ge=0.0,
+            le=1e9,
+            description="seconds since the estimate was made; the covariance has grown by as many seconds of walking",
+        ),
     ]
     x_m: Metres
     y_m: Metres
@@ -50,19 +55,21 @@ class Position:
     heading_rad: Heading | None
     heading_sd_rad: Annotated[float, Meta(ge=0.0, le=100.0, description="standard deviation, rad")]
     floor: Annotated[int, Meta(ge=-1000, le=1000, description="index of the level in the plan")]
-    floor_name: Annotated[str, Meta(max_length=64, description="its name")]
-    floor_probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that he is on this floor")]
-    z_m: Annotated[
-        float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor he stands on, in the plan's metres")
+    floor_name: Annotated[str, Meta(max_length=64, description="name of the level")]
+    floor_probability: Annotated[
+        float, Meta(ge=0.0, le=1.0, description="probability that the wearer is on this floor")
     ]
-    z_sd_m: Annotated[float, Meta(ge=0.0, le=LIMIT_M, description="standard deviation of it, m")]
+    z_m: Annotated[
+        float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor under the wearer, on the plan's scale, m")
+    ]
+    z_sd_m: Annotated[float, Meta(ge=0.0, le=LIMIT_M, description="standard deviation of z_m, m")]
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
     """How the wearer moves."""
 
-    steps: Annotated[int, Meta(ge=0, le=2**53, description="of the foot that wears the MTx")]
+    steps: Annotated[int, Meta(ge=0, le=2**53, description="steps of the foot that carries the MTx")]
     walked_m: Annotated[float, Meta(ge=0.0, le=1e9, description="length of the track so far, m")]
     speed_m_s: Annotated[float, Meta(ge=0.0, le=100.0, description="over the last seconds, m/s")]
     still_s: Annotated[float, Meta(ge=0.0, le=1e9, description="seconds since the last step")]
@@ -70,7 +77,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class ReportedPlace:
-    """Where that is on Earth, when the plan has a georeference."""
+    """Position on Earth, when the plan has a georeference."""
 
     lat_deg: Annotated[float, Meta(ge=-90.0, le=90.0, description="WGS 84")]
     lon_deg: Annotated[float, Meta(ge=-180.0, le=180.0, description="WGS 84")]
@@ -85,17 +92,21 @@ class ReportedPlace:
 
 @dataclass(frozen=True, slots=True)
 class StreamReport:
-    """Health of what the sensors send."""
+    """Health of the sensors' streams."""
 
     mtx_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="samples of the MTx per second")]
     board_hz: Annotated[float, Meta(ge=0.0, le=1e6, description="messages of the sensor board per second")]
     bad: Annotated[int, Meta(ge=0, le=2**53, description="frames that failed a check, both ports, since the start")]
-    lost: Annotated[int, Meta(ge=0, le=2**53, description="frames that never came, both ports, since the start")]
-    dropped: Annotated[int, Meta(ge=0, le=2**53, description="messages that the board had no room for")]
+    lost: Annotated[
+        int, Meta(ge=0, le=2**53, description="frames that were sent but not received, both ports, since the start")
+    ]
+    dropped: Annotated[
+        int, Meta(ge=0, le=2**53, description="messages that the board dropped because its buffer was full")
+    ]
     synchronised: Annotated[bool, Meta(description="the MTx is timed by its SyncOut wire")]
     findings: Annotated[
         tuple[Annotated[str, Meta(max_length=100)], ...],
-        Meta(max_length=4, description="what is wrong with the sensors, the worst first"),
+        Meta(max_length=4, description="faults of the sensors, the worst first"),
     ]
 
 
@@ -142,7 +153,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Presence:
-    """The retained word beside the reports: a tracker is online, has ended, or (the broker says so) its connection broke."""
+    """The retained message beside the reports: the tracker is online, has ended, or its connection broke (last will at the broker)."""
 
     echostep_presence: Literal[1]
     run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
@@ -158,7 +169,7 @@ def encode(report: Report | Presence) -> bytes:
 
 
 def decode(payload: bytes) -> Report:
-    """A payload as a report; raises BadReportError, and nothing else, whatever the bytes."""
+    """Decode a payload; raises BadReportError and no other exception, for any bytes."""
     report: Report = _decoded(payload, _REPORTS)
     check_name(report.team)
     check_name(report.name)
@@ -177,7 +188,7 @@ def decode(payload: bytes) -> Report:
 
 
 def decode_presence(payload: bytes) -> Presence:
-    """As `decode`, for the word beside the reports."""
+    """As `decode`, for a presence message."""
     presence: Presence = _decoded(payload, _PRESENCES)
     return presence
 
@@ -196,7 +207,7 @@ def _decoded(payload: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
 
 
 def _named(error: str) -> str:
-    """What msgspec found, without the sender's own text, which may be made to harm a terminal."""
+    """The error of msgspec without text of the sender, which may contain control sequences for a terminal."""
     if "missing required field" in error:
         return error.replace("Object missing required", "no")
     at = error.rpartition(" - at `$.")[2].rstrip("`")
@@ -204,13 +215,13 @@ def _named(error: str) -> str:
 
 
 def check_name(text: str) -> None:
-    """Raises BadReportError when a name could confuse a topic, a terminal or a reader."""
+    """Raises BadReportError when a name is not safe in an MQTT topic or on a terminal."""
     if not 1 <= len(text) <= 32 or text != text.strip() or not _printable(text) or any(c in "/+#" for c in text):
         raise BadReportError("a name has 1 to 32 printable characters, none of them / + #")
 
 
 def checked_name(option: str, text: str) -> str:
-    """A name that the user gave; raises EchostepError."""
+    """A valid name from a command-line option; raises EchostepError."""
     try:
         check_name(text)
     except BadReportError as error:
@@ -219,12 +230,12 @@ def checked_name(option: str, text: str) -> str:
 
 
 def printable(text: str, most: int) -> str:
-    """A text of ours as a report may carry it."""
+    """A text cut to `most` characters, with unprintable ones replaced by spaces."""
     return "".join(c if _printable(c) else " " for c in text[:most])
 
 
 def _printable(text: str) -> bool:
-    """No control characters, nothing that turns the direction of writing, no lone surrogates."""
+    """Whether a text has no control or format characters, line separators or lone surrogates."""
     return all(unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp") for c in text)
 
 

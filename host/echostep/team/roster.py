@@ -1,7 +1,8 @@
-"""The roster: who is where, who is lost, who has fallen silent.
+"""The roster: the last report and the state of each member of a team.
 
-In: payloads from anybody, with their topic and the time of their arrival by the commander's own clock. Out: `Member`s, sorted by need, and counts of
-what was not believed, by name. Owns the last report of each member. Only the commander's clock decides who is stale; the trackers' may be wrong.
+In: payloads from untrusted senders, with topic and time of arrival on the commander's clock. Out: `Member`s, the most urgent state first,
+and counts of rejected payloads by reason. Owns the last report of each member. Only the commander's clock decides which report is stale;
+trackers' clocks may be wrong.
 """
 
 from __future__ import annotations
@@ -15,20 +16,20 @@ from enum import StrEnum
 from echostep.team.outbox import aged
 from echostep.team.report import BadReportError, Position, Presence, Report, check_name, decode, decode_presence
 
-MOST_MEMBERS = 256
-MOST_REASONS = 64
-CLOCK_OFF_S = 5.0
-CLOCK_JUMP_S = 5.0
-MOST_STALE_S = 60.0  # no tracker may ask for a longer patience
-HURRY_M_S = 12.0  # nobody walks so fast: the position has jumped
-STILL_S = 30.0
-ENDED_KEPT_S = 3600.0  # runs that ended are shown for so long
-REMEMBERED_S = 86_400.0  # what a broker remembers for longer is of another day
-KEPT_S = 60.0  # a run that a newer run of the same name has replaced is forgotten after so long
+MAX_MEMBERS = 256
+MAX_REASONS = 64
+CLOCK_OFF_S = 5.0  # a larger difference of clocks is noted
+CLOCK_JUMP_S = 5.0  # a larger change of that difference is noted
+MAX_STALE_S = 60.0  # a report is stale after so long at most, whatever it says
+MAX_SPEED_M_S = 12.0  # a faster position has jumped; by reason: about the top speed of a sprinter
+STILL_S = 30.0  # a longer time without a step is noted
+ENDED_KEPT_S = 3600.0  # a run that ended is shown for so long
+MAX_RETAINED_S = 86_400.0  # an older retained report is rejected
+REPLACED_KEPT_S = 60.0  # a silent run is removed after so long when a newer run has the same name
 
 
-class Need(StrEnum):
-    """A member's state, the most pressing first."""
+class MemberState(StrEnum):
+    """State of a member, the most urgent first."""
 
     LOST = "lost"
     STALE = "stale"
@@ -38,17 +39,17 @@ class Need(StrEnum):
     ENDED = "ended"
 
 
-_ORDER = {need: k for k, need in enumerate(Need)}
+_URGENCY = {state: k for k, state in enumerate(MemberState)}
 
 
 @dataclass(slots=True)
 class Member:
-    """One run of one tracker, as last heard; times are the commander's monotonic clock."""
+    """Last report of one run of one tracker; times are on the commander's monotonic clock."""
 
     report: Report
-    heard_s: float
-    retained: bool  # the broker remembered it: nobody knows how old it is but by the tracker's clock
-    clock_off_s: float  # how far the tracker's clock is ahead, latency included
+    received_s: float
+    retained: bool  # kept by the broker: its age is known by the tracker's clock only
+    clock_ahead_s: float  # tracker's clock minus commander's clock at arrival
     presence: str = "online"
     missed: int = 0
     notes: Counter[str] = field(default_factory=Counter)
@@ -58,135 +59,144 @@ class Member:
         return self.report.team, self.report.name, self.report.run
 
     @property
-    def patience_s(self) -> float:
-        """How long his last report holds."""
-        return min(self.report.stale_after_s, MOST_STALE_S)
+    def stale_after_s(self) -> float:
+        """For how many seconds the last report is valid."""
+        return min(self.report.stale_after_s, MAX_STALE_S)
 
     def silent_s(self, now_s: float) -> float:
-        """Seconds without a word."""
-        return max(now_s - self.heard_s, 0.0)
+        """Seconds since the last report."""
+        return max(now_s - self.received_s, 0.0)
 
     def position(self, now_s: float) -> Position | None:
-        """Where he may be by now: when he is silent, as far as he may have walked since."""
+        """Last position; once the report is stale, with a covariance that has grown by the time since then."""
         p, silent_s = self.report.position, self.silent_s(now_s)
-        if p is None or self.presence == "ended" or silent_s <= self.patience_s:
+        if p is None or self.presence == "ended" or silent_s <= self.stale_after_s:
             return p
         return replace(aged(p, silent_s), age_s=p.age_s + silent_s)
 
-    def need(self, now_s: float) -> Need:
-        """What the commander should think of him."""
+    def state(self, now_s: float) -> MemberState:
+        """State at a time of the commander's clock."""
         if self.presence == "ended":
-            return Need.ENDED
+            return MemberState.ENDED
         if self.report.status == "lost":
-            return Need.LOST
-        if self.presence == "broken" or self.silent_s(now_s) > self.patience_s:
-            return Need.STALE
-        return Need(self.report.status)
+            return MemberState.LOST
+        if self.presence == "broken" or self.silent_s(now_s) > self.stale_after_s:
+            return MemberState.STALE
+        return MemberState(self.report.status)
 
 
 class Roster:
-    """`hear` every payload; `members` are sorted by need."""
+    """`receive` takes payloads; `members` gives the members, the most urgent first."""
 
     def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()  # what was not believed, and why
-        self.heard = 0
+        self.rejected: Counter[str] = Counter()  # payloads by reason
+        self.received = 0
         self._members: dict[tuple[str, str, str], Member] = {}
         self._presence: dict[tuple[str, str, str], str] = {}
 
-    def hear(self, topic: str | None, payload: bytes, retained: bool, now_s: float, unix_s: float) -> None:
-        """Take one payload; never raises."""
-        self.heard += 1
+    def receive(self, topic: str | None, payload: bytes, retained: bool, now_s: float, unix_s: float) -> None:
+        """Update the roster with one payload; never raises."""
+        self.received += 1
         try:
-            team, name, leaf = _parts(topic)
+            team, name, leaf = _topic_parts(topic)
             if leaf == "estimate":
-                self._report(team, name, decode(payload), retained, now_s, unix_s)
+                self._receive_report(team, name, decode(payload), retained, now_s, unix_s)
             elif leaf == "presence":
-                self._note_presence(team, name, decode_presence(payload))
+                self._receive_presence(team, name, decode_presence(payload))
             else:
                 raise BadReportError("unknown topic")
         except BadReportError as error:
-            self.refuse(str(error))
+            self.count_rejected(str(error))
 
-    def refuse(self, why: str, count: int = 1) -> None:
-        """Count what was not believed; reasons are few, whoever makes them up."""
-        why = why[:100]
-        if why not in self.counts and len(self.counts) >= MOST_REASONS:
-            why = "other"
-        self.counts[why] += count
+    def count_rejected(self, reason: str, count: int = 1) -> None:
+        """Count rejected payloads; after MAX_REASONS different reasons the others are counted together."""
+        reason = reason[:100]
+        if reason not in self.rejected and len(self.rejected) >= MAX_REASONS:
+            reason = "other"
+        self.rejected[reason] += count
 
     def members(self, now_s: float) -> list[Member]:
-        """Everybody, lost and stale first; among equals the one who is silent longest, then the least certain."""
-        self._forget(now_s)
+        """All members, by urgency of state; then the longest silent first (lost and stale ones), then the least certain."""
+        self._remove_old(now_s)
 
-        def pressing(m: Member) -> tuple[int, float, float, tuple[str, str, str]]:
-            p, need = m.report.position, m.need(now_s)
-            silence = m.silent_s(now_s) if need in (Need.LOST, Need.STALE) and m.silent_s(now_s) > m.patience_s else 0.0
-            return _ORDER[need], -silence, -(p.radius95_m if p else 0.0), m.key
+        def urgency(m: Member) -> tuple[int, float, float, tuple[str, str, str]]:
+            p, state = m.report.position, m.state(now_s)
+            silence = (
+                m.silent_s(now_s)
+                if state in (MemberState.LOST, MemberState.STALE) and m.silent_s(now_s) > m.stale_after_s
+                else 0.0
+            )
+            return _URGENCY[state], -silence, -(p.radius95_m if p else 0.0), m.key
 
-        return sorted(self._members.values(), key=pressing)
+        return sorted(self._members.values(), key=urgency)
 
     def duplicates(self, now_s: float) -> set[tuple[str, str]]:
-        """Names under which several trackers speak."""
-        speaking = Counter(
+        """(team, name) pairs that several running trackers use."""
+        running = Counter(
             m.key[:2]
             for m in self._members.values()
-            if m.need(now_s) is not Need.ENDED and m.silent_s(now_s) <= m.patience_s
+            if m.state(now_s) is not MemberState.ENDED and m.silent_s(now_s) <= m.stale_after_s
         )
-        return {key for key, count in speaking.items() if count > 1}
+        return {key for key, count in running.items() if count > 1}
 
-    def _report(self, team: str, name: str, r: Report, retained: bool, now_s: float, unix_s: float) -> None:
+    def _receive_report(self, team: str, name: str, r: Report, retained: bool, now_s: float, unix_s: float) -> None:
         if (r.team, r.name) != (team, name):
             raise BadReportError("name and topic contradict each other")
         key = (team, name, r.run)
-        off_s = r.sent_s - unix_s
-        if retained and off_s < -REMEMBERED_S:
+        ahead_s = r.sent_s - unix_s
+        if retained and ahead_s < -MAX_RETAINED_S:
             raise BadReportError("remembered by the broker for more than a day")
-        heard_s = now_s - max(-off_s, 0.0) if retained else now_s
+        received_s = now_s - max(-ahead_s, 0.0) if retained else now_s
         last = self._members.get(key)
         if last is None:
-            if len(self._members) >= MOST_MEMBERS and not self._forget(now_s, hard=True):
-                raise BadReportError(f"more than {MOST_MEMBERS} trackers")
-            self._members[key] = Member(r, heard_s, retained, off_s, self._presence.pop(key, "online"))
+            if len(self._members) >= MAX_MEMBERS and not self._remove_old(now_s, all_ended=True):
+                raise BadReportError(f"more than {MAX_MEMBERS} trackers")
+            self._members[key] = Member(r, received_s, retained, ahead_s, self._presence.pop(key, "online"))
             return
         if retained and r == last.report:
-            return  # told again after a new connection
+            return  # the broker repeats it after a new connection
         if r.sequence <= last.report.sequence:
             raise BadReportError("older than what was heard before")
         last.missed += r.sequence - last.report.sequence - 1
-        if not retained and not last.retained and abs(off_s - last.clock_off_s) > CLOCK_JUMP_S:
+        if not retained and not last.retained and abs(ahead_s - last.clock_ahead_s) > CLOCK_JUMP_S:
             last.notes["clock jumped"] += 1
-        if _leaps(last.report.position, r.position):
+        if _jumps(last.report.position, r.position):
             last.notes["position jumped"] += 1
-        last.report, last.heard_s, last.retained, last.clock_off_s = r, max(heard_s, last.heard_s), retained, off_s
+        last.report, last.received_s, last.retained, last.clock_ahead_s = (
+            r,
+            max(received_s, last.received_s),
+            retained,
+            ahead_s,
+        )
         if last.presence == "broken":
             last.presence = "online"
 
-    def _note_presence(self, team: str, name: str, p: Presence) -> None:
+    def _receive_presence(self, team: str, name: str, p: Presence) -> None:
         key = (team, name, p.run)
         if (member := self._members.get(key)) is not None:
             member.presence = p.presence
         else:
-            if len(self._presence) >= MOST_MEMBERS:
+            if len(self._presence) >= MAX_MEMBERS:
                 self._presence.pop(next(iter(self._presence)))
             self._presence[key] = p.presence
 
-    def _forget(self, now_s: float, *, hard: bool = False) -> bool:
-        """Drop runs that a newer one has replaced, in need of room also those that ended; whether any went."""
+    def _remove_old(self, now_s: float, *, all_ended: bool = False) -> bool:
+        """Remove runs replaced by a newer one, and ended runs (`all_ended`: also recent ones); returns whether any was removed."""
         newest: dict[tuple[str, str], float] = {}
         for m in self._members.values():
-            newest[m.key[:2]] = max(newest.get(m.key[:2], -math.inf), m.heard_s)
-        gone = [
+            newest[m.key[:2]] = max(newest.get(m.key[:2], -math.inf), m.received_s)
+        removed = [
             m.key
             for m in self._members.values()
-            if (m.heard_s < newest[m.key[:2]] and (m.presence != "online" or m.silent_s(now_s) > KEPT_S))
-            or (m.need(now_s) is Need.ENDED and (hard or m.silent_s(now_s) > ENDED_KEPT_S))
+            if (m.received_s < newest[m.key[:2]] and (m.presence != "online" or m.silent_s(now_s) > REPLACED_KEPT_S))
+            or (m.state(now_s) is MemberState.ENDED and (all_ended or m.silent_s(now_s) > ENDED_KEPT_S))
         ]
-        for key in gone:
+        for key in removed:
             del self._members[key]
-        return bool(gone)
+        return bool(removed)
 
 
-def _parts(topic: str | None) -> tuple[str, str, str]:
+def _topic_parts(topic: str | None) -> tuple[str, str, str]:
     """Team, name and leaf of a topic; raises BadReportError."""
     parts = (topic or "").split("/")
     if len(parts) != 4 or parts[0] != "echostep":
@@ -196,26 +206,26 @@ def _parts(topic: str | None) -> tuple[str, str, str]:
     return parts[1], parts[2], parts[3]
 
 
-def _leaps(before: Position | None, after: Position | None) -> bool:
-    """Whether a position is farther from the last one than legs and both ellipses explain."""
+def _jumps(before: Position | None, after: Position | None) -> bool:
+    """Whether two positions are farther apart than MAX_SPEED_M_S and both 95 % radii allow."""
     if before is None or after is None or before.floor != after.floor:
         return False
-    way_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
-    walked_m = HURRY_M_S * max(after.t_s - before.t_s, 0.0)
-    return way_m > walked_m + before.radius95_m + after.radius95_m + 1.0
+    distance = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+    reach_m = MAX_SPEED_M_S * max(after.t_s - before.t_s, 0.0)
+    return distance > reach_m + before.radius95_m + after.radius95_m + 1.0
 
 
 def distance_m(a: Position, b: Position) -> float | None:
-    """Straight distance of two positions on one floor."""
+    """Straight distance of two positions; None when they are on different floors."""
     return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) if a.floor == b.floor else None
 
 
-def nearest(me: Member, others: Iterable[Member]) -> tuple[float, Member] | None:
-    """The closest other member with a position on the same floor; by their last known places."""
-    if me.report.position is None:
+def nearest(member: Member, others: Iterable[Member]) -> tuple[float, Member] | None:
+    """Distance to the closest other member on the same floor, and that member, by their last reports."""
+    if member.report.position is None:
         return None
-    found = [
+    candidates = [
         (d, o) for o in others
-        if o is not me and o.report.position is not None and (d := distance_m(me.report.position, o.report.position)) is not None
+        if o is not member and o.report.position is not None and (d := distance_m(member.report.position, o.report.position)) is not None
     ]  # fmt: skip
-    return min(found, key=lambda pair: pair[0], default=None)
+    return min(candidates, key=lambda pair: pair[0], default=None)
