@@ -123,7 +123,7 @@ def test_the_scale_of_the_legs_follows_the_walk() -> None:
     assert found["wearer"]["leg_scale"] == pytest.approx(1.0, abs=0.06)
     twice, _ = fit_legs(walked(10.0), GyroSettings(), segments, 11.0)
     assert twice["wearer"]["leg_scale"] == pytest.approx(1.1 * found["wearer"]["leg_scale"], abs=0.001)
-    assert "10 m was seen as" in line
+    assert "10 m was measured as" in line
     assert parse_settings("[wearer]\nleg_scale = 1.02\nthigh_m = 0.4\n", "x").wearer.leg_scale == 1.02
 
 

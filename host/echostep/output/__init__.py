@@ -1,4 +1,4 @@
-"""What leaves a run, but for the browser and the team: the terminal view, track files, pictures, messages for Foxglove.
+"""Output of a run, except to the browser and to the team: terminal view, track files, pictures, derived messages.
 
 In: the tracker's published state and its estimates. Out: text, CSV, Parquet, GeoPackage, KML, PNG, MCAP messages. Owns nothing.
 """

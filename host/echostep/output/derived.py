@@ -1,7 +1,7 @@
-"""What a recording says besides the ports' bytes: estimates, steps, echoes, pressure, the board's status, in messages that viewers show.
+"""Derived messages of a recording, for viewers: estimates, steps, echoes, pressure, status of the board.
 
-In: portions as they come from the ports, and the estimates that the tracker made of them. Out: `Note`s for the recorder. Owns a board reader of
-its own and the last estimate; it asks the tracker for its counts and its clock and changes nothing. No replay reads what is written here.
+In: portions, and the estimates that the tracker made of them. Out: `Note`s for the recorder. Owns a board reader, the last estimate and the drawn
+track; it reads the counts and the clock of the tracker and changes nothing. A replay does not read these messages.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ from echostep.ports.chunks import BOARD, Portion
 from echostep.recording.recorder import Note, Topic
 from echostep.tracker import Tracker
 
-PRESSURE_PA, TEMPERATURE_C = 0.25, 0.05  # a count
+PRESSURE_PA, TEMPERATURE_C = 0.25, 0.05  # units of a count
 ELLIPSE_POINTS = 17
-TRACK_PIECE = 40  # points of the track that are drawn as one
-BEAM_S = 1.0  # an older echo is not drawn any more
+TRACK_PIECE = 40  # points of the track in one line of the scene
+BEAM_S = 1.0  # an older echo is not drawn
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 _SHAPES: dict[str, Shape] = {
@@ -98,20 +98,22 @@ TOPICS: tuple[Topic, ...] = (ESTIMATE, STEP, *ECHO, PRESSURE, STATUS)
 
 
 class Derived:
-    """`take` after the tracker has taken the same portion."""
+    """Derives the messages of each portion; `take` is called after `Tracker.take` of the same portion."""
 
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
-        tracker.arrival_ns(0.0)  # compiled before anything is in a hurry
+        tracker.arrival_ns(0.0)  # compiles its kernel before the run starts
         self._earth = earth_of(tracker.plan)
+        # The board's bytes are decoded a second time here: `Tracker.take` cuts a portion at check-ins and beacon readings, and its front end
+        # decodes the pieces one by one; the recorded messages are ordered by kind over the whole portion.
         self._board = BoardReader()
-        self._drawn = False
+        self._walls_sent = False
         self._last: Estimate | None = None
-        self._walked: list[Place] = []
-        self._heard: dict[int, tuple[int, float]] = {}
+        self._track: list[Place] = []
+        self._last_echo: dict[int, tuple[int, float]] = {}
 
     def take(self, portion: Portion, estimates: list[Estimate]) -> list[Note]:
-        """The messages of a portion."""
+        """The messages of a portion: from its board frames by kind, then from its estimates."""
         notes: list[Note] = []
         from_board = portion.of(BOARD)
         if from_board.received:
@@ -123,20 +125,20 @@ class Derived:
         return notes
 
     def _echoes(self, frames: Frames, t_ns: Any) -> list[Note]:
-        at, pings = frames.rows(_IDS[Ping])
+        frame_index, pings = frames.rows(_IDS[Ping])
         notes = []
         for k, ping, range_m in zip(
-            at.tolist(), pings, ranges(pings, self._tracker.settings.ranger).tolist(), strict=True
+            frame_index.tolist(), pings, ranges(pings, self._tracker.settings.ranger).tolist(), strict=True
         ):
             which, body = int(ping["ranger"]), {"ticks": int(ping["ticks"]), "heard": not math.isnan(range_m)}
             if body["heard"]:
                 body |= {"range_m": range_m, "time_of_flight_us": int(ping["time_of_flight_us"])}
-                self._heard[which] = int(t_ns[k]), range_m
+                self._last_echo[which] = int(t_ns[k]), range_m
             notes.append(Note(ECHO[which], int(t_ns[k]), body))
         return notes
 
     def _status(self, frames: Frames, t_ns: Any) -> list[Note]:
-        at, rows = frames.rows(_IDS[Status])
+        frame_index, rows = frames.rows(_IDS[Status])
         streams = self._tracker.streams
         own = {
             "frames": streams.board.good,
@@ -150,7 +152,7 @@ class Derived:
         }
         return [
             Note(STATUS, int(t_ns[k]), {**Status.unpack(row.tobytes())._asdict(), **own})
-            for k, row in zip(at.tolist(), rows, strict=True)
+            for k, row in zip(frame_index.tolist(), rows, strict=True)
         ]
 
     def _estimate(self, e: Estimate) -> list[Note]:
@@ -183,7 +185,7 @@ class Derived:
         return [location(t_ns, longitude, latitude, e.z_m, covariance)]
 
     def _step(self, e: Estimate, t_ns: int) -> list[Note]:
-        """A step ends at the first estimate that counts it; it began at the last estimate of the step before."""
+        """The message of a step: from the last estimate of the previous step to the first estimate with a higher step count."""
         before = self._last
         if before is None or e.step <= before.step:
             return []
@@ -197,28 +199,28 @@ class Derived:
         return [Note(STEP, t_ns, body)]
 
     def _scene(self, e: Estimate, t_ns: int) -> Note:
-        """The plan once, and what moves."""
+        """Track, ellipse and echo beams of an estimate; with the first one also the walls."""
         here = (e.x_m, e.y_m, e.z_m)
-        self._walked.append(here)
-        begun = (len(self._walked) - 2) // TRACK_PIECE * TRACK_PIECE if len(self._walked) > 1 else 0
+        self._track.append(here)
+        piece_start = (len(self._track) - 2) // TRACK_PIECE * TRACK_PIECE if len(self._track) > 1 else 0
         drawn = {
-            f"track_{begun}": (LINE_STRIP, TRACK, self._walked[begun:]),
+            f"track_{piece_start}": (LINE_STRIP, TRACK, self._track[piece_start:]),
             "ellipse95": (LINE_STRIP, ELLIPSE, _outline(e)),
         }
         for which, color in ((Ranger.LEFT, LEFT_BEAM), (Ranger.RIGHT, RIGHT_BEAM)):
-            heard_ns, range_m = self._heard.get(which, (-1 << 62, 0.0))
+            echo_ns, range_m = self._last_echo.get(which, (-1 << 62, 0.0))
             axis = e.heading_rad + (0.5 if which == Ranger.LEFT else -0.5) * math.pi
-            fresh = abs(t_ns - heard_ns) < BEAM_S * 1e9
+            is_fresh = abs(t_ns - echo_ns) < BEAM_S * 1e9
             end = (e.x_m + range_m * math.cos(axis), e.y_m + range_m * math.sin(axis), e.z_m)
-            drawn[f"echo_{_SIDES[which]}"] = (LINE_STRIP, color, [here, end] if fresh else [])
-        if not self._drawn:
-            self._drawn = True
+            drawn[f"echo_{_SIDES[which]}"] = (LINE_STRIP, color, [here, end] if is_fresh else [])
+        if not self._walls_sent:
+            self._walls_sent = True
             drawn |= {f"plan {k} {level.name}": walls(level) for k, level in enumerate(self._tracker.plan.levels)}
         return scene(t_ns, **drawn)
 
 
 def earth_of(plan: Plan) -> EarthTransform | None:
-    """Where the plan lies on EarthTransform, if that is known; raises EchostepError when it cannot be understood."""
+    """The transform of a plan to longitude and latitude, None without a georeference; raises EchostepError when it is not valid."""
     try:
         return None if plan.georeference is None else EarthTransform(plan.georeference)
     except ValueError as error:
@@ -226,7 +228,7 @@ def earth_of(plan: Plan) -> EarthTransform | None:
 
 
 def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) -> tuple[float, float, float]:
-    """A covariance on the map's axes as variances east, of both, north; `rotation_rad`: from east to the map's x axis."""
+    """A covariance (xx, xy, yy) on the map's axes as (east, east-north, north); `rotation_rad`: from east to the map's x axis."""
     c, s = math.cos(rotation_rad), math.sin(rotation_rad)
     east = c * c * xx_m2 - 2.0 * c * s * xy_m2 + s * s * yy_m2
     north = s * s * xx_m2 + 2.0 * c * s * xy_m2 + c * c * yy_m2
@@ -234,9 +236,9 @@ def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) ->
 
 
 def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
-    at, rows = frames.rows(_IDS[Pressure])
+    frame_index, rows = frames.rows(_IDS[Pressure])
     notes = []
-    for k, row in zip(at.tolist(), rows, strict=True):
+    for k, row in zip(frame_index.tolist(), rows, strict=True):
         if row["pressure"] == PRESSURE_PRESSURE_INVALID:
             continue
         body: dict[str, Any] = {"ticks": int(row["ticks"]), "pressure_pa": PRESSURE_PA * int(row["pressure"])}
@@ -247,6 +249,7 @@ def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
 
 
 def _outline(e: Estimate) -> list[Place]:
+    """The 95 % ellipse of an estimate as points on the map."""
     major_m, minor_m, angle_rad = e.ellipse95
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return [

@@ -1,7 +1,7 @@
 """Messages that viewers of recordings (Foxglove, PlotJuggler) show without a plug-in.
 
-In: places, headings, a plan. Out: `Note`s for a `Recorder`: JSON with JSON Schemas, Foxglove's own where one fits [Foxglove, message schemas], flat
-objects of numbers else, which plot as they are. Owns nothing. Only the fields that are filled stand in the schemas.
+In: positions, headings, a plan. Out: `Note`s for a `Recorder`: JSON with JSON Schemas, those of Foxglove where one fits [Foxglove, message schemas],
+else flat objects of numbers, which can be plotted. Owns nothing. The schemas contain only the fields that are filled.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from echostep.recording.recorder import Note, Topic
 
 MAP_FRAME, TRUNK_FRAME = "map", "trunk"
 NUMBER, TEXT, WHOLE, TRUTH = {"type": "number"}, {"type": "string"}, {"type": "integer"}, {"type": "boolean"}
-MOST_WALLS = 20_000  # of a drawing: a city's plan is no use in a recording
+MOST_WALLS = 20_000  # drawn of a level; by reason: keeps the recording of a large plan small
 LINE_STRIP, LINE_LIST = 0, 2
-KNOWN = 3  # the whole covariance
+COVARIANCE_KNOWN = 3  # `position_covariance_type` of LocationFix: all elements are known
 LINE_PIXELS = 2.0
 
 Shape = Mapping[str, Any]
@@ -93,24 +93,24 @@ Color = tuple[float, float, float, float]
 
 
 def time_of(t_ns: int) -> dict[str, int]:
-    """Nanoseconds as viewers want them."""
+    """Nanoseconds as seconds and nanoseconds, as Foxglove expects."""
     sec, nsec = divmod(max(t_ns, 0), 1_000_000_000)
     return {"sec": sec, "nsec": nsec}
 
 
-def place(at: Place) -> dict[str, float]:
-    """A point or a vector, to a tenth of a millimetre."""
-    return {axis: round(v, 4) for axis, v in zip("xyz", at, strict=True)}
+def vector(xyz: Place) -> dict[str, float]:
+    """A point or a vector (m), rounded to a tenth of a millimetre."""
+    return {axis: round(v, 4) for axis, v in zip("xyz", xyz, strict=True)}
 
 
-def turned(heading_rad: float) -> dict[str, float]:
-    """A rotation about the vertical."""
+def about_vertical(heading_rad: float) -> dict[str, float]:
+    """The quaternion of a rotation about the vertical axis."""
     return {"x": 0.0, "y": 0.0, "z": math.sin(0.5 * heading_rad), "w": math.cos(0.5 * heading_rad)}
 
 
-def pose(t_ns: int, at: Place, heading_rad: float) -> list[Note]:
-    """Where the trunk is: as a pose, and as a frame that a view can follow."""
-    stamp, here, turn = time_of(t_ns), place(at), turned(heading_rad)
+def pose(t_ns: int, xyz_m: Place, heading_rad: float) -> list[Note]:
+    """Position and heading of the trunk: as a pose, and as a frame that a 3D view can follow."""
+    stamp, here, turn = time_of(t_ns), vector(xyz_m), about_vertical(heading_rad)
     return [
         Note(POSE, t_ns, {"timestamp": stamp, "frame_id": MAP_FRAME, "pose": {"position": here, "orientation": turn}}),
         Note(
@@ -128,7 +128,7 @@ def pose(t_ns: int, at: Place, heading_rad: float) -> list[Note]:
 
 
 def location(t_ns: int, longitude: float, latitude: float, height_m: float, covariance_m2: Sequence[float]) -> Note:
-    """A place on the earth; covariance (9,): east, north, up."""
+    """A position in longitude and latitude (WGS 84, degrees); `covariance_m2` (9,), row by row: east, north, up."""
     body = {
         "timestamp": time_of(t_ns),
         "frame_id": TRUNK_FRAME,
@@ -136,13 +136,13 @@ def location(t_ns: int, longitude: float, latitude: float, height_m: float, cova
         "longitude": longitude,
         "altitude": height_m,
         "position_covariance": list(covariance_m2),
-        "position_covariance_type": KNOWN,
+        "position_covariance_type": COVARIANCE_KNOWN,
     }
     return Note(LOCATION, t_ns, body)
 
 
 def scene(t_ns: int, **drawn: tuple[int, Color, Sequence[Place]]) -> Note:
-    """Lines on the map by name (kind, color, points); one of the same name replaces the one before."""
+    """Lines on the map by name, each (kind, color, points (m)); a later line of the same name replaces the earlier one."""
     entities = [_entity(t_ns, name, *what) for name, what in drawn.items()]
     return Note(SCENE, t_ns, {"deletions": [], "entities": entities})
 
@@ -158,10 +158,10 @@ def walls(level: Level) -> tuple[int, Color, list[Place]]:
 def _entity(t_ns: int, name: str, kind: int, color: Color, points: Sequence[Place]) -> dict[str, Any]:
     line = {
         "type": kind,
-        "pose": {"position": place((0.0, 0.0, 0.0)), "orientation": turned(0.0)},
+        "pose": {"position": vector((0.0, 0.0, 0.0)), "orientation": about_vertical(0.0)},
         "thickness": LINE_PIXELS,
         "scale_invariant": True,
-        "points": [place(p) for p in points],
+        "points": [vector(p) for p in points],
         "color": dict(zip("rgba", color, strict=True)),
         "colors": [],
         "indices": [],

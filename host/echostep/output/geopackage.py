@@ -1,4 +1,4 @@
-"""A track as a GeoPackage, which every geographic information system opens.
+"""Writes points and lines as a GeoPackage, the exchange format of geographic information systems.
 
 In: points and lines in longitude and latitude. Out: an SQLite file [OGC 12-128r19, GeoPackage 1.4]. Owns nothing.
 """
@@ -40,7 +40,7 @@ INSERT INTO gpkg_spatial_ref_sys VALUES ('WGS 84', {WGS84}, 'EPSG', {WGS84}, '{_
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """A table of features: `kind` is POINT or LINESTRING; `columns` are names with their SQL types; each row: geometry, then one value a column."""
+    """A table of features: `kind` is POINT or LINESTRING; `columns` are names with SQL types; a row is a geometry and one value per column."""
 
     name: str
     kind: str
@@ -49,7 +49,7 @@ class Layer:
 
 
 def write_geopackage(path: Path, layers: Sequence[Layer]) -> None:
-    """A new file; raises OSError or sqlite3.Error when it cannot be written."""
+    """Write a new file; raises OSError or sqlite3.Error."""
     path.unlink(missing_ok=True)
     connection = sqlite3.connect(path)
     try:
@@ -83,5 +83,5 @@ def _write(connection: sqlite3.Connection, layer: Layer) -> None:
 
 
 def _blob(geometry: BaseGeometry) -> bytes:
-    """Header without envelope, then well-known binary [GeoPackage, 2.1.3]."""
+    """A geometry as a GeoPackage blob: header without envelope, then well-known binary [GeoPackage, 2.1.3]."""
     return struct.pack("<2sBBi", b"GP", 0, 1, WGS84) + bytes(shapely.to_wkb(geometry, byte_order=1))

@@ -1,6 +1,6 @@
-"""The terminal view: the plan, the track and the health of the streams, redrawn a few times a second.
+"""The terminal view: plan, track and health of the streams, redrawn ten times a second.
 
-In: a tracker and its estimates. Out: text on the terminal. Owns the canvas; the tracker never waits for it.
+In: a tracker and its estimates. Out: text on the terminal. Owns the canvas.
 """
 
 from __future__ import annotations
@@ -25,12 +25,18 @@ from echostep.plan.model import Level
 from echostep.tracker import Tracker
 
 REFRESH_S = 0.1
-MOST_FINDINGS = 3
-DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille dots by row and column
+MAX_FINDINGS = 3  # shown at a time
+DOTS = (
+    (0x01, 0x08),
+    (0x02, 0x10),
+    (0x04, 0x20),
+    (0x40, 0x80),
+)  # bits of a braille character by row and column [Unicode, block 2800]
+BRAILLE = 0x2800
 
 
 class Canvas:
-    """The plan in braille dots (two by four to a character), with marks on top."""
+    """The walls of a level and the track in braille dots, two by four per character."""
 
     def __init__(self, level: Level, columns: int = 76, rows: int = 22) -> None:
         ends = level.walls.reshape(-1, 2) if len(level.walls) else np.array([[0.0, 0.0], [10.0, 10.0]])
@@ -46,51 +52,51 @@ class Canvas:
             self.line(self._walls, x0, y0, x1, y1)
 
     def line(self, layer: Octets, x0: float, y0: float, x1: float, y1: float) -> None:
-        """Draw a line (map metres) into a layer."""
+        """Set the dots of a line from (x0, y0) to (x1, y1), map frame, m, in a layer."""
         steps = int(math.hypot(x1 - x0, y1 - y0) * self._scale) + 1
         for k in range(steps + 1):
             self._dot(layer, x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps)
 
-    def walked(self, estimate: Estimate) -> None:
-        """Go on with the track to a place."""
+    def extend_track(self, estimate: Estimate) -> None:
+        """Draw the track from the previous estimate to this one."""
         before, self._last = self._last or estimate, estimate
         self.line(self._track, before.x_m, before.y_m, estimate.x_m, estimate.y_m)
 
     def _dot(self, layer: Octets, x: float, y: float) -> None:
-        column, row = self._place(x, y)
+        column, row = self._dot_of(x, y)
         if 0 <= column < 2 * self._columns and 0 <= row < 4 * self._rows:
             layer[row // 4, column // 2] |= DOTS[row % 4][column % 2]
 
-    def _place(self, x: float, y: float) -> tuple[int, int]:
+    def _dot_of(self, x: float, y: float) -> tuple[int, int]:
         column = round((x - self._low[0]) * self._scale)
         return column, 4 * self._rows - 1 - round((y - self._low[1]) * self._scale)
 
     def render(self, here: Estimate | None) -> Text:
-        """The picture as text: walls grey, track blue, the wearer a star."""
-        mark = (-1, -1) if here is None else self._place(here.x_m, here.y_m)
+        """The canvas as text: walls grey, track blue, the wearer a yellow dot at `here`."""
+        mark = (-1, -1) if here is None else self._dot_of(here.x_m, here.y_m)
         text = Text()
         for r in range(self._rows):
             for c in range(self._columns):
                 if (mark[1] // 4, mark[0] // 2) == (r, c):
                     text.append("●", style="bold bright_yellow")
                 elif self._track[r, c]:
-                    text.append(chr(0x2800 + int(self._track[r, c] | self._walls[r, c])), style="bright_blue")
+                    text.append(chr(BRAILLE + int(self._track[r, c] | self._walls[r, c])), style="bright_blue")
                 else:
-                    text.append(chr(0x2800 + int(self._walls[r, c])), style="grey62")
+                    text.append(chr(BRAILLE + int(self._walls[r, c])), style="grey62")
             text.append("\n")
         return text
 
 
 class TerminalView:
-    """Shows a running tracker; `progress` tells how much of the run is over, 0 to 1, None: nobody knows."""
+    """Shows a running tracker; `progress` gives the finished fraction of the run, 0 to 1; None when it is not known."""
 
     def __init__(
         self, tracker: Tracker, title: str, progress: Callable[[], float] | None = None, console: Console | None = None
     ) -> None:
         self._tracker = tracker
         self._title = title
-        at = tracker.start.level if tracker.start else 0
-        self._level = at if at in range(len(tracker.plan.levels)) else 0
+        level = tracker.start.level if tracker.start else 0
+        self._level = level if level in range(len(tracker.plan.levels)) else 0
         self._canvas = Canvas(tracker.plan.levels[self._level])
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn()
@@ -98,7 +104,7 @@ class TerminalView:
         self._fraction = progress
         self._bar = self._progress.add_task("walk", total=1.0 if progress else None)
         self._last: Estimate | None = None
-        self._drawn = 0.0
+        self._drawn_s = 0.0
         self._live = Live(console=console, auto_refresh=False, transient=False)
 
     def __enter__(self) -> Self:
@@ -109,29 +115,29 @@ class TerminalView:
         self.show([], final=True)
         self._live.__exit__(kind, error, at)
 
-    def _storey(self) -> str:
-        """The level in words, where there are several."""
+    def _level_text(self) -> str:
+        """Name, probability and height of the level; empty when the plan has one level."""
         levels, here = self._tracker.plan.levels, self._last
         if len(levels) < 2 or here is None:
             return ""
         return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
 
     def show(self, estimates: list[Estimate], notice: str = "", *, final: bool = False) -> None:
-        """Take new estimates; redraw when it is time."""
+        """Add new estimates; redraw when REFRESH_S has passed since the last time, or when `final`."""
         for e in estimates:
             if e.level != self._level:
                 self._level, self._canvas = e.level, Canvas(self._tracker.plan.levels[e.level])
-            self._canvas.walked(e)
+            self._canvas.extend_track(e)
             self._last = e
         now = time.monotonic()
-        if not final and now - self._drawn < REFRESH_S:
+        if not final and now - self._drawn_s < REFRESH_S:
             return
-        self._drawn = now
+        self._drawn_s = now
         if self._fraction:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
             self._canvas.render(self._last),
-            Text(describe(self._last) + self._storey()),
+            Text(describe(self._last) + self._level_text()),
             Text(health(self._tracker), style="grey62"),
             *(Text(str(finding), style="bold red") for finding in findings(self._tracker)),
         ]
@@ -141,7 +147,7 @@ class TerminalView:
 
 
 def describe(e: Estimate | None) -> str:
-    """The estimate in words."""
+    """The estimate as a line of text."""
     if e is None:
         return "waiting for the foot to stand still"
     return (
@@ -151,7 +157,7 @@ def describe(e: Estimate | None) -> str:
 
 
 def health(tracker: Tracker) -> str:
-    """The streams in words: what was rejected, lost or dropped."""
+    """Counts of rejected, lost and dropped frames, the time source of the MTx, and the beacons, as a line of text."""
     board, status = tracker.intake.board.counts, tracker.intake.status
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
@@ -162,6 +168,6 @@ def health(tracker: Tracker) -> str:
 
 
 def findings(tracker: Tracker) -> list[Finding]:
-    """The worst that the board says is wrong, in words."""
+    """The most severe findings on the board, at most MAX_FINDINGS."""
     found = board_findings(tracker.intake.words)
-    return [finding for finding in found if finding.severity > Severity.NOTE][:MOST_FINDINGS]
+    return [finding for finding in found if finding.severity > Severity.NOTE][:MAX_FINDINGS]

@@ -1,6 +1,7 @@
-"""Tracks of recordings for other programs.
+"""Tracks of recordings as files for other programs.
 
-In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, or a recording with newly derived messages, by the name of the file. Owns nothing.
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, or a recording with newly derived messages, chosen by the suffix of the file
+name. Owns nothing.
 """
 
 from __future__ import annotations
@@ -37,16 +38,16 @@ COLORS = {"tracking": "ffff8020", "uncertain": "ff20a0ff", "lost": "ff2020ff"}  
 
 
 def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recording, Plan], Tracker]) -> str:
-    """Track a recording and write its track in the format that the name of `out` asks for; returns what was written, in words.
+    """Track a recording and write the track in the format of the suffix of `out`; returns a summary line.
 
-    Raises EchostepError for an unknown format, a map that is nowhere on EarthTransform where one is needed, and a recording without a walk.
+    Raises EchostepError for an unknown format, a plan without the georeference that the format needs, and a recording without estimates.
     """
     if out.suffix not in FORMATS:
-        raise EchostepError(f"{out}: unknown kind of file; there are {', '.join(FORMATS)}")
+        raise EchostepError(f"{out}: unknown kind of file: choose from {', '.join(FORMATS)}")
     recording, plan = open_recording(path), open_plan(plan_path)
-    if earth_of(plan) is None and out.suffix in ON_EARTH:
+    if earth_of(plan) is None and out.suffix in NEEDS_GEOREFERENCE:
         raise EchostepError(
-            f"{plan_path}: has no georeference, which {out.suffix} needs: the longitude and latitude of the map's origin"
+            f"{plan_path}: {out.suffix} needs a georeference: add longitude and latitude of the map's origin to the plan"
         )
     if out.exists() and out.resolve() == path.resolve():
         raise EchostepError(f"{out}: that is the recording itself: give another name with -o")
@@ -57,7 +58,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
         if out.suffix == ".mcap":
             _record(recording, tracker, out, estimates)
         else:
-            for portion in shown(recording, f"tracking {path.name}"):
+            for portion in with_progress(recording, f"tracking {path.name}"):
                 estimates += tracker.take(portion)
             if not estimates:
                 raise EchostepError(f"{path}: no estimate: the foot never stood still, or no MTx bytes came")
@@ -67,7 +68,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
     return f"{out}: {len(estimates)} estimates, {estimates[-1].t_s - estimates[0].t_s if estimates else 0.0:.1f} s"
 
 
-def shown(recording: Recording, title: str) -> Iterator[Portion]:
+def with_progress(recording: Recording, title: str) -> Iterator[Portion]:
     """The recording's portions, with a progress bar on a terminal."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
@@ -78,30 +79,30 @@ def shown(recording: Recording, title: str) -> Iterator[Portion]:
 
 
 def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
-    """The estimates' fields by name, and longitude and latitude where the map lies somewhere on EarthTransform."""
+    """The estimates' fields by name, and longitude and latitude where the plan has a georeference."""
     columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
     columns["status"] = [e.status.value for e in estimates]
     if earth := earth_of(plan):
-        columns["longitude_deg"], columns["latitude_deg"] = _places(estimates, earth).T.tolist()
+        columns["longitude_deg"], columns["latitude_deg"] = _degrees(estimates, earth).T.tolist()
     return columns
 
 
-def _places(estimates: list[Estimate], earth: EarthTransform) -> Floats:
+def _degrees(estimates: list[Estimate], earth: EarthTransform) -> Floats:
     return earth.degrees(np.array([(e.x_m, e.y_m) for e in estimates]))
 
 
 def _flat(columns: Columns) -> Columns:
-    """Lists within columns as text, for formats that know none."""
+    """The same columns with tuples as text, for formats without lists."""
     return {
         name: [" ".join(map(str, v)) if isinstance(v, tuple) else v for v in column] for name, column in columns.items()
     }
 
 
 def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[Estimate]) -> None:
-    """The same bytes again, with what is derived from them now."""
+    """Write the recorded bytes again, with the messages derived from them now."""
     derived = Derived(tracker)
     with Recorder(out, recording.about) as recorder:
-        for portion in shown(recording, f"tracking {recording.path.name}"):
+        for portion in with_progress(recording, f"tracking {recording.path.name}"):
             for chunk in portion.chunks():
                 recorder.write(chunk)
                 recorder.settle(chunk)
@@ -159,11 +160,11 @@ def _write_kml(out: Path, estimates: list[Estimate], plan: Plan) -> None:
         _element(line, "color", color)
         _element(line, "width", "2")
         _element(_element(style, "PolyStyle"), "color", "40" + color[2:])
-    places = _places(estimates, earth)
+    degrees = _degrees(estimates, earth)
     track = _element(document, "Placemark")
     _element(track, "name", "track")
     _element(track, "styleUrl", "#tracking")
-    _element(_element(track, "LineString"), "coordinates", _coordinates(places))
+    _element(_element(track, "LineString"), "coordinates", _coordinates(degrees))
     folder = _element(document, "Folder")
     _element(folder, "name", "estimates")
     for k, e in enumerate(estimates):
@@ -171,9 +172,9 @@ def _write_kml(out: Path, estimates: list[Estimate], plan: Plan) -> None:
         _element(mark, "name", f"{e.t_s:.1f} s")
         _element(mark, "description", f"step {e.step}, {e.status.value}, 95 % within {e.ellipse95.major_m:.2f} m")
         _element(mark, "styleUrl", f"#{e.status.value}")
-        both = _element(mark, "MultiGeometry")
-        _element(_element(both, "Point"), "coordinates", _coordinates(places[k : k + 1]))
-        ring = _element(_element(_element(both, "Polygon"), "outerBoundaryIs"), "LinearRing")
+        geometry = _element(mark, "MultiGeometry")
+        _element(_element(geometry, "Point"), "coordinates", _coordinates(degrees[k : k + 1]))
+        ring = _element(_element(_element(geometry, "Polygon"), "outerBoundaryIs"), "LinearRing")
         _element(ring, "coordinates", _coordinates(_ellipse(e, earth)))
     ET.indent(root)
     ET.ElementTree(root).write(out, encoding="utf-8", xml_declaration=True)
@@ -185,11 +186,13 @@ def _element(parent: ET.Element, name: str, text: str | None = None, **attribute
     return element
 
 
-def _coordinates(places: Floats) -> str:
-    return " ".join(f"{x:.9f},{y:.9f}" for x, y in places.tolist())
+def _coordinates(degrees: Floats) -> str:
+    """Longitudes and latitudes (n, 2) as KML coordinates."""
+    return " ".join(f"{x:.9f},{y:.9f}" for x, y in degrees.tolist())
 
 
 def _ellipse(e: Estimate, earth: EarthTransform) -> Floats:
+    """The 95 % ellipse of an estimate as longitudes and latitudes (n, 2)."""
     major_m, minor_m, angle_rad = e.ellipse95
     turn = np.linspace(0.0, 2.0 * math.pi, ELLIPSE_POINTS)
     u, v = major_m * np.cos(turn), minor_m * np.sin(turn)
@@ -205,4 +208,4 @@ FORMATS: dict[str, Write] = {
     ".kml": _write_kml,
     ".mcap": lambda *_: None,
 }
-ON_EARTH = (".gpkg", ".kml")
+NEEDS_GEOREFERENCE = (".gpkg", ".kml")

@@ -1,6 +1,6 @@
-"""track.csv and track.png: a run to keep and to look at.
+"""track.csv and track.png of a run, and the picture of a foot's track.
 
-In: a plan, estimates, the truth where known. Out: two files. Owns nothing.
+In: a plan, estimates, the true path where it is known. Out: CSV and PNG files. Owns nothing.
 """
 
 from __future__ import annotations
@@ -40,14 +40,15 @@ COLUMNS = (
     "z_m",
     "z_sd_m",
 )
-MOST_INCHES = 40.0
-ELSEWHERE_S = 5.0
-WAY_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
-TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # told apart by the colour-blind [Okabe and Ito 2008]
+MAX_HEIGHT_INCHES = 40.0  # of the picture
+GAP_S = 5.0  # the line of the track is broken after so long on another level
+MAX_ELLIPSES = 60  # drawn per level
+ROUTE_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
+TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour blindness [Okabe and Ito 2008]
 
 
 def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
-    """All estimates as CSV; numbers are written so that they read back to the same bits."""
+    """Write estimates as CSV; numbers read back to the same bits."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
@@ -58,12 +59,12 @@ def draw_track(
     path: Path, plan: Plan, estimates: Sequence[Estimate], truth: Truth | None, title: str,
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
 ) -> None:  # fmt: skip
-    """Plan, truth, way, beacons, estimate and 95 % ellipses as a PNG, the levels that he was on one above the other."""
+    """Draw plan, true path, route, beacons, estimates and 95 % ellipses as PNG: one panel for each visited level, the lowest at the bottom."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     visited = sorted({e.level for e in estimates}) or [0]
-    inches = min(sum(_height(plan.levels[k]) for k in visited), MOST_INCHES)
+    inches = min(sum(_height(plan.levels[k]) for k in visited), MAX_HEIGHT_INCHES)
     figure = Figure(figsize=(10, inches), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title, parse_math=False)
@@ -86,7 +87,7 @@ def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m
         axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8, parse_math=False)
     if truth_m is not None:
         axes.plot(*truth_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
-    for e in _spread(estimates, 60):
+    for e in _evenly_spaced(estimates, MAX_ELLIPSES):
         ellipse = e.ellipse95
         patch = Patch(
             (e.x_m, e.y_m),
@@ -104,15 +105,15 @@ def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m
 
 
 def _draw_guidance(axes: Axes, level: int, route: Route | None, beacons: Sequence[BeaconPlace]) -> None:
-    """The way, and each beacon with its standard deviation; those that were moved or are silent are hollow."""
+    """Draw the route, and each beacon with two standard deviations; moved and silent beacons are hollow."""
     from matplotlib.patches import Circle
 
     for stretch in route.stretches if route else ():
         if stretch.level == level:
-            axes.plot(*stretch.line_m.T, color=WAY_COLOUR, linewidth=2, linestyle="--", label="way")
+            axes.plot(*stretch.line_m.T, color=ROUTE_COLOUR, linewidth=2, linestyle="--", label="route")
     for b in beacons:
-        full = b.state is BeaconState.WELL
-        axes.plot(b.x_m, b.y_m, "^", color=BEACON_COLOUR, mfc=BEACON_COLOUR if full else "none", markersize=6)
+        filled = b.state is BeaconState.WELL
+        axes.plot(b.x_m, b.y_m, "^", color=BEACON_COLOUR, mfc=BEACON_COLOUR if filled else "none", markersize=6)
         axes.add_patch(Circle((b.x_m, b.y_m), 2.0 * b.sd_m, color=BEACON_COLOUR, alpha=0.15, lw=0))
     if beacons:
         axes.plot([], [], "^", color=BEACON_COLOUR, label="beacons (hollow: moved or silent)")
@@ -121,15 +122,15 @@ def _draw_guidance(axes: Axes, level: int, route: Route | None, beacons: Sequenc
 
 
 def _with_gaps(rows: Sequence[tuple[float, float, float]]) -> Floats:
-    """Places (n, 2) of rows of t_s, x, y; a break in the line where he was elsewhere."""
+    """Positions (n, 2) of rows (t_s, x, y), with a row of NaN in each gap longer than GAP_S."""
     table = np.array(rows).reshape(-1, 3)
-    breaks = np.flatnonzero(np.diff(table[:, 0]) > ELSEWHERE_S) + 1
-    found: Floats = np.insert(table[:, 1:], breaks, np.nan, axis=0)
-    return found
+    breaks = np.flatnonzero(np.diff(table[:, 0]) > GAP_S) + 1
+    positions: Floats = np.insert(table[:, 1:], breaks, np.nan, axis=0)
+    return positions
 
 
 def draw_foot(path: Path, track: Track, title: str) -> None:
-    """The foot's way from above and its height over time, stances as dots, as a PNG."""
+    """Draw the foot's path from above and its height over time, stances as dots, as PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -148,13 +149,13 @@ def draw_foot(path: Path, track: Track, title: str) -> None:
 
 
 def _height(level: Level) -> float:
-    """Inches that suit the plan's shape at a width of ten."""
+    """Height (inches) of a panel that is ten inches wide, from the plan's aspect ratio."""
     if not len(level.solid):
         return 6.5
     width, height = np.ptp(level.solid.reshape(-1, 2), axis=0)
     return float(np.clip(1.0 + 9.2 * height / max(width, 1e-9), 4.0, 12.0))
 
 
-def _spread(estimates: Sequence[Estimate], most: int) -> Sequence[Estimate]:
-    """At most so many of them, evenly."""
+def _evenly_spaced(estimates: Sequence[Estimate], most: int) -> Sequence[Estimate]:
+    """About `most` of the estimates, evenly spaced."""
     return estimates[:: max(1, len(estimates) // most)]
