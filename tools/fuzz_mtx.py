@@ -1,6 +1,6 @@
-"""Fuzz the MTx decoder with mutated frames: nothing may raise, memory stays bounded, what passes is a measurement.
+"""Fuzzes the MTx decoder with mutated frames: no exception, bounded memory, and only samples within the limits pass.
 
-In: a number of frames and a seed. Out: the rate and what became of the frames; status 1 when anything is wrong.
+In: a number of frames and a seed. Out: frames per second and counts of the reader; exit status 1 on a failure.
 """
 
 from __future__ import annotations
@@ -20,17 +20,15 @@ from echostep.xsens.packets import read_packets
 from echostep.xsens.requests import project_requests
 from echostep.xsens.setup import MtxSetup
 
-BLOCK = 20_000  # frames that are mutated together
-REST = MAX_LENGTH + 6  # the longest unfinished frame
-SETUP_SHARE = (
-    50  # one block in so many also goes through the configuration and the packet reader, which are not vectorised
-)
+BLOCK = 20_000  # frames mutated together
+MAX_PENDING = MAX_LENGTH + 6  # bytes of the longest unfinished frame
+SETUP_SHARE = 50  # one block in so many is also fed to the setup and to the packet reader, which are slower
 OTHER_OUTPUTS = (OutputFormat(0x0004, 0x0001), OutputFormat(0x0007, 0x0108), OutputFormat(0x4000, 0x0001))
 SAMPLE = MtSample(0, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
 
 
 def mtdata2(form: int, counter: int) -> bytes:
-    """A frame of an MTi with counter, quaternion, accel and gyro in one of the number formats."""
+    """An MTData2 frame with counter, quaternion, accel and gyro in number format `form` (float32, fixed 12.20, fixed 16.32, float64)."""
     number = (
         lambda v: np.array(v, ">f4").tobytes(),
         lambda v: np.array(round(v * 2**20), ">i4").tobytes(),
@@ -45,7 +43,7 @@ def mtdata2(form: int, counter: int) -> bytes:
 
 
 def frames(count: int, rng: np.random.Generator) -> list[bytes]:
-    """Frames of all kinds with running counters, most of them as the project sets the MTx."""
+    """Frames of all kinds with increasing counters, most of them in the output format of this project."""
     kinds = rng.choice(7, size=count, p=[0.6, 0.05, 0.05, 0.1, 0.1, 0.05, 0.05])
     made = []
     for n, kind in enumerate(kinds.tolist()):
@@ -61,23 +59,23 @@ def frames(count: int, rng: np.random.Generator) -> list[bytes]:
 
 
 def mutate(stream: bytes, rng: np.random.Generator, count: int) -> bytes:
-    """Bytes changed, lost, doubled, moved to the marks of the protocol; some frames get a checksum that fits again, so that the gates are reached."""
+    """Change, delete and insert bytes, some to special values of the protocol; some changes keep the checksum, so that the limits are tested."""
     changed = np.frombuffer(stream, np.uint8).copy()
-    at = rng.integers(0, len(changed), count)
-    changed[at] ^= rng.integers(1, 256, count, dtype=np.uint8)
-    at = rng.integers(0, len(changed), count // 4)
-    changed[at] = rng.choice(np.array([0xFA, 0xFF, 0x00, 0x7F, 0x80, 0x32, 0x36], np.uint8), len(at))
-    at = rng.integers(0, len(changed), count // 4)
-    balance = rng.integers(1, 256, len(at), dtype=np.uint8)
-    np.add.at(changed, at, balance)  # two changes that the checksum does not see
-    np.subtract.at(changed, np.minimum(at + rng.integers(1, 8, len(at)), len(changed) - 1), balance)
+    index = rng.integers(0, len(changed), count)
+    changed[index] ^= rng.integers(1, 256, count, dtype=np.uint8)
+    index = rng.integers(0, len(changed), count // 4)
+    changed[index] = rng.choice(np.array([0xFA, 0xFF, 0x00, 0x7F, 0x80, 0x32, 0x36], np.uint8), len(index))
+    index = rng.integers(0, len(changed), count // 4)
+    balance = rng.integers(1, 256, len(index), dtype=np.uint8)
+    np.add.at(changed, index, balance)  # two changes that cancel in the checksum
+    np.subtract.at(changed, np.minimum(index + rng.integers(1, 8, len(index)), len(changed) - 1), balance)
     changed = np.delete(changed, rng.integers(0, len(changed), count // 8))
-    at = rng.integers(0, len(changed), count // 8)
-    return np.insert(changed, at, rng.integers(0, 256, len(at), dtype=np.uint8)).tobytes()
+    index = rng.integers(0, len(changed), count // 8)
+    return np.insert(changed, index, rng.integers(0, 256, len(index), dtype=np.uint8)).tobytes()
 
 
 def check(batch: MtBatch, fed: int, limits: MtxLimits) -> None:
-    """Raise AssertionError when something passed that is no measurement."""
+    """Raise AssertionError when a sample is outside the limits."""
     quaternion = batch.quaternion[~np.isnan(batch.quaternion).all(axis=1)]
     mag = batch.mag[~np.isnan(batch.mag).all(axis=1)]
     assert np.all(np.abs(batch.accel) <= limits.accel_m_s2), "accel"
@@ -91,7 +89,7 @@ def check(batch: MtBatch, fed: int, limits: MtxLimits) -> None:
 
 
 def fuzz(count: int, seed: int) -> Counter[str]:
-    """Feed so many frames; returns what became of them. Raises whatever the decoder raises."""
+    """Feed `count` mutated frames; returns the reader's counts. Raises what the decoder raises."""
     rng = np.random.default_rng(seed)
     blocks = [b"".join(frames(min(BLOCK, count), rng)) for _ in range(2)]
     limits, reader = MtxLimits(), MtxReader()
@@ -103,9 +101,9 @@ def fuzz(count: int, seed: int) -> Counter[str]:
             batch = reader.feed_batch(stream[start:end])
             check(batch, end - start, limits)
             passed += len(batch.counter)
-            assert reader.pending <= REST, "memory"
+            assert reader.pending <= MAX_PENDING, "memory"
         if total // BLOCK % SETUP_SHARE == 0:
-            converse(stream[:200_000])
+            feed_setup(stream[:200_000])
         fed += len(stream)
         total += min(BLOCK, count)
     counts = reader.counts
@@ -115,8 +113,8 @@ def fuzz(count: int, seed: int) -> Counter[str]:
     return found
 
 
-def converse(stream: bytes) -> None:
-    """The configuration hears the same; the packet reader may refuse a payload only by ValueError."""
+def feed_setup(stream: bytes) -> None:
+    """Feed the same bytes to the MTx setup, and to the packet reader, which may only raise ValueError."""
     setup = MtxSetup(project_requests(100.0), 100.0)
     for k in range(0, len(stream), 997):
         assert len(setup.advance(stream[k : k + 997], k * 1e-5)) < 1_000, "answers"
@@ -131,11 +129,11 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=200_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    fuzz(2_000, 0)  # compile
+    fuzz(2_000, 0)  # compiles the kernels
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     try:
         found = fuzz(options.frames, options.seed)
-    except Exception as error:  # the finding, whatever it is
+    except Exception as error:  # any exception is a failure
         print(f"FAILED: {type(error).__name__}: {error}")
         return 1
     elapsed_s = time.perf_counter() - began
@@ -143,7 +141,7 @@ def main() -> int:
     print(
         f"{found['frames']} mutated frames, {found['bytes']} bytes in {elapsed_s:.1f} s: {found['frames'] / elapsed_s:.0f} frames/s, no exception"
     )
-    print(f"peak memory grew by {grown:.0f} MB; the reader held at most {REST} bytes")
+    print(f"peak memory grew by {grown:.0f} MB; the reader held at most {MAX_PENDING} bytes")
     print(", ".join(f"{name} {value}" for name, value in found.items() if name not in ("frames", "bytes")))
     return 0
 

@@ -1,10 +1,11 @@
-"""Kill a recording run with SIGKILL at random moments, and see what is left of the recording.
+"""Kills a recording process with SIGKILL at random moments, and measures what is missing from its file.
 
-In: nothing but options. Out: how much of the last second is missing, on the terminal; exit status 1 when more than a second is, or when a file
-does not open. Owns the processes that it starts.
+In: options. Out: how many milliseconds before each kill are missing; exit status 1 when it is more than a second, or when a file does not
+open. Owns the processes that it starts.
 
-What is killed is a process that records chunks as the ports deliver them (850 a second), holds the interpreter for long moments as the filter's
-kernels do, and says on a pipe, which outlives it, when each chunk was handed to the recorder. What the pipe says and the file does not hold is lost.
+The killed process records 850 chunks a second, as the ports deliver them, and holds the interpreter lock for long moments, as the filter's
+kernels do. It writes number and time of each recorded chunk to a pipe, which outlives it. A chunk that is in the pipe but not in the file
+is lost.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.recorder import open_recording
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
-HANDED = struct.Struct("<Qq")
+ROW = struct.Struct("<Qq")
 LIMIT_S = 1.0
 
 WRITER = """
@@ -45,7 +46,7 @@ with Recorder(path, {"note": "to be killed"}) as recorder:
         number += 1
         recorder.write(Chunk("mtx" if number % 3 else "board", now, number.to_bytes(8, "little") * 2))
         if not number % 400:
-            sorted(busy)  # one call into C: nobody else runs meanwhile
+            sorted(busy)  # one call into C: no other thread runs meanwhile
         if not number % 40:
             recorder.notes(pose(now, (1.0, 2.0, 0.0), 0.5))
         os.write(pipe, struct.pack("<Qq", number, now))
@@ -55,55 +56,55 @@ with Recorder(path, {"note": "to be killed"}) as recorder:
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """What one kill cost: chunks handed to the recorder, and for how long before the kill they are missing."""
+    """Loss of one kill: chunks given to the recorder, chunks missing, and the time before the kill that they span."""
 
-    handed: int
+    given: int
     missing: int
     missing_s: float
     opens: bool
 
 
 def kill_once(path: Path, after_s: float) -> Kill:
-    """Record, kill `after_s` seconds after the first chunk, read what is left; raises AssertionError when a chunk is not what was recorded."""
+    """Record, kill `after_s` seconds after the first chunk, read the file; raises AssertionError when a chunk in the middle is missing."""
     read_end, write_end = os.pipe()
     run = subprocess.Popen([sys.executable, "-c", WRITER, str(path), str(write_end)], pass_fds=[write_end])
     os.close(write_end)
     try:
-        handed = [HANDED.unpack(_exactly(read_end))]
+        given = [ROW.unpack(_read_row(read_end))]
         end = time.monotonic() + after_s
         while time.monotonic() < end:
-            handed.append(HANDED.unpack(_exactly(read_end)))
+            given.append(ROW.unpack(_read_row(read_end)))
     finally:
         run.send_signal(signal.SIGKILL)
         run.wait()
-    while row := os.read(read_end, HANDED.size):
-        handed.append(HANDED.unpack(row))
+    while row := os.read(read_end, ROW.size):
+        given.append(ROW.unpack(row))
     os.close(read_end)
-    return _cost(path, handed)
+    return _loss(path, given)
 
 
-def _exactly(pipe: int) -> bytes:
-    row = os.read(pipe, HANDED.size)
-    if len(row) < HANDED.size:
-        raise RuntimeError("the recording process has died by itself")
+def _read_row(pipe: int) -> bytes:
+    row = os.read(pipe, ROW.size)
+    if len(row) < ROW.size:
+        raise RuntimeError("the recording process ended by itself")
     return row
 
 
-def _cost(path: Path, handed: Sequence[tuple[int, int]]) -> Kill:
+def _loss(path: Path, given: Sequence[tuple[int, int]]) -> Kill:
     try:
         numbers = [int.from_bytes(chunk.data[:8], "little") for chunk in open_recording(path).chunks()]
-        repair(path, path.with_suffix(".mended.mcap"))
-        opens = path.with_suffix(".mended.mcap").read_bytes().endswith(MCAP_MAGIC)
+        repair(path, path.with_suffix(".repaired.mcap"))
+        opens = path.with_suffix(".repaired.mcap").read_bytes().endswith(MCAP_MAGIC)
     except EchostepError:
-        numbers, opens = [], len(handed) == 1  # nothing was recorded yet
+        numbers, opens = [], len(given) == 1  # killed before the first chunk was written
     assert numbers == list(range(1, len(numbers) + 1)), "chunks are missing in the middle"
-    lost = [t_ns for number, t_ns in handed if number > len(numbers)]
-    missing_s = (handed[-1][1] - lost[0]) * 1e-9 + CHUNK_NS * 1e-9 if lost else 0.0
-    return Kill(len(handed) - 1, len(lost), missing_s, opens)
+    lost = [t_ns for number, t_ns in given if number > len(numbers)]
+    missing_s = (given[-1][1] - lost[0]) * 1e-9 + CHUNK_NS * 1e-9 if lost else 0.0
+    return Kill(len(given) - 1, len(lost), missing_s, opens)
 
 
 def main() -> int:
-    """Run the kills and print what they cost."""
+    """Run the kills and print the losses."""
     parser = argparse.ArgumentParser(description="kill -9 a recorder at random moments")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--longest", type=float, default=3.0, metavar="S", help="latest moment of a kill")
@@ -120,7 +121,7 @@ def main() -> int:
     closed = sum(not kill.opens for kill in kills)
     print(
         f"{len(kills)} kills: the last {typical * 1e3:.0f} ms missing (median), {worst * 1e3:.0f} ms at worst; "
-        f"{sum(kill.handed for kill in kills)} chunks handed over, {sum(kill.missing for kill in kills)} missing; {closed} files do not open"
+        f"{sum(kill.given for kill in kills)} chunks recorded, {sum(kill.missing for kill in kills)} missing; {closed} files do not open"
     )
     return int(worst > LIMIT_S or closed > 0)
 

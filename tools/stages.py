@@ -1,6 +1,6 @@
-"""Where the time of a replay goes: CPU seconds of each stage, the least of some rounds.
+"""CPU time of each stage of a replay: the smallest of several rounds.
 
-In: a recording and its plan. Out: a table on the terminal. Kernels are compiled and loaded before the clock starts.
+In: a recording and its plan. Out: a table on the terminal. Kernels are compiled before the measurement.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from echostep.tracker import Tracker
 Spent = dict[str, float]
 
 
-def clocked(stage: str, work: Callable[..., Any], spent: Spent) -> Callable[..., Any]:
-    """The same work, its time added to a stage."""
+def timed(stage: str, work: Callable[..., Any], spent: Spent) -> Callable[..., Any]:
+    """The same function; its CPU time is added to `spent[stage]`."""
 
     def run(*arguments: Any) -> Any:
         began = time.thread_time()
-        found = work(*arguments)
+        result = work(*arguments)
         spent[stage] = spent.get(stage, 0.0) + time.thread_time() - began
-        return found
+        return result
 
     return run
 
 
 def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
-    """Seconds of each stage, and the span of the estimates."""
+    """CPU seconds of each stage, and the time span of the estimates (s)."""
     tracker, spent = Tracker(load_plan(plan_path)), Spent()
     tracker.warm_up()
     recording, intake = open_recording(path), tracker.intake
@@ -45,15 +45,15 @@ def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
         ("foot and path", intake, "_follow"),
         ("all of the intake", intake, "take"),
     ):
-        setattr(owner, name, clocked(stage, getattr(owner, name), spent))
+        setattr(owner, name, timed(stage, getattr(owner, name), spent))
     began = time.thread_time()
     estimates = [e for portion in recording.portions() for e in tracker.take(portion)]
     spent["replay"] = time.thread_time() - began
     return spent, estimates[-1].t_s - estimates[0].t_s
 
 
-def reading(path: Path) -> float:
-    """Seconds to read the recording."""
+def reading_time(path: Path) -> float:
+    """CPU seconds to read the recording without tracking."""
     recording, began = open_recording(path), time.thread_time()
     for _ in recording.portions():
         pass
@@ -68,7 +68,7 @@ def main() -> None:
     options = parser.parse_args()
     runs = [replay(options.recording, options.plan) for _ in range(options.rounds)]
     least = {stage: min(spent[stage] for spent, _ in runs) for stage in runs[0][0]}
-    read_s, span_s = min(reading(options.recording) for _ in range(options.rounds)), runs[0][1]
+    read_s, span_s = min(reading_time(options.recording) for _ in range(options.rounds)), runs[0][1]
     inner = ("board frames", "MTx samples", "timeline", "foot and path")
     rows = {"reading the recording": read_s} | {stage: least[stage] for stage in inner}
     rows["ports, pings, waiting"] = least["all of the intake"] - sum(least[stage] for stage in inner)

@@ -1,7 +1,7 @@
-"""What it costs to follow a team: trackers that publish, a commander that follows them, the CPU share of both.
+"""CPU load of a team: trackers that publish over MQTT, and two commanders that receive their reports.
 
-In: how many trackers, how often, for how long. Out: figures on the terminal. Owns a Mosquitto broker of its own on a free loopback port. The trackers
-are threads that publish simulated reports through the code of `--publish`; the commander is the command, its table drawn on a pseudo terminal.
+In: number of trackers, rate, duration. Out: figures on the terminal. Owns a Mosquitto broker on a free loopback port. The trackers are threads that
+publish simulated reports through the code of `--publish`; one commander draws its table on a pseudo terminal, the other prints JSON.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
-def follow(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.Popen[str]:
+def start_commander(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.Popen[str]:
     """Start a commander, on a pseudo terminal or with its output kept."""
     command = [sys.executable, "-m", "echostep", "command", "--plan", str(plan_path), url, *more]
     if not terminal:
@@ -96,11 +96,11 @@ def follow(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.
 
 
 def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: float, flood_hz: float) -> None:
-    """Two commanders follow, one draws its table, one keeps the roster; print what they used and heard."""
-    drawing = follow(url, plan_path, terminal=True)
-    keeping = follow(url, plan_path, "--json", terminal=False)
+    """Run two commanders, one with its table, one with JSON, and the trackers; print CPU shares and message counts."""
+    drawing = start_commander(url, plan_path, terminal=True)
+    printing = start_commander(url, plan_path, "--json", terminal=False)
     time.sleep(5.0)
-    before_s, mine_s = (cpu_s(drawing.pid), cpu_s(keeping.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    before_s, mine_s = (cpu_s(drawing.pid), cpu_s(printing.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     began = time.monotonic()
     ended = threading.Event()
     if flood_hz:
@@ -109,23 +109,23 @@ def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: f
     summaries = publish(url, load_plan(plan_path), trackers, rate_hz, seconds)
     ended.set()
     span_s = time.monotonic() - began
-    after_s, ours_s = (cpu_s(drawing.pid), cpu_s(keeping.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-    for commander in (drawing, keeping):
+    after_s, ours_s = (cpu_s(drawing.pid), cpu_s(printing.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    for commander in (drawing, printing):
         commander.send_signal(signal.SIGINT)
-    out, _ = keeping.communicate(timeout=30)
+    out, _ = printing.communicate(timeout=30)
     drawing.wait(30)
     roster = json.loads(out)
     late = sum("0 overtaken" not in s or "0 unsent" not in s for s in summaries)
     print(f"{trackers} trackers x {rate_hz:g} estimates/s for {span_s:.0f} s on {os.cpu_count()} cores")
-    for name, a, b in zip(("with its table", "roster only"), after_s, before_s, strict=True):
-        print(f"commander, {name}: {100.0 * (a - b) / span_s:.1f} % of one core")
+    for name, after, before in zip(("with its table", "roster only"), after_s, before_s, strict=True):
+        print(f"commander, {name}: {100.0 * (after - before) / span_s:.1f} % of one core")
     if not flood_hz:
         print(f"publishing, each tracker: {100.0 * (ours_s - mine_s) / span_s / trackers:.2f} % of one core")
     followed = [m for m in roster["members"] if m["team"] == "load"]
     missed, refused = sum(m["missed"] for m in followed), sum(roster["not_believed"].values())
-    print(f"{roster['heard']} messages heard, {refused} rejected")
+    print(f"{roster['heard']} messages received, {refused} rejected")
     print(
-        f"{len(followed)} trackers followed, {missed} of their reports missed; {late} overtook some or left some unsent"
+        f"{len(followed)} trackers shown, {missed} of their reports missed; {late} trackers with overtaken or unsent reports"
     )
 
 
@@ -135,7 +135,7 @@ def main() -> None:
     parser.add_argument("--trackers", type=int, default=20)
     parser.add_argument("--rate", type=float, default=10.0)
     parser.add_argument("--seconds", type=float, default=30.0)
-    parser.add_argument("--flood", type=float, default=0.0, help="hostile messages per second beside them")
+    parser.add_argument("--flood", type=float, default=0.0, help="invalid messages per second besides")
     asked = parser.parse_args()
     mosquitto = shutil.which("mosquitto", path=os.environ["PATH"] + ":/usr/sbin")
     if mosquitto is None:

@@ -23,7 +23,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
             pytest.skip("hatchling is not installed in this environment")
         raise
     programs = wheels.environment(folder / "fresh", built, borrow=True)
-    return programs, wheels.bare(programs, folder)
+    return programs, wheels.environment_variables(programs, folder)
 
 
 def test_an_installed_wheel_decodes_and_looks_into_recordings(
