@@ -35,7 +35,7 @@ MAX_COLUMN_WIDTH = 24  # characters
 LOW_BATTERY_PERCENT = 20
 NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
 COLUMNS = {
-    "who": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "to start": "right",
+    "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "to start": "right",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
 OPTIONAL_COLUMNS = ("looks", "nearest m", "walked m")  # not shown on a narrow terminal
@@ -135,7 +135,7 @@ def _cells(
     r, p, near = m.report, m.position(now_s), nearest(m, members)
     from_start = _from_start(m, plan)
     return {
-        "who": f"{r.team}/{r.name}",
+        "name": f"{r.team}/{r.name}",
         "state": _state(m, now_s),
         "x, y m": f"{p.x_m:.1f}, {p.y_m:.1f}" if p else "",
         "±95% m": f"{p.radius95_m:.1f}" if p else "",

@@ -86,7 +86,7 @@ class ReportedPlace:
         float,
         Meta(ge=0.0, le=1e7, description="standard deviation along the worst direction, georeference included, m"),
     ]
-    hae_sd_m: Annotated[float, Meta(ge=0.0, le=1e7, description="of the height, m")] | None
+    hae_sd_m: Annotated[float, Meta(ge=0.0, le=1e7, description="standard deviation of hae_m, m")] | None
     course_deg: Annotated[float, Meta(ge=0.0, le=360.0, description="heading, clockwise from true north")] | None
 
 
@@ -132,9 +132,9 @@ class Report:
     motion: Annotated[Motion | None, Meta(description="missing while waiting")]
     place: Annotated[ReportedPlace | None, Meta(description="missing without a georeference")]
     streams: Annotated[StreamReport | None, Meta(description="missing until something is heard")]
-    plan: Annotated[str, Meta(max_length=64, description="name of the plan that he is tracked on")]
-    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="of the plan's file")]
-    version: Annotated[str, Meta(max_length=32, description="of the tracker's echostep")]
+    plan: Annotated[str, Meta(max_length=64, description="name of the plan that the wearer is tracked on")]
+    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="SHA-256 of the plan's file")]
+    version: Annotated[str, Meta(max_length=32, description="version of echostep on the tracker")]
     battery_percent: Annotated[int, Meta(ge=0, le=100, description="charge of the tracker's computer")] | None
     superseded: Annotated[
         int, Meta(ge=0, le=2**53, description="reports that a newer one overtook before they could be sent")
