@@ -149,7 +149,7 @@ def test_the_udev_rules_are_printed_and_recognised(tmp_path: Path) -> None:
     (tmp_path / ports.RULES).write_text(done.stdout)
     assert ports.rules_findings((tmp_path,)) == []
     (tmp_path / ports.RULES).write_text("# old")
-    assert "not this version's" in str(ports.rules_findings((tmp_path,))[0])
+    assert "is of another version" in str(ports.rules_findings((tmp_path,))[0])
 
 
 def test_roles_by_usb_identifiers() -> None:
