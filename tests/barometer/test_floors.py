@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_kernels as vertical
+from echostep.barometer import vertical_model as vertical
 from echostep.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
 from echostep.barometer.floor_filter import FloorFilter, checked_heights
 from echostep.barometer.floor_record import find_storeys, stays

@@ -110,7 +110,7 @@ def test_strapdown_follows_a_turning_and_accelerating_body_exactly() -> None:
     nav = ins.new_nav(ins.Noise())
     forces = [expm(cross(rate) * (k - 0.5) * dt).T @ (accel + [0.0, 0.0, ins.GRAVITY_M_S2]) for k in range(n + 1)]
     for k in range(n):
-        ins.predict(nav, dt, dt, forces[k], forces[k + 1], rate, rate)
+        ins.propagate(nav, dt, dt, forces[k], forces[k + 1], rate, rate)
     t = n * dt
     assert np.array(ins.rotation(nav.attitude)) == pytest.approx(expm(cross(rate) * t), abs=1e-9)
     assert nav.velocity == pytest.approx(accel * t, abs=1e-4)
@@ -126,7 +126,7 @@ def test_attitude_is_right_to_second_order_when_the_axis_turns() -> None:
     def integrate(dt: float, n: int) -> Floats:
         nav, force = ins.new_nav(ins.Noise()), np.zeros(3)
         for k in range(n):
-            ins.predict(nav, dt, dt, force, force, rate((k - 0.5) * dt), rate((k + 0.5) * dt))
+            ins.propagate(nav, dt, dt, force, force, rate((k - 0.5) * dt), rate((k + 0.5) * dt))
         return np.array(ins.rotation(nav.attitude))
 
     fine, coarse = integrate(1e-4, 10_000), integrate(0.01, 100)
@@ -140,7 +140,7 @@ def test_transition_is_the_derivative_of_the_strapdown_step() -> None:
 
     def after(errors: Floats) -> ins.Nav:
         moved = apply_errors(nav, errors)
-        ins.predict(moved, dt, dt, forces[0], forces[1], rates[0], rates[1])
+        ins.propagate(moved, dt, dt, forces[0], forces[1], rates[0], rates[1])
         return moved
 
     here, eps = after(np.zeros(15)), 1e-6
@@ -149,7 +149,7 @@ def test_transition_is_the_derivative_of_the_strapdown_step() -> None:
         single = copied(nav)
         single.P[:] = 0.0
         single.P[at, at] = 1e8
-        ins.predict(single, dt, dt, forces[0], forces[1], rates[0], rates[1])
+        ins.propagate(single, dt, dt, forces[0], forces[1], rates[0], rates[1])
         column = single.P[:15, at] / 1e8 / transition[at, at]
         assert column == pytest.approx(transition[:, at], abs=2e-3)
 
@@ -160,7 +160,7 @@ def test_update_agrees_with_the_textbook() -> None:
         nav = some_nav(rng)
         before = copied(nav)
         error, variance = 1e-3 * float(rng.standard_normal()), 0.3
-        ins.observe(nav, at, error, variance)
+        ins.update(nav, at, error, variance)
         h = np.eye(ins.SIZE)[at : at + 1]
         gain = before.P @ h.T / (h @ before.P @ h.T + variance)
         joseph = np.eye(ins.SIZE) - gain @ h

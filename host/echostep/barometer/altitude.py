@@ -1,10 +1,10 @@
-"""Heights from pressure, sample by sample: what the weather, doors and fans do to pressure is told from what the wearer does.
+"""Heights from pressure, sample by sample; effects of weather, doors and fans are separated from vertical motion.
 
 In: pressures with times, and what is known of temperature, gait, foot and plan. Out: `Heights`: height above the start with its variance,
-vertical speed, probability of going up or down. Owns the running column of air and the filter's state (`vertical.py`).
+vertical speed, probability of going up or down. Owns the pressure of the last sample (`AirColumn`) and the state of `vertical_filter`.
 
-Pressure to height is hypsometric, dh = -(R T / g) dp / p, summed from sample to sample, so that a warming device does not lift anybody who
-stands. T is the air's: a device is never long colder than the air about it, but often warmer (body, electronics), so what it reads above 20 degC
+Pressure to height is hypsometric, dh = -(R T / g) dp / p, summed from sample to sample, so that a change of temperature alone moves no
+height. T is the air's: a device is never long colder than the air about it, but often warmer (body, electronics), so what it reads above 20 degC
 counts half. Without a reading 20 degC are taken: an error of 3 K makes 1 % of the rise.
 """
 
@@ -17,11 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats
-from echostep.barometer import vertical_kernels as vertical
+from echostep.barometer import vertical_model as vertical
 from echostep.barometer.vertical_filter import Hypotheses
 from echostep.jit import kernel
 
 Codes = NDArray[np.int8]
+
+LAST_T, LAST_PA, HEIGHT_M, AIR_C = range(
+    4
+)  # state of `AirColumn`: last sample's time and pressure, claimed height, temperature
 
 AIR_J_KG_K, GRAVITY_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C, COLDEST_C, WARMEST_C = 20.0, -30.0, 45.0
@@ -83,7 +87,7 @@ class AirColumn:
         self._state = np.array([math.nan, math.nan, 0.0, math.nan])  # t_s, pressure, claimed height, temperature
 
     def rows(self, samples: Pressures) -> tuple[Floats, Bools]:
-        """Rows (m, 9) for `vertical.follow`, and which of the n samples they are: those that are numbers, possible and later than the one before."""
+        """Rows (m, 9) for the kernel, and which of the n samples they are: those that are numbers, possible and later than the one before."""
         n = len(samples.t_s)
         temperature = np.full(n, np.nan) if samples.temperature_c is None else samples.temperature_c
         if self._settings.air_c is not None:
@@ -110,11 +114,11 @@ class Altitude:
     def feed(self, samples: Pressures) -> Heights:
         """Heights at the samples that could be used; what is no pressure, or not later than the sample before, is left out."""
         seen, used = self._column.rows(samples)
-        found = self._hypotheses.follow(seen)
-        return _heights(samples.t_s[used], found, found[:, :, 0])
+        found = self._hypotheses.filter(seen)
+        return _heights(samples.t_s[used], found, found[:, :, vertical.RESULT_WEIGHT])
 
     def smooth(self, samples: Pressures) -> Heights:
-        """Heights at the samples of a whole record: whether he moved is judged by all of it; once for an `Altitude`."""
+        """Heights at the samples of a whole record: motion is judged by all samples; the last call on an `Altitude`."""
         seen, used = self._column.rows(samples)
         return _heights(samples.t_s[used], *self._hypotheses.smooth(seen))
 
@@ -129,9 +133,9 @@ def noise_of(pressure_pa: Floats) -> float:
 
 def _heights(t_s: Floats, found: Floats, w: Floats) -> Heights:
     """Mean and variance over the hypotheses."""
-    h, v = found[:, :, 1], found[:, :, 2]
+    h, v = found[:, :, vertical.RESULT_HEIGHT], found[:, :, vertical.RESULT_RATE]
     mean = (w * h).sum(axis=1)
-    variance = (w * (found[:, :, 4] + (h - mean[:, None]) ** 2)).sum(axis=1)
+    variance = (w * (found[:, :, vertical.RESULT_VARIANCE] + (h - mean[:, None]) ** 2)).sum(axis=1)
     moving = w * (np.arange(vertical.MODES) % vertical.WAYS != vertical.ON)
     speed = (moving * v).sum(axis=1)
     return Heights(t_s, mean, variance, speed, moving.sum(axis=1))
@@ -149,21 +153,23 @@ def _claim(
 ) -> None:
     """Time since the last good sample, the height that pressure claims, and metres for a pascal, into `seen`."""
     for i in range(len(t_s)):
-        if not (LOWEST_PA <= pressure_pa[i] <= HIGHEST_PA and (t_s[i] > state[0] or state[0] != state[0])):
+        if not (
+            LOWEST_PA <= pressure_pa[i] <= HIGHEST_PA and (t_s[i] > state[LAST_T] or state[LAST_T] != state[LAST_T])
+        ):
             continue
         if not math.isfinite(t_s[i]):
             continue
         if COLDEST_C <= temperature_c[i] <= WARMEST_C:
             warm = temperature_c[i] - INDOORS_C
-            state[3] = INDOORS_C + (warm if known or warm < 0.0 else 0.5 * warm)
-        elif state[3] != state[3]:
-            state[3] = INDOORS_C
-        metres = AIR_J_KG_K * (state[3] + ZERO_C_K) / GRAVITY_M_S2
-        first = state[0] != state[0]
+            state[AIR_C] = INDOORS_C + (warm if known or warm < 0.0 else 0.5 * warm)
+        elif state[AIR_C] != state[AIR_C]:
+            state[AIR_C] = INDOORS_C
+        metres = AIR_J_KG_K * (state[AIR_C] + ZERO_C_K) / GRAVITY_M_S2
+        first = state[LAST_T] != state[LAST_T]
         if not first:
-            state[2] -= metres * math.log(pressure_pa[i] / state[1])
-        seen[i, 0] = 0.05 if first else t_s[i] - state[0]
-        seen[i, 1] = state[2]
-        seen[i, 2] = metres / pressure_pa[i]
-        state[0], state[1] = t_s[i], pressure_pa[i]
+            state[HEIGHT_M] -= metres * math.log(pressure_pa[i] / state[LAST_PA])
+        seen[i, vertical.DT] = 0.05 if first else t_s[i] - state[LAST_T]
+        seen[i, vertical.CLAIMED] = state[HEIGHT_M]
+        seen[i, vertical.NOISE] = metres / pressure_pa[i]
+        state[LAST_T], state[LAST_PA] = t_s[i], pressure_pa[i]
         used[i] = True

@@ -3,7 +3,7 @@
 In: `Pressures` and the storeys' heights. Out: probabilities of each floor, the height in the building's frame; live, sample by sample, or from a
 whole record, where what comes later helps: an ambiguous start is resolved when the walk shows which storeys fit. Owns nothing but its `Hypotheses`.
 
-A floor is the index into `heights_m`. On stairs and in a lift the nearest storey counts: the floor changes when he passes the middle between two.
+A floor is the index into `heights_m`. On stairs and in a lift the nearest storey counts: the floor changes at the middle between two levels.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.barometer import vertical_kernels as vertical
+from echostep.barometer import vertical_model as vertical
 from echostep.barometer.altitude import AirColumn, BarometerSettings, Pressures
 from echostep.barometer.vertical_filter import Hypotheses
 from echostep.errors import EchostepError
@@ -53,8 +53,8 @@ class FloorFilter:
     def feed(self, samples: Pressures) -> Floors:
         """Floors at the samples that could be used, each by what was known then."""
         seen, used = self._column.rows(samples)
-        found = self._hypotheses.follow(seen)
-        return _floors(samples.t_s[used], self.heights_m, found, found[:, :, 0])
+        found = self._hypotheses.filter(seen)
+        return _floors(samples.t_s[used], self.heights_m, found, found[:, :, vertical.RESULT_WEIGHT])
 
     def smooth(self, samples: Pressures) -> Floors:
         """Floors at the samples of a whole record, each by all of it; a filter can do so once."""
@@ -80,12 +80,12 @@ def checked_heights(heights_m: Floats) -> Floats:
 
 
 def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats) -> Floors:
-    """Floors by weights (n, 15 k): the storey of those who are on one, the nearest one of those between."""
+    """Floors by weights (n, 15 k): the hypothesis' level when on one, the nearest levels by its height otherwise."""
     n, count = len(found), len(heights_m)
     middles = 0.5 * (heights_m[1:] + heights_m[:-1])
     probability = np.zeros((n, count))
-    height = found[:, :, 1]
-    sd = np.sqrt(np.maximum(found[:, :, 4], 1e-6))
+    height = found[:, :, vertical.RESULT_HEIGHT]
+    sd = np.sqrt(np.maximum(found[:, :, vertical.RESULT_VARIANCE], 1e-6))
     for k in range(count):
         for mode in range(vertical.MODES):
             s = k * vertical.MODES + mode
@@ -108,7 +108,7 @@ def _floors(t_s: Floats, heights_m: Floats, found: Floats, weight: Floats) -> Fl
 
 
 def _height(heights_m: Floats, floor: Ints, height: Floats, weight: Floats) -> Floats:
-    """Mean height of the hypotheses that have him nearest to the named floor."""
+    """Mean height of the hypotheses whose nearest level is the reported floor."""
     nearest = np.abs(height[:, :, None] - heights_m).argmin(axis=2) == floor[:, None]
     w = weight * nearest
     total = w.sum(axis=1)
@@ -116,5 +116,5 @@ def _height(heights_m: Floats, floor: Ints, height: Floats, weight: Floats) -> F
 
 
 def _normal_cdf(x: Floats) -> Floats:
-    """Of the standard normal distribution, to 1e-4 and better, by its logistic approximation [Bowling et al. 2009]."""
+    """Cumulative standard normal distribution, error below 1e-4, by its logistic approximation [Bowling et al. 2009]."""
     return np.asarray(1.0 / (1.0 + np.exp(-np.clip(1.5976 * x + 0.07056 * x**3, -700.0, 700.0))))

@@ -13,7 +13,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.barometer.altitude import AirColumn, Altitude, BarometerSettings, Heights, Pressures, noise_of
 from echostep.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
-from echostep.barometer.vertical_kernels import CLAIMED
+from echostep.barometer.vertical_model import CLAIMED
 from echostep.errors import EchostepError
 
 Way = tuple[int, int, float]  # from one storey to another, and metres up

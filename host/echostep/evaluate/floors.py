@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.barometer import vertical_kernels as vertical
+from echostep.barometer import vertical_model as vertical
 from echostep.barometer.altitude import BarometerSettings, Pressures
 from echostep.barometer.floor_filter import FloorFilter, Floors
 from echostep.evaluate.report import Row, Table, rows_by_name

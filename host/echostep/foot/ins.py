@@ -3,8 +3,8 @@
 In: specific force and angular rate of the foot. Out: position, velocity, attitude and their covariance, in a `Nav` that the caller owns.
 
 Errors are true minus estimated, in the order of the constants below [Foxlin 2005; Nilsson et al. 2012]; attitude errors turn about the walk
-frame's axes. `YAW` repeats the attitude's third error but is never forgotten, so that the growth of the heading's error stays known when the
-position and yaw errors of earlier steps have been handed over to whoever adds the steps up.
+frame's axes. `YAW` repeats the attitude's third error but is never reset: it keeps the growth of the heading's error known after the position and
+yaw errors of earlier steps have been handed over with those steps.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ GRAVITY_M_S2 = 9.81
 POS, VEL, TILT, GYRO_BIAS, ACCEL_BIAS, YAW, SIZE = 0, 3, 6, 9, 12, 15, 16
 
 MOTION_S = 0.1  # a foot keeps its motion for about so long: in that time its scale and alignment errors repeat
-MISSED_SHARE = 1.0  # of the change over a time without samples: a blow may have come and gone
-GYRO_CHANGE_SHARE = 0.01  # of the rate's: a mean over the period loses no angle, but for its axis
+MISSED_SHARE = 1.0  # of the change over a time without samples: an impact may fall between two samples
+GYRO_CHANGE_SHARE = 0.01  # of the rate's change: a mean over the period keeps the angle, only its axis errs
 ACCEL_WANDER = 1e-4  # m/s2 per root s
 GYRO_WANDER = 1e-5  # rad/s per root s
 
 
 class Noise(NamedTuple):
-    """How wrong an MTx-class sensor on a shoe, and the models of it, are: one setting for everybody (`evaluate feet --leave-one-out`)."""
+    """Error model of an MTx-class sensor on a shoe; one setting for all wearers, fitted by `evaluate feet --leave-one-out`."""
 
-    accel: float = 0.03  # m/s2 per root Hz; a hundred times the data sheet's: vibration
+    accel: float = 0.03  # m/s2 per root Hz; a hundred times the data sheet's, for vibration
     gyro: float = 1e-3  # rad/s per root Hz
-    accel_share: float = 0.005  # of the acceleration, by scale and alignment, as calibrated sensors have it
+    accel_share: float = 0.005  # of the acceleration: scale and alignment errors of a calibrated sensor
     gyro_share: float = 0.01  # of the rate
-    change_share: float = 0.1  # of the change of the force from one sample to the next is lost between them: a blow
-    lever_m: float = 0.1  # the foot's point of contact is known to within the foot
-    rest_m_s: float = 0.005
-    kept_s: float = 0.1  # a rest's velocity is wrong by the same for so long: more samples in that time say no more
-    flat_m: float = 0.01  # how level a floor is from step to step
+    change_share: float = 0.1  # of the force's change between two samples is lost, as in an impact
+    lever_m: float = 0.1  # sd of the lever arm from sensor to point of contact
+    rest_m_s: float = 0.005  # sd of a resting foot's velocity
+    kept_s: float = 0.1  # correlation time of that velocity error: samples within it carry no more information
+    flat_m: float = 0.01  # sd of a level floor's height from step to step
 
 
 class Nav(NamedTuple):
@@ -61,7 +61,7 @@ class Nav(NamedTuple):
 
 
 def new_nav(noise: Noise) -> Nav:
-    """At the origin, at rest, not levelled yet."""
+    """State at the origin, at rest, not levelled yet."""
     attitude = np.array([1.0, 0.0, 0.0, 0.0])
     return Nav(np.zeros(3), np.zeros(3), attitude, np.zeros(3), np.zeros(3), np.eye(3), np.zeros((SIZE, SIZE)), noise)
 
@@ -110,13 +110,13 @@ def apply(r: Matrix, v: Floats | Vector) -> Vector:
 
 @lean_kernel
 def difference(a: Floats | Vector, b: Floats | Vector) -> Vector:
-    """A - b, of two (3,)."""
+    """The difference a - b of two (3,)."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @lean_kernel
 def _distance(a: Floats, b: Floats) -> float:
-    """Of two (3,)."""
+    """Distance between two (3,)."""
     d = difference(a, b)
     return math.sqrt(dot(d, d))
 
@@ -137,7 +137,7 @@ def heading(nav: Nav) -> float:
 
 @lean_kernel
 def set_level(nav: Nav, force: Vector, yaw: float, at_rest: bool) -> None:
-    """Attitude from gravity: roll and pitch from the direction of the mean specific force (3,), yaw as given; at rest, bias from its size."""
+    """Attitude: roll and pitch from the direction of the mean specific force (3,), yaw as given. If `at_rest`, accelerometer bias from its norm."""
     size = max(math.sqrt(dot(force, force)), 1e-9)
     if at_rest:
         for i in range(3):
@@ -148,18 +148,18 @@ def set_level(nav: Nav, force: Vector, yaw: float, at_rest: bool) -> None:
     level = rotation(flat)
     for i in range(3):
         nav.level[i, 0], nav.level[i, 1], nav.level[i, 2] = level[i]
-    _face(nav, multiply(turning(0.0, 0.0, yaw), flat))
+    _set_attitude(nav, multiply(turning(0.0, 0.0, yaw), flat))
 
 
 @lean_kernel
-def _face(nav: Nav, q: Quaternion) -> None:
-    """Take an attitude."""
+def _set_attitude(nav: Nav, q: Quaternion) -> None:
+    """Set the attitude."""
     nav.attitude[0], nav.attitude[1], nav.attitude[2], nav.attitude[3] = q
 
 
 @lean_kernel
 def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: float, accel_bias_sd: float) -> None:
-    """At rest after levelling, with these standard deviations: what the accelerometer's bias has tilted, the filter knows to be tilted."""
+    """Covariance after levelling, velocity zero, from standard deviations; accelerometer bias and the tilt that it causes are correlated."""
     nav.velocity[:] = 0.0
     r = rotation(nav.attitude)
     P = nav.P
@@ -178,11 +178,11 @@ def set_covariance(nav: Nav, tilt_sd: float, velocity_sd: float, gyro_bias_sd: f
 
 
 @lean_kernel
-def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
+def propagate(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> None:
     """Strapdown step over `dt` with the samples of specific force and rate (3,) at its beginning and its end.
 
-    A sample is the mean over the `period` before it; what is missing of `dt` is taken as straight between both. How the rates and forces change
-    from one sample to the next turns the axis (coning) and the force (sculling) within the step [Savage 1998, part 1 eq. 47, part 2 eq. 56].
+    A sample is the mean over the `period` before it; the rest of `dt` is interpolated linearly between both. The change of rate and force from
+    one sample to the next gives the coning and sculling corrections [Savage 1998, part 1 eq. 47, part 2 eq. 56].
     """
     seen = min(0.5 + 0.5 * period / dt, 1.0) if dt > 0.0 else 1.0
     rate = _mean(seen, rate0, rate1, nav.gyro_bias)
@@ -195,7 +195,7 @@ def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, 
         dt * rate[1] + c * (rate0[2] * rate1[0] - rate0[0] * rate1[2]),
         dt * rate[2] + c * (rate0[0] * rate1[1] - rate0[1] * rate1[0]),
     )
-    _face(nav, multiply(nav.attitude, whole))
+    _set_attitude(nav, multiply(nav.attitude, whole))
     f = apply(
         r,
         (
@@ -208,8 +208,8 @@ def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, 
     for i in range(3):
         nav.position[i] += nav.velocity[i] * dt + 0.5 * accel[i] * dt * dt
         nav.velocity[i] += accel[i] * dt
-    _carry(nav.P, f, r, dt)
-    _carry(nav.P.T, f, r, dt)
+    _propagate_errors(nav.P, f, r, dt)
+    _propagate_errors(nav.P.T, f, r, dt)
     turn = apply(r, rate)
     hidden = 0.125 * dt * dt / MOTION_S  # a motion that begins and ends between two samples
     missed = MISSED_SHARE * (1.0 - seen)
@@ -222,7 +222,7 @@ def predict(nav: Nav, dt: float, period: float, force0: Floats, force1: Floats, 
 
 @lean_kernel
 def _mean(share: float, earlier: Floats, later: Floats, bias: Floats) -> Vector:
-    """So much of the later sample (3,), the rest of the earlier one, less the bias."""
+    """Mean of two samples (3,), the later one weighted by `share`, less the bias."""
     rest = 1.0 - share
     return (
         share * later[0] + rest * earlier[0] - bias[0],
@@ -233,13 +233,13 @@ def _mean(share: float, earlier: Floats, later: Floats, bias: Floats) -> Vector:
 
 @lean_kernel
 def _sculling(j: int, k: int, force0: Floats, force1: Floats, rate0: Floats, rate1: Floats) -> float:
-    """The component of rate0 x force1 + force0 x rate1 that is square to j and k."""
+    """The component perpendicular to axes j and k of rate0 x force1 + force0 x rate1."""
     return rate0[j] * force1[k] - rate0[k] * force1[j] + force0[j] * rate1[k] - force0[k] * rate1[j]
 
 
 @lean_kernel
-def _carry(m: Floats, f: Vector, r: Matrix, dt: float) -> None:
-    """The errors after dt: m <- F m, F = 1 + dt (dp = v, dv = -[f x] tilt - R b_a, dtilt = -R b_g); on P and then on its transpose: F P F'."""
+def _propagate_errors(m: Floats, f: Vector, r: Matrix, dt: float) -> None:
+    """Propagate errors over dt: m <- F m, F = 1 + dt (dp = v, dv = -[f x] tilt - R b_a, dtilt = -R b_g); applied to P and to P' it gives F P F'."""
     for c in range(SIZE):
         for i in range(3):
             m[POS + i, c] += dt * m[VEL + i, c]
@@ -260,7 +260,7 @@ def _carry(m: Floats, f: Vector, r: Matrix, dt: float) -> None:
 def _add_noise(
     P: Floats, noise: Noise, dt: float, accel: Vector, rate: Vector, lost_m_s: float, lost_rad: float
 ) -> None:
-    """Process noise; scale errors of the gyros turn the foot about the axis about which it turns anyway."""
+    """Add process noise to P; scale errors of the gyros act along the present axis of rotation, `rate` (3,) in the walk frame."""
     moving = accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2
     velocity = (noise.accel**2 + noise.accel_share**2 * moving * MOTION_S) * dt + lost_m_s**2
     tilt = noise.gyro**2 * dt + lost_rad**2
@@ -281,11 +281,11 @@ def _add_noise(
 
 
 @lean_kernel
-def observe(nav: Nav, at: int, error: float, variance: float) -> None:
-    """Kalman update: error number `at` has been seen to be `error`, with this variance; the corrections go into the state."""
+def update(nav: Nav, component: int, error: float, variance: float) -> None:
+    """Scalar Kalman update: the error state `component` is measured as `error` with this variance; the correction goes into the state."""
     P = nav.P
-    row = P[at]
-    total = row[at] + variance
+    row = P[component]
+    total = row[component] + variance
     share = error / total
     for i in range(3):
         nav.position[i] += share * row[POS + i]
@@ -293,9 +293,9 @@ def observe(nav: Nav, at: int, error: float, variance: float) -> None:
         nav.gyro_bias[i] += share * row[GYRO_BIAS + i]
         nav.accel_bias[i] += share * row[ACCEL_BIAS + i]
     turned = turning(share * row[TILT], share * row[TILT + 1], share * row[TILT + 2])
-    _face(nav, multiply(turned, nav.attitude))
+    _set_attitude(nav, multiply(turned, nav.attitude))
     for k in range(1, SIZE + 1):
-        i = (at + k) % SIZE  # the row itself last: the others need it as it was
+        i = (component + k) % SIZE  # the row itself last: the others need it as it was
         gain = row[i] / total
         for j in range(SIZE):
             P[i, j] -= gain * row[j]
@@ -303,18 +303,18 @@ def observe(nav: Nav, at: int, error: float, variance: float) -> None:
 
 @lean_kernel
 def turn(nav: Nav, centre: Floats, angle: float) -> None:
-    """The yaw was wrong by this angle since the foot left `centre` (3,)."""
+    """Correct the yaw by an angle (rad), and position and velocity since the foot left `centre` (3,) with it."""
     c, s = math.cos(angle), math.sin(angle)
     x, y = nav.position[0] - centre[0], nav.position[1] - centre[1]
     u, v = nav.velocity[0], nav.velocity[1]
     nav.position[0], nav.position[1] = centre[0] + c * x - s * y, centre[1] + s * x + c * y
     nav.velocity[0], nav.velocity[1] = c * u - s * v, s * u + c * v
-    _face(nav, multiply(turning(0.0, 0.0, angle), nav.attitude))
+    _set_attitude(nav, multiply(turning(0.0, 0.0, angle), nav.attitude))
 
 
 @lean_kernel
-def forget_start(nav: Nav) -> None:
-    """Where the foot stands and looks now becomes the reference: those errors belong to the steps already told."""
-    for at in (POS, POS + 1, POS + 2, TILT + 2):
-        nav.P[at, :] = 0.0
-        nav.P[:, at] = 0.0
+def reset_reference(nav: Nav) -> None:
+    """Make the present position and yaw the reference: their errors belong to the steps already reported."""
+    for component in (POS, POS + 1, POS + 2, TILT + 2):
+        nav.P[component, :] = 0.0
+        nav.P[:, component] = 0.0

@@ -1,10 +1,10 @@
-"""How the sensor sits on the foot: up from gravity, the toe from how the foot tips while it swings.
+"""Mounting of the sensor on the foot: the direction of the toe, from how the foot tips while it swings.
 
 In: the attitude at each sample of a swing. Out: the angle from the foot's yaw to the direction of its toe. The caller owns the sums.
 
-Gravity at rest gives the level (`ins.set_level`). A foot tips about the axis from its right to its left, and it tips toe down much further than
-toe up: over the ball at push-off, forward, backward and sideways alike, and towards the floor on stairs [Perry 1992]. So the second moment of the
-tilt gives the axis, its third moment the sign, and the direction of the steps is not needed.
+Gravity at rest gives the level (`ins.set_level`). The foot tips about the axis from its right to its left, and much further toe down than
+toe up: over the ball at push-off, whether it steps forward, backward or sideways, and towards the floor on stairs [Perry 1992]. So the second
+moment of the tilt gives the axis, its third moment the sign; the direction of the steps is not used.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ from echostep.foot import ins
 from echostep.foot.ins import Nav, Vector
 from echostep.jit import lean_kernel
 
-ENOUGH_RAD2_S = 0.1  # less than one whole stride: the first half step of a walk may tip toe up only
-ROUND = 0.6  # a tilt about one axis has squares along it only; noise and twisting feet add some across
-MEMORY = 0.95  # of a swing, at the next
+ENOUGH_RAD2_S = (
+    0.1  # second moment of the tilt; less than one whole stride's, as the first half step of a walk may tip toe up only
+)
+ROUND = 0.6  # least anisotropy of the second moment: 1 is a tilt about one axis, 0 one about all axes alike
+MEMORY = 0.95  # weight of the sums of earlier swings, per swing
 
 
 @lean_kernel
 def tilt(nav: Nav) -> Vector:
-    """How far the foot is tipped from its level: rotation vector (3,), z = 0, in the levelled axes of the foot itself."""
+    """Tilt of the foot against its level: rotation vector (3,), z = 0, in the levelled axes of the foot itself."""
     r = ins.rotation(nav.attitude)
     yaw = ins.heading(nav)
     c, s = math.cos(yaw), math.sin(yaw)
@@ -39,7 +41,7 @@ def tilt(nav: Nav) -> Vector:
 
 
 @lean_kernel
-def watch(square: Floats, cube: Floats, tipped: Vector, dt: float) -> None:
+def accumulate(square: Floats, cube: Floats, tipped: Vector, dt: float) -> None:
     """Add a sample of a swing, tipped by (3,) rad since the last stance: second moments xx, xy, yy and third moment times the vector."""
     x, y, _ = tipped
     square[0] += dt * x * x
@@ -51,7 +53,7 @@ def watch(square: Floats, cube: Floats, tipped: Vector, dt: float) -> None:
 
 @lean_kernel
 def toe(square: Floats, cube: Floats) -> float:
-    """Angle (rad) from the foot's yaw to its toe; NaN as long as the foot has not tipped enough to tell."""
+    """Angle (rad) from the foot's yaw to its toe; NaN while the foot has not tipped enough."""
     whole = square[0] + square[2]
     along = math.hypot(square[0] - square[2], 2.0 * square[1])
     if whole < ENOUGH_RAD2_S or along < ROUND * whole:

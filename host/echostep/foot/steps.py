@@ -1,8 +1,7 @@
-"""Zero-velocity inertial navigation of one foot: samples -> stances and steps.
+"""Zero-velocity-aided inertial navigation of one foot: samples -> stances and steps.
 
 In: time, specific force and angular rate of the foot, any mounting, 50-500 Hz. Out: `Step` when the foot has landed, `Stance` when it has left.
-Owns the filter's state (`ins`), the stance detector's (`stance`) and the footing (`footsteps`). Walk frame: levelled, z up, origin and yaw those
-of the first rest; yaw is how far the foot has turned since.
+Owns the state of the kernel `zupt_ins`. Walk frame: levelled, z up, origin and yaw those of the first rest; yaw is the foot's turn since then.
 """
 
 from __future__ import annotations
@@ -13,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.foot import ins, stance
-from echostep.foot import zupt_ins as footsteps
-from echostep.foot.magnetometer import new_compass
+from echostep.foot import ins, stance, zupt_ins
+from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
 
 NO_MAG: Floats = np.empty((0, 3))
 
@@ -42,7 +40,7 @@ class Step:
 
     `heading_rad` is its yaw after the step. The covariance holds for a known yaw before the step; `heading_sd_rad` is the growth of the yaw's
     error: its square is the growth of the variance. All moves together are the position. `toe_rad` is the angle from the yaw to the direction of the
-    toe, as known so far; None until the foot has tipped enough to tell.
+    toe, as known so far; None until the foot has tipped enough to estimate it.
     """
 
     t_start_s: float
@@ -56,10 +54,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class FootCounts:
-    """Samples that came; `impossible` (not finite, or beyond any foot) and `not_later` ones were skipped, `saturated` ones trusted less.
+    """Counts of samples: all; skipped as `impossible` (not finite, or beyond any foot) or `not_later`; `saturated` ones, with inflated covariance.
 
-    `forced` samples of rest contradicted the filter, which gave in. After each of the `gaps`, and when all rests contradict the filter, the
-    foot waits for a new level.
+    `forced`: samples of rest accepted against the innovation gate. After each of the `gaps`, which include long runs of forced rest, the foot
+    is levelled anew.
     """
 
     samples: int
@@ -104,20 +102,20 @@ class FootEvents:
 
 
 class Foot:
-    """Feed it samples in any portions; equal samples give equal events, bit for bit."""
+    """Live processing; equal samples give equal events, bit for bit, in whatever portions they are fed."""
 
     def __init__(self, settings: FootSettings | None = None, noise: ins.Noise | None = None) -> None:
-        self._height_m = (settings or FootSettings()).height_m
-        self._footing = np.zeros(1, footsteps.FOOTING)
+        self._zupt = np.zeros(1, zupt_ins.ZUPT_STATE)
+        self._zupt["height_m"] = (settings or FootSettings()).height_m
         self._nav = ins.new_nav(noise or ins.Noise())
         self._window = stance.new_window()
-        self._rest = stance.new_rest()
+        self._sums = stance.new_zaru_sums()
         self._compass = new_compass()
 
     @property
     def in_stance(self) -> bool:
         """Whether the foot stands."""
-        return bool(self._footing["in_stance"][0])
+        return bool(self._zupt["in_stance"][0])
 
     @property
     def position_m(self) -> tuple[float, float, float]:
@@ -133,40 +131,39 @@ class Foot:
     @property
     def compass(self) -> tuple[int, int]:
         """Stances in which the magnetometer was trusted, and in which it was read."""
-        return int(self._compass.seen[2]), int(self._compass.seen[0])
+        return int(self._compass.seen[TRUSTED]), int(self._compass.seen[MEASURED])
 
     @property
     def counts(self) -> FootCounts:
-        """What the samples were like so far."""
-        return FootCounts(*(int(self._footing[name][0]) for name in FootCounts.__slots__))
+        """Counts of the samples so far."""
+        return FootCounts(*(int(self._zupt[name][0]) for name in FootCounts.__slots__))
 
     def feed(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> list[Step | Stance]:
         """Events of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, mag (n, 3) of any unit, body frame.
 
         Raises ValueError for other shapes.
         """
-        return self._run(t_s, accel, gyro, mag, np.empty((0, footsteps.ROW_SIZE)))
+        return self._run(t_s, accel, gyro, mag, np.empty((0, zupt_ins.ROW_SIZE)))
 
     def track(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:
-        """The same, and when each event was told."""
-        rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
+        """As `feed`, with the sample after which each event was known."""
+        rows = np.zeros((len(t_s), zupt_ins.ROW_SIZE))
         events = self._run(t_s, accel, gyro, mag, rows)
-        told = np.searchsorted(rows[:, 5], np.arange(1, len(events) + 1))
-        return FootEvents(events, told, rows[:, 3], rows[:, 4] > 0.0)
+        known = np.searchsorted(rows[:, 5], np.arange(1, len(events) + 1))
+        return FootEvents(events, known, rows[:, 3], rows[:, 4] > 0.0)
 
     def _run(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None, rows: Floats) -> list[Step | Stance]:
+        """Events of the samples; fills `rows` (n, ROW_SIZE), or nothing where it is empty."""
         t_s, accel, gyro = (np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro))
         mag = NO_MAG if mag is None else np.ascontiguousarray(mag, np.float64)
         if t_s.ndim != 1 or any(v.shape != (len(t_s), 3) for v in (accel, gyro, *([] if mag is NO_MAG else [mag]))):
             raise ValueError(
                 f"samples of shapes {t_s.shape}, {accel.shape}, {gyro.shape}; expected (n,), (n, 3), (n, 3), mag as gyro"
             )
-        events = np.zeros((footsteps.EVENTS_PER_SAMPLE * len(t_s), footsteps.EVENT_SIZE))
-        found = footsteps.walk(
-            self._footing[0], self._nav, self._window, self._rest, self._compass, self._height_m,
-            t_s, accel, gyro, mag, events, rows,
-        )  # fmt: skip
-        return [_event(row) for row in events[:found]]
+        events = np.zeros((zupt_ins.EVENTS_PER_SAMPLE * len(t_s), zupt_ins.EVENT_SIZE))
+        state = zupt_ins.FootState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
+        count = zupt_ins.process(state, zupt_ins.Samples(t_s, accel, gyro, mag), zupt_ins.Output(events, rows))
+        return [_event(row) for row in events[:count]]
 
 
 def walk_track(
@@ -177,9 +174,9 @@ def walk_track(
     noise: ins.Noise | None = None,
     mag: Floats | None = None,
 ) -> Track:
-    """The whole walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s at once: what `Foot` would have told live."""
+    """The whole walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s at once, equal to what `Foot` gives live."""
     foot = Foot(settings, noise)
-    rows = np.zeros((len(t_s), footsteps.ROW_SIZE))
+    rows = np.zeros((len(t_s), zupt_ins.ROW_SIZE))
     events = foot._run(t_s, accel, gyro, mag, rows)
     return Track(
         np.asarray(t_s, np.float64),
@@ -193,9 +190,10 @@ def walk_track(
 
 
 def _event(row: Floats) -> Step | Stance:
+    """The event of a row (EVENT_SIZE,)."""
     kind, start, end, dx, dy, dz = row[:6].tolist()
     heading, heading_sd, toe = row[15:].tolist()
-    if kind == footsteps.STANCE:
+    if kind == zupt_ins.STANCE:
         return Stance(start, end, heading)
     return Step(
         start, end, (dx, dy, dz), row[6:15].reshape(3, 3).copy(), heading, heading_sd, None if math.isnan(toe) else toe

@@ -1,14 +1,13 @@
-"""A recorded foot IMU as a CSV file, for researchers: read with suspicion, tracked by the same kernel as live.
+"""A recorded foot IMU as a CSV file: samples checked and read, the track written and described.
 
-In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s, any unit), 50 to 500 Hz, any mounting. Out: `Imu` with what had to be mended, or an
-EchostepError; the track as CSV and in words. Owns nothing. `imu_checks` knows what is wrong with samples.
+In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s, any unit), 50 to 500 Hz, any mounting. Out: `Imu` with notes on what was
+mended, or an EchostepError; the track as CSV and in words. Owns nothing. `imu_checks` holds the checks.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +18,12 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
+from echostep.offline.csv_table import CsvLimits, header_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")
 TRACK_COLUMNS = ("t_s", "x", "y", "z", "heading_rad", "stance")
-LONGEST_LINE = 10_000
-EARLY_ROWS, MOST_BAD = 2000, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,71 +42,32 @@ class Imu:
 
 def load_imu(path: Path | str) -> Imu:
     """Samples of a CSV file; raises EchostepError that names the file and what is wrong with which column."""
-    try:
-        with Path(path).open(newline=None, encoding="utf-8-sig", errors="replace") as file:
-            table, holes = whole_rows(_table(_lines(file)))
-        table, mended = sorted_by_time(table)
-        if wrong := complaint(table, COLUMNS):
-            raise ValueError(wrong)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+    table, mended = open_samples(path, _mended_table)
     mag = table[:, 7:10] if table.shape[1] > len(COLUMNS) else None
-    return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*holes, *mended, *notes(table, COLUMNS)))
+    return Imu(table[:, 0], table[:, 1:4], table[:, 4:7], mag, (*mended, *notes(table, COLUMNS)))
 
 
-def _lines(file: TextIO) -> Iterator[str]:
-    """Lines of a bounded length; raises ValueError for a longer one, which is no line of numbers."""
-    number = 0
-    while line := file.readline(LONGEST_LINE):
-        number += 1
-        if len(line) == LONGEST_LINE:
-            raise ValueError(f"line {number} is longer than {LONGEST_LINE} characters: is this a CSV file?")
-        yield line
+def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
+    """Usable rows (n, 7) or (n, 10) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
+    table, holes = whole_rows(_table(lines_of(file, CsvLimits())))
+    table, mended = sorted_by_time(table)
+    if wrong := complaint(table, COLUMNS):
+        raise ValueError(wrong)
+    return table, (*holes, *mended)
 
 
 def _table(lines: Iterator[str]) -> Floats:
-    """The columns (n, 7) or (n, 10)."""
-    first = next(lines, "")
-    comma = max(",;\t", key=first.count)
-    header = [name.strip().strip('"') for name in first.split(comma)]
+    """The columns (n, 7), or (n, 10) with a magnetometer."""
+    header, separator = header_of(next(lines, ""))
     if missing := [name for name in COLUMNS if name not in header]:
-        hint = ": the first line must name the columns" if _is_numbers(header) else ""
+        hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
         raise ValueError(f"no column {', '.join(missing)}{hint}; expected {','.join(COLUMNS)}[,mx,my,mz]")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
-    places = [header.index(name) for name in wanted]
-    found, rows, bad = array("d"), 0, 0
-    for line in lines:
-        if not line.strip():
-            continue
-        cells = (line.replace(",", ".") if comma == ";" else line).split(comma)
-        numbers = [_number(cells[k]) if k < len(cells) else math.nan for k in places]
-        found.extend(numbers)
-        rows += 1
-        bad += not all(map(math.isfinite, numbers[: len(COLUMNS)]))
-        if rows == EARLY_ROWS and bad > MOST_BAD * rows:
-            break  # garbage, however long
-    if rows < 2:
-        raise ValueError("no samples")
-    if bad > MOST_BAD * rows:
-        raise ValueError(f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column")
-    return np.array(found).reshape(rows, len(wanted))
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-def _is_numbers(cells: list[str]) -> bool:
-    return all(math.isfinite(_number(cell)) for cell in cells)
+    return read_rows(lines, separator, [header.index(name) for name in wanted], len(COLUMNS), CsvLimits()).values
 
 
 def checked(track: Track, path: Path | str) -> Track:
-    """The track; raises EchostepError when it contradicts itself, because then the samples are not what they are taken for."""
+    """The track; raises EchostepError when it contradicts itself, because then the samples have other units or axes than assumed."""
     if wrong := contradiction(track):
         raise EchostepError(f"{path}: {wrong}")
     return track
@@ -129,7 +88,7 @@ def write_foot_track(path: Path | str, track: Track) -> None:
 
 
 def describe_track(track: Track) -> str:
-    """Distance, closure, how well the end is known, steps and losses in words."""
+    """Distance, distance from start to end with its standard deviation, steps and skipped samples, in words."""
     steps = track.steps
     distance = sum(float(np.hypot(*step.move_m[:2])) for step in steps)
     end = track.position_m[-1] - track.position_m[0]

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import csv
 import math
-from array import array
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -22,14 +21,13 @@ from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.heading import Heading
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.strides import Flag, LegCounts, Stride, StrideEstimator, StrideSettings, distance_sd_m
+from echostep.offline.csv_table import LONGEST_LINE, CsvLimits, header_of, lines_of, open_samples, read_rows
 from echostep.offline.imu_checks import RATE_RANGE_HZ, sorted_by_time
 from echostep.papers import lee2010
 
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")
 OPTIONAL = ("belt_rad_s", "compass_rad")
 TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")
-LONGEST_LINE = 10_000
-EARLY_ROWS, MOST_BAD = 2000, 0.5
 FASTEST_LEG_RAD_S = 20.0  # of one sample in a hundred; a sprinter's shank reaches it
 MOST_TURNS = 4  # of a compass that was not wrapped
 MOST_BACK, FEW = 0.02, 100
@@ -75,58 +73,32 @@ def segments(thigh_m: float, shank_m: float, scale: float = 1.0) -> LegLengths:
 
 def load_legs(path: Path | str) -> LegSamples:
     """Samples of a CSV file; raises EchostepError that names the file and what is wrong with which column."""
-    try:
-        with Path(path).open(newline=None, encoding="utf-8-sig", errors="replace") as file:
-            table = _table(iter(lambda: file.readline(LONGEST_LINE), ""))
-        whole = np.isfinite(table[:, :3]).all(axis=1)
-        holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)
-        table, mended = sorted_by_time(table[whole])
-        if wrong := complaint(table):
-            raise ValueError(wrong)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+    table, mended = open_samples(path, _mended_table)
     later = np.concatenate([[True], table[1:, 0] > np.maximum.accumulate(table[:-1, 0])])
     t_s, thigh, shank, belt, compass = table[later].T
-    return LegSamples(t_s, thigh, shank, belt, compass, (*holes, *mended, *_notes(table)))
+    return LegSamples(t_s, thigh, shank, belt, compass, (*mended, *_notes(table)))
 
 
-def _table(lines: Iterator[str]) -> Floats:
+def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
+    """Usable rows (n, 5) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
+    table = _table(file)
+    whole = np.isfinite(table[:, :3]).all(axis=1)
+    holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)
+    table, mended = sorted_by_time(table[whole])
+    if wrong := complaint(table):
+        raise ValueError(wrong)
+    return table, (*holes, *mended)
+
+
+def _table(file: TextIO) -> Floats:
     """The columns (n, 5), NaN where the file has none or no number."""
-    first = next(lines, "")
-    comma = max(",;\t", key=first.count)
-    header = [name.strip().strip('"') for name in first.split(comma)]
+    header, separator = header_of(file.readline(LONGEST_LINE))
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(
             f"no column {', '.join(missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}]{_unit_hint(header)}"
         )
-    places = [header.index(name) if name in header else -1 for name in COLUMNS + OPTIONAL]
-    found, rows, bad = array("d"), 0, 0
-    for number, line in enumerate(lines, start=2):
-        if len(line) >= LONGEST_LINE:
-            raise ValueError(f"line {number} is longer than {LONGEST_LINE} characters: is this a CSV file?")
-        if not line.strip():
-            continue
-        cells = (line.replace(",", ".") if comma == ";" else line).split(comma)
-        numbers = [_number(cells[k]) if 0 <= k < len(cells) else math.nan for k in places]
-        found.extend(numbers)
-        rows += 1
-        bad += not all(map(math.isfinite, numbers[:3]))
-        if rows == EARLY_ROWS and bad > MOST_BAD * rows:
-            break  # garbage, however long
-    if rows < 2:
-        raise ValueError("no samples")
-    if bad > MOST_BAD * rows:
-        raise ValueError(f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column")
-    return np.array(found).reshape(rows, 5)
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+    columns = [header.index(name) if name in header else -1 for name in COLUMNS + OPTIONAL]
+    return read_rows(lines_of(file, CsvLimits(), first=2), separator, columns, len(COLUMNS), CsvLimits()).values
 
 
 def _unit_hint(header: list[str]) -> str:

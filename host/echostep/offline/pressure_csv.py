@@ -1,6 +1,6 @@
-"""A recorded barometer as a CSV file: read with suspicion, and the floors written.
+"""A recorded barometer as a CSV file: samples checked and read, the floors written.
 
-In: columns `t_s,pressure_pa[,temperature_c]`, 0.5 to 50 Hz. Out: `Pressures` with what had to be mended, or an EchostepError that names file,
+In: columns `t_s,pressure_pa[,temperature_c]`, 0.5 to 50 Hz. Out: `Pressures` with notes on what was mended, or an EchostepError that names file,
 line and field; the floors as CSV. Owns nothing.
 """
 
@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import csv
 import math
-from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
@@ -20,12 +19,12 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.barometer.altitude import COLDEST_C, HIGHEST_PA, LOWEST_PA, WARMEST_C, Pressures
 from echostep.barometer.floor_filter import Floors
 from echostep.errors import EchostepError
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, header_of, lines_of, open_samples, read_rows
 
 COLUMNS = ("t_s", "pressure_pa")
 TEMPERATURE = "temperature_c"
 FLOOR_COLUMNS = ("t_s", "floor", "probability", "height_m")
-LONGEST_LINE, MOST_LINES = 1000, 20_000_000
-MOST_BAD = 0.5
+LIMITS = CsvLimits(line_chars=1000, lines=19_999_999, early_rows=None)
 RATE_HZ = (0.45, 55.0)
 BACK_SHARE = 0.01
 LONGEST_GAP_S = 5.0
@@ -50,55 +49,23 @@ class PressureRecord:
 
 def load_pressures(path: Path | str) -> PressureRecord:
     """Samples of a CSV file; raises EchostepError that names the file, the line and the field."""
-    try:
-        with Path(path).open(newline=None, encoding="utf-8-sig", errors="replace") as file:
-            table, lines = _table(_lines(file))
-        return _checked(table, lines)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
-
-
-def _lines(file: TextIO) -> Iterator[str]:
-    for number in range(1, MOST_LINES):
-        line = file.readline(LONGEST_LINE)
-        if not line:
-            return
-        if len(line) == LONGEST_LINE:
-            raise ValueError(f"line {number} is longer than {LONGEST_LINE} characters: is this a CSV file?")
-        yield line
+    return open_samples(path, lambda file: _checked(*_table(lines_of(file, LIMITS))))
 
 
 def _table(lines: Iterator[str]) -> tuple[Floats, Ints]:
     """Columns (n, 3), NaN where there is no number, and the line of each row."""
-    first = next(lines, "")
-    comma = max(",;\t", key=first.count)
-    header = [name.strip().strip('"') for name in first.split(comma)]
+    header, separator = header_of(next(lines, ""))
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(
             f"line 1: no column {', '.join(missing)}; the first line must name t_s,pressure_pa[,temperature_c]"
         )
     if twice := [name for name in (*COLUMNS, TEMPERATURE) if header.count(name) > 1]:
         raise ValueError(f"line 1: column {twice[0]} is there twice")
-    places = [header.index(name) if name in header else -1 for name in (*COLUMNS, TEMPERATURE)]
-    found, numbers = array("d"), array("q")
-    for number, line in enumerate(lines, start=2):
-        if not line.strip():
-            continue
-        cells = (line.replace(",", ".") if comma == ";" else line).split(comma)
-        found.extend(_number(cells[k]) if 0 <= k < len(cells) else math.nan for k in places)
-        numbers.append(number)
-    if len(numbers) < 2:
+    columns = [header.index(name) if name in header else -1 for name in (*COLUMNS, TEMPERATURE)]
+    table = read_rows(lines, separator, columns, len(COLUMNS), LIMITS)
+    if len(table.line) < 2:
         raise ValueError("no samples: two rows at least are needed under the names of the columns")
-    return np.array(found).reshape(-1, 3), np.array(numbers)
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+    return table.values, table.line
 
 
 def _checked(table: Floats, lines: Ints) -> PressureRecord:
@@ -108,16 +75,16 @@ def _checked(table: Floats, lines: Ints) -> PressureRecord:
         raise ValueError(
             f"line {lines[~whole][0]}: no number in {_field(table[~whole][0])}, as in {100 * (~whole).mean():.0f} % of the rows"
         )
-    notes = _told(~whole, lines, "without a number in t_s or pressure_pa: skipped")
+    notes = _note(~whole, lines, "without a number in t_s or pressure_pa: skipped")
     table, lines = table[whole], lines[whole]
     if len(table) < 2:
         raise ValueError("no samples: two rows with numbers at least are needed")
     _check_unit(table[:, 1], lines)
     possible = (table[:, 1] >= LOWEST_PA) & (table[:, 1] <= HIGHEST_PA)
-    notes += _told(~possible, lines, f"with pressure_pa outside of {LOWEST_PA:.0f} to {HIGHEST_PA:.0f} Pa: skipped")
+    notes += _note(~possible, lines, f"with pressure_pa outside of {LOWEST_PA:.0f} to {HIGHEST_PA:.0f} Pa: skipped")
     table, lines = table[possible], lines[possible]
     again = np.concatenate([[False], np.diff(table[:, 0]) == 0.0])
-    notes += _told(again, lines, "with the t_s of the row before: skipped")
+    notes += _note(again, lines, "with the t_s of the row before: skipped")
     table, lines = table[~again], lines[~again]
     back = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
     if len(back) > max(1.0, BACK_SHARE * len(table)):
@@ -125,7 +92,7 @@ def _checked(table: Floats, lines: Ints) -> PressureRecord:
             f"line {lines[back[0] + 1]}: t_s does not advance, as in {len(back)} rows: sort the rows by t_s, one recording in a file"
         )
     later = np.concatenate([[True], table[1:, 0] > np.maximum.accumulate(table[:, 0])[:-1]])
-    notes += _told(~later, lines, "not later than the row before: skipped")
+    notes += _note(~later, lines, "not later than the row before: skipped")
     table, lines = table[later], lines[later]
     _check_rate(table[:, 0])
     gaps = np.flatnonzero(np.diff(table[:, 0]) > LONGEST_GAP_S)
@@ -143,7 +110,7 @@ def _field(row: Floats) -> str:
     return COLUMNS[0] if not math.isfinite(row[0]) else COLUMNS[1]
 
 
-def _told(bad: Any, lines: Ints, what: str) -> tuple[str, ...]:
+def _note(bad: Any, lines: Ints, what: str) -> tuple[str, ...]:
     return (f"{int(bad.sum())} rows {what} (first: line {lines[bad][0]})",) if bad.any() else ()
 
 

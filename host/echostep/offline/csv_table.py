@@ -1,0 +1,109 @@
+"""One reader for CSV files of samples: named columns of numbers, in any of three dialects.
+
+In: a text file whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable` with the wanted
+columns, NaN where there is no number; ValueError for a file that is not such a table. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO, TypeVar
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.errors import EchostepError
+
+LONGEST_LINE = 10_000  # characters; by reason: no line of numbers is longer
+Result = TypeVar("Result")
+
+EARLY_ROWS = 2000  # rows after which a file of garbage is given up
+MOST_BAD = 0.5  # share of rows without a number in a required column
+
+
+@dataclass(frozen=True, slots=True)
+class CsvLimits:
+    """`line_chars`: a longer line is an error. `lines`: reading stops after so many. `early_rows`: rows after which garbage is given up, or None."""
+
+    line_chars: int = LONGEST_LINE
+    lines: int | None = None
+    early_rows: int | None = EARLY_ROWS
+
+
+@dataclass(frozen=True, slots=True)
+class CsvTable:
+    """`values` (n, k) of the wanted columns, NaN where there is no number; `line` (n,): number of each row's line in the file."""
+
+    values: Floats
+    line: Ints
+
+
+def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
+    """Result of `read` on the file; OSError and ValueError become an EchostepError that names the file."""
+    try:
+        with Path(path).open(newline=None, encoding="utf-8-sig", errors="replace") as file:
+            return read(file)
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
+    except ValueError as error:
+        raise EchostepError(f"{path}: {error}") from error
+
+
+def header_of(first_line: str) -> tuple[list[str], str]:
+    """Names of the columns in the first line, and the separator: the most frequent of comma, semicolon and tab."""
+    separator = max(",;\t", key=first_line.count)
+    return [name.strip().strip('"') for name in first_line.split(separator)], separator
+
+
+def lines_of(file: TextIO, limits: CsvLimits, first: int = 1) -> Iterator[str]:
+    """Lines of bounded length, the next one being number `first`; raises ValueError for a longer one."""
+    number = first - 1
+    while (limits.lines is None or number < limits.lines) and (line := file.readline(limits.line_chars)):
+        number += 1
+        if len(line) == limits.line_chars:
+            raise ValueError(f"line {number} is longer than {limits.line_chars} characters: is this a CSV file?")
+        yield line
+
+
+def read_rows(
+    lines: Iterator[str], separator: str, columns: Sequence[int], required: int, limits: CsvLimits
+) -> CsvTable:
+    """Rows of the lines after the header; empty lines are skipped. `columns`: index of each wanted column, -1 for one that the file lacks.
+
+    With `limits.early_rows`, raises ValueError when fewer than two rows exist, or when most of them lack a number in one of the first `required`
+    columns.
+    """
+    values, numbers, bad = array("d"), array("q"), 0
+    for number, line in enumerate(lines, start=2):
+        if not line.strip():
+            continue
+        cells = (line.replace(",", ".") if separator == ";" else line).split(separator)
+        row = [number_of(cells[k]) if 0 <= k < len(cells) else math.nan for k in columns]
+        values.extend(row)
+        numbers.append(number)
+        bad += not all(map(math.isfinite, row[:required]))
+        if len(numbers) == limits.early_rows and bad > MOST_BAD * len(numbers):
+            break
+    if limits.early_rows is not None:
+        _check_share(len(numbers), bad)
+    return CsvTable(np.array(values).reshape(-1, len(columns)), np.array(numbers))
+
+
+def _check_share(rows: int, bad: int) -> None:
+    """Raise ValueError for too few rows, or too many without a number."""
+    if rows < 2:
+        raise ValueError("no samples")
+    if bad > MOST_BAD * rows:
+        raise ValueError(f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column")
+
+
+def number_of(text: str) -> float:
+    """The number in a cell; NaN where there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
