@@ -13,7 +13,8 @@ from echostep.arrays import Floats
 from echostep.cli import app
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Flag, Stride, StrideEstimator, StrideSettings, distance_sd_m
+from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
+from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples, describe_legs, load_legs, track_default, track_lee2010
 from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, WalkingPace, draw_person, simulate_gait
 from echostep.simulation.people.leg_angles import LegDimensions

@@ -16,7 +16,7 @@ from echostep.commands.console import console
 from echostep.errors import EchostepError
 from echostep.foot.alignment import aligned
 from echostep.foot.steps import Track, walk_track
-from echostep.legs.strides import StrideSettings
+from echostep.legs.stride import StrideSettings
 from echostep.offline import leg_csv
 from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.output.track_plot import draw_foot

@@ -16,7 +16,8 @@ from echostep.commissioning.probe import TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
 from echostep.legs.heading import compass_heading, fit_compass_errors
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import StrideEstimator, StrideSettings
+from echostep.legs.stride import StrideSettings
+from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import calibrated_scale
 
 Values = dict[str, float | bool]

@@ -16,7 +16,8 @@ from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Request, Study
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import StrideEstimator, StrideSettings
+from echostep.legs.stride import StrideSettings
+from echostep.legs.strides import StrideEstimator
 from echostep.simulation.people.joint_gait import (
     FAST,
     NATURAL,

@@ -1,11 +1,11 @@
 """Strides from two gyros on one leg: samples of thigh and shank -> what the hips did, stride by stride.
 
 In: time and pitch rates of thigh and shank, 50 to 500 Hz, either sign. Out: `Stride`s in order of time. Owns the angles, the gyros' biases and
-what has not yet become a stride. `leg_kinematics` knows how far a stance carries the hips, `leg_swings` when a leg swings and which way round a
-gyro is worn.
+what has not yet become a stride. `kinematics` gives the travel of the hips over a stance, `swing_detection` the swings and the sign of each
+gyro.
 
-A stride is told from one middle of a swing to the next; before the first and after the last the hips move over the standing foot, and that way is
-told, too. A gyro knows no vertical: at rest the leg is upright, and over a stride its mean is the usual one; its bias is what it says at rest,
+A stride goes from one middle of a swing to the next. Before the first and after the last the hips move over the standing foot; these pieces are
+reported, too. A gyro knows no vertical: at rest the leg is upright, and over a stride its mean is the usual one; its bias is what it says at rest,
 and what is left of its angle after a stride.
 
 One leg in the sagittal plane sees neither sideways nor backward steps, nor steps in place: they are flagged, their length is 0, and their
@@ -14,10 +14,7 @@ uncertainty holds what they may have been.
 
 from __future__ import annotations
 
-import enum
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,32 +27,25 @@ from echostep.legs.kinematics import (
     STANDING_SHANK_RAD,
     STANDING_THIGH_RAD,
     TOE_OFF,
-    LegLengths,
     knee_at,
     travel,
 )
+from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.swing_detection import GRID_HZ, Swings
+from echostep.legs.walking_bout import Bout, GyroBias, edge_pace, stairs_flag
 
 LONGEST_GAP_S = 0.25
-BRIDGED_S = 3.0  # by the pace before it; nobody knows what is done in a longer gap
+BRIDGED_S = 3.0  # longest gap bridged by the pace before it
 UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0
 FASTEST_RAD_S = 35.0
-USUAL_STRIDE_S = 1.2
 SHORTEST_M = 0.25  # a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # of the stride, which the hips pass over the foot that stands alone; 0.25 to 0.3 in walking
-BENT_RAD = math.radians(
-    33.0
-)  # of the knee at the strike (up) or half a stride later (down); on the flat 5 to 25 degrees
 LONGEST_ON_STAIRS_M = 1.0
-STAIRS_M, STAIRS_RISE_M = (
-    0.57,
-    0.34,
-)  # two treads of 28.5 and 17 cm: houses differ by 2 cm each, our angles by more [DIN 18065]
+STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses differ by 2 cm each [DIN 18065]
 STAIRS_WEIGHT = 0.15  # of what the angles say
 PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
 LEVEL_STRIDE_M = 0.85  # longer than any on stairs
 LEVEL_GAIN = 0.15
-BIAS_SD_RAD_S = math.radians(3.0)
 CLOSURE_SD_RAD = math.radians(2.5)  # of an angle after a stride
 SCALE_SD = 0.035  # of all strides of a person whose legs alone are known
 CALIBRATED_SD = 0.012
@@ -65,107 +55,18 @@ BLIND_SD_M = 0.4  # of what this leg cannot see
 REST_SD_RAD_S = math.radians(0.15)
 LOOK = 3  # places on either side for a rate
 STANCE = 62  # percent of a stride
-AT_LEAST = 0.5  # of the pace, in a swing that begins or ends a walk with the feet together; all of it when the foot comes from or to a whole stride
 STAYS = 0.44  # phase after which a foot that stays does not rise
 FORGET = 500
 
 
-class Flag(enum.Flag):
-    """What is to be known of a stride."""
-
-    NONE = 0
-    EDGE = enum.auto()  # the beginning or the end of a walk: not a whole stride
-    STANDING = enum.auto()
-    UNSEEN = enum.auto()  # in place or sideways: the length is not known
-    BACKWARD = enum.auto()  # the length is not known
-    STAIRS_UP = enum.auto()
-    STAIRS_DOWN = enum.auto()
-    SLOW = enum.auto()
-    FAST = enum.auto()
-    TURNING = enum.auto()
-    GAP = enum.auto()  # samples were missing
-
-
-@dataclass(frozen=True, slots=True)
-class Stride:
-    """The hips went `length_m` forward and `rise_m` up from `t_start_s` to `t_end_s`; `length_sd_m` holds for this stride alone.
-
-    `scale_sd`: what is wrong with all strides of this wearer alike, in shares of the length; not in `length_sd_m`.
-    """
-
-    t_start_s: float
-    t_end_s: float
-    length_m: float
-    length_sd_m: float
-    scale_sd: float
-    rise_m: float = 0.0
-    flags: Flag = Flag.NONE
-
-    @property
-    def speed_m_s(self) -> float:
-        """Mean speed."""
-        return self.length_m / (self.t_end_s - self.t_start_s) if self.t_end_s > self.t_start_s else 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class StrideSettings:
-    """The wearer's `segments`; `calibrated`: their scale was found by a walk of known length."""
-
-    segments: LegLengths = field(default_factory=LegLengths)
-    calibrated: bool = False
-
-
-@dataclass(slots=True)
-class LegCounts:
-    """Samples that came; `impossible` (not finite or beyond any leg) and `not_later` ones were skipped."""
-
-    samples: int = 0
-    impossible: int = 0
-    not_later: int = 0
-    gaps: int = 0
-
-
-@dataclass(slots=True)
-class _Bias:
-    """A gyro's bias by its estimate and variance (rad/s)."""
-
-    value: float = 0.0
-    variance: float = BIAS_SD_RAD_S**2
-
-    def learn(self, measured: float, sd: float) -> None:
-        gain = self.variance / (self.variance + sd * sd)
-        self.value += gain * (measured - self.value)
-        self.variance = max((1.0 - gain) * self.variance, math.radians(0.02) ** 2)
-
-
-@dataclass(slots=True)
-class _Bout:
-    """A walk under way, in places of the grid: where it begins, whether it begins with standing, the middles of swings since.
-
-    `level`: angles of thigh and shank at place `level_at`; None until they can be known. `cycle`, `reach_m`,
-    `trail_m` of its newest stride.
-    """
-
-    begin: int
-    stood: bool
-    peaks: list[int] = field(default_factory=list)
-    level: tuple[float, float] | None = None
-    level_at: int = 0
-    cycle: int = int(USUAL_STRIDE_S * GRID_HZ)
-    pace_m_s: float | None = None
-    reach_m: float = 0.0  # of the foot before the hips at the strike
-    trail_m: float = 0.0  # behind them at toe off
-    blind: Flag = Flag.NONE  # of the newest stride
-
-
 class StrideEstimator:
-    """Feed it samples; it returns strides as they become certain, equal however the samples are cut into portions."""
+    """Strides from samples, returned when they are certain; the portions in which samples are fed do not matter."""
 
     def __init__(self, settings: StrideSettings | None = None) -> None:
         self.settings = settings or StrideSettings()
         self.counts = LegCounts()
         self.swings = Swings()
-        self.bias = (_Bias(), _Bias())
+        self.bias = (GyroBias(), GyroBias())
         self._last: tuple[float, float, float] | None = None  # t, thigh, shank of the newest sample
         self._turned = (0.0, 0.0)  # since the first sample, with the sensor's sign and bias
         self._origin_s = 0.0
@@ -173,7 +74,7 @@ class StrideEstimator:
         self._shank: list[float] = []
         self._moved = 0
         self._done = 0  # places of the grid that were looked at
-        self._bout = _Bout(0, stood=False)
+        self._bout = Bout(0, stood=False)
         self._still_since: int | None = None
         self._top = (0.0, 0)  # of the swing under way: rate, place
         self._found: list[Stride] = []
@@ -181,18 +82,18 @@ class StrideEstimator:
 
     @property
     def standing_since_s(self) -> float | None:
-        """Since when he stands; None: he does not, as far as is known."""
+        """Time since which the leg stands; None while it does not, or is not known to."""
         return None if self._still_since is None else self._time(self._still_since)
 
     def feed(self, t_s: Floats, thigh: Floats, shank: Floats) -> list[Stride]:
         """Samples (n,) each: time, rates in rad/s."""
         for sample in zip(t_s.tolist(), thigh.tolist(), shank.tolist(), strict=True):
-            self._take(*sample)
+            self._integrate(*sample)
         found, self._found = self._found, []
         return found
 
     def finish(self) -> list[Stride]:
-        """No more samples: what is still under way."""
+        """The strides still under way; no samples may follow."""
         if self.swings.known or self.swings.decide(self._rates(), final=True):
             self._advance(len(self._thigh))
             if self._still_since is None and len(self._thigh) > 1:
@@ -200,7 +101,7 @@ class StrideEstimator:
         found, self._found = self._found, []
         return found
 
-    def _take(self, t_s: float, thigh: float, shank: float) -> None:
+    def _integrate(self, t_s: float, thigh: float, shank: float) -> None:
         """One sample: integrate to it and put the angles on the grid."""
         self.counts.samples += 1
         if not abs(thigh) < FASTEST_RAD_S or not abs(shank) < FASTEST_RAD_S or not math.isfinite(t_s):
@@ -215,7 +116,7 @@ class StrideEstimator:
             self.counts.not_later += 1
             return
         if t_s - t0 > LONGEST_GAP_S:
-            self._across(t_s)
+            self._bridge_gap(t_s)
             self._last = (t_s, thigh, shank)
             return
         turned = tuple(
@@ -223,11 +124,11 @@ class StrideEstimator:
         )
         while (at_s := self._origin_s + len(self._thigh) / GRID_HZ) <= t_s:
             share = (at_s - t0) / (t_s - t0)
-            self._tick(*(a + share * (b - a) for a, b in zip(self._turned, turned, strict=True)))
+            self._append(*(a + share * (b - a) for a, b in zip(self._turned, turned, strict=True)))
         self._turned, self._last = (turned[0], turned[1]), (t_s, thigh, shank)
 
-    def _tick(self, thigh: float, shank: float) -> None:
-        """One place more."""
+    def _append(self, thigh: float, shank: float) -> None:
+        """Append a value to the grid."""
         self._thigh.append(thigh)
         self._shank.append(shank)
         if self.swings.known:
@@ -239,8 +140,8 @@ class StrideEstimator:
             if enough and self.swings.decide(self._rates(), final=False):
                 self._advance(len(self._thigh) - LOOK)
 
-    def _across(self, t_s: float) -> None:
-        """Samples are missing up to `t_s`: what was under way ends, and who walked went on at his pace, as far as is known."""
+    def _bridge_gap(self, t_s: float) -> None:
+        """Samples are missing up to `t_s`: end the bout, and bridge a short gap at its pace."""
         assert self._last is not None
         self.counts.gaps += 1
         t0 = self._last[0]
@@ -253,10 +154,10 @@ class StrideEstimator:
                 self._end_bout(len(self._thigh) - 1, stands=False)
         span_s = t_s - t0
         way = pace * span_s if span_s < BRIDGED_S else 0.0
-        self._tell(t0, t_s, way, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
+        self._add_stride(t0, t_s, way, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
         self._origin_s, self._turned = t_s, (0.0, 0.0)
         self._thigh, self._shank, self._done = [0.0], [0.0], 0
-        self._bout, self._still_since, self._top, self._keep = _Bout(0, stood=False), None, (0.0, 0), 0
+        self._bout, self._still_since, self._top, self._keep = Bout(0, stood=False), None, (0.0, 0), 0
 
     def _rates(self) -> Floats:
         return np.diff(np.column_stack([self._thigh, self._shank]), axis=0) * GRID_HZ
@@ -290,7 +191,7 @@ class StrideEstimator:
             self._end_bout(k, stands=True)
 
     def _watch_rest(self, k: int) -> None:
-        """Standing ends a walk, tells the biases, and the leg is upright."""
+        """Detect standing: it ends a bout, measures the gyros' biases and sets the leg upright."""
         first = k - leg_swings.STILL
         if (
             self._still_since is None
@@ -302,7 +203,7 @@ class StrideEstimator:
         smoothed = np.column_stack([leg_swings.smooth(rates[:, 0]), leg_swings.smooth(rates[:, 1])])
         if not leg_swings.is_still(smoothed):
             if self._still_since is not None:
-                self._told_standing(k - 5)
+                self._end_standing(k - 5)
                 self._still_since = None
             return
         if self._still_since is None:
@@ -311,14 +212,14 @@ class StrideEstimator:
             self._still_since = first
         for bias, sign, rate in zip(self.bias, self.swings.sign, rates.mean(axis=0).tolist(), strict=True):
             bias.learn(sign * rate, REST_SD_RAD_S)
-        self._bout = _Bout(k, stood=True, level=(STANDING_THIGH_RAD, STANDING_SHANK_RAD), level_at=k, pace_m_s=0.0)
+        self._bout = Bout(k, stood=True, level=(STANDING_THIGH_RAD, STANDING_SHANK_RAD), level_at=k, pace_m_s=0.0)
 
-    def _told_standing(self, k: int) -> None:
-        """He stood until here."""
+    def _end_standing(self, k: int) -> None:
+        """Report standing up to grid index k."""
         assert self._still_since is not None
         begin = self._still_since
         if k > begin:
-            self._tell(self._time(begin), self._time(k), 0.0, 0.0, 0.0, Flag.STANDING)
+            self._add_stride(self._time(begin), self._time(k), 0.0, 0.0, 0.0, Flag.STANDING)
         self._bout.begin = min(max(self._bout.begin, begin), k)
         self._keep = begin
 
@@ -341,8 +242,8 @@ class StrideEstimator:
         pace = length * GRID_HZ / bout.cycle
         bout.blind = flags & (Flag.UNSEEN | Flag.BACKWARD)
         if len(bout.peaks) == 2 and previous > bout.begin:
-            self._tell_edge(bout.begin, previous, self._begin_piece(previous, pace))
-        self._tell(self._time(previous), self._time(k), length, sd, rise, flags)
+            self._add_edge(bout.begin, previous, self._begin_piece(previous, pace))
+        self._add_stride(self._time(previous), self._time(k), length, sd, rise, flags)
         bout.pace_m_s = pace
         self._relevel(k, thigh, shank, length)
         self._keep = previous
@@ -355,7 +256,7 @@ class StrideEstimator:
         stance = phase[strike:], thigh[strike:], shank[strike:]
         self._bout.reach_m = self._ahead_m(thigh[strike], shank[strike])
         self._bout.trail_m = -self._ahead_m(*(np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank)))
-        stairs = _stairs(knee_at(*stance, at=0.02), knee_at(*stance, at=0.5))
+        stairs = stairs_flag(knee_at(*stance, at=0.02), knee_at(*stance, at=0.5))
         way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
         length = way.stride()[0]
         rates = np.column_stack([np.diff(thigh), np.diff(shank)])
@@ -403,7 +304,7 @@ class StrideEstimator:
         stance = 0 if stood else int(np.argmax(phase > 0.0))
         swinging = 1.0
         if bout.stood or (stood and phase[0] < -0.1):
-            swinging = _edge_pace(-self._ahead_m(thigh[off], shank[off]), bout.trail_m)
+            swinging = edge_pace(-self._ahead_m(thigh[off], shank[off]), bout.trail_m)
         way = travel(phase, thigh, shank, self.settings.segments, struck=None)
         length = PELVIS * float(way.forward_m[off] - way.forward_m[stance])
         return length + pace_m_s * (stance + swinging * (span - off)) / GRID_HZ
@@ -413,13 +314,13 @@ class StrideEstimator:
         return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.OF_USUAL
 
     def _end_bout(self, end: int, *, stands: bool) -> None:
-        """The walk is over at this place, because he stands or because there is no more to see."""
+        """End the bout at this grid index, because the leg stands or because the samples end."""
         bout = self._bout
         if len(bout.peaks) == 1:
             self._end_step(bout.peaks[0], end, stands=stands)
         elif bout.peaks and end > bout.peaks[-1]:
-            self._tell_edge(bout.peaks[-1], end, self._end_piece(bout.peaks[-1], end, stands=stands))
-        self._bout = _Bout(end, stood=False)
+            self._add_edge(bout.peaks[-1], end, self._end_piece(bout.peaks[-1], end, stands=stands))
+        self._bout = Bout(end, stood=False)
         self._keep = end - leg_swings.STILL
 
     def _end_step(self, peak: int, end: int, *, stands: bool) -> None:
@@ -431,7 +332,7 @@ class StrideEstimator:
         length = begins + (self._end_piece(peak, end, stands=stands) if end > peak else 0.0)
         if length < SHORTEST_M:
             bout.blind = Flag.UNSEEN
-        self._tell_edge(bout.begin, end, length)
+        self._add_edge(bout.begin, end, length)
 
     def _end_piece(self, peak: int, end: int, *, stands: bool) -> float:
         """How far from the last middle of a swing to the end of the walk."""
@@ -447,7 +348,7 @@ class StrideEstimator:
             last = min(last, int(TOE_OFF * bout.cycle))
         way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
         length = PELVIS * float(way.forward_m[last] - way.forward_m[0])
-        swinging = _edge_pace(self._ahead_m(thigh[strike], shank[strike]), bout.reach_m) if stands else 1.0
+        swinging = edge_pace(self._ahead_m(thigh[strike], shank[strike]), bout.reach_m) if stands else 1.0
         return length + pace * (swinging * strike + span - strike - last) / GRID_HZ
 
     def _ahead_m(self, thigh: float, shank: float) -> float:
@@ -455,11 +356,11 @@ class StrideEstimator:
         segments = self.settings.segments
         return float(segments.thigh_m * np.sin(thigh) + segments.to_ankle_m * np.sin(shank))
 
-    def _tell_edge(self, begin: int, end: int, length: float) -> None:
+    def _add_edge(self, begin: int, end: int, length: float) -> None:
         """A beginning or an end is certain; beside strides that cannot be seen it cannot either."""
         blind = self._bout.blind
         way, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
-        self._tell(self._time(begin), self._time(end), way, sd, 0.0, Flag.EDGE | blind)
+        self._add_stride(self._time(begin), self._time(end), way, sd, 0.0, Flag.EDGE | blind)
 
     def _angles(self, begin: int, end: int) -> tuple[Floats, Floats]:
         """Angles (n,) of thigh and shank at the places begin..end, by the present biases from the last known level."""
@@ -475,13 +376,13 @@ class StrideEstimator:
     def _time(self, k: int) -> float:
         return self._origin_s + k / GRID_HZ
 
-    def _tell(self, t0: float, t1: float, length: float, sd: float, rise: float, flags: Flag) -> None:
+    def _add_stride(self, t0: float, t1: float, length: float, sd: float, rise: float, flags: Flag) -> None:
         """A stride is certain."""
         scale_sd = CALIBRATED_SD if self.settings.calibrated else SCALE_SD
         self._found.append(Stride(t0, t1, length, sd, scale_sd, rise, flags))
 
     def _drop(self) -> None:
-        """Drop the places that nobody asks for any more."""
+        """Drop grid values that are no longer needed."""
         k = self._keep
         if k < FORGET:
             return
@@ -496,26 +397,3 @@ class StrideEstimator:
         if self._still_since is not None:
             self._still_since -= k
         self._top = (self._top[0], self._top[1] - k)
-
-
-def _edge_pace(reach_m: float, usual_m: float) -> float:
-    """The hips' pace against the usual one while this leg swings for the first or the last time, by how far its foot is from under them.
-
-    Somebody who starts or stops with this foot beside the other hardly moves meanwhile, who does it with the other is at full pace [Jian 1993].
-    """
-    share = min(max(reach_m / usual_m, 0.0), 1.0) if usual_m > 0.0 else 0.0
-    return AT_LEAST + (1.0 - AT_LEAST) * share
-
-
-def _stairs(knee_at_strike: float, knee_half_later: float) -> Flag:
-    """Up stairs a foot is set down with a bent knee; down stairs the knee that carries gives way [Riener 2002]."""
-    if knee_at_strike > BENT_RAD:
-        return Flag.STAIRS_UP
-    return Flag.STAIRS_DOWN if knee_half_later > BENT_RAD else Flag.NONE
-
-
-def distance_sd_m(strides: Iterable[Stride]) -> float:
-    """Standard deviation of the sum of lengths: what is wrong with all alike adds up, the rest adds by squares."""
-    each = list(strides)
-    alike = sum(s.length_m * s.scale_sd for s in each)
-    return math.sqrt(alike**2 + sum(s.length_sd_m**2 for s in each))

@@ -19,7 +19,8 @@ from echostep.arrays import Floats
 from echostep.legs.clipping import ClippingRepair
 from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Flag, Stride, StrideEstimator, StrideSettings
+from echostep.legs.stride import Flag, Stride, StrideSettings
+from echostep.legs.strides import StrideEstimator
 from echostep.path import STANDING_PIECE_S, PathSegment
 
 TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes away again

@@ -20,7 +20,8 @@ from echostep.legs import swing_detection as leg_swings
 from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.heading import Heading
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import Flag, LegCounts, Stride, StrideEstimator, StrideSettings, distance_sd_m
+from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings, distance_sd_m
+from echostep.legs.strides import StrideEstimator
 from echostep.offline.csv_table import LONGEST_LINE, CsvLimits, header_of, lines_of, open_samples, read_rows
 from echostep.offline.imu_checks import RATE_RANGE_HZ, sorted_by_time
 from echostep.papers import lee2010

@@ -21,7 +21,7 @@ from echostep.evaluate.lee2010.walks import (
     storeys,
 )
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.strides import StrideSettings
+from echostep.legs.stride import StrideSettings
 from echostep.legs.trunk_path import WearerSettings
 from echostep.offline.leg_csv import track_default
 from echostep.papers import lee2010
