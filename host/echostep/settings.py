@@ -1,4 +1,4 @@
-"""Settings: the dataclasses of the stages, gathered from a TOML file.
+"""Settings: the dataclasses of all stages, read from a TOML file.
 
 In: a TOML file (sections named as the fields of `Settings`). Out: `Settings`. Owns nothing; an error names the file, the section and the field.
 """
@@ -53,22 +53,24 @@ def read_settings(path: Path | str) -> str:
 def parse_settings(text: str, origin: str) -> Settings:
     """Settings from TOML text; raises EchostepError that names the origin, the section and the field."""
     try:
-        return _gather(tomllib.loads(text))
+        return _settings_of(tomllib.loads(text))
     except ValueError as error:
         raise EchostepError(f"{origin}: {error}") from error
 
 
-def _gather(tree: dict[str, Any]) -> Settings:
+def _settings_of(tree: dict[str, Any]) -> Settings:
+    """Settings from a parsed TOML tree; raises ValueError that names the section and the field."""
     sections = {f.name: f.default_factory for f in dataclasses.fields(Settings)}
-    made: dict[str, Any] = {}
+    sections_read: dict[str, Any] = {}
     for name, rows in tree.items():
         if name not in sections:
             raise ValueError(f"[{name}] is no section; there are {', '.join(sections)}")
-        made[name] = _section(name, rows, sections[name]())  # type: ignore[operator]
-    return Settings(**made)
+        sections_read[name] = _section(name, rows, sections[name]())  # type: ignore[operator]
+    return Settings(**sections_read)
 
 
 def _section(name: str, rows: Any, default: Any) -> Any:
+    """A copy of the section's defaults with the fields of `rows`; raises ValueError that names the field."""
     if not isinstance(rows, dict):
         raise ValueError(f"{name}: expected a section, [{name}]")
     known = {f.name: getattr(default, f.name) for f in dataclasses.fields(default)}

@@ -15,7 +15,7 @@ from echostep.localization.particle_kernels import Move, PingBatch, effective_si
 from echostep.localization.particles import Cloud, CloudSettings
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
-from echostep.walls.visibility import CORNER, EDGE
+from echostep.walls.tile_points import CORNER, EDGE
 
 MODEL = echo_model(EchoSettings())
 BOX = Walls(np.array([[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 2.0], [6.0, 2.0, 0.0, 2.0], [0.0, 2.0, 0.0, 0.0]]))

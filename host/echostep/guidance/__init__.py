@@ -1,4 +1,4 @@
 """Estimates -> spoken and drawn cues on the way to a destination.
 
-In: estimates, a destination. Out: `Cue`s, one at a time. Owns the present cue and the way.
+In: estimates, a destination. Out: `Cue`s, one at a time. Owns the present cue and the route.
 """

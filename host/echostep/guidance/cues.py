@@ -1,8 +1,7 @@
-"""Guidance for a person: where to go next, one cue at a time, in words, as an arrow, and as a sentence to speak.
+"""Cues for a wearer on a route: where to go next, as words, as an arrow, and as a sentence to speak.
 
-In: a way (a `Route`, or a trail of crumbs), estimates, and when a beacon was last heard. Out: `Cue`s. Owns how far he has come along the way, the
-arrow's present direction, and the last place that was sure. What the estimate cannot carry is not guided: the cue is then "stop", or the way back
-to that place.
+In: a `Route`, estimates, and when a beacon was last heard. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
+last known place. An estimate that is too uncertain gives no direction: the cue is then "stop", or the direction back to the last known place.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from echostep.angles import wrap
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.polyline import along, nearest, way_m
@@ -21,9 +21,9 @@ from echostep.plan.routing import Route, RoutePlace, Stretch
 class CueKind(StrEnum):
     """What a cue is about, in order of urgency."""
 
-    STOP = "stop"  # nobody knows where he looks
+    STOP = "stop"  # position, heading or route is not known
     RETURN = "return"  # to the last known place
-    OFF = "off"  # he has left the way
+    OFF = "off"  # off the route
     ARRIVED = "arrived"
     CHANGE = "change"  # of level: stairs, lift, ramp
     TURN = "turn"
@@ -31,14 +31,19 @@ class CueKind(StrEnum):
 
 
 NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
+# Direction beyond which the target is behind, by reason.
+AROUND_RAD = math.radians(135.0)
+RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, by reason
+LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts anew, by reason
+ARROWS = "↑↖←↙↓↘→↗"
 
 
 @dataclass(frozen=True, slots=True)
 class Cue:
-    """What a person is told now. `arrow_rad`: where to walk, from where he looks, counter-clockwise; None: no arrow is shown.
+    """One cue. `arrow_rad`: direction to walk relative to the wearer's heading, counter-clockwise; None: no arrow is shown.
 
-    `spoken` is empty when there is nothing new to say. `left_m`: way that is left. `aim_rad`: where the arrow is turning to, for who draws
-    it more often than estimates come, and turns it smoothly himself.
+    `spoken` is empty when there is nothing new to say. `left_m`: length of the route ahead. `aim_rad`: direction towards which the arrow is turning,
+    for a view that draws it more often than estimates come.
     """
 
     t_s: float
@@ -52,11 +57,13 @@ class Cue:
 
 @dataclass(frozen=True, slots=True)
 class GuidanceSettings:
-    """`ahead_m`: the target along the way [Fischer 2008, 4.2]. `off_m`: from the way, beyond what the estimate allows, until he has left it.
+    """Limits of guidance.
 
-    `deaf_s`, `return_s`: without any beacon until he is warned and sent back; twice as long when that has brought
-    him back once, for the next beacons may be dead, until he has been heard for `safe_s`. `heading_sd_deg`: beyond it nobody knows where he looks.
-    `arrow_s`: time constant of the arrow, `arrow_deg_s` its greatest speed. `say_again_s`: a sentence is repeated no sooner.
+    `ahead_m`: the target's distance along the route [Fischer 2008, 4.2]. `arrived_m`: distance from the end at which the wearer has arrived.
+    `off_m`: distance from the route, beyond the 95 % radius, that counts as off it. `deaf_s`, `return_s`: time without beacon contact before the
+    warning, and before the wearer is sent back. The second doubles after each return (the next beacons may be dead), and is reset after `safe_s` of
+    contact. `heading_sd_deg`: greatest standard deviation of a usable heading. `turn_deg`: least angle of a cue to turn. `arrow_s`: time constant of
+    the arrow, `arrow_deg_s` its greatest rate. `say_again_s`: least time before a sentence is repeated.
     """
 
     ahead_m: float = 3.0
@@ -73,175 +80,181 @@ class GuidanceSettings:
 
 
 class _Planner(Protocol):
+    """Finds a route between two places."""
+
     def way(self, start: RoutePlace, end: RoutePlace) -> Route: ...
 
 
 class Guide:
-    """Follows one person along one way.
+    """Guides one wearer along one route.
 
-    With a planner, who leaves the way gets a new one from where he is; without, the arrow leads back to it.
+    With a planner, a wearer off the route gets a new one from the present place; without, the arrow leads back to the route.
     """
 
     def __init__(self, route: Route, settings: GuidanceSettings | None = None, planner: _Planner | None = None) -> None:
-        """Raises EchostepError for a way without length."""
+        """Raises EchostepError for a route without stretches."""
         if not route.stretches:
-            raise EchostepError("a way needs at least one stretch")
+            raise EchostepError("a route needs at least one stretch")
         self.route = route
         self._settings = settings or GuidanceSettings()
         self._planner = planner
         self._stretch = 0
-        self._come_m = 0.0
+        self._progress_m = 0.0
         self._arrow: float | None = None
         self._arrow_s = -math.inf
-        self._sure: RoutePlace | None = None
-        self._leash_s = self._settings.return_s
+        self._known_place: RoutePlace | None = None
+        self._silence_limit_s = self._settings.return_s
         self._sent_back = False
-        self._heard_since_s = -math.inf
-        self._said = ""
-        self._said_s = -math.inf
+        self._contact_since_s = -math.inf
+        self._last_text = ""
+        self._spoken_s = -math.inf
         self.replanned = 0
 
     def cue(self, e: Estimate, heard_s: float | None = None) -> Cue:
-        """What to tell him at this estimate; `heard_s`: when a beacon last heard him, None where there are none."""
+        """The cue at this estimate; `heard_s`: when a beacon last measured, None where there are none."""
         silent_s = 0.0 if heard_s is None else e.t_s - heard_s
-        self._lengthen(e.t_s, silent_s)
+        self._update_silence_limit(e.t_s, silent_s)
         if e.status is not TrackStatus.LOST and silent_s < self._settings.deaf_s:
-            self._sure = RoutePlace(e.x_m, e.y_m, e.level)
+            self._known_place = RoutePlace(e.x_m, e.y_m, e.level)
         if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
-            return self._told(e, CueKind.STOP, NO_HEADING, None)
-        if e.status is TrackStatus.LOST or silent_s >= self._leash_s:
-            return self._back(e, silent_s)
-        self._find(e)
-        cue = self._along(e)
+            return self._make_cue(e, CueKind.STOP, NO_HEADING, None)
+        if e.status is TrackStatus.LOST or silent_s >= self._silence_limit_s:
+            return self._cue_back(e, silent_s)
+        self._update_progress(e)
+        cue = self._cue_along(e)
         if silent_s >= self._settings.deaf_s and cue.kind is not CueKind.ARRIVED:
-            return self._told(e, CueKind.OFF, "You leave the beacons' range", cue.arrow_rad)
+            return self._make_cue(e, CueKind.OFF, "You leave the beacons' range", cue.arrow_rad)
         return cue
 
-    def _lengthen(self, t_s: float, silent_s: float) -> None:
-        """How long he may be out of range before he is sent back: who has come back from silence may go on further into it."""
+    def _update_silence_limit(self, t_s: float, silent_s: float) -> None:
+        """Double the allowed time without beacon contact after each return; reset it after `safe_s` of contact."""
         if silent_s >= self._settings.deaf_s:
-            self._heard_since_s = math.inf
-            self._sent_back = self._sent_back or silent_s >= self._leash_s
+            self._contact_since_s = math.inf
+            self._sent_back = self._sent_back or silent_s >= self._silence_limit_s
             return
-        self._heard_since_s = min(self._heard_since_s, t_s)
+        self._contact_since_s = min(self._contact_since_s, t_s)
         if self._sent_back:
-            self._leash_s, self._sent_back = 2.0 * self._leash_s, False
-        elif t_s - self._heard_since_s > self._settings.safe_s:
-            self._leash_s = self._settings.return_s
+            self._silence_limit_s, self._sent_back = 2.0 * self._silence_limit_s, False
+        elif t_s - self._contact_since_s > self._settings.safe_s:
+            self._silence_limit_s = self._settings.return_s
 
     @property
     def left_m(self) -> float:
-        """Way that is left, on all levels."""
+        """Length of the route ahead, on all levels."""
         rest = self.route.stretches[self._stretch + 1 :]
-        return way_m(self._here.line_m) - self._come_m + sum(way_m(s.line_m) for s in rest)
+        return way_m(self._here.line_m) - self._progress_m + sum(way_m(s.line_m) for s in rest)
 
     @property
     def _here(self) -> Stretch:
+        """The stretch that the wearer is on."""
         return self.route.stretches[self._stretch]
 
-    def _find(self, e: Estimate) -> None:
-        """The stretch of his level, and how far along it he is: from where he was, not jumping to where the way comes by again."""
+    def _update_progress(self, e: Estimate) -> None:
+        """Update the stretch, by level, and the progress along it.
+
+        The nearest place is looked for near the last one first, so that progress does not jump where the route comes by again.
+        """
         if self._here.level != e.level:
             levels = [s.level for s in self.route.stretches]
             later = [k for k in range(len(levels)) if levels[k] == e.level]
             if later:
                 self._stretch = min(later, key=lambda k: (k < self._stretch, abs(k - self._stretch)))
-                self._come_m = 0.0
+                self._progress_m = 0.0
         reach = 2.0 * self._settings.ahead_m
-        come, off = nearest(self._here.line_m, e.x_m, e.y_m, self._come_m - reach, self._come_m + reach)
+        progress, off = nearest(self._here.line_m, e.x_m, e.y_m, self._progress_m - reach, self._progress_m + reach)
         if off > self._settings.off_m:
-            come, off = nearest(self._here.line_m, e.x_m, e.y_m, 0.0, math.inf)
-        self._come_m = come
+            progress, off = nearest(self._here.line_m, e.x_m, e.y_m, 0.0, math.inf)
+        self._progress_m = progress
 
-    def _along(self, e: Estimate) -> Cue:
+    def _cue_along(self, e: Estimate) -> Cue:
+        """The cue on the route: arrived, change of level, turn, or straight ahead."""
         s, line = self._settings, self._here.line_m
-        x, y, _ = along(line, self._come_m)
+        x, y, _ = along(line, self._progress_m)
         off = math.hypot(x - e.x_m, y - e.y_m)
         if self._here.level != e.level or off > s.off_m + e.ellipse95.major_m:
-            return self._off(e, off)
+            return self._cue_off_route(e, off)
         if self.left_m < s.arrived_m or (
             self._last and math.hypot(e.x_m - line[-1, 0], e.y_m - line[-1, 1]) < s.arrived_m
         ):
-            return self._told(e, CueKind.ARRIVED, "You have arrived", None)
-        to_x, to_y, _ = along(line, self._come_m + s.ahead_m)
+            return self._make_cue(e, CueKind.ARRIVED, "You have arrived", None)
+        to_x, to_y, _ = along(line, self._progress_m + s.ahead_m)
         arrow = math.atan2(to_y - e.y_m, to_x - e.x_m) - e.heading_rad
-        rest = way_m(line) - self._come_m
+        rest = way_m(line) - self._progress_m
         if not self._last and rest < s.ahead_m:
             after = self.route.stretches[self._stretch + 1].level
             step = "up" if after > e.level else "down"
-            return self._told(e, CueKind.CHANGE, f"Take the {self._here.by} {step}", arrow)
-        side = _wrap(arrow)
-        if abs(side) > math.radians(135.0):
-            return self._told(e, CueKind.TURN, "Turn around", arrow)
+            return self._make_cue(e, CueKind.CHANGE, f"Take the {self._here.by} {step}", arrow)
+        side = wrap(arrow)
+        if abs(side) > AROUND_RAD:
+            return self._make_cue(e, CueKind.TURN, "Turn around", arrow)
         if abs(side) > math.radians(s.turn_deg):
-            return self._told(e, CueKind.TURN, "Turn left" if side > 0.0 else "Turn right", arrow)
-        return self._told(e, CueKind.AHEAD, "Straight ahead", arrow)
+            return self._make_cue(e, CueKind.TURN, "Turn left" if side > 0.0 else "Turn right", arrow)
+        return self._make_cue(e, CueKind.AHEAD, "Straight ahead", arrow)
 
     @property
     def _last(self) -> bool:
+        """Whether the present stretch is the last one."""
         return self._stretch == len(self.route.stretches) - 1
 
-    def _off(self, e: Estimate, off_m: float) -> Cue:
-        """He has left the way: a new one if there is a plan, else back to it."""
+    def _cue_off_route(self, e: Estimate, off_m: float) -> Cue:
+        """The cue off the route: a new route with a planner, else the direction back to it."""
         if self._planner is not None:
             end = self.route.stretches[-1]
             goal = RoutePlace(float(end.line_m[-1, 0]), float(end.line_m[-1, 1]), end.level)
             try:
                 self.route = self._planner.way(RoutePlace(e.x_m, e.y_m, e.level), goal)
             except EchostepError:
-                return self._told(e, CueKind.STOP, "Stop. No way leads on from here", None)
-            self._stretch, self._come_m = 0, 0.0
+                return self._make_cue(e, CueKind.STOP, "Stop. No way leads on from here", None)
+            self._stretch, self._progress_m = 0, 0.0
             self.replanned += 1
             x, y, _ = along(self._here.line_m, self._settings.ahead_m)
-            return self._told(
+            return self._make_cue(
                 e, CueKind.OFF, "You left the way. Here is another", math.atan2(y - e.y_m, x - e.x_m) - e.heading_rad
             )
         if self._here.level != e.level:
-            return self._told(e, CueKind.STOP, "Stop. You are on the wrong level", None)
-        x, y, _ = along(self._here.line_m, self._come_m + 1.0)
+            return self._make_cue(e, CueKind.STOP, "Stop. You are on the wrong level", None)
+        x, y, _ = along(self._here.line_m, self._progress_m + RETURN_AHEAD_M)
         arrow = math.atan2(y - e.y_m, x - e.x_m) - e.heading_rad
-        return self._told(e, CueKind.OFF, f"You left the way: it is {off_m:.0f} metres off", arrow)
+        return self._make_cue(e, CueKind.OFF, f"You left the way: it is {off_m:.0f} metres off", arrow)
 
-    def _back(self, e: Estimate, silent_s: float) -> Cue:
-        """Nobody knows well enough where he is: back to the last known place, as long as his steps tell the direction."""
-        why = "No beacon hears you" if silent_s >= self._leash_s else "Your place is not known"
-        if self._sure is None or self._sure.level != e.level:
-            return self._told(e, CueKind.STOP, f"Stop. {why}", None)
-        dx, dy = self._sure.x_m - e.x_m, self._sure.y_m - e.y_m
+    def _cue_back(self, e: Estimate, silent_s: float) -> Cue:
+        """The cue where the position is not known: back to the last known place, by the steps since, while it is on this level."""
+        why = "No beacon hears you" if silent_s >= self._silence_limit_s else "Your place is not known"
+        if self._known_place is None or self._known_place.level != e.level:
+            return self._make_cue(e, CueKind.STOP, f"Stop. {why}", None)
+        dx, dy = self._known_place.x_m - e.x_m, self._known_place.y_m - e.y_m
         if math.hypot(dx, dy) < self._settings.arrived_m:
-            return self._told(e, CueKind.STOP, f"Stop. {why}, and this is the last known place", None)
-        return self._told(
+            return self._make_cue(e, CueKind.STOP, f"Stop. {why}, and this is the last known place", None)
+        return self._make_cue(
             e, CueKind.RETURN, f"{why}. Go back to the last known place", math.atan2(dy, dx) - e.heading_rad
         )
 
-    def _told(self, e: Estimate, kind: CueKind, text: str, arrow_rad: float | None) -> Cue:
+    def _make_cue(self, e: Estimate, kind: CueKind, text: str, arrow_rad: float | None) -> Cue:
+        """A cue with its smoothed arrow, and its sentence unless that was just spoken."""
         arrow = self._smooth(arrow_rad, e.t_s)
-        new = text != self._said or e.t_s - self._said_s >= self._settings.say_again_s
+        new = text != self._last_text or e.t_s - self._spoken_s >= self._settings.say_again_s
         spoken = ""
-        if new and not (kind is CueKind.AHEAD and text == self._said):
-            spoken, self._said, self._said_s = text + ".", text, e.t_s
-        aim = None if arrow_rad is None else _wrap(arrow_rad)
+        if new and not (kind is CueKind.AHEAD and text == self._last_text):
+            spoken, self._last_text, self._spoken_s = text + ".", text, e.t_s
+        aim = None if arrow_rad is None else wrap(arrow_rad)
         return Cue(e.t_s, kind, text, arrow, spoken, self.left_m, aim)
 
     def _smooth(self, wanted: float | None, t_s: float) -> float | None:
-        """The arrow follows with a time constant and a greatest speed; after it was hidden it starts where it should be."""
+        """The arrow's new direction: it follows with a time constant and a greatest rate; after it was hidden it starts at `wanted`."""
         s = self._settings
         if wanted is None:
             self._arrow = None
             return None
         span_s = t_s - self._arrow_s
         self._arrow_s = t_s
-        if self._arrow is None or not 0.0 <= span_s < 5.0:
-            self._arrow = _wrap(wanted)
+        if self._arrow is None or not 0.0 <= span_s < LONGEST_SPAN_S:
+            self._arrow = wrap(wanted)
             return self._arrow
-        off = _wrap(wanted - self._arrow)
+        off = wrap(wanted - self._arrow)
         turn = off * (1.0 - math.exp(-span_s / s.arrow_s))
         most = math.radians(s.arrow_deg_s) * span_s
-        self._arrow = _wrap(self._arrow + min(max(turn, -most), most))
+        self._arrow = wrap(self._arrow + min(max(turn, -most), most))
         return self._arrow
-
-
-ARROWS = "↑↖←↙↓↘→↗"
 
 
 def arrow_sign(arrow_rad: float | None) -> str:
@@ -253,7 +266,3 @@ def describe_cue(cue: Cue) -> str:
     """A cue on one line."""
     left = "" if math.isnan(cue.left_m) else f"   {cue.left_m:.0f} m to go"
     return f"{arrow_sign(cue.arrow_rad)}  {cue.text}{left}"
-
-
-def _wrap(angle: float) -> float:
-    return math.remainder(angle, 2.0 * math.pi)

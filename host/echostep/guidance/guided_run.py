@@ -1,7 +1,7 @@
-"""A run that is guided: the tracker's estimates in, cues out, to show, to speak and to keep.
+"""A guided run: estimates of a tracker in, cues out, to show, to speak and to keep.
 
-In: a tracker, where to go. Out: a `Cue` for each estimate, at the moment when it is told; cues.csv. Owns the guide. What beacons have said is
-asked at that moment, so a replay gives the cues of the run, in whatever portions its chunks come.
+In: a tracker, a destination. Out: a `Cue` for each estimate, when the tracker publishes it; cues.csv. Owns the guide. The time of the last beacon
+contact is read at that moment, so a replay gives the same cues, in whatever portions its chunks come.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ def destination(text: str, plan: Plan) -> RoutePlace:
 
 
 class GuidedRun:
-    """Guides the wearer of one tracker to one place; the way is laid at the first estimate."""
+    """Guides the wearer of one tracker to one place; the route begins at the first estimate."""
 
     def __init__(self, tracker: Tracker, to: RoutePlace) -> None:
-        """Raises EchostepError for a place outside the plan, before anybody walks."""
+        """Raises EchostepError for a place outside the plan."""
         self._tracker = tracker
         self._to = to
         self._routes = Routes(tracker.plan)
         first = Guide(self._routes.way(to, to))
         first.cue(
             Estimate(0.0, to.x_m, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, to.level)
-        )  # compiled now, not on the way
+        )  # compiles the kernels now, not during the run
         self._guide: Guide | None = None
-        self._asked = 0
+        self._returned = 0
         self.cues: list[Cue] = []
         tracker.watchers.append(self._watch)
 
@@ -66,12 +66,12 @@ class GuidedRun:
 
     @property
     def route(self) -> Route | None:
-        """The way as it is now."""
+        """The present route."""
         return self._guide.route if self._guide else None
 
     def news(self) -> list[Cue]:
-        """The cues since it was last asked."""
-        begin, self._asked = self._asked, len(self.cues)
+        """The cues since the last call."""
+        begin, self._returned = self._returned, len(self.cues)
         return self.cues[begin:]
 
     def write(self, path: Path) -> None:
@@ -82,16 +82,16 @@ class GuidedRun:
             writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)
 
     def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
-        """The tracker told an estimate."""
+        """Add the cue of a new estimate."""
         if self._guide is None:
-            self._lay(e)
+            self._find_route(e)
         if self._guide is None:
             self.cues.append(Cue(e.t_s, CueKind.STOP, NO_WAY, None, "" if self.cues else f"{NO_WAY}."))
             return
         self.cues.append(self._guide.cue(e, self._tracker.state.beacon_heard_s))
 
-    def _lay(self, e: Estimate) -> None:
-        """Lay the way from a first estimate; a place from which no way leads is asked again at the next."""
+    def _find_route(self, e: Estimate) -> None:
+        """Find the route from an estimate; where there is none, the next estimate is tried."""
         try:
             route = self._routes.way(RoutePlace(e.x_m, e.y_m, e.level), self._to)
         except EchostepError:

@@ -1,9 +1,9 @@
-"""log p(echo | pose): what a ranger may report where the plan has these echo sources; one function, for the cloud to call.
+"""p(echo | pose): density of the range that a ranger reports, given the echo sources within its cone.
 
-In: a range and the echo sources that the plan shows to the ranger, nearest first. Out: a log-likelihood. Owns nothing.
+In: a range and the plan's echo sources, nearest first. Out: a likelihood. Owns nothing.
 
-An SRF02 reports the first echo that it hears. So each source answers if it is heard and no nearer one was; before all of them something that is
-not on the plan may stand, and after them a second reflection may come. The mixture is the beam model's, with that order [Thrun et al. 2005, 6.3].
+An SRF02 reports the first echo that it detects. So a source answers if it is detected and no nearer one is; an object that is not on the plan may
+answer before all of them, and a second reflection after them. The mixture is the beam model's, in that order [Thrun et al. 2005, 6.3].
 """
 
 from __future__ import annotations
@@ -14,19 +14,28 @@ from typing import NamedTuple
 
 from echostep.arrays import Floats
 from echostep.jit import inline_kernel, lean_kernel
-from echostep.walls.visibility import CORNER, EDGE
+from echostep.walls.tile_points import CORNER, EDGE
+
+ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
+DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
+NEGLIGIBLE = (
+    1e-4  # probability that no source so far was detected below which sources further away are left out, by reason
+)
+SILENT = 0.2  # share of outliers that are "no echo", by reason
+LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
+GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
 
 
 @dataclass(frozen=True, slots=True)
 class EchoSettings:
     """What an SRF02 may report; lengths in metres, probabilities of one ping.
 
-    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` a radian off the axis.
-    A wall is heard while its level, spread over the way there and back and through a beam that is `rim_db` down at 27.5 degrees each way
-    [Girard 2011, 2.6.2, 2.6.3], exceeds that of a wall straight ahead at `maximum_m`; `soft_db`: how sharply.
+    `sd_m`: range error of 3-4 cm [Girard 2011, 2.6] and the trunk's sway; it grows by `slant_m` per radian off the axis.
+    A wall is detected with probability 1/2 when its level equals that of a wall straight ahead at `maximum_m`, given spreading and absorption there
+    and back and a beam that is `rim_db` down at 27.5 degrees each way [Girard 2011, 2.6.2, 2.6.3]; `soft_db`: decibels per unit of logit.
     The inside of a corner answers `corner_db` more weakly, any other wall end `edge_db`, and more so with distance.
-    `short`: something nearer that is not on the plan; `stray`: a second reflection where nothing on the plan was heard; `outlier`: anything else.
-    `correlation_m`: travel over which errors of successive echoes become independent.
+    `short`: an object before all sources, not on the plan; `stray`: a second reflection when no source was detected; `outlier`: anything else.
+    `correlation_m`: length of the path over which errors of successive echoes become independent.
     """
 
     sd_m: float = 0.036
@@ -43,7 +52,7 @@ class EchoSettings:
     correlation_m: float = 0.06
 
     def __post_init__(self) -> None:
-        """Raise ValueError for lengths of zero and for probabilities that are none."""
+        """Raise ValueError for lengths of zero and for numbers that are not probabilities."""
         for name in ("sd_m", "soft_db", "correlation_m", "outlier"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"[echo] {name}: must be greater than 0")
@@ -55,7 +64,7 @@ class EchoSettings:
 
 
 class EchoModel(NamedTuple):
-    """`EchoSettings` as the kernels take them: levels as logit per dB, the beam per square radian."""
+    """`EchoSettings` as the kernels take them: levels in logits, the beam in logits per square radian."""
 
     sd_m: float
     slant_m: float
@@ -82,13 +91,6 @@ def echo_model(s: EchoSettings) -> EchoModel:
     )  # fmt: skip
 
 
-ABSORPTION_DB_M = 2.6  # there and back, 40 kHz in air [ISO 9613-1]
-DB = 20.0 / math.log(10.0)
-DEAF = 1e-4  # of a probability: nothing behind is worth a look
-SILENT = 0.2  # of what nothing explains, no echo
-NEVER = -8.0  # of a logit, likewise
-
-
 @lean_kernel
 def echo_density(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
@@ -100,9 +102,9 @@ def echo_density(
         heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
         unheard -= heard
         sd = m.sd_m + m.slant_m * off_axis_rad[k]
-        if heard > 0.0 and abs(range_m - distance_m[k]) < 6.0 * sd:
+        if heard > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
             hit += heard * normal(range_m - distance_m[k], sd)
-        if unheard < DEAF:
+        if unheard < NEGLIGIBLE:
             break
     span = m.maximum_m - m.minimum_m
     if range_m <= 0.0:
@@ -121,7 +123,7 @@ def log_echo(range_m: float, count: int, distance_m: Floats, off_axis_rad: Float
 
 @inline_kernel
 def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel) -> float:
-    """Probability that a source is heard: spreading, absorption, beam, and the weakness of a mere edge."""
+    """Probability that a source is detected: from spreading, absorption, beam, and the weaker echo of a corner or an edge."""
     if distance_m < 0.5 * m.minimum_m:
         return 0.0
     log_d = math.log(distance_m) * DB
@@ -130,7 +132,7 @@ def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel)
         margin -= m.edge + 0.5 * m.per_db * log_d
     elif kind == CORNER:
         margin -= m.corner
-    return 1.0 / (1.0 + math.exp(-margin)) if margin > NEVER else 0.0
+    return 1.0 / (1.0 + math.exp(-margin)) if margin > LEAST_LOGIT else 0.0
 
 
 @inline_kernel

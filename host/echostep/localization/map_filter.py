@@ -37,9 +37,8 @@ UNEXPLAINED = -1.5  # below it the plan does not explain the echoes, and the est
 LEAST_TRUST = 0.1  # by reason: with none the trust could not rise again
 LOST_SD_M = 3.0  # standard deviation added to a lost estimate, by reason: its status is then "lost"
 REGAIN_M = 10.0  # path at full trust over which that standard deviation falls to 1 / e, by reason
-TURNING_RAD = math.radians(
-    15.0
-)  # turn on a segment at which its pings count half, by reason: headings between its ends are interpolated
+# Turn on a segment at which its pings count half, by reason: headings between its ends are interpolated
+TURNING_RAD = math.radians(15.0)
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
 PLAN_SD_M = (
     0.15  # standard deviation per axis at zero trust, by reason: a plan that explains few echoes may be so far off

@@ -1,4 +1,4 @@
-"""The methods of three papers as printed: Girard 2011, Fischer 2008, Lee 2010. Nothing of ours imports them but the studies and `--profile`.
+"""The methods of three papers as printed: Girard 2011, Fischer 2008, Lee 2010. Only the studies and `--profile` use them.
 
-In: what their authors measured. Out: what they computed. Owns their state.
+In: the measurements that each paper uses. Out: what it computes. Owns the state of each.
 """

@@ -9,9 +9,9 @@ acceleration and rate of turn has been below a threshold for more than 0.2 s; in
 - Gravity is 9.81 m/s2 along the world's z axis, and is taken away after the rotation.
 - The product is of the raw readings, gravity included, in m/s2 times rad/s: near rest it is 9.81 times the rate, so 16 is 93 deg/s.
 - The threshold, "empirically determined", is 16 here: the lowest even number with which none of 200 real stances is missed (both feet of six walks
-  with an Xsens MTw at 100 Hz, xsens_mtw_voisard; the footfalls there are marked by hand). It calls 6 of the swings a stance too early.
-- A stance is known only when the 0.2 s are over, for their implementation was on-line: until then the velocity's error is still integrated.
-- What velocity has drifted by the end of a swing is dropped, not spread back over the swing.
+  with an Xsens MTw at 100 Hz, xsens_mtw_voisard; the footfalls there are marked by hand). It ends 6 of the swings too early.
+- A stance is detected only after the 0.2 s, because their implementation was on-line: until then the velocity's error is integrated.
+- The velocity's drift at the end of a swing is dropped, not distributed over the swing.
 - Integrals are trapezoids, from sample to sample. Over a gap nothing is integrated, and the velocity begins at zero after it.
 """
 
@@ -41,7 +41,7 @@ def walk_track(
     """The walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s, with the MTx's matrices (n, 3, 3) sensor -> world.
 
     The walk frame is the MTx world turned about the vertical, so that the sensor's x axis points along x in the first stance. A sample that
-    cannot be one (not finite, impossible, not later than those before) repeats the row before. The paper states no covariances: they are NaN.
+    is not usable (not finite, impossible, not later than those before) repeats the row before. The paper states no covariances: they are NaN.
     """
     settings = settings or Fischer2008()
     t_s = np.asarray(t_s, np.float64)
@@ -124,7 +124,7 @@ def events(t_s: Floats, position: Floats, heading: Floats, stance: Bools) -> lis
 
 
 def usable(t_s: Floats, accel: Floats, gyro: Floats, orientation: Floats | None = None) -> tuple[Bools, FootCounts]:
-    """Which samples are samples (n,), and the counts of those that are not; raises ValueError for arrays of other shapes."""
+    """Which samples are usable (n,), and the counts of those that are not; raises ValueError for arrays of other shapes."""
     n = len(t_s)
     matrices = np.zeros((n, 3, 3)) if orientation is None else orientation
     shapes = np.shape(t_s), np.shape(accel), np.shape(gyro), np.shape(matrices)
@@ -139,7 +139,7 @@ def usable(t_s: Floats, accel: Floats, gyro: Floats, orientation: Floats | None 
 
 
 def _advancing(t_s: Floats, possible: Bools) -> Bools:
-    """The possible samples (n,) that are later than the one before, or follow so many from the past that the clock must have been set."""
+    """The possible samples (n,) that are later than the one before, or follow STRAY_SAMPLES from the past: then the clock was set."""
     good, last, stray = possible.copy(), -np.inf, 0
     for k in np.flatnonzero(possible).tolist():
         stray = 0 if t_s[k] > last else stray + 1

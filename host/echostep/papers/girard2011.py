@@ -3,7 +3,7 @@
 In: the motion vector and heading of each step, one ping of each ranger. Out: the position estimate. Owns its particles; draws from the generator
 that it is given. The numbers 1 to 8 are the paper's (section 3.2). Where the paper leaves something open:
 
-- A new particle inherits its parent's weight; with it step 5 decides who is the lighter. Step 6 then sets the weight anew, as printed, from this
+- A new particle inherits its parent's weight; step 5 compares these weights. Step 6 then sets the weight anew, as printed, from this
   step's pings alone. Without rangers the inherited and merged weights go on to steps 7 and 8, so that the middle of the
   cloud is kept: it stops growing at about 0.4 m, unlike Figure 11. Drawing those that go in step 7 lets it grow, but misses the paper's row
   "with model" (0.33 m instead of 0.45 m; 0.47 m printed).
@@ -45,7 +45,7 @@ class Girard:
     def __init__(
         self, settings: GirardSettings, start_xy: tuple[float, float], walls: Floats | None, rng: np.random.Generator
     ) -> None:
-        """Step 1: a single particle where the user says he is."""
+        """Step 1: a single particle at the place that the user states."""
         self.settings = settings
         self.x_m: Floats = np.array([start_xy[0]])
         self.y_m: Floats = np.array([start_xy[1]])
@@ -63,13 +63,13 @@ class Girard:
         x, y, weight = self._propagate(vectors)
         x, y, weight = merge(x, y, weight, s.tau_m)
         if ranges_m is not None:
-            weight = self._weigh(x, y, heading_rad, ranges_m)
+            weight = self._reweight(x, y, heading_rad, ranges_m)
         kept = np.argsort(-weight, kind="stable")[: s.nu]
         self.x_m, self.y_m, self.weight = x[kept], y[kept], weight[kept]
         return average(self.x_m, self.y_m, self.weight)
 
     def _propagate(self, vectors: Floats) -> tuple[Floats, Floats, Floats]:
-        """Step 4: every vector applied to every particle; those that meet a wall on the way are gone."""
+        """Step 4: every vector applied to every particle; those that cross a wall are removed."""
         if self._walls is not None:
             x, y, parent = moved(self.x_m, self.y_m, vectors, self._walls.near(self.x_m, self.y_m))
             if len(x):
@@ -82,15 +82,15 @@ class Girard:
             np.repeat(self.weight, n) / n,
         )
 
-    def _weigh(self, x: Floats, y: Floats, heading_rad: float, ranges_m: tuple[float, float]) -> Floats:
+    def _reweight(self, x: Floats, y: Floats, heading_rad: float, ranges_m: tuple[float, float]) -> Floats:
         """Step 6 for both rangers."""
         s = self.settings
-        heard = np.array([s.maximum_m if math.isnan(r) else r for r in ranges_m])
+        measured = np.array([s.maximum_m if math.isnan(r) else r for r in ranges_m])
         if self._walls is None:
             return np.ones(len(x))
         heading = np.full(len(x), heading_rad)
         modelled = lambda_ray_ranges(x, y, heading, self._walls.near(x, y), s.rays, s.aperture_rad, s.maximum_m)
-        return similarity(modelled, heard, s.maximum_m)
+        return similarity(modelled, measured, s.maximum_m)
 
 
 def disc(rng: np.random.Generator, count: int, radius_m: float) -> Floats:
@@ -130,9 +130,9 @@ def moved(x: Floats, y: Floats, vectors: Floats, walls: WallIndex) -> tuple[Floa
 
 @kernel
 def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, Floats, Floats]:
-    """Step 5: no two particles closer than `tau_m`; the lighter one gives its weight away. Particles come by falling weight and keep their order."""
-    # A torus of cells, tau across the corners: each holds at most one kept particle, but for those that the torus brings together from afar; these
-    # stand in a list that all ask. An empty cell holds a place infinitely far away, so that it is asked without a branch.
+    """Step 5: no two particles closer than `tau_m`; the lighter gives its weight away. Particles are sorted by falling weight and stay so."""
+    # A torus of square cells with a diagonal of tau: each holds one kept particle. Kept particles whose cell is taken by one from another turn of the
+    # torus are in the list `crowded`, which is always searched. An empty cell holds a place at infinity, so that no branch is needed.
     n, side = len(x), 64
     while side * side < 4 * n:
         side *= 2
@@ -163,7 +163,7 @@ def merge(x: Floats, y: Floats, weight: Floats, tau_m: float) -> tuple[Floats, F
 
 @kernel
 def _host(px: float, py: float, column: int, row: int, side: int, places: Floats, holder: Int32s, tau2: float) -> int:
-    """A kept particle closer than tau in the cells about (column, row); -1 without one. The inner nine first: most find theirs there."""
+    """A kept particle closer than tau in the 21 cells about (column, row); -1 without one. The inner nine come first: most are found there."""
     host = -1
     for r in range(-1, 2):
         line = ((row + r) & (side - 1)) * side

@@ -1,4 +1,4 @@
-"""What the cones of many poses read, by the tiles in which they are.
+"""Readings of both rangers at many poses, tile by tile.
 
 In: poses and the tables of their tiles. Out: for each ranger the shortest ray that counts [Girard 2011, eq. 3]. Owns nothing.
 Every loop goes over the poses of one tile, without a branch and over few arrays, so that the compiler makes vector instructions of it.
@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
-from echostep.walls.echo_sources import bearing, hidden
+from echostep.walls.echo_sources import Ear, bearing, hidden
 from echostep.walls.index import (
     BEARINGS,
     CONE_RAD,
@@ -26,10 +26,18 @@ from echostep.walls.visibility import tile_sources
 Eight = tuple[float, float, float, float, float, float, float, float]
 
 MOST_RAYS = 8  # of a fan
-POSES = 256  # of a tile at a time: their columns stay in the nearest cache
-COLUMNS = 10
-FEWEST = 10  # in a tile: for less it takes longer than one by one
-SAME_M = 1e-9  # a ray meets walls so close together at once
+POSES = 256  # processed at a time in a tile: their columns stay in the nearest cache
+COLUMNS = 10  # of scratch, each (POSES,): x, y, axis x, axis y, reading left, reading right, and four for `_meet`
+FEWEST = 10  # poses in a tile: fewer are faster one by one
+SAME_M = 1e-9  # walls so close together are met by a ray at once
+
+
+class Poses(NamedTuple):
+    """n poses, each (n,): place (m) and heading (rad); the rangers look to the left and to the right of the heading."""
+
+    x: Floats
+    y: Floats
+    heading: Floats
 
 
 class Fan(NamedTuple):
@@ -41,18 +49,46 @@ class Fan(NamedTuple):
     last: float
 
 
-@lean_kernel
-def sort_by_tile(
-    x: Floats, y: Floats, heading: Floats, index: WallIndex, which: Int32s, begin: Int32s, order: Int32s
-) -> int:
-    """Numbers of the poses (n,) into `order`, tile by tile in the order in which they were looked at: `begin` (looked + 2,), zeros before.
+class Cone(NamedTuple):
+    """The same rays for one pose at a time: `fan` (3, rays + 1) has cosine and sine of each off the axis, and the sine of the bound before it.
 
-    Returns how many there are in tiles with FEWEST at least; the others come last.
+    `slant`: tangent of half the spacing of two rays. `maximum_m`: reading when no ray counts.
     """
-    odd = index.looked
+
+    fan: Floats
+    slant: float
+    maximum_m: float
+
+
+class WallLine(NamedTuple):
+    """Start of a wall and its unit tangent."""
+
+    x: float
+    y: float
+    tx: float
+    ty: float
+
+
+class WallEnds(NamedTuple):
+    """Both ends of a wall."""
+
+    ax: float
+    ay: float
+    bx: float
+    by: float
+
+
+@lean_kernel
+def sort_by_tile(poses: Poses, index: WallIndex, which: Int32s, begin: Int32s, order: Int32s) -> int:
+    """Numbers of the poses into `order` (n,), tile by tile in the order of the tables; where each begins into `begin` (tabulated + 2,), zeros before.
+
+    Returns how many are in tiles with at least FEWEST poses; the others come last.
+    """
+    x, y, heading = poses
+    odd = index.tabulated
     for i in range(len(x)):
         tile = tile_at(x[i], y[i], index)
-        k = index.seen[tile] - 1 if tile >= 0 and math.isfinite(heading[i]) else odd
+        k = index.tile_number[tile] - 1 if tile >= 0 and math.isfinite(heading[i]) else odd
         which[i] = k if 0 <= k < odd else odd
         begin[which[i] + 1] += 1
     for i in range(len(x)):
@@ -76,11 +112,11 @@ def sort_by_tile(
 
 @lean_kernel
 def read_cones(
-    x: Floats, y: Floats, heading: Floats, index: WallIndex, order: Int32s, begin: Int32s, fan: Fan, maximum_m: float,
-    columns: Floats, ranges: Floats,
+    poses: Poses, index: WallIndex, order: Int32s, begin: Int32s, fan: Fan, maximum_m: float, columns: Floats, ranges: Floats
 ) -> None:  # fmt: skip
     """Fill `ranges` (n, 2) of the poses that were sorted into tiles; `columns` (COLUMNS, POSES) is scratch."""
-    for k in range(index.looked):
+    x, y, heading = poses
+    for k in range(index.tabulated):
         for first in range(begin[k], begin[k + 1], POSES):
             chosen = order[first : min(first + POSES, begin[k + 1])]
             m = len(chosen)
@@ -99,7 +135,7 @@ def read_cones(
 
 @lean_kernel
 def _meet(face: int, index: WallIndex, fan: Fan, maximum_m: float, columns: Floats, m: int) -> None:
-    """The rays of m poses that meet one wall first."""
+    """Shorten the readings of m poses by the rays that meet one wall first."""
     px, py, ax, ay, left, right = (
         columns[0, :m], columns[1, :m], columns[2, :m], columns[3, :m], columns[4, :m], columns[5, :m]
     )  # fmt: skip
@@ -112,7 +148,8 @@ def _meet(face: int, index: WallIndex, fan: Fan, maximum_m: float, columns: Floa
         return
     for j in range(faces.screen_start[face], faces.screen_start[face + 1]):
         w = faces.screens[j]
-        _hide(c, px, py, s, x, y, tx, ty, walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3], maximum_m)
+        screen = WallEnds(walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3])
+        _hide(c, px, py, s, WallLine(x, y, tx, ty), screen, maximum_m)
     _keep(c, e, left, right)
 
 
@@ -126,10 +163,19 @@ def _place(px: Floats, py: Floats, x: float, y: float, tx: float, ty: float, alo
 
 @lean_kernel
 def _end(c: Floats, e: Floats, h: Floats, s: Floats, width_m: float, fan: Fan, maximum_m: float) -> int:
-    """Where the ray nearest to the wall's normal ends, and how many count.
+    """Where the ray nearest to the wall's normal ends; returns how many rays count.
 
-    In: the axis to the left of the wall's tangent and along it, the pose likewise. Out: `c` length of the ray (`maximum_m` where it does not
-    count), `s` its end along the wall, `e` 1 for the left ranger and -1 for the right one.
+    In the wall's axes, along its tangent and to the left of it:
+
+              in                                      out
+        e, c  left ranger's axis, along and left      e: 1 the left ranger looks at the wall, -1 the right one does
+        s, h  pose, along and left                    s: end of the ray along the wall
+                                                      c: length of the ray, `maximum_m` where it does not count
+
+        sign of c * h    the left ranger looks    side
+              < 0        towards the wall          1
+              > 0        away from it             -1
+              = 0        along it                 no ray counts
     """
     cos0, cos1, cos2, cos3, cos4, cos5, cos6, cos7 = fan.cosine
     sin0, sin1, sin2, sin3, sin4, sin5, sin6, sin7 = fan.sine
@@ -158,10 +204,11 @@ def _end(c: Floats, e: Floats, h: Floats, s: Floats, width_m: float, fan: Fan, m
 
 @lean_kernel
 def _hide(
-    length: Floats, px: Floats, py: Floats, s: Floats, x: float, y: float, tx: float, ty: float,
-    ax: float, ay: float, bx: float, by: float, maximum_m: float,
-) -> None:  # fmt: skip
-    """Rays to a wall do not count if they meet the wall from a to b before it; touching counts (`walls.segments_cross`)."""
+    length: Floats, px: Floats, py: Floats, s: Floats, line: WallLine, screen: WallEnds, maximum_m: float
+) -> None:
+    """Rays to places s along a line do not count if they meet another wall before it; touching counts (`index.segments_cross`)."""
+    x, y, tx, ty = line
+    ax, ay, bx, by = screen
     vx, vy = bx - ax, by - ay
     for i in range(len(length)):
         share = 1.0 - SAME_M / length[i]
@@ -175,7 +222,7 @@ def _hide(
 
 @lean_kernel
 def _keep(length: Floats, side: Floats, left: Floats, right: Floats) -> None:
-    """The shorter one, for the ranger that it belongs to."""
+    """Keep the shorter reading, of the ranger that the ray belongs to."""
     for i in range(len(length)):
         left[i] = length[i] if (side[i] > 0.0) & (length[i] < left[i]) else left[i]
         right[i] = length[i] if (side[i] < 0.0) & (length[i] < right[i]) else right[i]
@@ -186,7 +233,7 @@ def lambda_ray_ranges(
     x: Floats, y: Floats, heading_rad: Floats, index: WallIndex,
     rays: int = 7, aperture_rad: float = math.radians(55.0), maximum_m: float = 6.0,
 ) -> Floats:  # fmt: skip
-    """What each of n poses reads with rangers to the left and to the right, (n, 2) [Girard 2011, eq. 3].
+    """Readings (n, 2) of the left and the right ranger at n poses [Girard 2011, eq. 3].
 
     Each ranger sends `rays` rays, `aperture_rad` / `rays` apart about its axis. A ray ends at the first wall it meets, and counts if it meets that
     within half the spacing from its normal. The reading is the shortest ray that counts, `maximum_m` (at most EAR_REACH_M) if there is none.
@@ -200,14 +247,15 @@ def lambda_ray_ranges(
     slant = math.tan(0.5 * spacing) * (1.0 + 1e-12)
     tables_hold = slant <= index.slant * (1.0 + 1e-11) and 0.5 * aperture_rad <= CONE_RAD
     order, others = np.arange(len(x)).astype(np.int32), 0
+    poses = Poses(x, y, heading_rad)
     if tables_hold and rays <= MOST_RAYS:
-        begin = np.zeros(index.looked + 2, np.int32)
-        others = sort_by_tile(x, y, heading_rad, index, np.empty(len(x), np.int32), begin, order)
+        begin = np.zeros(index.tabulated + 2, np.int32)
+        others = sort_by_tile(poses, index, np.empty(len(x), np.int32), begin, order)
         eight = Fan(_eight(cosine, rays, 0.0), _eight(sine, rays, 0.0), _eight(bound, rays, np.inf), bound[rays])
         columns = np.empty((COLUMNS, POSES))
-        read_cones(x, y, heading_rad, index, order, begin, eight, maximum_m, columns, ranges)
-    fan = np.vstack((cosine, sine, bound))
-    _cone_ranges(order[others:], x, y, heading_rad, index, fan, slant, tables_hold, maximum_m, ranges)
+        read_cones(poses, index, order, begin, eight, maximum_m, columns, ranges)
+    cone = Cone(np.vstack((cosine, sine, bound)), slant, maximum_m)
+    _cone_ranges(order[others:], poses, index, cone, tables_hold, ranges)
     return ranges
 
 
@@ -220,61 +268,46 @@ def _eight(values: Floats, count: int, beyond: float) -> Eight:
 
 
 @lean_kernel
-def _cone_ranges(
-    chosen: Int32s, x: Floats, y: Floats, heading: Floats, index: WallIndex,
-    fan: Floats, slant: float, tables_hold: bool, maximum_m: float, ranges: Floats,
-) -> None:  # fmt: skip
-    """Fill `ranges` of the chosen poses, one by one.
-
-    `fan` (3, rays + 1): cosine and sine of each ray off the axis, sine of the bound before it; `slant`: tangent of its width.
-    """
+def _cone_ranges(chosen: Int32s, poses: Poses, index: WallIndex, cone: Cone, tables_hold: bool, ranges: Floats) -> None:
+    """Fill `ranges` of the chosen poses, one by one; `tables_hold`: whether the index was made for at least this slant."""
+    x, y, heading = poses
     for i in chosen:
         tile = tile_at(x[i], y[i], index)
         if tile < 0 or not math.isfinite(heading[i]):
-            ranges[i, 0] = ranges[i, 1] = maximum_m
+            ranges[i, 0] = ranges[i, 1] = cone.maximum_m
             continue
-        k = index.seen[tile] - 1
+        k = index.tile_number[tile] - 1
         ax, ay = -math.sin(heading[i]), math.cos(heading[i])
-        if not (0 <= k < index.looked and tables_hold):
-            ranges[i, 0] = _cone_range_unseen(x[i], y[i], ax, ay, tile, index, fan, slant, maximum_m)
-            ranges[i, 1] = _cone_range_unseen(x[i], y[i], -ax, -ay, tile, index, fan, slant, maximum_m)
+        to_left, to_right = Ear(x[i], y[i], ax, ay), Ear(x[i], y[i], -ax, -ay)
+        if not (0 <= k < index.tabulated and tables_hold):
+            ranges[i, 0] = _cone_range_without_tables(to_left, tile, index, cone)
+            ranges[i, 1] = _cone_range_without_tables(to_right, tile, index, cone)
             continue
         left = bearing(heading[i] + 0.5 * math.pi)
         right = (left + BEARINGS // 2) % BEARINGS
         left, right = left + k * BEARINGS, right + k * BEARINGS
-        ranges[i, 0] = _cone_range(x[i], y[i], ax, ay, index.walls, index.faces, left, fan, slant, maximum_m)
-        ranges[i, 1] = _cone_range(x[i], y[i], -ax, -ay, index.walls, index.faces, right, fan, slant, maximum_m)
+        ranges[i, 0] = _cone_range(to_left, index.walls, index.faces, left, cone)
+        ranges[i, 1] = _cone_range(to_right, index.walls, index.faces, right, cone)
 
 
 @allocating_kernel
-def _cone_range_unseen(
-    px: float, py: float, ax: float, ay: float, tile: int, index: WallIndex, fan: Floats, slant: float, maximum_m: float
-) -> float:
-    """The same where the tables do not hold."""
-    faces, _ = tile_sources(tile, index, slant)
-    shortest = maximum_m
+def _cone_range_without_tables(ear: Ear, tile: int, index: WallIndex, cone: Cone) -> float:
+    """`_cone_range` where the index has no tables for the tile or for this slant."""
+    faces, _ = tile_sources(tile, index, cone.slant)
+    shortest = cone.maximum_m
     for u in range(BEARINGS):
-        shortest = min(shortest, _cone_range(px, py, ax, ay, index.walls, faces, u, fan, slant, maximum_m))
+        shortest = min(shortest, _cone_range(ear, index.walls, faces, u, cone))
     return shortest
 
 
 @inline_kernel
-def _cone_range(
-    px: float,
-    py: float,
-    ax: float,
-    ay: float,
-    walls: Floats,
-    faces: SourceTable,
-    u: int,
-    fan: Floats,
-    slant: float,
-    maximum_m: float,
-) -> float:
-    """The shortest ray that counts about the axis a, among the walls of unit u."""
-    shortest, rays = maximum_m, fan.shape[1] - 1
-    for at in range(faces.start[u], faces.start[u + 1]):
-        i = faces.order[at]
+def _cone_range(ear: Ear, walls: Floats, faces: SourceTable, u: int, cone: Cone) -> float:
+    """The shortest ray that counts of a ranger, among the walls of unit u."""
+    px, py, ax, ay = ear
+    fan, slant, shortest = cone
+    rays = fan.shape[1] - 1
+    for position in range(faces.start[u], faces.start[u + 1]):
+        i = faces.order[position]
         dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
         tx, ty = faces.rows[i, 2], faces.rows[i, 3]
         h = dy * tx - dx * ty

@@ -1,7 +1,7 @@
 """The ambulatory system of Lee and Lee 2010 as printed: distance from thigh and calf gyros, heading by compass and belt gyro, floor by pressure.
 
 In: angles and rates of thigh and calf (forward positive), compass and belt gyro, pressure. Out: travel, velocity, covariance, heading, place, floor.
-Owns the state of `Walker`: the leg's angles and where he is. Equation numbers are those of [Lee 2010]. What the paper leaves open is decided
+Owns the state of `Walker`: the leg's angles, heading and place. Equation numbers are those of [Lee 2010]. What the paper leaves open is decided
 here: angles are wrapped before they are fused, and a period of the leg ends where the thigh turns round behind the body.
 """
 
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Floats
 
 THIGH_M, CALF_M = 0.48, 0.56  # L1, L2 [Lee 2010, section 2]
 RATE_HZ = 10.0  # of eqs. 19 and 20 [Lee 2010, section 3]
-LONGEST_GAP_S = 0.25  # without samples: what happened in it is not known
+LONGEST_GAP_S = 0.25  # without samples; over a longer gap nothing is integrated
 ISO_PRESSURE_PA, ISO_EXPONENT, ISO_LAPSE_1_M = 101_325.0, 5.25588, 2.25577e-5  # [ISO 2533]
 
 
@@ -38,12 +39,12 @@ class Fused:
 
 
 def knee_travel(thigh_plus: float, thigh_minus: float, legs: Lee2010Legs) -> float:
-    """d, how far the knee travels: `thigh_plus` and `thigh_minus` are the sizes of the thigh's angle in front and behind [Lee 2010, eq. 1]."""
+    """d, travel of the knee (m), from the sizes of the thigh's angle in front and behind (rad) [Lee 2010, eq. 1]."""
     return legs.thigh_m * math.sin(thigh_plus) + legs.thigh_m * math.sin(thigh_minus)
 
 
 def hip_travel(thigh_plus: float, thigh_minus: float, calf_plus: float, calf_minus: float, legs: Lee2010Legs) -> float:
-    """D, how far the hip travels [Lee 2010, eq. 2]."""
+    """D, travel of the hip (m) [Lee 2010, eq. 2]."""
     return (
         knee_travel(thigh_plus, thigh_minus, legs)
         + legs.calf_m * math.sin(calf_plus)
@@ -133,11 +134,6 @@ def iso_height_m(pressure_pa: float) -> float:
     return float((1.0 - (pressure_pa / ISO_PRESSURE_PA) ** (1.0 / ISO_EXPONENT)) / ISO_LAPSE_1_M)
 
 
-def wrap(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
-
-
 @dataclass(frozen=True, slots=True)
 class LeeSettings:
     """`compass_sd_rad` and `gyro_sd_rad_s` weigh eq. 17: the compass's error, and how fast the integrated belt gyro goes wrong (per root second).
@@ -153,20 +149,20 @@ class LeeSettings:
 
 
 class Neutral:
-    """One segment's angle: its rate is summed, and after each period the middle of its swing is upright again [Lee 2010, Figure 4]."""
+    """Angle of thigh or calf: the integrated rate, corrected after each period so that the swing's middle is upright [Lee 2010, Figure 4]."""
 
     def __init__(self) -> None:
         self.angle_rad = 0.0
         self.front_rad = self.rear_rad = 0.0  # of the period under way
 
     def turn(self, rate_rad_s: float, dt_s: float) -> None:
-        """Integrate."""
+        """Integrate a rate over `dt_s`."""
         self.angle_rad += rate_rad_s * dt_s
         self.front_rad = max(self.front_rad, self.angle_rad)
         self.rear_rad = min(self.rear_rad, self.angle_rad)
 
     def reset(self) -> None:
-        """A period is over."""
+        """Correct the angle at the end of a period."""
         self.angle_rad -= nominal(self.front_rad, self.rear_rad)
         self.front_rad = self.rear_rad = self.angle_rad
 
@@ -223,7 +219,7 @@ class Walker:
         return self._row(t_s)
 
     def _turn(self, belt: float, dt_s: float) -> None:
-        """The integrated value of the gyro, and what it may have drifted."""
+        """Integrate the belt gyro's rate into the heading, and its drift into the variance."""
         variance = self.heading.variance + self.settings.gyro_sd_rad_s**2 * dt_s
         self.heading = Fused(wrap(self.heading.angle_rad + belt * dt_s), variance)
 

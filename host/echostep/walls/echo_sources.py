@@ -1,12 +1,13 @@
-"""What a ranger hears from a place: the echo sources of the plan.
+"""Echo sources of the plan: where a ranger's ping is reflected back to it.
 
 In: walls (n, 4) and places. Out: `Walls.near` gives the `WallIndex` for kernels; `echo_sources` is such a kernel.
-`Walls` owns the tables of the tiles that a cloud has reached; they are made when it first comes near.
+Owns, in `Walls`, the tables of the tiles that a cloud has reached; they are made when it first comes near.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,21 +25,39 @@ from echostep.walls.index import (
     segments_cross,
     tile_at,
 )
-from echostep.walls.visibility import CORNER, EDGE, in_sector, tile_sources
+from echostep.walls.tile_points import CORNER, EDGE, in_sector
+from echostep.walls.visibility import tile_sources
 
 __all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
 
 
-WALL = 0.0
-MOST_SOURCES = 8
-FARTHEST_M = 3.0
-FOOT_M = 1e-3  # what stands so close to a wall does not hide it: walls drawn twice
-NEAREST_M = 1e-6
+WALL = 0.0  # kind, beside EDGE and CORNER
+MOST_SOURCES = 8  # of one ping, by reason: the nearest ones mask the others
+FARTHEST_M = 3.0  # greatest `reach_m`, by reason: it bounds the tiles made at once
+FOOT_M = 1e-3  # a wall so close before another does not hide it: walls drawn twice
+NEAREST_M = 1e-6  # a source no further away has no direction
 CONE = math.cos(CONE_RAD)
 
 
+class Ear(NamedTuple):
+    """A ranger: its place (m), and the unit vector of its axis."""
+
+    x: float
+    y: float
+    axis_x: float
+    axis_y: float
+
+
+class SourceList(NamedTuple):
+    """Echo sources found so far, nearest first, each array (MOST_SOURCES,): distance (m), cosine off the axis and later the angle (rad), kind."""
+
+    distance_m: Floats
+    off_axis: Floats
+    kind: Floats
+
+
 class Walls:
-    """A plan's walls, and the tables of the tiles that were looked at so far."""
+    """A plan's walls, and the tables of the tiles that a cloud has reached so far."""
 
     def __init__(self, walls: Floats, slant_rad: float = 0.0) -> None:
         """`slant_rad`: greatest angle of a ray to a wall's normal for which the tables must hold; 0 serves `echo_sources`."""
@@ -46,22 +65,22 @@ class Walls:
 
     @property
     def index(self) -> WallIndex:
-        """The index as it is, with the tiles looked at so far."""
+        """The index as it is, with the tiles tabulated so far."""
         return self._index
 
     def near(self, x_m: Floats, y_m: Floats, reach_m: float = 0.0) -> WallIndex:
-        """The index with all tiles looked at that hold these places (n,) or anything within `reach_m` (at most FARTHEST_M) of them."""
+        """The index with all tiles tabulated that hold these places (n,) or anything within `reach_m` (at most FARTHEST_M) of them."""
         reach_m = min(reach_m, FARTHEST_M)
         tiles = np.empty(len(x_m) * (int(2.0 * reach_m / TILE_M) + 2) ** 2, np.int32)
-        count = _unseen(np.ascontiguousarray(x_m), np.ascontiguousarray(y_m), reach_m, self._index, tiles)
+        count = _missing_tiles(np.ascontiguousarray(x_m), np.ascontiguousarray(y_m), reach_m, self._index, tiles)
         if count:
-            self._index = _look(tiles[:count], self._index)
+            self._index = _tabulate(tiles[:count], self._index)
         return self._index
 
 
 @lean_kernel
-def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex, tiles: Int32s) -> int:
-    """Tiles near these places that were not looked at, each once, in order of appearance, into `tiles`; their number."""
+def _missing_tiles(x: Floats, y: Floats, reach: float, index: WallIndex, tiles: Int32s) -> int:
+    """Tiles near these places that are not tabulated, each once, in order of appearance, into `tiles`; their number."""
     count = 0
     for i in range(len(x)):
         if tile_at(x[i], y[i], index) < 0:
@@ -72,35 +91,35 @@ def _unseen(x: Floats, y: Floats, reach: float, index: WallIndex, tiles: Int32s)
             for tile in range(
                 row * index.columns + max(int(left), 0), row * index.columns + min(int(right) + 1, index.columns)
             ):
-                if index.seen[tile] == 0:
-                    index.seen[tile] = -1
+                if index.tile_number[tile] == 0:
+                    index.tile_number[tile] = -1  # listed, until the end of this function
                     tiles[count] = tile
                     count += 1
     for k in range(count):
-        index.seen[tiles[k]] = 0
+        index.tile_number[tiles[k]] = 0
     return count
 
 
 @kernel
-def _look(tiles: Int32s, index: WallIndex) -> WallIndex:
+def _tabulate(tiles: Int32s, index: WallIndex) -> WallIndex:
     """Append the tables of these tiles. Indexes given out before stay as they are."""
-    count = index.looked
+    count = index.tabulated
     faces, points, numbers = index.faces, index.points, tiles.astype(np.int64)
     for k in range(len(tiles)):
         more_faces, more_points = tile_sources(numbers[k], index, index.slant)
         faces = _appended(faces, count + k, more_faces)
         points = _appended(points, count + k, more_points)
     for k in range(len(tiles)):
-        index.seen[tiles[k]] = count + k + 1
+        index.tile_number[tiles[k]] = count + k + 1
     return WallIndex(
-        index.x0_m, index.y0_m, index.columns, index.rows, index.walls, index.start, index.ids, index.slant, index.seen,
+        index.x0_m, index.y0_m, index.columns, index.rows, index.walls, index.start, index.ids, index.slant, index.tile_number,
         count + len(tiles), faces, points,
     )  # fmt: skip
 
 
 @kernel
 def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
-    """`table` of `tile` tiles with one more, in arrays that are at least doubled when they grow."""
+    """`table` of `tile` tiles with one tile more, in arrays that are at least doubled when they grow."""
     unit, rows = tile * BEARINGS, table.tile_start[tile]
     ordered, used = table.start[unit], table.screen_start[rows]
     added, screens = len(more.rows), len(more.screens)
@@ -141,14 +160,15 @@ def echo_sources(
     tile = tile_at(px, py, index)
     if tile < 0 or not math.isfinite(axis_rad):
         return 0
-    k = index.seen[tile] - 1
+    k = index.tile_number[tile] - 1
     u = bearing(axis_rad)
-    ax, ay = math.cos(axis_rad), math.sin(axis_rad)
-    if not 0 <= k < index.looked:
-        return _sources_unseen(px, py, ax, ay, tile, u, index, distance_m, off_axis_rad, kind)
+    ear = Ear(px, py, math.cos(axis_rad), math.sin(axis_rad))
+    sources = SourceList(distance_m, off_axis_rad, kind)
+    if not 0 <= k < index.tabulated:
+        return _sources_of_missing_tile(ear, tile, u, index, sources)
     u += k * BEARINGS
-    n = _add_faces(px, py, ax, ay, index.walls, index.faces, u, distance_m, off_axis_rad, kind)
-    n = _add_points(px, py, ax, ay, index.walls, index.points, u, n, distance_m, off_axis_rad, kind)
+    n = _add_faces(ear, index.walls, index.faces, u, sources)
+    n = _add_points(ear, index.walls, index.points, u, n, sources)
     for i in range(n):
         off_axis_rad[i] = _angle(off_axis_rad[i])
     return n
@@ -162,28 +182,32 @@ def bearing(axis_rad: float) -> int:
 
 
 @allocating_kernel
-def _sources_unseen(
-    px: float, py: float, ax: float, ay: float, tile: int, u: int, index: WallIndex,
-    distance_m: Floats, off_axis_rad: Floats, kind: Floats,
-) -> int:  # fmt: skip
-    """The same for a tile that nobody looked at before."""
+def _sources_of_missing_tile(ear: Ear, tile: int, u: int, index: WallIndex, sources: SourceList) -> int:
+    """`echo_sources` in a tile that is not tabulated: its tables are made for this call alone."""
     faces, points = tile_sources(tile, index, 0.0)
-    n = _add_faces(px, py, ax, ay, index.walls, faces, u, distance_m, off_axis_rad, kind)
-    n = _add_points(px, py, ax, ay, index.walls, points, u, n, distance_m, off_axis_rad, kind)
+    n = _add_faces(ear, index.walls, faces, u, sources)
+    n = _add_points(ear, index.walls, points, u, n, sources)
     for i in range(n):
-        off_axis_rad[i] = _angle(off_axis_rad[i])
+        sources.off_axis[i] = _angle(sources.off_axis[i])
     return n
 
 
 @inline_kernel
-def _add_faces(
-    px: float, py: float, ax: float, ay: float, walls: Floats, faces: SourceTable, u: int,
-    distance_m: Floats, off_axis: Floats, kind: Floats,
-) -> int:  # fmt: skip
-    """The walls of unit u; `off_axis` gets cosines."""
+def _add_faces(ear: Ear, walls: Floats, faces: SourceTable, u: int, sources: SourceList) -> int:
+    """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number.
+
+    In the wall's own axes: s along its tangent t, h to the left of it.
+
+          h ^
+            |      o ear (s, h)        d = |h|
+            |      |
+            o------x----------> s      x: the source, at 0 <= s <= length
+          start   foot         end
+    """
+    px, py, ax, ay = ear
     n = 0
-    for at in range(faces.start[u], faces.start[u + 1]):
-        i = faces.order[at]
+    for position in range(faces.start[u], faces.start[u + 1]):
+        i = faces.order[position]
         dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
         tx, ty = faces.rows[i, 2], faces.rows[i, 3]
         s, h = dx * tx + dy * ty, dy * tx - dx * ty
@@ -195,18 +219,16 @@ def _add_faces(
         qx, qy = px + share * h * ty, py - share * h * tx
         if d > FOOT_M and hidden(px, py, qx, qy, walls, faces, i):
             continue
-        n = _insert(n, d, ahead / d, WALL, distance_m, off_axis, kind)
+        n = _insert(n, d, ahead / d, WALL, sources)
     return n
 
 
 @inline_kernel
-def _add_points(
-    px: float, py: float, ax: float, ay: float, walls: Floats, points: SourceTable, u: int, n: int,
-    distance_m: Floats, off_axis: Floats, kind: Floats,
-) -> int:  # fmt: skip
-    """The corners and edges of unit u, after n walls."""
-    for at in range(points.start[u], points.start[u + 1]):
-        i = points.order[at]
+def _add_points(ear: Ear, walls: Floats, points: SourceTable, u: int, n: int, sources: SourceList) -> int:
+    """Corners and edges of unit u, beside n sources found before; the new number."""
+    px, py, ax, ay = ear
+    for position in range(points.start[u], points.start[u + 1]):
+        i = points.order[position]
         dx, dy = points.rows[i, 0] - px, points.rows[i, 1] - py
         ahead, d2 = dx * ax + dy * ay, dx * dx + dy * dy
         if not (ahead > 0.0 and ahead * ahead >= CONE * CONE * d2 and d2 <= EAR_REACH_M * EAR_REACH_M):
@@ -217,7 +239,7 @@ def _add_points(
         share = 1.0 - JOIN_M / d
         if d <= NEAREST_M or (share > 0.0 and hidden(px, py, px + share * dx, py + share * dy, walls, points, i)):
             continue
-        n = _insert(n, d, ahead / d, points.rows[i, 2], distance_m, off_axis, kind)
+        n = _insert(n, d, ahead / d, points.rows[i, 2], sources)
     return n
 
 
@@ -240,8 +262,9 @@ def _angle(cosine: float) -> float:
 
 
 @inline_kernel
-def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_axis: Floats, kind: Floats) -> int:
-    """Sort a source in among n, nearest first; beyond MOST_SOURCES the farthest goes."""
+def _insert(n: int, d: float, off: float, new_kind: float, sources: SourceList) -> int:
+    """Insert a source among n, nearest first; beyond MOST_SOURCES the farthest is dropped."""
+    distance_m, off_axis, kind = sources
     i = n
     if n == MOST_SOURCES:
         if d >= distance_m[n - 1]:
@@ -250,5 +273,5 @@ def _insert(n: int, d: float, off: float, what: float, distance_m: Floats, off_a
     while i > 0 and distance_m[i - 1] > d:
         distance_m[i], off_axis[i], kind[i] = distance_m[i - 1], off_axis[i - 1], kind[i - 1]
         i -= 1
-    distance_m[i], off_axis[i], kind[i] = d, off, what
+    distance_m[i], off_axis[i], kind[i] = d, off, new_kind
     return min(n + 1, MOST_SOURCES)

@@ -1,8 +1,8 @@
 """The walls of a plan on a grid of square tiles: which of them a move crosses.
 
 In: wall segments (n, 4) in map metres. Out: `WallIndex`, plain arrays for kernels, and `crosses_wall`. Owns nothing.
-Each tile lists the walls that touch it, so that a move of some centimetres looks at one or two of them, however large the plan is. The second half of
-the index, what a ranger may hear from a tile, is filled by `reflectors.Walls`.
+Each tile lists the walls that touch it, so that a short move is checked against one or two walls, in a plan of any size. The second half of the
+index, the echo sources by tile, is filled by `echo_sources.Walls`.
 """
 
 from __future__ import annotations
@@ -19,20 +19,21 @@ from echostep.errors import EchostepError
 from echostep.jit import inline_kernel, kernel, lean_kernel
 
 TILE_M = 1.0
-EAR_REACH_M = 6.3  # a little more than the rangers' 6 m
-JOIN_M = 0.01  # walls that miss each other by no more than this are joined
-CONE_RAD = math.radians(
-    35.0
-)  # beyond it nothing is heard: half the 55 degree cone and its soft rim [Girard 2011, Figure 2]
-MAX_TILES = 40_000_000
-SHORTEST_M = 1e-6  # shorter walls are points, they bound nothing
+EAR_REACH_M = 6.3  # greatest distance of an echo source: a little more than the rangers' 6 m
+JOIN_M = 0.01  # walls whose ends are no further apart are joined, by reason: drawing accuracy
+# Greatest angle off a ranger's axis: half the 55 degree cone and its rim [Girard 2011, Figure 2]
+CONE_RAD = math.radians(35.0)
+MAX_TILES = 40_000_000  # by reason: a plan of more is not in metres, and its index would fill the memory
+SHORTEST_M = 1e-6  # shorter walls are left out
+FACE, POINT = 5, 7  # columns of the rows of a face and of a point (`WallIndex`)
+BEARINGS = 16  # sectors of the ranger's axis for which the tables list their rows
 
 
 class SourceTable(NamedTuple):
-    """Places that may throw sound back, by tile and bearing of the ranger's axis.
+    """Places that may reflect sound, by tile and by bearing of the ranger's axis.
 
-    With u = k * BEARINGS + bearing, the k-th tile that was looked at has rows[order[start[u] : start[u + 1]]] within CONE_RAD of that bearing; all
-    its rows are rows[tile_start[k] : tile_start[k + 1]]. The walls that can hide row i from somewhere in the tile are
+    With unit u = k * BEARINGS + bearing, the k-th tabulated tile has rows[order[start[u] : start[u + 1]]] within CONE_RAD of that bearing; all its
+    rows are rows[tile_start[k] : tile_start[k + 1]]. The walls that can hide row i from somewhere in the tile are
     walls[screens[screen_start[i] : screen_start[i + 1]]].
     """
 
@@ -45,12 +46,12 @@ class SourceTable(NamedTuple):
 
 
 class WallIndex(NamedTuple):
-    """A grid of tiles over the walls, and what may be heard from those tiles that were looked at.
+    """A grid of tiles over the walls, and the echo sources of those tiles that are tabulated.
 
-    Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `seen[t]` is k + 1 for the k-th tile that was looked at, else 0; the tables have
-    the first `looked` of them. Rows of `faces` (walls): a place x, y on the wall's line, its unit tangent x, y, its length. Rows of `points` (ends of
-    walls): x, y, kind, and the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that
-    leaves a wall at up to `slant` (tangent) from its normal.
+    Tile t is touched by walls[ids[start[t] : start[t + 1]]]. `tile_number[t]` is k + 1 for the k-th tabulated tile, else 0; this index has the first
+    `tabulated` of them. Rows of `faces` (walls): start x, y of the wall, its unit tangent x, y, its length. Rows of `points` (ends of walls): x, y,
+    kind, and the sector in which they are of that kind, as unit vectors x, y of its sides, counter-clockwise. Both hold for sound that leaves a wall
+    at up to `slant` (tangent) from its normal.
     """
 
     x0_m: float
@@ -61,19 +62,15 @@ class WallIndex(NamedTuple):
     start: Int32s
     ids: Int32s
     slant: float
-    seen: Int32s
-    looked: int
+    tile_number: Int32s
+    tabulated: int
     faces: SourceTable
     points: SourceTable
 
 
-FACE, POINT = 5, 7  # columns of the rows
-BEARINGS = 16
-
-
 @typeof_impl.register(WallIndex)
 def _index_type(index: WallIndex, context: object) -> types.Type:
-    """All indexes have one type: numba need not look at the arrays of each, which takes longer than many a kernel."""
+    """The numba type of every index: found once, because looking at all its arrays takes longer than many a kernel."""
     if not _INDEX_TYPE:
         _INDEX_TYPE.append(types.NamedTuple([typeof_impl(field, context) for field in index], WallIndex))  # type: ignore[no-untyped-call]
     return _INDEX_TYPE[0]
@@ -89,32 +86,32 @@ def no_sources(columns: int) -> SourceTable:
 
 
 def build_index(walls: Floats, slant_rad: float = 0.0) -> WallIndex:
-    """Index of walls (n, 4), no tile looked at yet; raises EchostepError for a plan too wide for its tiles.
+    """Index of walls (n, 4), no tile tabulated yet; raises EchostepError for a plan too wide for its tiles.
 
     Walls without length or with a coordinate that is not finite are left out.
     """
     walls = np.ascontiguousarray(walls, dtype=np.float64).reshape(-1, 4)
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.hypot(walls[:, 2] - walls[:, 0], walls[:, 3] - walls[:, 1])
-    sound = np.isfinite(length) & (length >= SHORTEST_M)
-    walls = walls if sound.all() else walls[sound]
-    nothing_seen = (no_sources(FACE), no_sources(POINT))
+    valid = np.isfinite(length) & (length >= SHORTEST_M)
+    walls = walls if valid.all() else walls[valid]
+    tables = (no_sources(FACE), no_sources(POINT))
     none, slant = np.zeros(1, np.int32), math.tan(slant_rad)
     if not len(walls):
-        return WallIndex(0.0, 0.0, 0, 0, walls, none, none[:0], slant, none[:0], 0, *nothing_seen)
+        return WallIndex(0.0, 0.0, 0, 0, walls, none, none[:0], slant, none[:0], 0, *tables)
     ends = walls.reshape(-1, 2)
     low, high = ends.min(0) - EAR_REACH_M, ends.max(0) + EAR_REACH_M
     size = np.ceil((high - low) / TILE_M) + 1
     if size.prod() > MAX_TILES:
         raise EchostepError(f"the plan spans {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m: are its units metres?")
     columns, rows = int(size[0]), int(size[1])
-    start, ids = _touched(walls, float(low[0]), float(low[1]), columns, rows)
-    seen = np.zeros(columns * rows, np.int32)
-    return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, slant, seen, 0, *nothing_seen)
+    start, ids = _walls_by_tile(walls, float(low[0]), float(low[1]), columns, rows)
+    tile_number = np.zeros(columns * rows, np.int32)
+    return WallIndex(float(low[0]), float(low[1]), columns, rows, walls, start, ids, slant, tile_number, 0, *tables)
 
 
 @kernel
-def _touched(walls: Floats, x0: float, y0: float, columns: int, rows: int) -> tuple[Int32s, Int32s]:
+def _walls_by_tile(walls: Floats, x0: float, y0: float, columns: int, rows: int) -> tuple[Int32s, Int32s]:
     """For each tile, the walls that come within JOIN_M of it, as starts and ids in order."""
     start = np.zeros(columns * rows + 1, np.int32)
     for w in range(len(walls)):
@@ -181,7 +178,7 @@ def segments_cross(ax: float, ay: float, bx: float, by: float, walls: Floats, j:
 
 @lean_kernel
 def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -> bool:
-    """Whether a move from a to b goes through any wall; never for a move that is not finite."""
+    """Whether a move from a to b crosses any wall; never for a move that is not finite."""
     walls, start, ids, x0, y0 = index.walls, index.start, index.ids, index.x0_m, index.y0_m
     columns, rows = index.columns, index.rows
     c0, r0, c1, r1 = (ax - x0) / TILE_M, (ay - y0) / TILE_M, (bx - x0) / TILE_M, (by - y0) / TILE_M
@@ -203,7 +200,7 @@ def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -
 
 @kernel
 def _clipped(c0: float, r0: float, c1: float, r1: float, columns: int, rows: int) -> tuple[float, float, float, float]:
-    """The part of a way that is on the grid, in tiles [Liang, Barsky 1984]; -1 for none and for a way that is not finite."""
+    """The part of a move that is on the grid, in tiles [Liang, Barsky 1984]; -1 for none and for a move that is not finite."""
     if not (math.isfinite(c1 - c0) and math.isfinite(r1 - r0)):
         return -1.0, -1.0, -1.0, -1.0
     enter, leave = _within(c0, c1 - c0, columns, 0.0, 1.0)
@@ -219,7 +216,7 @@ def _clipped(c0: float, r0: float, c1: float, r1: float, columns: int, rows: int
 
 @kernel
 def _within(offset: float, along: float, width: float, enter: float, leave: float) -> tuple[float, float]:
-    """Share of a way at which it enters 0 to `width` along one axis, and at which it leaves."""
+    """Share of a move at which it enters 0 to `width` along one axis, and at which it leaves."""
     if along == 0.0:
         return (enter, leave) if 0.0 <= offset <= width else (1.0, 0.0)
     near, far = -offset / along, (width - offset) / along
