@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.papers import lee2010
 from echostep.papers.lee2010 import Lee2010Legs
@@ -70,7 +71,7 @@ def test_covariance_is_that_of_drawn_errors() -> None:
 @given(st.floats(-20, 20), st.floats(0.01, 2), st.floats(-20, 20), st.floats(0.01, 2))
 def test_fusion_is_the_best_and_lies_between(c: float, c_var: float, g: float, g_var: float) -> None:
     fused = lee2010.fuse(c, c_var, g, g_var)
-    off, whole = abs(lee2010.wrap(c - g)), abs(lee2010.wrap(fused.angle_rad - g))
+    off, whole = abs(wrap(c - g)), abs(wrap(fused.angle_rad - g))
     assert whole == pytest.approx(off * g_var / (c_var + g_var), abs=1e-9)
     assert fused.variance == pytest.approx(1.0 / (1.0 / c_var + 1.0 / g_var))
     assert -math.pi <= fused.angle_rad < math.pi
