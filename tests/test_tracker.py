@@ -43,8 +43,8 @@ def test_the_walk_is_tracked() -> None:
     assert off.mean_m < 0.2
     assert off.max_m < 0.6
     assert off.coverage95 > 0.8
-    assert tracker.intake.timeline.synchronised
-    assert tracker.intake.counts.late_pings == tracker.intake.counts.bad_times == 0
+    assert tracker.front_end.timeline.synchronised
+    assert tracker.front_end.counts.late_pings == tracker.front_end.counts.bad_times == 0
     assert {e.status for e in found} == {TrackStatus.TRACKING}
 
 
@@ -93,7 +93,7 @@ def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
     tracker, found = track([c for c in CHUNKS if c.port == BOARD or c.t_arrival_ns < half_ns])
     assert not sure_but_wrong(found, TRUTH)
     assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
-    assert tracker.intake.status is not None
+    assert tracker.front_end.status is not None
 
 
 def sure_but_wrong(found: list[Estimate], truth: Truth) -> list[Estimate]:
@@ -162,8 +162,8 @@ def test_noise_on_both_ports_is_survived() -> None:
     off = errors(found, TRUTH)
     assert off is not None
     assert off.max_m < 1.5
-    assert tracker.intake.board.counts.rejected > 50
-    assert tracker.intake.mtx.counts.bad_checksum > 10
+    assert tracker.front_end.board.counts.rejected > 50
+    assert tracker.front_end.mtx.counts.bad_checksum > 10
 
 
 def test_strange_ports_and_pure_noise_are_counted() -> None:
@@ -172,8 +172,8 @@ def test_strange_ports_and_pure_noise_are_counted() -> None:
     for n in range(2_000):
         port = rng.choice([BOARD, MTX, "kettle"])
         assert tracker.feed(Chunk(port, n * 1_000_000, rng.randbytes(rng.randrange(200)))) == []
-    assert tracker.intake.counts.unknown_ports > 500
-    assert tracker.intake.board.counts.rejected > 100
+    assert tracker.front_end.counts.unknown_ports > 500
+    assert tracker.front_end.board.counts.rejected > 100
 
 
 @needs_twin
@@ -193,7 +193,7 @@ def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
     assert off is not None
     assert off.max_m < 0.8
     assert found[-1].t_s > TRUTH.t_s[-1] - 3.0
-    assert tracker.intake.timeline.board_restarts == (1 if fault == "reset=watchdog" else 0)
+    assert tracker.front_end.timeline.board_restarts == (1 if fault == "reset=watchdog" else 0)
 
 
 @needs_twin

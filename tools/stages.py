@@ -37,13 +37,13 @@ def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
     """CPU seconds of each stage, and the time span of the estimates (s)."""
     tracker, spent = Tracker(load_plan(plan_path)), Spent()
     tracker.warm_up()
-    recording, intake = open_recording(path), tracker.intake
+    recording, front_end = open_recording(path), tracker.front_end
     for stage, owner, name in (
-        ("board frames", intake.board, "frames"),
-        ("MTx samples", intake.mtx, "feed_batch"),
-        ("timeline", intake.timeline, "times"),
-        ("foot and path", intake, "_follow"),
-        ("all of the intake", intake, "take"),
+        ("board frames", front_end.board, "frames"),
+        ("MTx samples", front_end.mtx, "feed_batch"),
+        ("timeline", front_end.timeline, "times"),
+        ("foot and path", front_end, "_track_foot"),
+        ("all of the front end", front_end, "process"),
     ):
         setattr(owner, name, timed(stage, getattr(owner, name), spent))
     began = time.thread_time()
@@ -71,8 +71,8 @@ def main() -> None:
     read_s, span_s = min(reading_time(options.recording) for _ in range(options.rounds)), runs[0][1]
     inner = ("board frames", "MTx samples", "timeline", "foot and path")
     rows = {"reading the recording": read_s} | {stage: least[stage] for stage in inner}
-    rows["ports, pings, waiting"] = least["all of the intake"] - sum(least[stage] for stage in inner)
-    rows["bytes to legs and pings"] = read_s + least["all of the intake"]
+    rows["ports, pings, waiting"] = least["all of the front end"] - sum(least[stage] for stage in inner)
+    rows["bytes to legs and pings"] = read_s + least["all of the front end"]
     rows["cloud and estimates"] = least["replay"] - rows["bytes to legs and pings"]
     rows["replay"] = least["replay"]
     table = Table(

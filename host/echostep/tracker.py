@@ -1,7 +1,7 @@
-"""The tracker: bytes in, estimates out. The one place where the stages meet.
+"""The tracker: chunks in, estimates out. The only module where the stages meet.
 
-In: chunks in order of arrival. Out: estimates. Owns the intake, the cloud and the random generator. Live, replay and simulation all come through
-`Tracker.take`; nothing in here looks at a wall clock, so equal chunks give equal estimates, bit for bit, in whatever portions they come.
+In: chunks in order of arrival. Out: estimates. Owns the front end, the filter and the random generator. Live, replay and simulation all use
+`Tracker.take`. No wall clock is read here: equal chunks give equal estimates, bit for bit, in portions of any size.
 """
 
 from __future__ import annotations
@@ -29,16 +29,14 @@ from echostep.settings import Settings
 from echostep.tracker_state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
-MOST_WORDS = 4096  # of beacons that wait for the foot; older ones are forgotten
-KNOWN_SD_RAD = 0.5  # of a heading; beyond it the cloud must look everywhere
+MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
+KNOWN_SD_RAD = 0.5  # of a heading; by reason: with a larger one the particles are spread over all headings
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
-Watch = Callable[
-    [MeasuredSegment | None, Estimate], None
-]  # is told of each estimate and of what it came from; None: of a silent foot
+Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
 
 
 class Tracker:
-    """Feed it every chunk; it returns the estimates that the chunk completes."""
+    """Call `feed` with every chunk, or `take` with portions of them; both return the estimates that become certain."""
 
     def __init__(
         self,
@@ -49,10 +47,7 @@ class Tracker:
         *,
         waits: bool = False,
     ) -> None:
-        """`start`: where the trunk stands and looks at the beginning; the plan's own start when None.
-
-        `waits`: for a check-in, when there is neither.
-        """
+        """`start`: pose of the trunk at the beginning; the plan's own start when None. `waits`: without either, wait for a check-in."""
         pose = start or plan.start
         if pose is None and not waits:
             raise EchostepError("the plan has no start: give one with --start X,Y,DEG")
@@ -62,36 +57,30 @@ class Tracker:
         self.plan = plan
         self.start = pose
         s = self.settings
-        self.intake = FrontEnd(
+        self.front_end = FrontEnd(
             s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == CompassErrors() else s.compass
         )
         self.laid_out = lay_out_levels(plan)
-        self.filter: MapFilter | None = None  # from the moment when the foot has stood still
+        self.filter: MapFilter | None = None  # from the first segment on
         self.gateway = Gateway()
-        self._words: list[BeaconReading] = []  # that wait for their leg
-        self.watchers: list[Watch] = []  # are told in this order
-        self.check_ins = 0
-        self.bad_check_ins = 0
+        self.watchers: list[Watch] = []  # called in this order
+        self._readings: list[BeaconReading] = []  # that wait for their segment
+        self._check_ins = self._bad_check_ins = 0
+        self._check_in: CheckIn | None = None  # the newest
+        self._segment: PathSegment | None = None  # the newest
+        self._estimate: Estimate | None = None  # the newest
         self._rng = np.random.default_rng(seed)
-        self._last: Estimate | None = None
-        self.leg: PathSegment | None = None  # the last one
-        self._said: CheckIn | None = None
-
-    @property
-    def lost_at_start(self) -> bool:
-        """Whether nobody has said yet where the walk begins."""
-        return self.start is None and self._said is None
 
     @property
     def state(self) -> TrackerState:
         """Estimate, path and filter after the newest chunk."""
         return TrackerState(
-            estimate=self._last,
-            last_segment=self.leg,
-            pending_segments=self.intake.ahead,
-            waits_for_start=self.lost_at_start,
-            check_ins=self.check_ins,
-            bad_check_ins=self.bad_check_ins,
+            estimate=self._estimate,
+            last_segment=self._segment,
+            pending_segments=self.front_end.pending_segments,
+            waits_for_start=self.start is None and self._check_in is None,
+            check_ins=self._check_ins,
+            bad_check_ins=self._bad_check_ins,
             particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
             plan_explained=math.nan if self.filter is None else self.filter.explained,
             beacon_numbers=tuple(self.gateway.numbers),
@@ -101,7 +90,7 @@ class Tracker:
     @property
     def streams(self) -> StreamState:
         """Counts of the input streams and reports of the board after the newest chunk."""
-        front_end, reports = self.intake, self.intake.words
+        front_end, reports = self.front_end, self.front_end.reports
         return StreamState(
             board=front_end.board.counts,
             mtx=front_end.mtx.counts,
@@ -134,104 +123,105 @@ class Tracker:
 
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""
-        return self.intake.timeline.arrival_ns(t_s)
+        return self.front_end.timeline.arrival_ns(t_s)
 
     def feed(self, chunk: Chunk) -> list[Estimate]:
-        """Take one chunk; estimates come at the middle of each stance, and twice a second while standing."""
+        """Process one chunk; estimates come at the middle of each stance, and twice a second while standing."""
         return self.take(portion_of([chunk]))
 
     def take(self, portion: Portion) -> list[Estimate]:
-        """Take many chunks; the estimates are those that the chunks would have given one by one."""
-        if PERSON not in portion.ports:
-            return self._cut(portion)
+        """Process many chunks; the estimates are those of the chunks one by one."""
         estimates: list[Estimate] = []
-        begin = 0
-        for row in np.flatnonzero(portion.port == portion.ports.index(PERSON)).tolist():
-            estimates += self._cut(portion.rows(begin, row))
-            said = parse_check_in(portion.received[portion.start[row] : portion.end[row]])
-            if said is None or said.level >= len(self.plan.levels):
-                self.bad_check_ins += 1
-            else:
-                estimates += self.check_in(said)
-            begin = row + 1
-        return estimates + self._cut(portion.rows(begin, len(portion.port)))
-
-    def check_in(self, said: CheckIn) -> list[Estimate]:
-        """Somebody says where he stands: the cloud is drawn anew about it, with what was known of the heading when he did not say it.
-
-        Before the first leg it is the start. Legs that are still on their way come on top: who checks in should stand.
-        """
-        self.check_ins += 1
-        self._said = said
-        if self.leg is None:
-            return []
-        self.filter = self._drawn(said, self.leg.heading1_rad)
-        t_s = max(self.leg.t1_s, self._last.t_s) if self._last else self.leg.t1_s
-        self._last = estimate(self.filter.cloud, t_s, self.leg.heading1_rad, self.leg.step)
-        self._tell(MeasuredSegment(self.leg, *NO_PINGS), self._last)
-        return [self._last]
-
-    def _cut(self, portion: Portion) -> list[Estimate]:
-        return [e for piece in portion.cut_after(GATEWAY) for e in self._take(piece)]
-
-    def _take(self, portion: Portion) -> list[Estimate]:
-        """Take chunks of which the last alone may be the gateway's: what beacons said is known from then on."""
-        estimates: list[Estimate] = []
-        for piece in self.intake.take(portion):
-            if isinstance(piece, MeasuredSegment):
-                self.leg = piece.segment
-                self.filter = self.filter or self._first(piece.segment.heading0_rad)
-                if self.filter is None:
-                    continue
-                self._last = self.filter.update(piece, self._words_until(piece.segment.t1_s))
-                estimates.append(self._last)
-                self._tell(piece, self._last)
-            elif self._last is not None:
-                estimates.append(unobserved(self._last, piece.t_s))
-                self._tell(None, estimates[-1])
-        if said := portion.of(GATEWAY).received:
-            self._words += self.gateway.take(said, self.intake.newest_s)
+        for piece in portion.cut_after(PERSON):
+            for part in piece.cut_after(GATEWAY):
+                estimates += self._track(part)
+            check_in = piece.of(PERSON)
+            if len(check_in.row):
+                estimates += self._apply_check_in(check_in.received)
         return estimates
 
-    def _words_until(self, t_s: float) -> list[BeaconReading]:
-        """What beacons have said up to then and nobody has heard yet."""
-        words = [word for word in self._words if word.t_s <= t_s]
-        self._words = [word for word in self._words if word.t_s > t_s][-MOST_WORDS:]
-        return words
-
-    def _tell(self, passage: MeasuredSegment | None, told: Estimate) -> None:
-        for watch in self.watchers:
-            watch(passage, told)
-
     def warm_up(self) -> None:
-        """Compile the kernels (seconds, the first time on a machine), so that nothing waits for it later; leaves the tracker as it was."""
-        self.intake.warm_up()
-        leg = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
-        one = MeasuredSegment(leg, np.array([0.5]), np.array([0]), np.array([1.0]))
-        first = self._begin(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
-        first.update(one, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
-        first.beacon_map.places(first.cloud, 1.0)
+        """Compile the kernels (seconds, the first time on a machine), so that no chunk waits for it later; leaves the tracker as it was."""
+        self.front_end.warm_up()
+        segment = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
+        measured = MeasuredSegment(segment, np.array([0.5]), np.array([0]), np.array([1.0]))
+        other = self._new_filter(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
+        other.update(measured, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+        other.beacon_map.places(other.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
 
-    def _first(self, walk_heading_rad: float) -> MapFilter | None:
-        """The filter at the first leg; None while nobody has said where that is."""
-        if self._said is not None:
-            return self._drawn(self._said, walk_heading_rad)
-        return None if self.start is None else self._begin(self.start, walk_heading_rad, self._rng)
+    def _track(self, portion: Portion) -> list[Estimate]:
+        """Estimates from a portion of which only the last chunk may be the gateway's: its readings count from the next portion on."""
+        estimates: list[Estimate] = []
+        # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
+        for piece in self.front_end.process(portion):
+            if isinstance(piece, MeasuredSegment):
+                self._segment = piece.segment
+                self.filter = self.filter or self._first_filter(piece.segment.heading0_rad)
+                if self.filter is None:
+                    continue
+                # Localization: propagate by the segment, reweight by pings and beacon readings.
+                self._estimate = self.filter.update(piece, self._pop_readings(piece.segment.t1_s))
+                estimates.append(self._publish(piece, self._estimate))
+            elif self._estimate is not None:
+                estimates.append(self._publish(None, unobserved(self._estimate, piece.t_s)))
+        # Beacons: bytes of the gateway -> readings.
+        if received := portion.of(GATEWAY).received:
+            self._readings += self.gateway.read(received, self.front_end.newest_s)
+        return estimates
 
-    def _drawn(self, said: CheckIn, walk_heading_rad: float) -> MapFilter:
-        """A filter about a check-in; with no heading at all its cloud is large and looks everywhere."""
-        heading_rad, sd_rad = said.heading_rad, HEADING_SD_RAD
+    def _pop_readings(self, t_s: float) -> list[BeaconReading]:
+        """The waiting beacon readings up to a time."""
+        ready = [reading for reading in self._readings if reading.t_s <= t_s]
+        self._readings = [reading for reading in self._readings if reading.t_s > t_s][-MAX_READINGS:]
+        return ready
+
+    def _publish(self, measured: MeasuredSegment | None, new: Estimate) -> Estimate:
+        """Call the watchers with a new estimate."""
+        for watch in self.watchers:
+            watch(measured, new)
+        return new
+
+    def _apply_check_in(self, received: bytes) -> list[Estimate]:
+        """Draw a new filter about a check-in; before the first segment it is the start. A check-in that is not valid is counted.
+
+        A missing heading is taken from the last estimate. Segments that are still pending are added on top: a check-in needs a standing wearer.
+        """
+        check_in = parse_check_in(received)
+        if check_in is None or check_in.level >= len(self.plan.levels):
+            self._bad_check_ins += 1
+            return []
+        self._check_ins += 1
+        self._check_in = check_in
+        segment = self._segment
+        if segment is None:
+            return []
+        self.filter = self._filter_at(check_in, segment.heading1_rad)
+        t_s = max(segment.t1_s, self._estimate.t_s) if self._estimate else segment.t1_s
+        self._estimate = estimate(self.filter.cloud, t_s, segment.heading1_rad, segment.step)
+        return [self._publish(MeasuredSegment(segment, *NO_PINGS), self._estimate)]
+
+    def _first_filter(self, walk_heading_rad: float) -> MapFilter | None:
+        """The filter at the first segment; None while neither a start nor a check-in is known."""
+        if self._check_in is not None:
+            return self._filter_at(self._check_in, walk_heading_rad)
+        return None if self.start is None else self._new_filter(self.start, walk_heading_rad, self._rng)
+
+    def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> MapFilter:
+        """A filter about a check-in; without a known heading its particles are many and point anywhere."""
+        heading_rad, sd_rad = check_in.heading_rad, HEADING_SD_RAD
         if heading_rad is None:
-            heading_rad, sd_rad = (self._last.heading_rad, self._last.heading_sd_rad) if self._last else (0.0, math.pi)
+            last = self._estimate
+            heading_rad, sd_rad = (last.heading_rad, last.heading_sd_rad) if last else (0.0, math.pi)
         turn_sd_deg = math.degrees(min(sd_rad, KNOWN_SD_RAD))
-        spread = replace(self.settings.cloud, start_sd_m=said.sd_m, start_turn_sd_deg=turn_sd_deg)
-        drawn = self._begin(Pose(said.x_m, said.y_m, heading_rad, said.level), walk_heading_rad, self._rng, spread)
+        spread = replace(self.settings.cloud, start_sd_m=check_in.sd_m, start_turn_sd_deg=turn_sd_deg)
+        start = Pose(check_in.x_m, check_in.y_m, heading_rad, check_in.level)
+        drawn = self._new_filter(start, walk_heading_rad, self._rng, spread)
         if sd_rad > KNOWN_SD_RAD:
             drawn.cloud.scatter(Move(0.0, 0.0, 0.0, sd_rad))
         return drawn
 
-    def _begin(
+    def _new_filter(
         self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
     ) -> MapFilter:
         s, laid_out = self.settings, self.laid_out

@@ -25,7 +25,7 @@ class TrackerState:
 
     `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `plan_explained`: running mean log-likelihood of the
     echoes under the plan (about 1 when tracked well), NaN before the first segment. `beacon_numbers`: by slot. `beacon_heard_s`: time of the newest
-    reading that the filter used.
+    reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
     """
 
     estimate: Estimate | None

@@ -24,7 +24,7 @@ GOOD = message(7, 3.25, 0.5, 10.0)
 
 
 def said(gateway: Gateway, *beacons: Beacon, now_s: float = 10.0) -> list[tuple[float, int, float, float]]:
-    return [tuple(w) for b in beacons for w in gateway.take(encode(b, 0), now_s)]  # type: ignore[misc]
+    return [tuple(w) for b in beacons for w in gateway.read(encode(b, 0), now_s)]  # type: ignore[misc]
 
 
 def test_a_word_is_on_the_trackers_time() -> None:
@@ -71,7 +71,7 @@ def test_second_unit_under_a_number_is_refused_and_named() -> None:
 def test_a_beacon_that_speaks_too_often_is_a_flood_and_others_are_still_heard() -> None:
     gateway = Gateway()
     stream = b"".join(encode(GOOD, k) for k in range(10_000)) + encode(message(8, 2.0, 0.0, 10.0), 10_000)
-    words = gateway.take(stream, 10.0)
+    words = gateway.read(stream, 10.0)
     assert [w.slot for w in words] == [0, 1]
     assert gateway.counts.flood == 9_999
 
@@ -93,7 +93,7 @@ def test_clock_that_jumps_is_doubted_until_it_is_steady() -> None:
 
 def test_frames_of_a_board_at_the_gateways_port_are_foreign() -> None:
     gateway = Gateway()
-    assert gateway.take(encode(Identity(0, 0x12345678, 0, 0, 0, 0), 0) + b"\0", 1.0) == []
+    assert gateway.read(encode(Identity(0, 0x12345678, 0, 0, 0, 0), 0) + b"\0", 1.0) == []
     assert gateway.counts.foreign == 1
     assert len(said(gateway, GOOD)) == 1
 
@@ -103,8 +103,8 @@ def test_frames_of_a_board_at_the_gateways_port_are_foreign() -> None:
 def test_any_bytes_leave_the_next_word_readable(noise: list[bytes]) -> None:
     gateway = Gateway()
     for part in noise:
-        gateway.take(part, 10.0)
-    gateway.take(b"\0", 10.0)
+        gateway.read(part, 10.0)
+    gateway.read(b"\0", 10.0)
     assert len(said(gateway, GOOD)) == 1
 
 
@@ -162,7 +162,7 @@ def test_udp_flood_and_malformed_datagrams_reach_the_reader_and_stop_nothing() -
             plug.sendto(encode(message(9, 1.0, 0.0, 10.0), 0), address)
         until = time.monotonic() + 10.0
         for chunk in ports.chunks():
-            words += len(gateway.take(chunk.data, 10.0)) if chunk else 0
+            words += len(gateway.read(chunk.data, 10.0)) if chunk else 0
             if words == 2 or time.monotonic() > until:
                 break
     finally:

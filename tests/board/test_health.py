@@ -25,7 +25,7 @@ def status(**changed: int) -> m.Status:
 def words(*said: m.Message) -> BoardReports:
     heard = BoardReports()
     for message in (CONFIGURATION, *said):
-        heard.take(message)
+        heard.add(message)
     return heard
 
 
@@ -47,7 +47,7 @@ def test_a_failed_eeprom_is_said_with_what_to_do() -> None:
 
 def test_a_device_that_is_switched_off_is_no_finding() -> None:
     heard = words(status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM))
-    heard.take(CONFIGURATION._replace(sensors=0x3F))
+    heard.add(CONFIGURATION._replace(sensors=0x3F))
     assert texts(heard) == []
 
 
@@ -65,12 +65,12 @@ def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
     old = {"errors_compass": 9, "fault_compass": m.Fault.NO_ANSWER, "bus_recoveries": 3, "dropped_ping": 65_530}
     heard = words(status(**old), status(**old | {"ticks": 2_000_000}))
     assert texts(heard) == []
-    heard.take(status(**old | {"ticks": 4_000_000, "errors_compass": 12, "dropped_ping": 4}))
+    heard.add(status(**old | {"ticks": 4_000_000, "errors_compass": 12, "dropped_ping": 4}))
     assert [text.split(";")[0] for text in texts(heard)] == [
         "compass: failed 3 times in the last 1 s (no answer), and answers again",
         "board: left out 10 messages in the last 1 s",
     ]
-    heard.take(status(ticks=5))  # it has restarted
+    heard.add(status(ticks=5))  # it has restarted
     assert texts(heard) == []
 
 
@@ -110,7 +110,7 @@ def test_rates_below_what_is_configured_are_said() -> None:
     slow, silent = rate_findings(heard, rates | {"Gyros": 150.0, "Compass": 0.0})
     assert (slow.severity, silent.severity) == (Severity.WARNING, Severity.FAULT)
     assert "150.0 samples/s, expected are 200.0" in str(slow)
-    heard.take(status(healthy=0x7B, errors_compass=1, fault_compass=1))
+    heard.add(status(healthy=0x7B, errors_compass=1, fault_compass=1))
     assert rate_findings(heard, rates | {"Compass": 0.0}) == []  # the status says why
 
 
@@ -166,13 +166,13 @@ def test_every_fault_of_the_twin_is_named() -> None:
             bench.fault(fault)
             bench.run(4_500 if "scp1000" in fault else 2_100)
             for message in bench.messages[said:]:
-                heard.take(message)
+                heard.add(message)
             assert any(found.startswith(text) for found in texts(heard)), (fault, texts(heard))
             assert len(texts(heard)) <= 3, (fault, texts(heard))
             bench.fault(fault.split("=")[0] + "=ok")
             bench.run(4_000 if "scp1000" in fault else 2_100)
             for message in bench.messages[said:]:
-                heard.take(message)
+                heard.add(message)
             said = len(bench.messages)
             assert texts(heard) == [], (fault, texts(heard))
     finally:

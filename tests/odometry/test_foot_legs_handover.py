@@ -76,21 +76,21 @@ def test_a_turned_leg_leads_elsewhere() -> None:
 
 
 def test_a_foot_alone_is_left_as_it_is() -> None:
-    journey = FootLegsHandover(WearerSettings())
+    handover = FootLegsHandover(WearerSettings())
     legs = [leg(float(k), k + 1.0) for k in range(100)]
-    assert [gone for one in legs for gone in journey.foot([one])] == legs
-    assert len(journey._known) <= KEPT_S + 2
+    assert [gone for one in legs for gone in handover.add_foot_segments([one])] == legs
+    assert len(handover._kept_segments) <= KEPT_S + 2
 
 
 def test_nobody_who_lies_still_is_believed_to_stand() -> None:
     """The foot walks, then falls silent; the leg gyros lie in a drawer."""
-    journey = FootLegsHandover(WearerSettings())
+    handover = FootLegsHandover(WearerSettings())
     for k in range(100):
-        journey.foot([leg(0.1 * k, 0.1 * k + 0.1, 0.1)])
-        journey.legs(lying_block(k), 0.1 * k + 0.1)
+        handover.add_foot_segments([leg(0.1 * k, 0.1 * k + 0.1, 0.1)])
+        handover.add_leg_block(lying_block(k), 0.1 * k + 0.1)
     for k in range(100, 200):
-        assert journey.legs(lying_block(k), 10.0) == []
-    assert journey.watched_s == -math.inf
+        assert handover.add_leg_block(lying_block(k), 10.0) == []
+    assert handover.legs_observed_s == -math.inf
 
 
 def test_blocks_of_any_size_give_the_same_way() -> None:

@@ -1,4 +1,4 @@
-"""The intake: the chunks alone decide what comes out; what is late, lost or silent is counted or told."""
+"""The front end: the chunks alone decide what comes out; what is late, lost or silent is counted or told."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def recorded() -> list[Chunk]:
 CHUNKS = recorded()
 
 
-def intake() -> FrontEnd:
+def front_end() -> FrontEnd:
     return FrontEnd(MtxTiming(), RangerSettings(), FootSettings(), GaitSettings())
 
 
@@ -68,11 +68,11 @@ def told(pieces: list[MeasuredSegment | Dropout]) -> Told:
 
 
 def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...]]:
-    """What an intake tells of the chunks, in portions cut there, and what it counted."""
-    ours, found = intake(), []
+    """What a front end tells of the chunks, in portions cut there, and what it counted."""
+    ours, found = front_end(), []
     edges = sorted({0, len(chunks), *(c % (len(chunks) + 1) for c in cuts)})
     for a, b in zip(edges, edges[1:], strict=False):
-        found += told(ours.take(portion_of(chunks[a:b])))
+        found += told(ours.process(portion_of(chunks[a:b])))
     return found, (
         ours.counts,
         ours.board.counts,
@@ -89,8 +89,8 @@ WHOLE = taken(CHUNKS, [])
 def test_the_recorded_walk_has_all_that_matters() -> None:
     kinds = {len(piece) for piece in WHOLE[0]}
     assert kinds == {1, 4}
-    ours = intake()
-    pieces = ours.take(portion_of(CHUNKS))
+    ours = front_end()
+    pieces = ours.process(portion_of(CHUNKS))
     passages = [piece for piece in pieces if isinstance(piece, MeasuredSegment)]
     assert sum(len(p.t_s) for p in passages) > 200
     assert any(p.segment.unobserved for p in passages)
@@ -127,12 +127,12 @@ def test_bytes_that_arrived_together_may_be_cut_anywhere(seed: int, cuts: list[i
 
 
 def test_pings_without_a_foot_are_bounded_and_counted() -> None:
-    ours = intake()
+    ours = front_end()
     sent = MAX_WAITING + 500
     chunks = [
         Chunk(BOARD, n * 10_000_000, encode(Ping(n * 20_000, n % 2, Outcome.ECHO, 5_000), n)) for n in range(sent)
     ]
-    assert ours.take(portion_of(chunks)) == []
+    assert ours.process(portion_of(chunks)) == []
     assert ours.counts.dropped_pings == 500
 
 
@@ -218,10 +218,10 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
     edges = sorted({0, n, *cuts})
     for a, b in zip(edges, edges[1:], strict=False):
         at = [k - a for k in range(a, b) for _ in pings[k]]
-        ours.hear(np.array(at, np.int64), np.array([p for k in range(a, b) for p in pings[k]]).reshape(-1, 3))
+        ours.add_pings(np.array(at, np.int64), np.array([p for k in range(a, b) for p in pings[k]]).reshape(-1, 3))
         for k in range(a, b):
-            ours.go(k - a, legs[k])
-        for piece in ours.release(board[a:b], mtx[a:b], mtx[a:b]):
+            ours.add_segments(k - a, legs[k])
+        for piece in ours.pop_ready(board[a:b], mtx[a:b], mtx[a:b]):
             if isinstance(piece, MeasuredSegment):
                 heard = zip(piece.t_s.tolist(), piece.ranger.tolist(), piece.range_m.tolist(), strict=True)
                 found.append((piece.segment, list(heard)))
@@ -234,8 +234,8 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
 def test_the_rangers_delay_moves_their_pings() -> None:
     late = FrontEnd(MtxTiming(), RangerSettings(delay_s=0.01), FootSettings(), GaitSettings())
     times = [
-        np.concatenate([piece.t_s for piece in ours.take(portion_of(CHUNKS)) if isinstance(piece, MeasuredSegment)])
-        for ours in (intake(), late)
+        np.concatenate([piece.t_s for piece in ours.process(portion_of(CHUNKS)) if isinstance(piece, MeasuredSegment)])
+        for ours in (front_end(), late)
     ]
     both = min(map(len, times)) - 10
     assert np.allclose(times[1][:both] - times[0][:both], 0.01)

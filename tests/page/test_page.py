@@ -163,8 +163,13 @@ def test_check_ins_give_the_same_estimates_in_whatever_portions(chunks: list[Chu
         if start >= len(mixed):
             break
     assert digest(singly) == digest(jointly)
-    assert (one.check_ins, one.bad_check_ins, many.check_ins, many.bad_check_ins) == (2, 2, 2, 2)
-    assert one.intake.counts.unknown_ports == 0
+    assert (one.state.check_ins, one.state.bad_check_ins, many.state.check_ins, many.state.bad_check_ins) == (
+        2,
+        2,
+        2,
+        2,
+    )
+    assert one.front_end.counts.unknown_ports == 0
 
 
 def test_a_check_in_draws_the_cloud_anew(chunks: list[Chunk]) -> None:
@@ -190,12 +195,12 @@ def test_a_tap_starts_the_walk_where_nobody_knew(chunks: list[Chunk], heading_ra
     with pytest.raises(EchostepError, match="--start"):
         Tracker(nowhere)
     tracker = Tracker(nowhere, seed=1, waits=True)
-    assert tracker.lost_at_start
+    assert tracker.state.waits_for_start
     early = [estimate for chunk in chunks[:400] for estimate in tracker.feed(chunk)]
     tracker.feed(Chunk(PERSON, 0, CheckIn(2.0, 7.5, heading_rad, 0.5).encode()))
     late = [estimate for chunk in chunks[400:] for estimate in tracker.feed(chunk)]
     assert not early
-    assert not tracker.lost_at_start
+    assert not tracker.state.waits_for_start
     assert math.hypot(late[-1].x_m - 9.5, late[-1].y_m - 10.8) < 1.0
 
 
@@ -497,8 +502,8 @@ def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
             assert new[0].t_s == then.t_s
         if new:
             last, then = new[-1], None
-        if last and (since := tracker.intake.ahead) and tracker.leg and not then:
-            then = extrapolate(last, tracker.leg, since[:1])
+        if last and (since := tracker.state.pending_segments) and tracker.state.last_segment and not then:
+            then = extrapolate(last, tracker.state.last_segment, since[:1])
             assert then.xx_m2 > last.xx_m2
     assert len(off_m) > 5
     assert max(off_m) < 0.3

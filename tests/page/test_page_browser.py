@@ -84,13 +84,13 @@ class Walk:
         self._thread = threading.Thread(target=self._run, daemon=True)
         self.taken = 0
         self.told_s: list[float] = []  # for each step, how long after the landing its bytes had come
-        told = self._tracker.intake.path.add_step
+        told = self._tracker.front_end.path.add_step
 
         def step(landed: Step) -> list[PathSegment]:
             self.told_s.append(self._now_s - landed.t_end_s)
             return told(landed)
 
-        self._tracker.intake.path.add_step = step  # type: ignore[assignment, method-assign]
+        self._tracker.front_end.path.add_step = step  # type: ignore[assignment, method-assign]
 
     def __enter__(self) -> Walk:
         self.page.__enter__()

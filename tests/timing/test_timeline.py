@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from echostep.ports.chunks import BOARD, LATEST_NS, MTX
 from echostep.timing import sync_edges as sync
 from echostep.timing.device_clock import new_clock, now_s, read
-from echostep.timing.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline
+from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline
 from naive import clocks as naive_clocks
 
 MS = 1_000_000
@@ -37,7 +37,7 @@ def tell(timeline: Timeline, messages: list[Message]) -> list[float | None]:
 
     times = timeline.times(of(BOARD), of(MTX))
     found = np.empty(len(messages))
-    found[times.board_at], found[times.mtx_at] = times.board_s, times.mtx_s
+    found[times.board_message_index], found[times.mtx_message_index] = times.board_s, times.mtx_s
     return [None if np.isnan(t) else t for t in found.tolist()]
 
 
@@ -159,7 +159,7 @@ def naive_times(messages: list[Message]) -> list[float | None]:
         if port == MTX:
             found.append(timeline.mtx_time(value, t_ns))
             continue
-        t_s = None if kind == SILENT else timeline.board_time(value, t_ns, restarted=kind == FIRST_WORD)
+        t_s = None if kind == SILENT else timeline.board_time(value, t_ns, restarted=kind == FIRST_MESSAGE)
         if kind >= 0 and t_s is not None:
             timeline.sync_edge(kind, t_s)
         found.append(t_s)
@@ -181,7 +181,9 @@ def streams(draw: st.DrawFn) -> list[Message]:
         if rng.random() < 0.1 * lies:
             arrival_ns = int(rng.choice([0, LATEST_NS, int(rng.integers(0, LATEST_NS))]))
         if rng.random() < 0.9:
-            kind = FIRST_WORD if n == restart else (edges + n) & 0xFFFF if wired else int(rng.choice([PLAIN, SILENT]))
+            kind = (
+                FIRST_MESSAGE if n == restart else (edges + n) & 0xFFFF if wired else int(rng.choice([PLAIN, SILENT]))
+            )
             messages.append((BOARD, ticks, arrival_ns, kind))
         if rng.random() < 0.9:
             messages.append((MTX, (65_300 + n) & 0xFFFF, arrival_ns + 7 * MS, PLAIN))

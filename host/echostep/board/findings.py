@@ -57,7 +57,7 @@ class BoardReports:
     earlier: Status | None = None
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
 
-    def take(self, message: Message) -> None:
+    def add(self, message: Message) -> None:
         """Keep a message when it says something about the board; a restart forgets the status before."""
         if isinstance(message, Identity):
             self.identity = message

@@ -72,7 +72,7 @@ class Gateway:
         self._counts.broken, self._counts.lost = frames.rejected, frames.lost
         return self._counts
 
-    def take(self, received: bytes, now_s: float) -> list[BeaconReading]:
+    def read(self, received: bytes, now_s: float) -> list[BeaconReading]:
         """Words in these bytes; `now_s`: the tracker's time, NaN before it has one."""
         try:
             frames = self._reader.frames(received)

@@ -99,5 +99,5 @@ def _with_mtx_setup(chunks: Iterable[Chunk | None], ports: SerialPorts, rate_hz:
     """The same chunks, while the MTx is set up at the start and whenever it wakes up."""
     start = MtxStart(rate_hz, lambda request: ports.send(MTX, request), console.print)
     for chunk in chunks:
-        start.follow(chunk)
+        start.advance(chunk)
         yield chunk

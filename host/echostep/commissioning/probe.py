@@ -177,7 +177,7 @@ class _Probe:
 
     def _add_message(self, message: Message, arrived_s: float) -> None:
         result = self.result
-        result.reports.take(message)
+        result.reports.add(message)
         ticks: int = getattr(message, "ticks", 0)
         self._first_ticks = ticks if self._first_ticks is None else self._first_ticks
         elapsed = (ticks - self._first_ticks + (1 << 31)) % (1 << 32) - (1 << 31)
@@ -195,7 +195,7 @@ class _Probe:
         if MTX not in self._names or self.result.mtx_fault:
             return
         try:
-            self._start.follow(chunk)
+            self._start.advance(chunk)
         except EchostepError as error:
             self.result.mtx_fault = str(error)
 

@@ -1,5 +1,5 @@
-"""Both ports' bytes -> the trunk's path with the pings heard on each piece of it.
+"""Odometry: bytes of board and MTx -> the trunk's path with the pings triggered on each segment.
 
-In: `Portion`s of chunks. Out: `MeasuredSegment`s and `Dropout`s in order of time. Owns readers, timeline, foot and legs, and what waits
-for each other.
+In: `Portion`s of chunks. Out: `MeasuredSegment`s and `Dropout`s in order of time. Owns the readers, the timeline, the foot and leg odometry, and the
+pings and segments that wait for each other.
 """

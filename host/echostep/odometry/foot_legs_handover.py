@@ -1,17 +1,21 @@
-"""The trunk's way from whoever tells it: the foot while it speaks, the legs where it is silent.
+"""Handover between foot and leg odometry: one path of the trunk from both.
 
-In: legs of the foot's path and blocks of leg samples, in order of their messages. Out: `PathSegment`s of one walk frame, without overlap. Owns which
-of the two carries on, and what turns and scales the one into the frame of the other.
+In: segments of the foot's path and blocks of leg gyro samples, in order of their messages. Out: `PathSegment`s of one walk frame, without overlap.
+Owns which of the two is active, and the rotation and scale from each source's frame into the common one.
 
-The foot is several times as exact, so it carries while it lives. The last half minute of leg samples is kept; when the foot falls silent they are
-gone through: as far as both know the way, the foot's tells how long these legs' strides are and where their heading points, and whether they are worn
-at all. Then they carry. When the foot is back, it takes over where its path meets theirs, rotated_segment to their heading.
+The foot's path is several times as accurate, so the foot is active while its samples come. The leg samples of the last KEPT_S are kept:
+
+    foot falls silent   the kept samples are processed. Where both paths overlap in time, the foot's path gives the legs' scale and rotation, and
+                        decides whether leg gyros are worn at all. If so, the legs are active.
+    foot comes back     its segments wait for a straight stride, where foot and trunk point the same way, and for the legs to reach its time. Then the
+                        foot is active again, rotated to the legs' heading there.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 
 from echostep.angles import wrap
@@ -19,154 +23,161 @@ from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.path import UNOBSERVED_SD_M, PathSegment
 
-SILENT_S = 0.5  # a foot that is this far behind the board does not tell
-KEPT_S = 30.0
-LIKE = 0.35  # the legs' way against the foot's may be off by this share: else nobody wears them
-LEAST_M = 3.0  # of a way that tells whether
-USUAL_M = 10.0  # a way as telling as what is known of all people
+# All by reason, unless a source is named.
+SILENT_S = 0.5  # the foot is silent when its newest sample is older than the leg samples by this
+KEPT_S = 30.0  # of leg samples and foot segments
+MAX_LENGTH_ERROR = 0.35  # share by which the legs' length may differ from the foot's; beyond it no leg gyros are worn
+MIN_OVERLAP_M = 3.0  # of the foot's path, to compare lengths
+PRIOR_M = 10.0  # weight of the prior scale, 1, as a length of path
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over
-BRIDGE_M_S, BRIDGE_M, BRIEF_S = 0.4, 1.5, 1.0
-STRAIGHT_M, STRAIGHT_RAD = 0.5, math.radians(20.0)
-PATIENCE_S = 4.0  # a foot that is back waits for the legs to catch up
+BRIDGE_M_S, BRIDGE_M = 0.4, 1.5  # standard deviation of an unobserved gap: per second, and at most
+BRIEF_S = 1.0  # a longer gap counts as unobserved
+STRAIGHT_M, STRAIGHT_RAD = 0.5, math.radians(20.0)  # a straight stride is longer and turns less
+CATCH_UP_S = 4.0  # longest time for which the foot's segments wait for the legs
 
 
 class FootLegsHandover:
-    """`foot` and `legs` take what comes, in order, and return what is certain."""
+    """Call `add_foot_segments` and `add_leg_block` in order of the messages; both return the segments that are certain."""
 
     def __init__(self, settings: WearerSettings, iron: CompassErrors | None = None) -> None:
-        """`iron`: the compass', when it was calibrated."""
+        """`iron`: errors of the compass, when it was calibrated."""
         self._settings, self._iron = settings, iron
-        self._path: LegPath | None = None  # while the legs carry
-        self._kept: deque[GyroBlock] = deque()
-        self._known: deque[PathSegment] = deque()  # that the foot told, as long ago as the kept blocks
-        self._waiting: list[PathSegment] = []  # of a foot that is back
-        self._covered_s = -math.inf
-        self._foot_turn = self._leg_turn = 0.0  # into the one walk frame
+        self._leg_path: LegPath | None = None  # while the legs are active
+        self._kept_blocks: deque[GyroBlock] = deque()
+        self._kept_segments: deque[PathSegment] = deque()  # of the foot, of the same time as the kept blocks
+        self._returned: list[PathSegment] = []  # of the foot that came back, not yet active
+        self._covered_s = -math.inf  # end of the common path
+        self._foot_turn_rad = self._leg_turn_rad = 0.0  # rotation of each source's frame into the common walk frame
         self._leg_scale = 1.0
         self._foot_seen = False
-        self._step = 0  # of the last leg
-        self._step_base: int | None = 0  # added to a source's own count; None: it begins to carry with the next leg
+        self._step = 0  # of the last segment
+        self._step_base: int | None = 0  # added to the active source's own count; None: set at its next segment
 
     @property
-    def watched_s(self) -> float:
-        """Up to when the legs watched him, if they carry."""
-        return float(self._kept[-1].t_s[-1]) if self._path is not None else -math.inf
+    def legs_observed_s(self) -> float:
+        """Time of the newest leg sample while the legs are active, else minus infinity."""
+        return float(self._kept_blocks[-1].t_s[-1]) if self._leg_path is not None else -math.inf
 
-    def foot(self, legs: list[PathSegment]) -> list[PathSegment]:
-        """What the foot's path tells."""
-        self._foot_seen = self._foot_seen or bool(legs)
-        if self._path is not None:
-            self._waiting += legs
-            return self._rejoined()
-        self._known.extend(legs)
-        while self._known and self._known[0].t1_s < self._known[-1].t1_s - KEPT_S:
-            self._known.popleft()
-        return [self._on(leg, self._foot_turn) for leg in legs]
+    def add_foot_segments(self, segments: list[PathSegment]) -> list[PathSegment]:
+        """Segments of the foot's path, in the foot's frame."""
+        self._foot_seen = self._foot_seen or bool(segments)
+        if self._leg_path is not None:
+            self._returned += segments
+            return self._return_to_foot()
+        self._kept_segments.extend(segments)
+        while self._kept_segments and self._kept_segments[0].t1_s < self._kept_segments[-1].t1_s - KEPT_S:
+            self._kept_segments.popleft()
+        return [self._append(segment, self._foot_turn_rad) for segment in segments]
 
-    def legs(self, block: GyroBlock, foot_newest_s: float) -> list[PathSegment]:
-        """A block of leg samples; `foot_newest_s`: of the newest sample of the foot, NaN before the first."""
+    def add_leg_block(self, block: GyroBlock, foot_newest_s: float) -> list[PathSegment]:
+        """A block of leg samples; `foot_newest_s`: time of the foot's newest sample, NaN before the first."""
         now_s = float(block.t_s[-1])
-        self._kept.append(block)
-        while self._kept[0].t_s[-1] < now_s - KEPT_S:
-            self._kept.popleft()
-        if self._path is not None:
-            return self._carried(self._path.feed(block)) + self._rejoined()
+        self._kept_blocks.append(block)
+        while self._kept_blocks[0].t_s[-1] < now_s - KEPT_S:
+            self._kept_blocks.popleft()
+        if self._leg_path is not None:
+            return self._append_leg_segments(self._leg_path.feed(block)) + self._return_to_foot()
         if now_s - foot_newest_s < SILENT_S:
             return []
-        return self._take_over()
+        return self._switch_to_legs()
 
-    def _take_over(self) -> list[PathSegment]:
-        """Go through what was kept; the legs carry if they are worn."""
-        if self._foot_seen and not self._known:
+    def _switch_to_legs(self) -> list[PathSegment]:
+        """Process the kept leg samples; the legs become active if leg gyros are worn."""
+        if self._foot_seen and not self._kept_segments:
             return []
         path = LegPath(self._settings, self._iron)
-        told = [leg for block in self._kept for leg in path.feed(block)]
-        if self._foot_seen and not self._learn(path, told):
-            self._known.clear()  # until the foot has told more, they are not asked again
+        leg_segments = [segment for block in self._kept_blocks for segment in path.feed(block)]
+        if self._foot_seen and not self._align_legs(path, leg_segments):
+            self._kept_segments.clear()  # no further attempt until the foot has given new segments
             return []
-        self._path, self._step_base = path, None
-        return self._carried(told)
+        self._leg_path, self._step_base = path, None
+        return self._append_leg_segments(leg_segments)
 
-    def _learn(self, path: LegPath, told: list[PathSegment]) -> bool:
-        """Scale and heading of the legs by the foot, over the time that both tell; whether they tell of the same walk."""
-        since_s = max(self._known[0].t0_s, told[0].t0_s) if told else math.inf
-        until_s = self._known[-1].t1_s
-        way_m = _length(self._known, since_s, until_s)
-        legs_m = _length(told, since_s, until_s)
-        if way_m < LEAST_M or not abs(legs_m / way_m - 1.0) < LIKE:
+    def _align_legs(self, path: LegPath, leg_segments: list[PathSegment]) -> bool:
+        """Set the legs' scale and rotation from the foot over the time that both cover; False when their lengths disagree."""
+        begin_s = max(self._kept_segments[0].t0_s, leg_segments[0].t0_s) if leg_segments else math.inf
+        end_s = self._kept_segments[-1].t1_s
+        foot_m = _length_m(self._kept_segments, begin_s, end_s)
+        legs_m = _length_m(leg_segments, begin_s, end_s)
+        if foot_m < MIN_OVERLAP_M or not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
             return False
-        self._leg_scale = (way_m + USUAL_M) / (legs_m + USUAL_M)
-        straight = [leg for leg in self._known if _straight(leg) and leg.t1_s >= path.remembered_s] or [self._known[-1]]
-        between = [leg.heading1_rad - path.heading_rad(leg.t1_s) for leg in straight]
-        mean = math.atan2(sum(math.sin(a) for a in between), sum(math.cos(a) for a in between))
-        self._leg_turn = wrap(mean + self._foot_turn)
+        self._leg_scale = (foot_m + PRIOR_M) / (legs_m + PRIOR_M)
+        remembered = (s for s in self._kept_segments if _is_straight(s) and s.t1_s >= path.remembered_s)
+        straight = list(remembered) or [self._kept_segments[-1]]
+        turns = [segment.heading1_rad - path.heading_rad(segment.t1_s) for segment in straight]
+        mean = math.atan2(sum(math.sin(a) for a in turns), sum(math.cos(a) for a in turns))
+        self._leg_turn_rad = wrap(mean + self._foot_turn_rad)
         return True
 
-    def _carried(self, told: list[PathSegment]) -> list[PathSegment]:
+    def _append_leg_segments(self, segments: list[PathSegment]) -> list[PathSegment]:
+        """The legs' segments beyond the end of the common path, scaled and rotated."""
         return [
-            self._on(rotated_segment(leg, self._leg_turn, self._leg_scale), 0.0)
-            for leg in told
-            if leg.t1_s > self._covered_s
+            self._append(rotated_segment(segment, self._leg_turn_rad, self._leg_scale), 0.0)
+            for segment in segments
+            if segment.t1_s > self._covered_s
         ]
 
-    def _rejoined(self) -> list[PathSegment]:
-        """Back to the foot with a straight stride, where foot and trunk look the same way, once the legs have told all before it."""
-        assert self._path is not None
-        nobody = self._covered_s == -math.inf
-        while (
-            self._waiting
-            and not nobody
-            and (not _straight(self._waiting[0]) or self._waiting[0].t1_s <= self._covered_s)
-        ):
-            del self._waiting[0]
-        if not self._waiting:
+    def _return_to_foot(self) -> list[PathSegment]:
+        """Make the foot active again at its first straight stride, once the legs have reached it or CATCH_UP_S is over."""
+        assert self._leg_path is not None
+        empty = self._covered_s == -math.inf  # the legs have given no segment
+        while not empty and self._returned and not self._can_rejoin(self._returned[0]):
+            del self._returned[0]
+        if not self._returned:
             return []
-        first = self._waiting[0]
-        if first.t0_s > self._covered_s and self._waiting[-1].t1_s < self._covered_s + PATIENCE_S:
+        first = self._returned[0]
+        if first.t0_s > self._covered_s and self._returned[-1].t1_s < self._covered_s + CATCH_UP_S:
             return []
-        if not nobody:
-            at_s = max(first.t0_s, self._covered_s)
-            self._foot_turn = wrap(self._path.heading_rad(at_s) + self._leg_turn - first.heading_rad(at_s))
-            self._waiting[0] = replace(first, turn_sd_rad=math.hypot(first.turn_sd_rad, REJOIN_SD_RAD))
-        legs, self._waiting = [*self._bridge(first), *self._waiting], []
-        self._path, self._step_base = None, None
-        self._known.clear()
-        self._known.extend(legs)
-        return [self._on(leg, self._foot_turn) for leg in legs]
+        if not empty:
+            join_s = max(first.t0_s, self._covered_s)
+            self._foot_turn_rad = wrap(
+                self._leg_path.heading_rad(join_s) + self._leg_turn_rad - first.heading_rad(join_s)
+            )
+            self._returned[0] = replace(first, turn_sd_rad=math.hypot(first.turn_sd_rad, REJOIN_SD_RAD))
+        segments, self._returned = [*self._bridge(first), *self._returned], []
+        self._leg_path, self._step_base = None, None
+        self._kept_segments.clear()
+        self._kept_segments.extend(segments)
+        return [self._append(segment, self._foot_turn_rad) for segment in segments]
+
+    def _can_rejoin(self, segment: PathSegment) -> bool:
+        return _is_straight(segment) and segment.t1_s > self._covered_s
 
     def _bridge(self, first: PathSegment) -> list[PathSegment]:
-        """From where the legs left off to where the foot begins, in the foot's frame: nobody told, but it was not long."""
+        """A segment without displacement over the gap between the legs' end and the foot's first segment, in the foot's frame; none without a gap."""
         if not -math.inf < self._covered_s < first.t0_s:
             return []
-        assert self._path is not None
+        assert self._leg_path is not None
         span_s = first.t0_s - self._covered_s
-        sd = min(BRIDGE_M_S * span_s, BRIDGE_M)
+        sd_m = min(BRIDGE_M_S * span_s, BRIDGE_M)
         if span_s > BRIEF_S:
-            sd = max(sd, 1.01 * UNOBSERVED_SD_M)  # the cloud is to look everywhere about
-        heading = self._path.heading_rad(self._covered_s) + self._leg_turn - self._foot_turn
-        return [PathSegment(self._covered_s, first.t0_s, 0.0, 0.0, heading, first.heading0_rad, sd, 0.0, first.step)]
+            sd_m = max(sd_m, 1.01 * UNOBSERVED_SD_M)  # makes the segment an unobserved one
+        heading_rad = self._leg_path.heading_rad(self._covered_s) + self._leg_turn_rad - self._foot_turn_rad
+        return [
+            PathSegment(self._covered_s, first.t0_s, 0.0, 0.0, heading_rad, first.heading0_rad, sd_m, 0.0, first.step)
+        ]
 
-    def _on(self, leg: PathSegment, turn_rad: float) -> PathSegment:
-        """The leg, from where the way is covered on, as a part of the one way."""
+    def _append(self, segment: PathSegment, turn_rad: float) -> PathSegment:
+        """The part of a segment beyond the end of the common path, rotated into its frame, with the common step count."""
         if self._step_base is None:
-            self._step_base = self._step + 1 - leg.step
-        self._step = leg.step + self._step_base
-        leg = rotated_segment(segment_after(leg, self._covered_s), turn_rad)
-        self._covered_s = max(self._covered_s, leg.t1_s)
-        return leg if leg.step == self._step else replace(leg, step=self._step)
+            self._step_base = self._step + 1 - segment.step
+        self._step = segment.step + self._step_base
+        segment = rotated_segment(segment_after(segment, self._covered_s), turn_rad)
+        self._covered_s = max(self._covered_s, segment.t1_s)
+        return segment if segment.step == self._step else replace(segment, step=self._step)
 
 
-def _straight(leg: PathSegment) -> bool:
-    """Whether it is a stride straight on."""
-    long = math.hypot(leg.dx_m, leg.dy_m) > STRAIGHT_M
-    return long and not leg.unobserved and abs(wrap(leg.heading1_rad - leg.heading0_rad)) < STRAIGHT_RAD
+def _is_straight(segment: PathSegment) -> bool:
+    """Whether a segment is an observed stride straight on."""
+    is_long = math.hypot(segment.dx_m, segment.dy_m) > STRAIGHT_M
+    return is_long and not segment.unobserved and abs(wrap(segment.heading1_rad - segment.heading0_rad)) < STRAIGHT_RAD
 
 
-def _length(legs: list[PathSegment] | deque[PathSegment], since_s: float, until_s: float) -> float:
-    """Way in a stretch of time."""
-    total = 0.0
-    for leg in legs:
-        t0, t1 = max(leg.t0_s, since_s), min(leg.t1_s, until_s)
+def _length_m(segments: Iterable[PathSegment], begin_s: float, end_s: float) -> float:
+    """Length of the path between two times."""
+    total_m = 0.0
+    for segment in segments:
+        t0, t1 = max(segment.t0_s, begin_s), min(segment.t1_s, end_s)
         if t1 > t0:
-            total += math.hypot(leg.dx_m, leg.dy_m) * (t1 - t0) / (leg.t1_s - leg.t0_s)
-    return total
+            total_m += math.hypot(segment.dx_m, segment.dy_m) * (t1 - t0) / (segment.t1_s - segment.t0_s)
+    return total_m

@@ -1,10 +1,12 @@
-"""The intake: chunks -> the trunk's legs, each with the pings that were heard until its end.
+"""Front end: chunks -> segments of the trunk's path, each with the pings that were triggered on it.
 
 In: portions of chunks in order of arrival. Out: `MeasuredSegment`s and `Dropout`s in order of time, as they become certain. Owns the readers, the
-timeline, the foot, the path, and the pings and legs that still wait for each other (`waiting`).
+timeline, the foot and leg odometry, and the synchronizer.
 
-What comes out depends on the chunks alone: on their bytes and arrival times, not on how many of them come in one portion, nor on where bytes
-that arrived together were cut. Every decision is taken message by message, at the message that makes it possible.
+The output depends on the chunks alone: on their bytes and arrival times, not on how many of them come in one portion, nor on where bytes that arrived
+together were cut. Every decision is taken message by message, at the message that makes it possible.
+
+Indices: `frame_row` counts the board's frames of a portion, `sample_index` the MTx samples, `message_index` both together in order of arrival.
 """
 
 from __future__ import annotations
@@ -15,16 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.board.calibration import GyroSettings, RangerSettings, compass_headings, gyro_rates, heights, ranges
+from echostep.board.calibration import GyroSettings, RangerSettings, heights, ranges
 from echostep.board.frames import BoardReader, Frames, encode
 from echostep.board.health import BoardReports
 from echostep.board.messages import (
     BY_ID,
     ROWS,
-    Compass,
     Configuration,
     GyroHealth,
-    Gyros,
     Identity,
     Outcome,
     Ping,
@@ -38,25 +38,23 @@ from echostep.foot.trunk_path import GaitSettings, TrunkPath
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, WearerSettings
 from echostep.odometry.foot_legs_handover import FootLegsHandover
+from echostep.odometry.gyro_blocks import GyroBlocks
 from echostep.odometry.synchronizer import HEIGHT, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
+from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk, Portion, portion_of
-from echostep.timing.timeline import FIRST_WORD, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
+from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, pack_mtdata
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-IDENTITY, PING, SYNC, STATUS = (_IDS[kind] for kind in (Identity, Ping, Sync, Status))
-PRESSURE, GYROS, COMPASS = (_IDS[kind] for kind in (Pressure, Gyros, Compass))
-BLOCK = 20  # gyro samples that go through the legs at a time: a tenth of a second
-_WORDS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth)]
-_TIMED = np.array(
-    [i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)]
-)  # the body begins with them
+IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
+_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth)]
+_TIMED = np.array([i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)])  # the body begins so
 
 
 @dataclass(slots=True)
 class FrontEndCounts:
-    """What did not become a leg or a ping, and why."""
+    """Input that became neither a segment nor a ping, by reason."""
 
     unknown_ports: int = 0
     late_pings: int = 0
@@ -65,190 +63,185 @@ class FrontEndCounts:
 
 
 class FrontEnd:
-    """Feed it every chunk; it returns what the chunks make certain."""
+    """Call `process` with every chunk, in order of arrival."""
 
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
         wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: CompassErrors | None = None,
     ) -> None:  # fmt: skip
+        """`iron`: errors of the compass, when it was calibrated."""
         self.board = BoardReader()
         self.mtx = MtxReader()
         self.timeline = Timeline(mtx)
         self.foot = Foot(foot)
         self.alignment = Alignment()
         self.path = TrunkPath(gait)
+        self.handover = FootLegsHandover(wearer or WearerSettings(), iron)
         self.status: Status | None = None
         self.identity: Identity | None = None
+        self.reports = BoardReports()
         self.pings = 0
-        self.words = BoardReports()
+        self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
-        self.journey = FootLegsHandover(wearer or WearerSettings(), iron)
-        self._stride = GyroBlocks(gyro or GyroSettings())
-        self._waiting = Synchronizer()
+        self._gyro_blocks = GyroBlocks(gyro or GyroSettings())
+        self._synchronizer = Synchronizer()
         self._unknown_ports = 0
         self._bad_times = 0
-        self.newest_s = math.nan  # how far either port has come
 
     @property
-    def ahead(self) -> tuple[PathSegment, ...]:
-        """Legs that the foot has told already, but whose pings are not all in."""
-        return self._waiting.legs
+    def pending_segments(self) -> tuple[PathSegment, ...]:
+        """Segments that are known already, but whose pings are not all in."""
+        return self._synchronizer.segments
 
     @property
     def counts(self) -> FrontEndCounts:
-        """What was not used so far."""
-        return FrontEndCounts(self._unknown_ports, self._waiting.late, self._waiting.dropped, self._bad_times)
+        """Counts since the start."""
+        synchronizer = self._synchronizer
+        return FrontEndCounts(self._unknown_ports, synchronizer.late, synchronizer.dropped, self._bad_times)
 
-    def take(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
-        """What a portion completes; raises StaleFirmwareError when the board has another schema."""
-        self._count_unknown(portion)
+    def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
+        """Segments and dropouts that a portion completes; raises StaleFirmwareError when the board has another schema."""
+        self._count_unknown_ports(portion)
+        # Decode: bytes of each port -> board frames, MTx samples.
         from_board, from_mtx = portion.of(BOARD), portion.of(MTX)
         frames, batch = self.board.frames(from_board.received), self.mtx.feed_batch(from_mtx.received)
         if not len(frames.id) and not len(batch.counter):
             return []
+        # Time: ticks, sample counters and arrival times -> t_s of every message.
         board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
         mtx = _mtx_arrivals(batch, from_mtx.rows_of(batch.end), portion.t_arrival_ns)
         times = self.timeline.times(board, mtx)
-        self._come(times)
-        self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
-        self._note(frames, times)
-        self._hear(frames, times)
-        watched_s = self._go(self._follow(batch, times), self._stride.cut(frames, times), times)
-        return self._waiting.release(times.board_newest_s, times.mtx_newest_s, watched_s)
+        self._count_bad_times(board, times)
+        self._advance_clock(times)
+        # Board: frames -> reports about itself, pings and heights, blocks of leg gyro samples.
+        self._keep_reports(frames, times)
+        self._collect_pings(frames, times)
+        leg_blocks = self._gyro_blocks.cut(frames, times)
+        # Foot: MTx samples -> segments of the trunk's path.
+        foot_segments = self._track_foot(batch, times)
+        # Handover: segments of foot and legs -> segments of one path.
+        observed_s = self._merge_paths(foot_segments, leg_blocks, times)
+        # Synchronize: segments and pings -> segments with their pings.
+        return self._synchronizer.pop_ready(times.board_newest_s, times.mtx_newest_s, observed_s)
 
     def warm_up(self) -> None:
-        """Compile the kernels, so that no chunk waits for it later; leaves the intake as it was."""
+        """Compile the kernels, so that no chunk waits for it later; leaves the front end as it was."""
         other = FrontEnd(self.timeline.timing, self._ranger, FootSettings(), GaitSettings())
         sample = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-        said = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
-        other.take(portion_of([said, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
+        ping = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
+        other.process(portion_of([ping, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
 
-    def _come(self, times: Times) -> None:
-        """How far the time has come."""
+    def _count_unknown_ports(self, portion: Portion) -> None:
+        for k, port in enumerate(portion.ports):
+            if port not in (BOARD, MTX, GATEWAY, PERSON):
+                self._unknown_ports += int((portion.port == k).sum())
+
+    def _count_bad_times(self, board: Arrivals, times: Times) -> None:
+        """Messages that should have a time and have none."""
+        self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
+
+    def _advance_clock(self, times: Times) -> None:
+        """Keep the newest time of either port."""
         newest = np.append(times.board_newest_s[-1:], times.mtx_newest_s[-1:])
         if not np.isnan(newest).all():
             self.newest_s = float(np.nanmax(newest))
 
-    def _count_unknown(self, portion: Portion) -> None:
-        for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, GATEWAY):
-                self._unknown_ports += int((portion.port == k).sum())
-
-    def _note(self, frames: Frames, times: Times) -> None:
-        """Keep the board's last words about itself."""
-        for identifier in _WORDS:
+    def _keep_reports(self, frames: Frames, times: Times) -> None:
+        """Keep the board's newest reports about itself."""
+        for identifier in _REPORTS:
             for row in frames.rows(identifier)[1]:
-                self.words.take(BY_ID[identifier].unpack(row.tobytes()))
-        if (status := _last(frames, times, STATUS)) is not None:
+                self.reports.add(BY_ID[identifier].unpack(row.tobytes()))
+        if (status := _newest_timed(frames, times, STATUS)) is not None:
             self.status = Status.unpack(status)
-        if (identity := _last(frames, times, IDENTITY)) is not None:
+        if (identity := _newest_timed(frames, times, IDENTITY)) is not None:
             self.identity = Identity.unpack(identity)
 
-    def _hear(self, frames: Frames, times: Times) -> None:
-        """Pings that say something about walls, and heights by pressure, wait for their leg."""
-        place, pings = frames.rows(PING)
-        self.pings += len(place)
-        t_s = times.board_s[place] + self._ranger.delay_s
-        kept = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
-        rows = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[kept]
-        aloft, samples = frames.rows(PRESSURE)
-        height_m = heights(samples)
-        high = ~np.isnan(times.board_s[aloft]) & ~np.isnan(height_m)
-        more = np.column_stack([times.board_s[aloft], np.full(len(aloft), HEIGHT), height_m])[high]
-        places = np.concatenate([place[kept], aloft[high]])
-        order = np.argsort(places, kind="stable")
-        self._waiting.hear(times.board_at[places[order]], np.concatenate([rows, more])[order])
+    def _collect_pings(self, frames: Frames, times: Times) -> None:
+        """Hand pings without a bus error, and heights by pressure, to the synchronizer, in order of their messages."""
+        ping_row, pings = frames.rows(PING)
+        self.pings += len(ping_row)
+        t_s = times.board_s[ping_row] + self._ranger.delay_s
+        usable = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
+        ping_values = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[usable]
+        height_row, samples = frames.rows(PRESSURE)
+        height_m, height_s = heights(samples), times.board_s[height_row]
+        valid = ~np.isnan(height_s) & ~np.isnan(height_m)
+        height_values = np.column_stack([height_s, np.full(len(height_row), HEIGHT), height_m])[valid]
+        frame_row = np.concatenate([ping_row[usable], height_row[valid]])
+        order = np.argsort(frame_row, kind="stable")
+        values = np.concatenate([ping_values, height_values])[order]
+        self._synchronizer.add_pings(times.board_message_index[frame_row[order]], values)
 
-    def _go(
-        self, by_foot: list[tuple[int, list[PathSegment]]], by_leg: list[tuple[int, GyroBlock]], times: Times
-    ) -> Floats:
-        """What foot and legs tell goes on one journey, message by message, and waits for its pings.
-
-        Returns up to when somebody watched him, after each message (n,).
-        """
-        count, foot_at, k = len(times.mtx_newest_s), [at for at, _ in by_foot], 0
-        legs_at, legs_s = [0], [self.journey.watched_s]
-        for at, block in [*by_leg, (count, None)]:
-            while k < len(foot_at) and (foot_at[k] < at or block is None):
-                self._waiting.go(foot_at[k], self.journey.foot(by_foot[k][1]))
-                k += 1
-            if block is not None and (legs := self.journey.legs(block, float(times.mtx_newest_s[at]))):
-                self._waiting.go(at, legs)
-            legs_at.append(at)
-            legs_s.append(self.journey.watched_s)
-        return np.fmax(times.mtx_newest_s, np.repeat(legs_s[:-1], np.diff(legs_at)))
-
-    def _follow(self, batch: MtBatch, times: Times) -> list[tuple[int, list[PathSegment]]]:
-        """Samples go through the foot to its path: the legs, and the place of the message that tells them."""
-        found: list[tuple[int, list[PathSegment]]] = []
-        kept = np.flatnonzero(~np.isnan(times.mtx_s))
-        if not len(kept):
-            return found
-        t_s, at = times.mtx_s[kept], times.mtx_at[kept]
-        fall = self.foot.track(t_s, batch.accel[kept], batch.gyro[kept], batch.mag[kept])
+    def _track_foot(self, batch: MtBatch, times: Times) -> list[tuple[int, list[PathSegment]]]:
+        """Segments from the foot odometry, each group with the index of the message that completed it."""
+        completed: list[tuple[int, list[PathSegment]]] = []
+        timed = np.flatnonzero(~np.isnan(times.mtx_s))
+        if not len(timed):
+            return completed
+        t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
+        foot = self.foot.track(t_s, batch.accel[timed], batch.gyro[timed], batch.mag[timed])
         begin = 0
-        for event, told in zip(fall.events, fall.sample_index.tolist(), strict=True):
-            found += self._stand(fall, t_s, at, begin, told)
-            for known in self.alignment.feed([event], float(t_s[told])):
-                legs = self.path.add_step(known) if isinstance(known, Step) else self.path.add_stance(known)
-                found.append((int(at[told]), legs))
-            begin = told
-        return found + self._stand(fall, t_s, at, begin, len(t_s))
+        for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):
+            completed += self._standing_segments(foot, t_s, message_index, begin, sample_index)
+            for aligned in self.alignment.feed([event], float(t_s[sample_index])):
+                segments = self.path.add_step(aligned) if isinstance(aligned, Step) else self.path.add_stance(aligned)
+                completed.append((int(message_index[sample_index]), segments))
+            begin = sample_index
+        return completed + self._standing_segments(foot, t_s, message_index, begin, len(t_s))
 
-    def _stand(
-        self, fall: FootEvents, t_s: Floats, at: Ints, begin: int, end: int
+    def _standing_segments(
+        self, foot: FootEvents, t_s: Floats, message_index: Ints, begin: int, end: int
     ) -> list[tuple[int, list[PathSegment]]]:
-        """What the samples [begin, end) between two events say of a trunk that stands."""
+        """Segments of a standing trunk from the samples [begin, end) between two events."""
         if self.alignment.waiting:
             return []
-        still = begin + np.flatnonzero(fall.stance[begin:end])
-        return [(int(at[still[k]]), [leg]) for k, leg in self.path.add_standing(t_s[still], fall.heading_rad[still])]
+        still = begin + np.flatnonzero(foot.stance[begin:end])
+        return [
+            (int(message_index[still[k]]), [segment])
+            for k, segment in self.path.add_standing(t_s[still], foot.heading_rad[still])
+        ]
+
+    def _merge_paths(
+        self, foot_segments: list[tuple[int, list[PathSegment]]], leg_blocks: list[tuple[int, GyroBlock]], times: Times
+    ) -> Floats:
+        """Merge foot and legs into one path, message by message, and hand its segments to the synchronizer.
+
+        Returns by message (n,) the time up to which foot or legs have been observed.
+        """
+        count, next_segment = len(times.mtx_newest_s), 0
+        block_index, legs_s = [0], [self.handover.legs_observed_s]
+        for message_index, block in [*leg_blocks, (count, None)]:
+            while next_segment < len(foot_segments) and (
+                foot_segments[next_segment][0] < message_index or block is None
+            ):
+                foot_index, segments = foot_segments[next_segment]
+                self._synchronizer.add_segments(foot_index, self.handover.add_foot_segments(segments))
+                next_segment += 1
+            if block is not None:
+                segments = self.handover.add_leg_block(block, float(times.mtx_newest_s[message_index]))
+                self._synchronizer.add_segments(message_index, segments)
+            block_index.append(message_index)
+            legs_s.append(self.handover.legs_observed_s)
+        return np.fmax(times.mtx_newest_s, np.repeat(legs_s[:-1], np.diff(block_index)))
 
 
-class GyroBlocks:
-    """Cuts the board's gyro samples into blocks of BLOCK, with the compass read since the sample before; counted from the first one."""
-
-    def __init__(self, gyro: GyroSettings) -> None:
-        self._gyro = gyro
-        self._rows = np.empty((0, 6))  # t_s, thigh, calf, belt, compass; the place of the message
-        self._compass = np.nan
-
-    def cut(self, frames: Frames, times: Times) -> list[tuple[int, GyroBlock]]:
-        """The blocks that are full, each with the place of the message that fills it."""
-        place, samples = frames.rows(GYROS)
-        read, bearings = frames.rows(COMPASS)
-        compass = np.full(len(place) + 1, np.nan)
-        compass[0] = self._compass
-        compass[np.searchsorted(place, read)] = compass_headings(bearings)
-        self._compass = compass[-1]
-        new = np.column_stack(
-            [times.board_s[place], gyro_rates(samples, self._gyro), compass[:-1], times.board_at[place]]
-        )
-        rows = np.concatenate([self._rows, new[~np.isnan(new[:, 0])]])
-        count = len(rows) // BLOCK
-        self._rows = rows[count * BLOCK :].copy()
-        self._rows[:, 5] = -1.0
-        *columns, at = rows[: count * BLOCK].reshape(count, BLOCK, 6).transpose(2, 0, 1)
-        blocks = (GyroBlock(*block) for block in zip(*columns, strict=True))
-        return list(zip(at[:, -1].astype(np.int64).tolist(), blocks, strict=True))
-
-
-def _board_arrivals(frames: Frames, row: Ints, t_arrival_ns: Ints) -> Arrivals:
-    """The board's messages for the timeline."""
+def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arrivals:
+    """The board's messages for the timeline; `chunk_row` (n,): row of the chunk that completed each."""
     ticks = np.ascontiguousarray(frames.body[:, :4]).view("<u4")[:, 0].astype(np.int64)
     kind = np.where(_TIMED[frames.id], PLAIN, SILENT)
-    kind[frames.id == IDENTITY] = FIRST_WORD
-    place, edges = frames.rows(SYNC)
-    kind[place] = edges["edge"]
-    return Arrivals(ticks, row, t_arrival_ns[row], kind)
+    kind[frames.id == IDENTITY] = FIRST_MESSAGE
+    sync_row, edges = frames.rows(SYNC)
+    kind[sync_row] = edges["edge"]
+    return Arrivals(ticks, chunk_row, t_arrival_ns[chunk_row], kind)
 
 
-def _mtx_arrivals(batch: MtBatch, row: Ints, t_arrival_ns: Ints) -> Arrivals:
-    return Arrivals(batch.counter, row, t_arrival_ns[row], np.full(len(row), PLAIN))
+def _mtx_arrivals(batch: MtBatch, chunk_row: Ints, t_arrival_ns: Ints) -> Arrivals:
+    """The MTx samples for the timeline; `chunk_row` (n,): row of the chunk that completed each."""
+    return Arrivals(batch.counter, chunk_row, t_arrival_ns[chunk_row], np.full(len(chunk_row), PLAIN))
 
 
-def _last(frames: Frames, times: Times, identifier: int) -> bytes | None:
-    """Body of the last message with this id and a believable time."""
-    place, rows = frames.rows(identifier)
-    kept = np.flatnonzero(~np.isnan(times.board_s[place]))
-    return rows[kept[-1]].tobytes() if len(kept) else None
+def _newest_timed(frames: Frames, times: Times, identifier: int) -> bytes | None:
+    """Body of the last message with this id that has a time."""
+    frame_row, bodies = frames.rows(identifier)
+    timed = np.flatnonzero(~np.isnan(times.board_s[frame_row]))
+    return bodies[timed[-1]].tobytes() if len(timed) else None

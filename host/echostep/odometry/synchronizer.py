@@ -1,13 +1,13 @@
-"""Legs and pings that wait for each other.
+"""Synchronizer: joins each path segment with the pings that were triggered on it.
 
-In: legs and pings as they become known, and how far either port has come after each message. Out: each leg with its pings, once no older ping can
-come any more, and seconds of a silent foot. Owns what waits.
+In: segments and pings as messages bring them, and how far either port has come after each message. Out: each segment with its pings, once no older
+ping can come any more; a `Dropout` for each second without any observation. Owns the pings and segments that wait.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,132 +15,181 @@ from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 
-PING_AGE_S = 0.1  # a ping is reported this long after its trigger at most
-SILENCE_S = 0.5  # a port that is this far behind the other one is not waited for
-BLIND_S = 1.0
-HEIGHT = 2  # among the rangers: a height by pressure
-MAX_WAITING = 4096  # pings; beyond it the oldest are given up and counted
+PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report; by reason: a cycle of both rangers takes 71 ms [board/health.py, PINGS_HZ]
+SILENCE_S = 0.5  # a port that lags the other one by more is not waited for; by reason
+BLIND_S = 1.0  # time without any observation that makes a dropout; by reason: twice a standing segment [path.STANDING_PIECE_S]
+MAX_WAITING = 4096  # pings and heights that wait; beyond it the oldest are dropped and counted; by reason: nearly two minutes of both
+HEIGHT = 2  # in the ranger column of a ping: the value is a height by pressure, not a range
+DROPOUT = -1  # in the segment column of the output: a dropout, no segment
 
 
 class _State(Protocol):
     pings: int  # that wait
     late: int
     dropped: int
-    gone: int  # legs
-    gone_s: float  # end of the last leg that has gone
-    told_s: float  # of the last silence
+    popped: int  # segments since the start
+    popped_s: float  # end of the last segment that was popped
+    dropout_s: float  # time of the last dropout
 
 
 _NUMPY = {"float": "f8", "int": "i8"}
 _STATE = np.dtype([(name, _NUMPY[kind]) for name, kind in _State.__annotations__.items()])
 
 
+class _NewPings(NamedTuple):
+    """Pings (k, 3) of t_s, ranger, range_m, and the index (k,) of the message that brought each."""
+
+    message_index: Ints
+    row: Floats
+
+
+class _WaitingSegments(NamedTuple):
+    """End (m,) of each segment that waits, and the index (m,) of the message that completed it; -1: of an earlier portion."""
+
+    message_index: Ints
+    end_s: Floats
+
+
+class _Progress(NamedTuple):
+    """By message (n,): newest time of the board and of the MTx, and the time up to which foot or legs have been observed."""
+
+    board_s: Floats
+    mtx_s: Floats
+    observed_s: Floats
+
+
+class _Popped(NamedTuple):
+    """Output columns: `ping` (3, k) of all popped pings; by segment or dropout: `segment`, `t_s`, `ping_end` (pings popped by then)."""
+
+    ping: Floats
+    segment: Ints
+    t_s: Floats
+    ping_end: Ints
+
+
 class Synchronizer:
-    """`hear` and `go` take what a portion brought, with the place of the message that brought it; `release` gives what is certain."""
+    """For each portion call `add_pings` and `add_segments`, then `pop_ready`. Messages are counted from the start of the portion."""
 
     def __init__(self) -> None:
         self._state = np.zeros(1, _STATE)
-        self._state["told_s"] = -math.inf
-        self._pings = np.empty((MAX_WAITING + 1, 3))  # t_s, ranger, range_m; oldest first
-        self._legs: list[PathSegment] = []
-        self._leg_at: list[int] = []
-        self._new_at, self._new = np.empty(0, np.int64), np.empty((0, 3))
+        self._state["dropout_s"] = -math.inf
+        self._waiting = np.empty((MAX_WAITING + 1, 3))  # pings: t_s, ranger, range_m; oldest first
+        self._segments: list[PathSegment] = []
+        self._completed_by: list[int] = []  # message index of each segment
+        self._new = _NewPings(np.empty(0, np.int64), np.empty((0, 3)))
 
     @property
     def late(self) -> int:
-        """Pings of legs that had gone."""
+        """Pings older than the last segment that was popped."""
         return int(self._state["late"][0])
 
     @property
     def dropped(self) -> int:
-        """Pings given up because no leg came."""
+        """Pings dropped because no segment came."""
         return int(self._state["dropped"][0])
 
     @property
-    def legs(self) -> tuple[PathSegment, ...]:
-        """Legs that wait for their pings, in order."""
-        return tuple(self._legs)
+    def segments(self) -> tuple[PathSegment, ...]:
+        """Segments that wait for their pings, in order of time."""
+        return tuple(self._segments)
 
-    def hear(self, at: Ints, pings: Floats) -> None:
-        """Pings (n, 3) of t_s, ranger, range_m, or HEIGHT and a height, and the place of each message (n,)."""
-        self._new_at, self._new = at, pings
+    def add_pings(self, message_index: Ints, pings: Floats) -> None:
+        """Pings (n, 3) of t_s, ranger, range_m, or of t_s, HEIGHT, height_m, and the index (n,) of the message that brought each."""
+        self._new = _NewPings(message_index, pings)
 
-    def go(self, at: int, legs: list[PathSegment]) -> None:
-        """Legs that the message at this place made known."""
-        self._legs += legs
-        self._leg_at += [at] * len(legs)
+    def add_segments(self, message_index: int, segments: list[PathSegment]) -> None:
+        """Segments that one message completed."""
+        self._segments += segments
+        self._completed_by += [message_index] * len(segments)
 
-    def release(
-        self, board_newest_s: Floats, mtx_newest_s: Floats, watched_s: Floats
+    def pop_ready(
+        self, board_newest_s: Floats, mtx_newest_s: Floats, observed_s: Floats
     ) -> list[MeasuredSegment | Dropout]:
-        """What is certain after these messages (n,), by how far either port has come with each of them; NaN: it has not spoken yet.
+        """Segments and dropouts that are certain after these messages (n,), from how far each port has come with each; NaN: no message yet.
 
-        `watched_s`: up to when foot or legs watched him.
+        `observed_s` (n,): time up to which foot or legs have been observed.
         """
-        legs, most = self._legs, len(self._legs) + len(board_newest_s)
-        heard = np.empty((3, int(self._state["pings"][0]) + len(self._new)))
-        leg, t_s, upto = np.empty(most, np.int64), np.empty(most), np.empty(most, np.int64)
-        found = _release(
-            self._state[0], self._pings, self._new_at, self._new, np.array(self._leg_at, np.int64),
-            np.array([leg.t1_s for leg in legs], np.float64), board_newest_s, mtx_newest_s, watched_s, heard, leg, t_s, upto,
-        )  # fmt: skip
-        ping_s, ranger, range_m = heard[0], heard[1, : upto[found - 1] if found else 0].astype(np.int64), heard[2]
-        pieces: list[MeasuredSegment | Dropout] = []
-        begin = gone = 0
-        for k, silent_s, end in zip(leg[:found].tolist(), t_s[:found].tolist(), upto[:found].tolist(), strict=True):
-            if k < 0:
-                pieces.append(Dropout(silent_s))
-                continue
-            pieces.append(_passage(legs[k], ping_s[begin:end], ranger[begin:end], range_m[begin:end]))
-            begin, gone = end, k + 1
-        self._new_at, self._new = np.empty(0, np.int64), np.empty((0, 3))
-        self._legs, self._leg_at = legs[gone:], [-1] * (len(legs) - gone)
-        return pieces
+        segments, most = self._segments, len(self._segments) + len(board_newest_s)
+        popped = _Popped(
+            np.empty((3, int(self._state["pings"][0]) + len(self._new.row))),
+            np.empty(most, np.int64),
+            np.empty(most),
+            np.empty(most, np.int64),
+        )
+        waiting = _WaitingSegments(
+            np.array(self._completed_by, np.int64), np.array([segment.t1_s for segment in segments], np.float64)
+        )
+        progress = _Progress(board_newest_s, mtx_newest_s, observed_s)
+        count = _pop_ready(self._state[0], self._waiting, self._new, waiting, progress, popped)
+        done = int(np.sum(popped.segment[:count] != DROPOUT))
+        self._segments, self._completed_by = segments[done:], [-1] * (len(segments) - done)
+        self._new = _NewPings(np.empty(0, np.int64), np.empty((0, 3)))
+        return _pieces(segments, popped, count)
 
 
-def _passage(leg: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats) -> MeasuredSegment:
-    high = ranger == HEIGHT
-    if not high.any():
-        return MeasuredSegment(leg, t_s, ranger, value_m)
-    return MeasuredSegment(leg, t_s[~high], ranger[~high], value_m[~high], value_m[high])
+def _pieces(segments: list[PathSegment], popped: _Popped, count: int) -> list[MeasuredSegment | Dropout]:
+    """The first `count` rows of the output columns as objects."""
+    pings = int(popped.ping_end[count - 1]) if count else 0
+    t_s, ranger, value_m = popped.ping[0], popped.ping[1, :pings].astype(np.int64), popped.ping[2]
+    pieces: list[MeasuredSegment | Dropout] = []
+    begin = 0
+    columns = (popped.segment[:count].tolist(), popped.t_s[:count].tolist(), popped.ping_end[:count].tolist())
+    for segment, dropout_s, end in zip(*columns, strict=True):
+        if segment == DROPOUT:
+            pieces.append(Dropout(dropout_s))
+        else:
+            pieces.append(_measured(segments[segment], t_s[begin:end], ranger[begin:end], value_m[begin:end]))
+            begin = end
+    return pieces
+
+
+def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats) -> MeasuredSegment:
+    """A segment with its pings, and apart from them the heights."""
+    is_height = ranger == HEIGHT
+    if not is_height.any():
+        return MeasuredSegment(segment, t_s, ranger, value_m)
+    return MeasuredSegment(segment, t_s[~is_height], ranger[~is_height], value_m[~is_height], value_m[is_height])
 
 
 @kernel
-def _release(
-    s: _State, waiting: Floats, ping_at: Ints, pings: Floats, leg_at: Ints, leg_s: Floats, board_newest_s: Floats, mtx_newest_s: Floats,
-    watched_s: Floats, heard: Floats, leg: Ints, t_s: Floats, upto: Ints,
-) -> int:  # fmt: skip
-    """Message by message: take in its ping, send off every leg that is complete, tell a silence.
+def _pop_ready(
+    s: _State, waiting: Floats, new: _NewPings, segments: _WaitingSegments, progress: _Progress, popped: _Popped
+) -> int:
+    """Message by message: add its pings, pop every segment that is complete, report a dropout.
 
-    Fills the columns of pings that have gone with their legs, and for each leg (its index) or silence (-1) its time and how many of them
-    have gone; returns how many legs and silences there were.
+    Fills the columns of `popped`; returns the number of segments and dropouts in it.
     """
-    found = next_ping = next_leg = out = 0
-    for at in range(len(board_newest_s)):
-        while next_ping < len(ping_at) and ping_at[next_ping] == at:
-            _push(s, waiting, pings[next_ping])
+    count = next_ping = next_segment = pings = 0
+    for message_index in range(len(progress.board_s)):
+        while next_ping < len(new.message_index) and new.message_index[next_ping] == message_index:
+            _push(s, waiting, new.row[next_ping])
             next_ping += 1
-        board, mtx = board_newest_s[at], mtx_newest_s[at]
+        board, mtx = progress.board_s[message_index], progress.mtx_s[message_index]
         complete_s = -np.inf if np.isnan(board) else board - PING_AGE_S
         complete_s = complete_s if np.isnan(mtx) else max(complete_s, mtx - SILENCE_S)
-        while next_leg < len(leg_s) and leg_at[next_leg] <= at and leg_s[next_leg] <= complete_s:
-            out = _pop(s, waiting, leg_s[next_leg], heard, out)
-            s.gone += 1
-            s.gone_s = max(s.gone_s, leg_s[next_leg])
-            leg[found], t_s[found], upto[found] = next_leg, leg_s[next_leg], out
-            next_leg += 1
-            found += 1
-        if s.gone and board - max(watched_s[at], s.told_s) >= BLIND_S:
-            s.told_s = board
-            leg[found], t_s[found], upto[found] = -1, board, out
-            found += 1
-    return found
+        while (
+            next_segment < len(segments.end_s)
+            and segments.message_index[next_segment] <= message_index
+            and segments.end_s[next_segment] <= complete_s
+        ):
+            end_s = segments.end_s[next_segment]
+            pings = _pop(s, waiting, end_s, popped.ping, pings)
+            s.popped += 1
+            s.popped_s = max(s.popped_s, end_s)
+            popped.segment[count], popped.t_s[count], popped.ping_end[count] = next_segment, end_s, pings
+            next_segment += 1
+            count += 1
+        if s.popped and board - max(progress.observed_s[message_index], s.dropout_s) >= BLIND_S:
+            s.dropout_s = board
+            popped.segment[count], popped.t_s[count], popped.ping_end[count] = DROPOUT, board, pings
+            count += 1
+    return count
 
 
 @kernel
 def _push(s: _State, waiting: Floats, ping: Floats) -> None:
-    """A ping joins those that wait, behind all that are not younger; too late, or one too many, and one is given up."""
-    if ping[0] < s.gone_s:
+    """Insert a ping by time, after equal ones. A ping older than the last popped segment is late; beyond MAX_WAITING the oldest is dropped."""
+    if ping[0] < s.popped_s:
         s.late += 1
         return
     k = s.pings
@@ -156,13 +205,13 @@ def _push(s: _State, waiting: Floats, ping: Floats) -> None:
 
 
 @kernel
-def _pop(s: _State, waiting: Floats, until_s: float, heard: Floats, out: int) -> int:
-    """Pings up to a time go."""
+def _pop(s: _State, waiting: Floats, until_s: float, popped: Floats, count: int) -> int:
+    """Move the pings up to a time to the columns of `popped` (3, n) from `count` on; returns the new count."""
     n = 0
     while n < s.pings and waiting[n, 0] <= until_s:
-        heard[:, out + n] = waiting[n]
+        popped[:, count + n] = waiting[n]
         n += 1
     for k in range(n, s.pings):
         waiting[k - n] = waiting[k]
     s.pings -= n
-    return out + n
+    return count + n

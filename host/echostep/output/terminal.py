@@ -158,9 +158,10 @@ def describe(e: Estimate | None) -> str:
 
 def health(tracker: Tracker) -> str:
     """Counts of rejected, lost and dropped frames, the time source of the MTx, and the beacons, as a line of text."""
-    board, status = tracker.intake.board.counts, tracker.intake.status
+    streams = tracker.streams
+    board, status = streams.board, streams.status
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
-    sync = "SyncOut" if tracker.intake.timeline.synchronised else "arrival times"
+    sync = "SyncOut" if streams.synchronised else "arrival times"
     heard = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
     return (
         f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}{heard}"
@@ -169,5 +170,5 @@ def health(tracker: Tracker) -> str:
 
 def findings(tracker: Tracker) -> list[Finding]:
     """The most severe findings on the board, at most MAX_FINDINGS."""
-    found = board_findings(tracker.intake.words)
+    found = board_findings(tracker.streams.reports)
     return [finding for finding in found if finding.severity > Severity.NOTE][:MAX_FINDINGS]

@@ -107,8 +107,8 @@ class ReportHistory:
 
     def streams(self, tracker: Tracker, t_s: float) -> StreamReport:
         """Health of the input streams; rates over AVERAGING_S of the clock of `t_s`."""
-        intake = tracker.intake
-        board, mtx, status = intake.board.counts, intake.mtx.counts, intake.status
+        state = tracker.streams
+        board, mtx, status = state.board, state.mtx, state.status
         counts = (t_s, mtx.good, board.good)
         self._counts.append(counts)
         while len(self._counts) > 2 and self._counts[1][0] < t_s - AVERAGING_S:
@@ -121,8 +121,8 @@ class ReportHistory:
             bad=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
             lost=board.lost + mtx.lost,
             dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
-            synchronised=bool(intake.timeline.synchronised),
-            findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in board_findings(intake.words)[:4]),
+            synchronised=state.synchronised,
+            findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in board_findings(state.reports)[:4]),
         )
 
 

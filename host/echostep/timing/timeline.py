@@ -1,15 +1,16 @@
-"""One clock: board ticks, the MTx sample counter and arrival times -> `t_s`.
+"""Timeline: board ticks, MTx sample counters and arrival times -> `t_s`.
 
 In: board messages and MTx samples with their time of arrival, many at once. Out: `t_s`, seconds of the board's clock since its first reset
-(without a board: of the MTx's counter). Owns every clock; nothing else converts time, and nothing here waits for a timer.
+(without a board: of the MTx's counter). Owns every clock; no other module converts time, and none here waits for a timer.
 
-The board's ticks are the clock. MTx samples are tied to it by SyncOut edges when the wire is there, else by the lower envelopes of both
-ports' arrival times. A device that restarts gets a new epoch, placed by arrival times.
+The board's ticks are the clock. SyncOut edges tie MTx samples to it if connected, else the lower envelopes of both ports' arrival times.
+A device that restarts gets a new epoch, set by arrival times.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,9 +22,10 @@ from echostep.timing import sync_edges as sync
 from echostep.timing.device_clock import DeviceClock
 from echostep.timing.sync_edges import SyncEdges
 
-TICK_S = 0.5e-6
-BOARD_LATENCY_S = 0.001  # a frame waits for the next USB millisecond at best
-SILENT, PLAIN, FIRST_WORD = -3, -2, -1  # kinds of board messages; a kind from 0 on is a SyncOut edge
+TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
+BOARD_LATENCY_S = 0.001  # at best; by reason: a frame waits for the next USB millisecond
+MIN_STEP_S = 1e-6  # between two MTx samples, by reason: times must increase
+SILENT, PLAIN, FIRST_MESSAGE = -3, -2, -1  # kinds of board messages; a kind from 0 on is the count of a SyncOut edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +41,10 @@ class MtxTiming:
             raise ValueError(f"[mtx] rate_hz: {self.rate_hz} is not a rate of an MTx")
 
 
-@dataclass(frozen=True, slots=True)
-class Arrivals:
-    """Messages of one port in order: `value` (n,) ticks or counter, `row` (n,) of the chunk that completed each, `t_arrival_ns` (n,) of that.
+class Arrivals(NamedTuple):
+    """Messages of one port in order: `value` (n,) ticks or counter, `row` (n,) of the chunk that completed each, `t_arrival_ns` (n,) of that chunk.
 
-    `kind` (n,): `SILENT` (no time in it), `PLAIN`, `FIRST_WORD` of a board that may have restarted, or the count of a SyncOut edge.
+    `kind` (n,): `SILENT` (without a time), `PLAIN`, `FIRST_MESSAGE` of a board that may have restarted, or the count of a SyncOut edge.
     """
 
     value: Ints
@@ -52,18 +53,17 @@ class Arrivals:
     kind: Ints
 
 
-@dataclass(frozen=True, slots=True)
-class Times:
-    """`board_s`, `mtx_s`: `t_s` of each message, NaN for one that cannot be true or has no time.
+class Times(NamedTuple):
+    """`board_s` (b,), `mtx_s` (m,): `t_s` of each message, NaN for an impossible one and for one without a time.
 
-    `board_at`, `mtx_at`: place of each among the messages of both ports in order of arrival. By that place, `board_newest_s` and
-    `mtx_newest_s`: how far either port has come once this message is in, NaN before its first one.
+    `board_message_index` (b,), `mtx_message_index` (m,): index of each message among those of both ports in order of arrival. By that index,
+    `board_newest_s` and `mtx_newest_s` (b + m,): newest time of each port once this message is in, NaN before its first one.
     """
 
     board_s: Floats
     mtx_s: Floats
-    board_at: Ints
-    mtx_at: Ints
+    board_message_index: Ints
+    mtx_message_index: Ints
     board_newest_s: Floats
     mtx_newest_s: Floats
 
@@ -84,18 +84,18 @@ class Timeline:
 
     @property
     def board_restarts(self) -> int:
-        """How often the board's clock has begun anew."""
+        """Restarts of the board's clock."""
         return int(self._board["restarts"])
 
     def arrival_ns(self, t_s: float) -> int:
-        """When undelayed bytes of that moment arrive, on the host's clock; 0 before anything has come."""
+        """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any message."""
         clock = self._board if self._board["started"] else self._mtx
         return max(round(arrival.to_arrival_s(clock, t_s) * 1e9), 0)
 
     def times(self, board: Arrivals, mtx: Arrivals) -> Times:
         """Times of a portion's messages; a board message comes before a sample of the same row."""
         nb, nm = len(board.value), len(mtx.value)
-        found = Times(
+        times = Times(
             np.empty(nb),
             np.empty(nm),
             np.empty(nb, np.int64),
@@ -103,41 +103,37 @@ class Timeline:
             np.empty(nb + nm),
             np.empty(nb + nm),
         )
-        _tell(
-            self._board, self._mtx, self._edges, self.timing.latency_s,
-            board.value, board.row, board.t_arrival_ns, board.kind, mtx.value, mtx.row, mtx.t_arrival_ns,
-            found.board_s, found.mtx_s, found.board_at, found.mtx_at, found.board_newest_s, found.mtx_newest_s,
-        )  # fmt: skip
-        return found
+        _assign_times(self._board, self._mtx, self._edges, self.timing.latency_s, board, mtx, times)
+        return times
 
 
 @kernel
-def _tell(
-    board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, latency_s: float,
-    ticks: Ints, board_row: Ints, board_ns: Ints, kind: Ints, counter: Ints, mtx_row: Ints, mtx_ns: Ints,
-    board_s: Floats, mtx_s: Floats, board_at: Ints, mtx_at: Ints, board_newest_s: Floats, mtx_newest_s: Floats,
+def _assign_times(
+    board_clock: DeviceClock, mtx_clock: DeviceClock, edges: SyncEdges, latency_s: float,
+    board: Arrivals, mtx: Arrivals, times: Times,
 ) -> None:  # fmt: skip
-    """Fill the columns of `Times`, message by message in order of arrival."""
+    """Fill the columns of `times`, message by message in order of arrival."""
     b, m = 0, 0
-    for at in range(len(ticks) + len(counter)):
-        if m == len(counter) or (b < len(ticks) and board_row[b] <= mtx_row[m]):
-            board_s[b] = _board_time(board, edges, ticks[b], board_ns[b], kind[b])
-            board_at[b] = at
+    for message_index in range(len(board.value) + len(mtx.value)):
+        if m == len(mtx.value) or (b < len(board.value) and board.row[b] <= mtx.row[m]):
+            times.board_s[b] = _board_time(board_clock, edges, board.value[b], board.t_arrival_ns[b], board.kind[b])
+            times.board_message_index[b] = message_index
             b += 1
         else:
-            mtx_s[m] = _mtx_time(board, mtx, edges, counter[m], mtx_ns[m], latency_s)
-            mtx_at[m] = at
+            times.mtx_s[m] = _mtx_time(board_clock, mtx_clock, edges, mtx.value[m], mtx.t_arrival_ns[m], latency_s)
+            times.mtx_message_index[m] = message_index
             m += 1
-        board_newest_s[at] = clocks.now_s(board)
-        mtx_newest_s[at] = mtx.newest_s
+        times.board_newest_s[message_index] = clocks.now_s(board_clock)
+        times.mtx_newest_s[message_index] = mtx_clock.newest_s
 
 
 @kernel
 def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: int, kind: int) -> float:
+    """`t_s` of a board message; a SyncOut edge is kept, a restart discards the edges."""
     if kind == SILENT:
         return np.nan
     restarts = board.restarts
-    t_s = clocks.read(board, ticks, t_arrival_ns, kind == FIRST_WORD)
+    t_s = clocks.read(board, ticks, t_arrival_ns, kind == FIRST_MESSAGE)
     if board.restarts != restarts:
         sync.forget(edges)
     if kind >= 0 and not np.isnan(t_s):
@@ -149,7 +145,7 @@ def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: 
 def _mtx_time(
     board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, counter: int, t_arrival_ns: int, latency_s: float
 ) -> float:
-    """`t_s` of an MTx sample, always later than the one before; NaN for a counter that cannot be true."""
+    """`t_s` of an MTx sample, always later than the one before; NaN for an impossible counter."""
     restarts = mtx.restarts
     device_s = clocks.read(mtx, counter, t_arrival_ns, False)
     if np.isnan(device_s):
@@ -163,6 +159,6 @@ def _mtx_time(
         by_edge_s = sync.time_of(edges, counter, by_arrival_s)
         t_s = by_arrival_s if np.isnan(by_edge_s) else by_edge_s
     if t_s <= mtx.newest_s:
-        t_s = mtx.newest_s + 1e-6
+        t_s = mtx.newest_s + MIN_STEP_S
     mtx.newest_s = t_s
     return t_s

@@ -1,6 +1,6 @@
-"""The MTx on a live port: set up at the start, and again whenever it wakes up.
+"""Setup of the MTx on a live port: at the start, and again after each WakeUp.
 
-In: the chunks of all ports, in order, after they were recorded. Out: bytes to the MTx, and lines for people. Owns the setup.
+In: the chunks of all ports, in order, after they were recorded. Out: bytes to the MTx, and messages for the terminal. Owns the `MtxSetup`.
 """
 
 from __future__ import annotations
@@ -15,34 +15,35 @@ from echostep.xsens.setup import MtxSetup, State
 
 
 class MtxStart:
-    """Follows the MTx's bytes and talks to it; raises EchostepError when it measures in a mode that cannot be used and does not listen."""
+    """Passes the MTx's bytes to its setup and sends the requests; raises EchostepError when the MTx sends an unusable format and cannot be set up."""
 
     def __init__(self, rate_hz: float, send: Callable[[bytes], None], say: Callable[[str], None]) -> None:
-        """`send` writes to the MTx's port, `say` tells the wearer."""
+        """`send` writes to the MTx's port, `say` prints a message."""
         try:
             requests = project_requests(rate_hz)
         except ValueError as error:
             raise EchostepError(str(error)) from error
         self._setup = MtxSetup(requests, rate_hz)
         self._send, self._say = send, say
-        self._usable = False
+        self._usable = False  # whether the MTx has ever sent what is wanted
 
-    def follow(self, chunk: Chunk | None) -> None:
-        """Take the next chunk of any port; None when nothing came."""
+    def advance(self, chunk: Chunk | None) -> None:
+        """Process the next chunk of any port; None when nothing came, so that timeouts are checked."""
         was_busy = not self._setup.finished
-        wakes = self._setup.wake_ups
+        wake_ups = self._setup.wake_ups
         now_s = time.monotonic()
         received, arrived_s = b"", now_s
         if chunk is not None and chunk.port == MTX:
             received, arrived_s = chunk.data, chunk.t_arrival_ns * 1e-9
         if sent := self._setup.advance(received, now_s, arrived_s):
             self._send(sent)
-        if self._setup.wake_ups > wakes and self._usable:
-            self._say("MTx: it started anew")
-        if self._setup.finished and (was_busy or self._setup.wake_ups > wakes):
-            self._conclude()
+        if self._setup.wake_ups > wake_ups and self._usable:
+            self._say("MTx: restarted")
+        if self._setup.finished and (was_busy or self._setup.wake_ups > wake_ups):
+            self._report_result()
 
-    def _conclude(self) -> None:
+    def _report_result(self) -> None:
+        """Print the result of the setup; raise it as an error when the MTx was never usable."""
         state = self._setup.state
         if state is State.WRONG_MODE and not self._usable:
             raise EchostepError(self._setup.verdict)
