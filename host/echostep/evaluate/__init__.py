@@ -1,4 +1,4 @@
-"""The papers' experiments and ours: one module or folder a study; `study` is the frame that all of them share.
+"""Experiments of the papers and of this project: one module or folder per study; `study`, `runs` and `report` are their common frame.
 
 In: seeds, or recordings. Out: rows, a table, JSON, Parquet, pictures. Owns a journal to resume from.
 """

@@ -1,8 +1,9 @@
 """Floors by pressure, simulated: how often the right floor is named, and for how long a wrong one.
 
-In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.climbs`, `simulation.weather`).
+In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.people.vertical_day`,
+`simulation.world.air_pressure`).
 
-The true floor is the storey nearest to the wearer: on stairs and in a lift it changes when he passes the middle between two. Within a quarter of
+The true floor is the storey nearest to the wearer: on stairs and in a lift it changes at the middle between two. Within a quarter of
 a metre of the middle both count as right (`floor_right`), because landings lie there; `strict_right` gives nothing away. Unless a scene is of a
 `whole` record, each sample is judged by what was known at it.
 """
@@ -37,7 +38,7 @@ STORM = Weather()
 
 @dataclass(frozen=True, slots=True)
 class FloorScene:
-    """`known_start`: the first floor is told; `gait`: walking and standing are told, as legs or foot do.
+    """`known_start`: the first floor is given; `gait`: walking and standing are given, as legs or foot report them.
 
     `whole`: judged with the whole record, as `echostep floors` does.
     """

@@ -1,4 +1,4 @@
-"""The experiment of [Girard 2011, 3.4 and 4] in simulation: the paper's three systems and ours on the same walks, and what it could not handle.
+"""The experiment of [Girard 2011, 3.4 and 4] in simulation: the paper's three systems and the default filter on the same walks.
 
 In: seeds. Out: rows in the form of the paper's Table 1, and the clouds of its Figures 10-13. Everything here is simulated: building, walker, sensors.
 """
@@ -35,7 +35,7 @@ from echostep.simulation.world.sites import (
 )
 from echostep.walls.echo_sources import Walls
 
-System = Callable[[SimulatedSite, MarkerWalk, int], Iterator["Seen"]]
+System = Callable[[SimulatedSite, MarkerWalk, int], Iterator["Output"]]
 
 STEP_SD_M = 0.02  # of a careful step, per axis
 AFTER_HALL_S = 10.0
@@ -62,8 +62,8 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """What a system says after a step: the estimate, and its cloud (n, 2) for the pictures; `inside` is None where it states no ellipse."""
+class Output:
+    """Output of a system after a step: the estimate, and its cloud (n, 2) for the pictures; `inside` is None where it states no ellipse."""
 
     at_m: tuple[float, float]
     inside: bool | None
@@ -71,7 +71,7 @@ class Seen:
 
 
 def draw(folder: Path, seed: int, _rows: list[Row]) -> None:
-    """The clouds after 9, 21 and 52 steps: without the plan, with it, with ranging, and ours [Girard 2011, Figures 10-13]."""
+    """The clouds after 9, 21 and 52 steps: without the plan, with it, with ranging, and the default filter [Girard 2011, Figures 10-13]."""
     from echostep.evaluate.pictures import draw_clouds
 
     site = otb()
@@ -91,7 +91,7 @@ def draw(folder: Path, seed: int, _rows: list[Row]) -> None:
 
 
 def one_run(seed: int) -> list[Row]:
-    """All systems on the walk of this seed, and ours on every other site."""
+    """All systems on the walk of this seed, and the default filter on every other site."""
     site = otb()
     walk = _walk(site, seed)
     rows = [_row(name, "girard2011", seed, walk, list(system(site, walk, seed))) for name, system in SYSTEMS.items()]
@@ -105,16 +105,16 @@ def one_run(seed: int) -> list[Row]:
     return rows
 
 
-def dead_reckoned(_site: SimulatedSite, walk: MarkerWalk, _seed: int) -> Iterator[Seen]:
+def dead_reckoned(_site: SimulatedSite, walk: MarkerWalk, _seed: int) -> Iterator[Output]:
     """Fixed steps in the measured directions [Girard 2011, Figure 10]."""
     way = np.column_stack([np.cos(walk.heading_rad), np.sin(walk.heading_rad)]) * STEP_M
     for x, y in (walk.trunk_m[0] + np.cumsum(way, axis=0)).tolist():
-        yield Seen((x, y), None, np.array([[x, y]]))
+        yield Output((x, y), None, np.array([[x, y]]))
 
 
 def girard(
     site: SimulatedSite, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True
-) -> Iterator[Seen]:
+) -> Iterator[Output]:
     """The paper's filter: on its plan or without, with one pair of pings a step or without."""
     walls = site.plan if model else None
     x0, y0 = walk.trunk_m[0].tolist()
@@ -122,23 +122,23 @@ def girard(
     for k, heading in enumerate(walk.heading_rad.tolist()):
         pair = (float(walk.pair_m[k + 1, 0]), float(walk.pair_m[k + 1, 1])) if ranging else None
         at = filter_.step(STEP_M * math.cos(heading), STEP_M * math.sin(heading), heading, pair)
-        yield Seen(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
+        yield Output(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
 
 
-def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[Seen]:
-    """Ours: the same steps and headings, and every ping on the way."""
+def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[Output]:
+    """The default filter: the same steps and headings, and every ping of the walk."""
     x0, y0 = walk.trunk_m[0].tolist()
     start = Pose(x0, y0, walk.start_heading_rad)
-    ours = MapFilter(Walls(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
+    map_filter = MapFilter(Walls(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
     since_s = -math.inf
-    for k, (turning, step) in enumerate(_legs(walk)):
+    for k, (turning, step) in enumerate(_segments(walk)):
         if turning is not None:
-            ours.update(_passage(turning, walk, since_s))
+            map_filter.update(_measured_segment(turning, walk, since_s))
             since_s = turning.t1_s
-        found = ours.update(_passage(step, walk, since_s))
+        found = map_filter.update(_measured_segment(step, walk, since_s))
         since_s = step.t1_s
-        cloud = np.column_stack([ours.cloud.x_m, ours.cloud.y_m])
-        yield Seen((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
+        cloud = np.column_stack([map_filter.cloud.x_m, map_filter.cloud.y_m])
+        yield Output((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
 
 
 SYSTEMS: dict[str, System] = {
@@ -148,14 +148,14 @@ SYSTEMS: dict[str, System] = {
 }
 
 
-def _passage(leg: PathSegment, walk: MarkerWalk, since_s: float) -> MeasuredSegment:
-    """A leg with the pings since the one before it."""
+def _measured_segment(segment: PathSegment, walk: MarkerWalk, since_s: float) -> MeasuredSegment:
+    """A segment of the path with the pings since the one before it."""
     p = walk.pings
-    on_it = (p.t_s > since_s) & (p.t_s <= leg.t1_s)
-    return MeasuredSegment(leg, p.t_s[on_it], p.ranger[on_it], p.range_m[on_it])
+    on_it = (p.t_s > since_s) & (p.t_s <= segment.t1_s)
+    return MeasuredSegment(segment, p.t_s[on_it], p.ranger[on_it], p.range_m[on_it])
 
 
-def _legs(walk: MarkerWalk) -> Iterator[tuple[PathSegment | None, PathSegment]]:
+def _segments(walk: MarkerWalk) -> Iterator[tuple[PathSegment | None, PathSegment]]:
     """The turn on the spot before each step, if there is one, and the step, with the covariance that the unit states."""
     sd_m = math.hypot(STEP_SD_M, STEP_M * math.radians(ImuModel().noise_deg))
     before = walk.start_heading_rad
@@ -173,7 +173,7 @@ def _walk(site: SimulatedSite, seed: int) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers)
 
 
-def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[Seen]) -> Row:
+def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[Output]) -> Row:
     errors = [
         math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
     ]

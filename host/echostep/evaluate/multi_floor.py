@@ -3,7 +3,7 @@
 In: seeds, and westport-house where it is at hand. Out: rows `storeys/...`. Everything is simulated but the plan. The whole tracker runs, from the
 bytes of the simulated board and MTx.
 
-The true floor is the one nearest to the wearer, of those where the lift stops while he rides it; within half a metre of the middle between two floors
+The true floor is the one nearest to the wearer, of those where the lift stops during a ride; within half a metre of the middle between two floors
 both are right (`floor_right`); `strict_right` gives nothing away.
 """
 
@@ -46,7 +46,7 @@ COLUMNS = {
 
 @dataclass(frozen=True, slots=True)
 class BuildingScene:
-    """`foot`: an MTx is worn; `known`: the start's floor is told."""
+    """`foot`: an MTx is worn; `known`: the floor of the start is given."""
 
     foot: bool = True
     known: bool = True

@@ -1,4 +1,4 @@
-"""A whole simulated run: somebody walks through a building, wearing a board and an MTx.
+"""A simulated run: a walk through a building with a board and an MTx.
 
 In: a plan, waypoints, a seed, a board. Out: the chunks of both ports in order of arrival, and the truth. Owns the board.
 """

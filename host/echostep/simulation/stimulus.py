@@ -1,4 +1,4 @@
-"""What the board's sensors feel, as rows of one millisecond (host/DESIGN.md, the bench).
+"""Inputs of the simulated board's sensors, as rows of one millisecond (host/DESIGN.md, the bench).
 
 In: a walk, the levels of a building, a seeded generator. Out: rows for a board. Owns the sensors.
 """
@@ -36,7 +36,9 @@ class BoardSensors:
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
         magnetism: MagneticField | None = None, air_pa: Floats | None = None,
     ) -> None:  # fmt: skip
-        """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone. He hears the level nearest to him.
+        """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone.
+
+        Echoes come from the walls of the nearest level.
 
         `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), in the place of its heights.
         """

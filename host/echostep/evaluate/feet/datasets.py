@@ -55,7 +55,7 @@ def read_recordings(folder: Path) -> tuple[list[FootRecording], list[str]]:
         for path in paths:
             try:
                 found += read(path)
-            except Exception as error:  # the file is somebody else's, and a reader fails in as many ways as a format
+            except Exception as error:  # foreign files: a reader may raise any exception
                 skipped.append(f"{group}: {path} skipped, cannot read it: {error or type(error).__name__}")
     return found, skipped
 

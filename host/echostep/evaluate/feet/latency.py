@@ -1,4 +1,4 @@
-"""How soon the foot tells a step, and what it costs live: sample by sample, as they come from a sensor.
+"""Latency of the step events and processor time of the foot filter, fed sample by sample.
 
 In: a recording. Out: seconds of data from the begin of a stance to the step that it ends, and the share of one core at 200 Hz. Owns nothing.
 """

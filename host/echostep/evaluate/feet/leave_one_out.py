@@ -1,4 +1,4 @@
-"""What the foot would reach on a set of recordings, had its constants been chosen on the other sets only.
+"""Leave-one-out check: errors on each set of recordings with constants chosen on the other sets only.
 
 In: recordings. Out: for each set with a close truth the choice and the rows of its recordings under that choice. Owns nothing. Every combination
 of the constants' halves and doubles is tried; the best has the least mean error of the sets, each error taken relative to that of the default.
@@ -36,8 +36,8 @@ def leave_one_out(recordings: list[FootRecording], track_of: TrackOf) -> dict[st
     return {group: candidates[_best(scores, default, without=group)] for group in groups}
 
 
-def said(noise: Noise) -> str:
-    """The constants of a choice in words."""
+def describe(noise: Noise) -> str:
+    """Names and values of the constants."""
     return ", ".join(f"{name} {getattr(noise, name):g}" for name in CONSTANTS)
 
 

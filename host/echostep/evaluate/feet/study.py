@@ -12,7 +12,7 @@ from statistics import median
 from echostep.errors import EchostepError
 from echostep.evaluate.feet.datasets import FootRecording, read_recordings
 from echostep.evaluate.feet.latency import LIVE, pace_rows
-from echostep.evaluate.feet.leave_one_out import add_left_out, leave_one_out, said
+from echostep.evaluate.feet.leave_one_out import add_left_out, describe, leave_one_out
 from echostep.evaluate.feet.metrics import Figure, way
 from echostep.evaluate.feet.pictures import draw_tracks
 from echostep.evaluate.report import Row, Table, console
@@ -53,7 +53,7 @@ def _rows_of_all(recordings: list[FootRecording], tracks: list[Track], *, left_o
         choices = leave_one_out(recordings, track_of)
         add_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
         for group, noise in choices.items():
-            console.print(f"{group} left out, the others choose: {said(noise)}")
+            console.print(f"{group} left out, the others choose: {describe(noise)}")
     return rows + pace_rows(recordings)
 
 
@@ -72,7 +72,7 @@ def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> li
 
 
 def recordings_in(folder: Path) -> list[FootRecording]:
-    """The recordings of the folder; what is skipped is said."""
+    """The recordings of the folder; prints what is skipped."""
     if not folder.is_dir():
         raise EchostepError(f"{folder}: no such folder: say with --data where the recordings are")
     recordings, skipped = read_recordings(folder)

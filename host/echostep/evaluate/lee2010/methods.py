@@ -1,4 +1,4 @@
-"""The methods that the study of [Lee 2010] compares: theirs, ours by dead reckoning, ours on the plan, and their floors by pressure.
+"""The methods that the study compares: that of [Lee 2010], the default by dead reckoning and on the plan; floors by pressure [Lee 2010].
 
 In: `Measured`, the start. Out: `MethodTrack`s, floors. Owns nothing.
 """
@@ -38,7 +38,7 @@ KNOWN_S = 2.0  # of standing on the floor where the walk begins: its pressure is
 
 @dataclass(frozen=True, slots=True)
 class MethodTrack:
-    """A method's track (n, 3) t_s, x, y from the true start on, and how far it says that he walked."""
+    """A method's track (n, 3) t_s, x, y from the true start on, and the distance walked that it reports."""
 
     track: Floats
     distance_m: float
@@ -55,7 +55,7 @@ def by_lee(measured: Measured, start: tuple[float, float, float]) -> MethodTrack
 
 
 def by_default(measured: Measured, start: tuple[float, float, float]) -> MethodTrack:
-    """Ours."""
+    """The default method: strides and fused heading by dead reckoning."""
     rows = track_default(measured.samples, StrideSettings(measured.segments), start[2]).rows[::20]
     return MethodTrack(np.column_stack([rows[:, 0], rows[:, 4] + start[0], rows[:, 5] + start[1]]), float(rows[-1, 1]))
 
@@ -70,7 +70,7 @@ def scale_of(segments: LegLengths, seed: int) -> float:
 def with_plan(
     plan: Plan, chunks: Sequence[Chunk], measured: Measured, start: tuple[float, float, float], seed: int
 ) -> MethodTrack:
-    """Ours on the plan: the tracker with the board's bytes alone, legs and pings and no foot."""
+    """The default method on the plan: the tracker on the board's bytes, with legs and pings, without foot."""
     scale = scale_of(measured.segments, seed)
     wearer = WearerSettings(measured.segments.thigh_m, measured.segments.shank_m, scale)
     tracker = Tracker(plan, Pose(*start), Settings(wearer=wearer), seed)

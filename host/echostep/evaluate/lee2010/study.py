@@ -1,4 +1,5 @@
-"""The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track; theirs and ours.
+"""The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track;
+the method of the paper and the default one.
 
 In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8.
 Owns the routes.

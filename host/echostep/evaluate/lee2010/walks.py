@@ -34,12 +34,12 @@ BLOCK_MS = 1000
 HALF_WIDE_M = 1.0  # of the corridor
 START_NS = 1_000_000_000
 NO_PINGS = m.Sensors.THIGH | m.Sensors.CALF | m.Sensors.BELT | m.Sensors.COMPASS | m.Sensors.PRESSURE
-TAPE_SD_M = 0.01  # of a thigh or a shank that somebody measures
+TAPE_SD_M = 0.01  # of a thigh or a shank measured by tape
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What the host has: the gyros' and the compass's `samples`, `pressure` (n, 2) t_s and Pa, the wearer's `segments` as measured."""
+    """Host's data of a walk: `samples` of gyros and compass, `pressure` (n, 2) t_s and Pa, lengths of the leg `segments` as measured."""
 
     samples: LegSamples
     pressure: Floats

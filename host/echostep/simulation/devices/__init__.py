@@ -1,4 +1,4 @@
-"""What simulated devices make of the world: counts, frames, serial bytes with their delays.
+"""Simulated devices: counts, frames, serial bytes with their delays.
 
 In: physical quantities. Out: bytes with times. Owns each device's state.
 """

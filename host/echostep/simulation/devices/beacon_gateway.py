@@ -80,12 +80,12 @@ def gateway_chunks(world: BeaconWorld, t_s: Floats, xy_m: Floats, arrival_ns: In
     sequence = 0
     for now in np.arange(float(t_s[0]), float(t_s[-1]), PERIOD_S).tolist():
         x, y = float(np.interp(now, t_s, xy_m[:, 0])), float(np.interp(now, t_s, xy_m[:, 1]))
-        said = b""
+        message_bytes = b""
         for k, range_m, bearing in heard_at(world, x, y, rng):
-            said += encode(message(k + 1, range_m, bearing, now), sequence)
+            message_bytes += encode(message(k + 1, range_m, bearing, now), sequence)
             sequence += 1
-        if said:
-            yield Chunk(GATEWAY, int(np.interp(now + LATENCY_S, t_s, arrival_ns)), said)
+        if message_bytes:
+            yield Chunk(GATEWAY, int(np.interp(now + LATENCY_S, t_s, arrival_ns)), message_bytes)
 
 
 def with_beacons(scenario: Scenario, plan: Plan, seed: int) -> Iterator[Chunk]:

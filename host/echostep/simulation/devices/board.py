@@ -112,7 +112,7 @@ class PythonBoard:
         return [identity, self._configuration._replace(ticks=_ticks(us))]
 
     def _reports(self, rows: NDArray[Any]) -> list[tuple[int, m.Message]]:
-        """Who it is at the start; once a second, and how it is."""
+        """Identification at the start; identification and state once a second."""
         found: list[tuple[int, m.Message]] = []
         for ms in range(self._ms, self._ms + len(rows)):
             if ms == 0:

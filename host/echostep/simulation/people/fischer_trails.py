@@ -1,7 +1,7 @@
 """The trails of [Fischer 2008, section 3.2] as walks past machines.
 
 In: a seed. Out: a walk and what an MTx on the foot measures. Owns the trails' geometry.
-The paper gives lengths and kinds, not plans: lengths are as printed, shapes as described, all the rest is ours. Everyone keeps to the right, so
+The paper gives lengths and kinds, not plans: lengths are as printed, shapes as described, the rest is chosen here. Everyone keeps to the right, so
 that a machine behind the wall is nearer on one way than on the other; the field falls off with the cube of the distance. That is our reading
 of "strong interference on the forward path but not on the return path", which puzzled the authors.
 """

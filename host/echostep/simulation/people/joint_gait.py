@@ -1,4 +1,4 @@
-"""People who walk by the joints' own curves: what the hips do follows from feet that roll on the floor and do not slip.
+"""Simulated gait from joint angle curves: the motion of the hips follows from feet that roll on the floor without slip.
 
 In: a gait (slow, natural, fast), a person drawn from a seed, how long. Out: `SimulatedGait`: rates of thigh and shank, and where the hips are. Owns
 the curves.
@@ -32,7 +32,7 @@ START = 0.55  # of the stride's time, from standing to the whole movement: the f
 
 @dataclass(frozen=True, slots=True)
 class WalkingPace:
-    """How one walks: `hip` and `load` scale the hip's excursion and the knee's flexion under load, `swing` that in the swing, `stride_s`."""
+    """Pace of walking: `hip` and `load` scale the hip's excursion and the knee's flexion under load, `swing` that in the swing, `stride_s`."""
 
     hip: float
     load: float
@@ -49,7 +49,7 @@ SLOW, NATURAL, FAST = (
 
 @dataclass(frozen=True, slots=True)
 class JointGaitPerson:
-    """One person: the leg, the foot (`ankle_m` high, `heel_m` behind and `ball_m` ahead of the ankle), and how the curves are this person's own."""
+    """One person: the leg, the foot (`ankle_m` high, `heel_m` behind and `ball_m` ahead of the ankle), and the factors of the joint curves."""
 
     leg: LegDimensions
     ankle_m: float
@@ -92,9 +92,9 @@ def draw_person(rng: np.random.Generator) -> JointGaitPerson:
 def simulate_gait(
     person: JointGaitPerson, manner: WalkingPace, walk_s: float, rng: np.random.Generator, stand_s: float = 1.5
 ) -> SimulatedGait:
-    """Stand, walk for so long or up to half a stride longer, stand: which leg goes first is drawn, too.
+    """Stand, walk for `walk_s` or up to half a stride longer, stand; the first leg is drawn at random.
 
-    He begins with a foot that leaves the floor and ends with one that comes down beside the other [Jian 1993].
+    The walk begins with a foot that leaves the floor and ends with one that lands beside the other [Jian 1993].
     """
     t = np.arange(0.0, walk_s + 2.0 * stand_s + LONGEST_STEP_S, 1.0 / RATE_HZ)
     stride_s = manner.stride_s * person.pace

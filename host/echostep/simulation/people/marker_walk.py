@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Bools, Floats, Ints
 from echostep.board.messages import Schedule
 from echostep.simulation.devices.srf02 import FIRST_US, HALF_US, JITTER_US, LAST_US
@@ -98,13 +99,13 @@ def walk_markers(
     acoustics: Acoustics = SRF02,
     offset_s: float = HALF_US[Schedule.CONCURRENT] * 1e-6,
 ) -> MarkerWalk:
-    """Walk over markers (n + 1, 2) between the walls that are there (m, 4); `passers`: share of the pings that meet somebody first;
+    """Walk over markers (n + 1, 2) between the walls that are there (m, 4); `passers`: share of the pings that a passer-by answers first;
     `offset_s`: from the left ranger's ping to the right one's.
     """
     ways, imu, rangers, people = (np.random.default_rng([seed, k]) for k in range(4))
     trunk = markers + CARELESS_M * ways.standard_normal(markers.shape)
     course = np.arctan2(*np.diff(markers, axis=0).T[::-1])
-    turn = np.abs(_wrapped(np.diff(course, prepend=course[:1])))
+    turn = np.abs(wrap(np.diff(course, prepend=course[:1])))
     dwell = np.append(turn / TURN_RAD_S, 0.0)
     t_s = np.concatenate([[0.0], np.cumsum(STEP_S + dwell[1:]) - dwell[1:]])
     leaves_s = t_s + dwell
@@ -129,7 +130,7 @@ def _heading_error(course: Floats, turn: Floats, model: ImuModel, rng: np.random
 
 
 class _Body:
-    """Where the trunk is and looks to at any time."""
+    """Position and heading of the trunk at any time."""
 
     def __init__(self, t_s: Floats, leaves_s: Floats, trunk: Floats, course: Floats, phase: float) -> None:
         self.end_s = float(t_s[-1])
@@ -175,7 +176,7 @@ def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.r
 
 
 def _pass(pings: Pings, share: float, rng: np.random.Generator) -> Pings:
-    """Somebody comes by on one side for about a second, now and again, nearer than what is heard otherwise."""
+    """A passer-by on one side for about a second, at random times, nearer than the echo without the passer-by."""
     range_m = pings.range_m.copy()
     for side in (0, 1):
         t_s = 0.0
@@ -186,7 +187,3 @@ def _pass(pings: Pings, share: float, rng: np.random.Generator) -> Pings:
             range_m[there] = np.where(np.isnan(range_m[there]), 2.0, range_m[there]) * rng.uniform(0.3, 0.9)
             t_s = until_s
     return replace(pings, range_m=np.maximum(range_m, SRF02.minimum_m))
-
-
-def _wrapped(angle: Floats) -> Floats:
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi

@@ -1,7 +1,7 @@
 """Waypoints along a way through a building, stairs and lifts included.
 
 In: a plan and places, one after the other. Out: waypoints for `walker`. Owns nothing. The ways between are the shortest that a person can walk.
-On stairs he goes by two flights and a landing a storey, along the longer side of their outline; in a lift he rides in its middle.
+Stairs are walked as two flights and a landing a storey, along the longer side of their outline; a lift is ridden in its middle.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.simulation.people.walker import Waypoint
 
 TURN_M = 0.9  # room to turn at the ends of a flight
-SHORTEST_M = 0.05  # nobody walks less
+SHORTEST_M = 0.05  # a waypoint nearer to the one before it is left out
 
 
 def tour(plan: Plan, places: Sequence[RoutePlace]) -> list[Waypoint]:
@@ -64,7 +64,7 @@ def _between(plan: Plan, connector: Connector, level: int, to: int, entered_m: F
 
 
 def _flights(outline_m: Floats, entered_m: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ends of the middle line of a stairwell, the nearer to where he comes in first, and how far its flights are beside it."""
+    """Ends of the middle line of a stairwell, the end nearer to the entry first, and how far its flights are beside it."""
     box = np.array(Polygon(outline_m).minimum_rotated_rectangle.exterior.coords)[:4]
     one, other = box[1] - box[0], box[3] - box[0]
     along, across = (one, other) if np.hypot(*one) >= np.hypot(*other) else (other, one)

@@ -1,7 +1,7 @@
-"""A person's day in one dimension: corridors, stairs with landings, lifts with doors.
+"""A simulated day in one dimension: corridors, stairs with landings, lifts with doors.
 
-In: the building's storeys, which ways he takes, a seeded generator. Out: times, true heights, gait, and where he is. Owns the speeds of stairs
-and lifts: 0.2 to 0.35 m/s upward of a stair's vertical [Fruin 1971], lifts of 1 to 2 m/s with 0.8 to 1.2 m/s2.
+In: the building's storeys, stairs, lift or both, a seeded generator. Out: times, true heights, gait, when in a stairwell or lift shaft. Owns the
+speeds of stairs and lifts: 0.2 to 0.35 m/s upward of a stair's vertical [Fruin 1971], lifts of 1 to 2 m/s with 0.8 to 1.2 m/s2.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A person who walks: trunk, right foot, thigh and calf, a thousand times a second.
+"""A simulated walk: trunk, right foot, thigh and calf at 1 kHz.
 
 In: waypoints on the plan, a seeded generator. Out: `Walk`: arrays at 1 kHz, map frame. Owns nothing.
-The person walks rounded corners, and stops for a pause or a sharp turn, where he turns on the spot. Between waypoints of different height he climbs
+The person walks rounded corners, and stops for a pause or a sharp turn, with a turn on the spot. Between waypoints of different height follow
 stairs, with shorter strides; above one another they are a lift's. The right foot's path is built from smooth pieces (`footpath`), so that integrating
 what its sensors would feel gives the path back.
 """
@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
 from echostep.simulation.people.attitude import rotations
 from echostep.simulation.people.foot_path import FootPath, Strides, foot_path
@@ -25,7 +26,7 @@ Waypoint = (  # x, y, how long to pause there (s), height (m; 0 when not given)
 
 RATE_HZ = 1000
 SPACING_M = 0.01
-SHARP_RAD = math.radians(100.0)  # nobody walks such a corner in a curve
+SHARP_RAD = math.radians(100.0)  # sharper corners are turned on the spot; by reason
 TURN_STRIDE_RAD = math.radians(75.0)  # per stride when turning on the spot
 SMOOTH_MS = 301
 STEEP = 0.1  # rise over run; less is a ramp, walked as the flat
@@ -34,7 +35,7 @@ LIFT_M_S, LIFT_M_S2 = 1.0, 0.8  # a passenger lift's speed and its change [ISO 8
 DOORS_S = 3.0  # before and after a ride
 CLIMBING_M_S = 0.08  # faster than on any ramp
 STEADY, LOADED = 0.85, 0.1  # effort, phase: when the hip is so low that the knee is all but straight
-LEG_SMOOTH_MS = 41  # soft parts round off what a sensor on them feels
+LEG_SMOOTH_MS = 41  # soft tissue low-pass filters the motion of a sensor on it
 ANKLE = np.array([-0.06, 0.0, 0.0])  # from the sensor on the instep, foot frame (m)
 
 
@@ -98,7 +99,7 @@ def round_corners(points: Floats, radius_m: float) -> Floats:
 
 
 def _legs(waypoints: Sequence[Waypoint]) -> list[tuple[Floats, float, float]]:
-    """Pieces (n, 3) of the way that are walked without a stop, the pause after each, and the height after the lift that he takes there."""
+    """Pieces (n, 3) of the way that are walked without a stop, the pause after each, and the height after the lift ride that follows."""
     points = [np.array([w[0], w[1], w[3] if len(w) == 4 else 0.0]) for w in waypoints]
     legs, begin = [], 0
     for k in range(1, len(points)):
@@ -166,7 +167,7 @@ class _Schedule:
         self._heading.append(np.interp(progress, middle, course))
 
     def stand(self, pause_s: float) -> None:
-        """Stay."""
+        """Add a pause."""
         if pause_s > 0.0:
             self._t.append(self._t[-1] + pause_s)
             self._moves.append(False)
@@ -186,7 +187,7 @@ class _Schedule:
         self.stand(DOORS_S)
 
     def played(self) -> Walk:
-        """The walk that was planned."""
+        """Trunk, foot, leg and belt of the whole schedule at 1 kHz."""
         trunk, heading = np.vstack(self._trunk), _smooth(np.concatenate(self._heading))
         height = np.concatenate(self._height)
         t = np.arange(len(heading)) / RATE_HZ
@@ -229,7 +230,7 @@ class _Schedule:
             self._hold(self._t[-1], at[:2], np.array([course]), float(at[2]))
             return
         start = float(self._heading[-1][-1])
-        turn = (course - start + math.pi) % (2.0 * math.pi) - math.pi
+        turn = wrap(course - start)
         count = math.ceil(abs(turn) / TURN_STRIDE_RAD - 0.1)
         if count == 0:
             return
@@ -267,7 +268,7 @@ class _Schedule:
         self._height.append(np.full(n, height_m))
 
     def _landings(self, trunk: Floats, heading: Floats, height: Floats) -> Strides:
-        """Where the foot stands at each time; who stands does not lift it."""
+        """Where the foot stands at each time; while standing it stays where it landed."""
         t = np.array(self._t)
         at = np.minimum((t * RATE_HZ).astype(int), len(heading) - 1)
         landed = np.maximum.accumulate(np.where(np.concatenate([[True], self._moves]), np.arange(len(t)), 0))

@@ -1,4 +1,4 @@
-"""What a simulated walker's sensors meet: echoes, air, magnetic field, buildings.
+"""The simulated world: echoes, air pressure, magnetic field, buildings.
 
 In: positions and attitudes. Out: times of flight, pressures, fields. Owns nothing.
 """

@@ -30,7 +30,7 @@ class Acoustics(NamedTuple):
     frame_radius_m: float = 0.01  # a wall's end echoes like a rod of this radius: the rounded profile of a door frame
     bounce_db: float = -1.5  # each reflection after the first
     body_db: float = -8.0  # passing by the wearer
-    body_m: float = 0.2  # half his width
+    body_m: float = 0.2  # half the width of the trunk
     threshold_db: float = -28.6  # a wall on the axis is heard half of the time at 6 m [SRF02 technical specification]
     threshold_sd_db: float = 1.5  # of the comparison, from ping to ping
     minimum_m: float = 0.15  # the transducer still rings [SRF02 technical specification]

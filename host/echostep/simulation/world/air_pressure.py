@@ -1,6 +1,6 @@
 """The air of a building: what a barometer is carried through.
 
-In: times, the wearer's true heights, whether he is in a stairwell or lift shaft, a seeded generator. Out: true pressures and the temperature that a
+In: times, true heights of the wearer, when in a stairwell or lift shaft, a seeded generator. Out: true pressures and the temperature that a
 worn device reads. Owns the constants of the air. Nothing here knows how anybody estimates heights from it.
 
 The column of air is hydrostatic at the building's own temperature [ISO 2533 with another temperature]. On top of it: weather (a trend and a random

@@ -20,8 +20,10 @@ from echostep.plan.polyline import along, way_m
 LEGS = (4, 7)  # straight parts of a trail
 LEG_M = (12.0, 25.0)
 TURNS_RAD = (math.radians(30.0), math.radians(110.0))
-ASIDE_M = 0.3  # beacons lie so far beside the way, standard deviation
-CLEARANCE_M = 8.0  # a trail keeps so far from its own earlier parts: on open ground nobody crosses his way without need
+ASIDE_M = 0.3  # distance of the beacons from the path, standard deviation per axis
+CLEARANCE_M = (
+    8.0  # distance of a trail from its own earlier parts; by reason: on open ground a path does not cross itself
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,9 +128,9 @@ def _sources(settings: GroundSettings, trail: Floats, rng: np.random.Generator) 
 
 @kernel
 def disturb(sources: Floats, inside: Bools, x: float, y: float, heading: float) -> float:
-    """What the sources add to the measured heading when somebody comes to (x, y) [Fischer 2008, 4.1.2].
+    """What the sources add to the measured heading when the wearer comes to (x, y) [Fischer 2008, 4.1.2].
 
-    Coming nearer than a source's radius turns the heading by its amplitude, once; the sign is the side on which he passes it. What was added stays:
+    Coming nearer than a source's radius turns the heading by its amplitude, once; the sign is the side on which it is passed. What was added stays:
     the sensor's own filter remembers the fields behind it. `inside` (s,) is kept up to date.
     """
     added = 0.0

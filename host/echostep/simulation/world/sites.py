@@ -24,7 +24,7 @@ CORRIDOR = (-1.5, 11.5, 2.0)  # from x, to x, width
 
 @dataclass(frozen=True, slots=True)
 class SimulatedSite:
-    """Walls (n, 4) on the plan, walls that are built, and a route (n, 2). `passers`: share of pings that meet somebody first."""
+    """Walls (n, 4) on the plan, walls that are built, and a route (n, 2). `passers`: share of pings that a passer-by answers first."""
 
     name: str
     plan: Floats
@@ -49,7 +49,7 @@ def furnished(seed: int) -> SimulatedSite:
 def with_doors(seed: int) -> SimulatedSite:
     """The paper's site with doors and with rooms across the corridor; what is open and closed has nothing to do with the plan.
 
-    He walks through three of the six doors, so these are open, their leaves swung into the rooms; each of the others is open or not, as a coin falls.
+    The route leads through three of the six doors, so these are open, their leaves swung into the rooms; each of the others is open at random.
     On the plan a door is a gap: half of the others differ from it, on average, and so do all leaves.
     """
     rng = np.random.default_rng([seed, 12])
