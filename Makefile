@@ -70,7 +70,7 @@ bench: $(VENV)/peers ## speed of the host as ratios against others, in the same 
 
 page-speed: $(READY) ## latency and frame rate of the live page in Chromium
 	@tools/apt.sh chromium || echo "Chromium is not installed."
-	$(BIN)/python tools/page_speed.py
+	$(BIN)/python -m pytest -q -s -m speed tests/page/test_page_speed.py
 
 $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
@@ -99,4 +99,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup  firmware twin demo real test check size measure bench page-speed wheel kill docs flash clean
+.PHONY: help setup firmware twin demo real test check size measure bench page-speed wheel kill docs flash clean

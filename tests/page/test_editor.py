@@ -23,7 +23,6 @@ from echostep.plan.writer import plan_json, save_plan
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PICTURE = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="300">'
     '<rect x="50" y="50" width="300" height="200" fill="none" stroke="#888" stroke-width="8"/></svg>'
@@ -149,17 +148,6 @@ def test_pictures_and_plans_that_are_none(tmp_path: Path) -> None:
         EditServer(tmp_path / "text.json", None, 0)
     with pytest.raises(EchostepError, match="there is no folder"):
         EditServer(tmp_path / "no/new.json", None, 0)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: nothing is drawn")
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine: nothing is drawn")
-    with playwright.sync_playwright() as running:
-        chromium = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture

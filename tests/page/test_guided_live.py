@@ -30,7 +30,7 @@ from echostep.commands.beacon_player import simulate_gateway
 from echostep.plan.model import load_plan
 from echostep.simulation.devices.board import PythonBoard, Sent
 from echostep.simulation.scenario import Scenario
-from page.test_page import header
+from page.frames import header
 from players import pseudo_terminal
 
 SEED = 3

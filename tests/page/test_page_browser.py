@@ -1,215 +1,25 @@
-"""The page in Chromium: what one sees, how soon, how often, and for whom.
-
-With ECHOSTEP_PICTURES=1 the pictures of the README are made anew.
-"""
+"""The page in Chromium: what is drawn, on a desk and on a phone, by touch and by keys."""
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import threading
-import time
-from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from board_runs import ROOT
-from echostep.foot.steps import Step
 from echostep.guidance.cues import Cue, CueKind
-from echostep.guidance.guided_run import GuidedRun
 from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
-from echostep.page.elements.scene import ParticleSample
 from echostep.page.live import LivePage
 from echostep.page.mailbox import Mailbox
-from echostep.page.server import Address, PageServer
-from echostep.path import PathSegment
-from echostep.plan.model import Pose, load_plan
+from echostep.page.server import PageServer
 from echostep.plan.routing import RoutePlace
-from echostep.ports.chunks import Chunk, portion_of
-from echostep.simulation.devices.beacon_gateway import with_beacons
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.scenario import START_NS, demo_scenario
+from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
-from page.test_page import scene
-
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pages are not looked at")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: pages are not looked at")
-
-PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
-PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
-LOCAL = Address(port=0)
-PHONE = {"viewport": {"width": 360, "height": 640}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
-DESK = {"viewport": {"width": 1100, "height": 640}}
-LOOKS: dict[str, dict[str, Any]] = {
-    "bright": {**PHONE, "color_scheme": "light"},
-    "dark": {**DESK, "color_scheme": "dark"},
-    "contrast": {**PHONE, "contrast": "more"},
-}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as running:
-        chromium = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
-
-
-@cache
-def demo_walk(*, beacons: bool) -> tuple[Pose, list[Chunk]]:
-    """Where the demo's walk begins, and its chunks."""
-    scenario = demo_scenario(PLAN, 1, PythonBoard(seed=1))
-    return scenario.start, list(with_beacons(scenario, PLAN, 1) if beacons else scenario.chunks())
-
-
-class Walk:
-    """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it; `guide`: with beacons, to a place."""
-
-    def __init__(self, begin_s: float, pace: float, guide: RoutePlace | None = None) -> None:
-        start, self._chunks = demo_walk(beacons=guide is not None)
-        self._first_ns = self._chunks[0].t_arrival_ns
-        self._tracker = Tracker(PLAN, start, seed=1)
-        self._pace = pace
-        self._stop = threading.Event()
-        guided = GuidedRun(self._tracker, guide) if guide else None
-        self.page = LivePage(self._tracker, "A simulated walk", LOCAL, guided)
-        self._begin = sum(chunk.t_arrival_ns - self._first_ns < begin_s * 1e9 for chunk in self._chunks)
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self.taken = 0
-        self.told_s: list[float] = []  # for each step, how long after the landing its bytes had come
-        told = self._tracker.front_end.path.add_step
-
-        def step(landed: Step) -> list[PathSegment]:
-            self.told_s.append(self._now_s - landed.t_end_s)
-            return told(landed)
-
-        self._tracker.front_end.path.add_step = step  # type: ignore[assignment, method-assign]
-
-    def __enter__(self) -> Walk:
-        self.page.__enter__()
-        for chunk in self._chunks[: self._begin]:
-            self._take(chunk)
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
-        self.page.__exit__(None, None, None)
-
-    def _run(self) -> None:
-        began, first_ns = time.monotonic(), self._chunks[self._begin].t_arrival_ns
-        for chunk in self._chunks[self._begin :]:
-            ahead_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / self._pace - (time.monotonic() - began)
-            if self._stop.wait(max(ahead_s, 0.0)):
-                return
-            for said in self.page.pop_check_ins():
-                self.taken += 1
-                self._take(Chunk("person", chunk.t_arrival_ns, said))
-            self._take(chunk)
-
-    def _take(self, chunk: Chunk) -> None:
-        self._now_s = (chunk.t_arrival_ns - START_NS) * 1e-9
-        portion = portion_of([chunk])
-        self.page.note_arrival()
-        self._tracker.take(portion)
-        self.page.publish(portion)
-
-
-def looking(browser: Any, url: str, look: str) -> Any:
-    page = browser.new_context(**LOOKS[look]).new_page()
-    page.wrong = []
-    page.on("pageerror", lambda error: page.wrong.append(str(error)))
-    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
-    page.goto(url)
-    wait_for(page, "echostep.scene.frame && echostep.scene.frame.told")
-    return page
-
-
-def until(holds: Callable[[], bool], timeout_s: float = 60.0) -> bool:
-    deadline = time.monotonic() + timeout_s
-    while not holds():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
-
-
-def skip_when_busy(reached: bool, measured: str) -> None:
-    """What was missed while others had the processors says nothing about the page."""
-    load, cores = os.getloadavg()[0], os.cpu_count() or 1
-    if not reached and load > 0.5 * cores:
-        pytest.skip(f"the machine is too busy to measure (load {load:.0f} on {cores} cores): {measured}")
-
-
-def wait_for(page: Any, holds: str) -> None:
-    """Until an expression holds (the page's own policy forbids Playwright's waiting)."""
-    assert until(lambda: bool(page.evaluate(holds))), holds
-
-
-def picture(page: Any, name: str, tmp_path: Path) -> None:
-    page.screenshot(path=(PICTURES or tmp_path) / f"page-{name}.png")
-
-
-def test_from_a_step_to_the_pixel_in_a_tenth_of_a_second(browser: Any) -> None:
-    """The foot lands; its bytes come; the page draws where that leads: in data time, then by the clock."""
-    with Walk(20.0, 3.0) as walk:
-        page = looking(browser, walk.page.url, "dark")
-        best_s = np.inf
-        for _ in range(5):  # the machine does other things too
-            for session in walk.page.server.sessions:
-                session.latency_s.clear()
-            time.sleep(4.0)
-            (drawn_s,) = [np.array(session.latency_s) for session in walk.page.server.sessions]
-            told_s = np.array(walk.told_s)
-            assert len(drawn_s) > 8
-            assert len(told_s) > 15
-            total_s = np.percentile(told_s, 95) + np.percentile(drawn_s, 95)
-            print(
-                f"95 %: told {1e3 * np.percentile(told_s, 95):.0f} ms after landing, "
-                f"drawn {1e3 * np.percentile(drawn_s, 95):.0f} ms later"
-            )
-            best_s = min(best_s, total_s)
-            if best_s <= 0.1:
-                break
-        assert not page.wrong
-        page.context.close()
-    skip_when_busy(best_s <= 0.1, f"{1e3 * best_s:.0f} ms")
-    assert best_s <= 0.1
-
-
-def test_thirty_frames_a_second_with_ten_thousand_particles(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
-        mailbox.publish(scene())
-        page = looking(browser, server.url, "dark")
-        rates_hz = [frame_rate(page, mailbox) for _ in range(5)]
-        assert page.evaluate("echostep.scene.cloud.count") == 10_000
-        page.context.close()
-    print("with 10,000 particles, frames/s:", ", ".join(f"{rate_hz:.1f}" for rate_hz in rates_hz))
-    skip_when_busy(max(rates_hz) > 28.5, f"{max(rates_hz):.1f} frames/s")
-    assert max(rates_hz) > 28.5  # the machine does other things too
-
-
-def frame_rate(page: Any, mailbox: Mailbox, span_s: float = 2.0) -> float:
-    """Frames that a page draws in a second while the mailbox has a new cloud sixty times a second."""
-    rng = np.random.default_rng(0)
-    began, frames, k = time.monotonic(), page.evaluate("echostep.frames"), 0
-    while (now := time.monotonic()) - began < span_s:
-        x, y = (rng.normal(v, 1.0, 10_000).astype(np.float32) for v in (12.0, 7.0))
-        crowd = ParticleSample(x, y, rng.integers(0, 256, 10_000).astype(np.uint8), np.zeros(10_000, np.uint8))
-        mailbox.publish(replace(scene(now), particles=crowd))
-        k += 1
-        time.sleep(max(began + k / 60.0 - time.monotonic(), 0.0))
-    drawn = page.evaluate("echostep.frames") - frames
-    return float(drawn / (time.monotonic() - began))
+from page.browser import LOCAL, LOOKS, PLAN, Walk, demo_walk, looking, picture, until, wait_for
+from page.frames import scene
 
 
 @pytest.mark.parametrize("look", LOOKS)

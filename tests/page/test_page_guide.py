@@ -27,7 +27,7 @@ from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
-from page.test_page import LOCAL, PLAN, next_frame, opened, opened_url, scene, served
+from page.frames import LOCAL, PLAN, next_frame, opened, opened_url, scene, served
 
 SEED = 5
 TO = RoutePlace(9.5, 10.8)

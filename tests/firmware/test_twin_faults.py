@@ -1,0 +1,230 @@
+"""The real firmware in the simulator: sensors and buses that fail."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from board_runs import ROOT, Bench, kinds, needs_twin, pings, quiet_rows
+from echostep.board import messages as m
+
+pytestmark = needs_twin
+
+
+@pytest.mark.parametrize("kind", ["absent", "nack", "mute"])
+def test_a_ranger_that_fails_does_not_stop_the_other(bench: Bench, kind: str) -> None:
+    bench.run(1_000)
+    bench.fault(f"srf_right={kind}")
+    found = bench.run(3_000)
+    assert len(pings(found, m.Ranger.LEFT)) >= 3 * 14
+    assert {p.outcome for p in pings(found, m.Ranger.RIGHT)[2:]} == {m.Outcome.BUS_ERROR}
+    assert bench.status.errors_ranger_right > 0
+    assert bench.status.fault_ranger_right == m.Fault.NO_ANSWER
+    assert not bench.status.healthy & m.Healthy.RANGER_RIGHT
+    bench.fault("srf_right=ok")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.RIGHT)} == {m.Outcome.ECHO}
+    assert bench.status.healthy & m.Healthy.RANGER_RIGHT
+
+
+def test_a_ranger_that_hears_nothing_is_no_failure(bench: Bench) -> None:
+    bench.fault("srf_left=deaf")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.LEFT)} == {m.Outcome.NO_ECHO}
+    assert bench.status.healthy & m.Healthy.RANGER_LEFT
+
+
+def test_clock_stretching_is_borne(bench: Bench) -> None:
+    bench.fault("srf_left=stretch")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(2_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+def test_a_stuck_bus_is_clocked_free(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("sda=stuck")
+    bench.run(1_000)
+    found = bench.run(2_000)
+    assert bench.status.bus_recoveries >= 1
+    assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+def test_a_bus_that_stays_stuck_leaves_the_rest_running(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("sda=stuck_forever")
+    found = bench.run(3_000)
+    assert {p.outcome for p in found[200:] if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
+    assert abs(kinds(found)["Gyros"] - 600) <= 3
+    assert kinds(found)["Pressure"] >= 24
+    assert bench.status.fault_compass == bench.status.fault_ranger_left == m.Fault.BUS_STUCK
+    bench.fault("sda=ok")
+    bench.run(1_000)
+    assert {p.outcome for p in pings(bench.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
+
+
+@pytest.mark.parametrize("name", ["thigh", "calf", "belt"])
+@pytest.mark.parametrize("kind", ["absent", "wrong_channel"])
+def test_a_gyro_that_fails_says_so(bench: Bench, name: str, kind: str) -> None:
+    bench.run(1_000)
+    bench.fault(f"{name}={kind}")
+    bench.run(20)
+    found = [g for g in bench.run(1_500) if isinstance(g, m.Gyros)]
+    assert {getattr(g, name) for g in found} == {-32768}
+    others = {"thigh", "calf", "belt"} - {name}
+    assert all(getattr(g, other) != -32768 for g in found for other in others)
+    assert getattr(bench.status, f"errors_{name}") > 100
+    assert not bench.status.healthy & m.Healthy[name.upper()]
+    cause = m.Fault.NO_ANSWER if kind == "absent" else m.Fault.WRONG_CHANNEL
+    assert getattr(bench.status, f"fault_{name}") == cause
+    assert gyro_health(found_all=bench.messages)[m.Gyro[name.upper()]].temperature == -32768
+
+
+def gyro_health(found_all: list[m.Message]) -> dict[int, m.GyroHealth]:
+    """The newest `gyro_health` of each gyro."""
+    return {x.gyro: x for x in found_all if isinstance(x, m.GyroHealth)}
+
+
+def test_the_gyros_test_themselves_at_the_start(bench: Bench) -> None:
+    first = [g for g in bench.run(1_000) if isinstance(g, m.Gyros)]
+    tested = [g for g in first if g.thigh == g.calf == g.belt == -32768]
+    assert 95 <= len(tested) <= 112  # half a second without rates
+    assert not any(-32768 in g[1:] for g in first[len(tested) :])
+    bench.run(1_000)
+    found = gyro_health(bench.messages)
+    assert {g.self_test for g in found.values()} == {m.SelfTest.PASSED}
+    assert all(g.response_st1 < -121 and g.response_st2 > 121 for g in found.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "outcome"),
+    [
+        ("absent", m.SelfTest.NO_ANSWER),
+        ("wrong_channel", m.SelfTest.NO_ANSWER),
+        ("zeros", m.SelfTest.FAILED),
+        ("stuck", m.SelfTest.FAILED),
+        ("no_self_test", m.SelfTest.FAILED),
+        ("ok", m.SelfTest.PASSED),
+    ],
+)
+def test_a_self_test_on_request_finds_the_gyro_that_fails(bench: Bench, kind: str, outcome: m.SelfTest) -> None:
+    bench.run(1_500)
+    bench.fault(f"calf={kind}")
+    bench.ask(m.CheckGyros())
+    bench.run(2_000)
+    found = gyro_health(bench.messages)
+    assert found[m.Gyro.CALF].self_test == outcome
+    assert found[m.Gyro.THIGH].self_test == found[m.Gyro.BELT].self_test == m.SelfTest.PASSED
+
+
+def test_a_self_test_in_motion_is_not_judged(bench: Bench) -> None:
+    bench.run(1_000)
+    rows = quiet_rows(2_000)
+    rows["thigh"] = np.round(300 * np.sin(np.arange(2_000) * 0.006))
+    bench.ask(m.CheckGyros())
+    bench.run(2_000, rows)
+    found = gyro_health(bench.messages)
+    assert found[m.Gyro.THIGH].self_test == m.SelfTest.MOVED
+    assert found[m.Gyro.BELT].self_test == m.SelfTest.PASSED
+
+
+def test_a_reset_in_the_middle_of_a_self_test_is_borne(bench: Bench) -> None:
+    bench.run(300)
+    bench.fault("reset=external")
+    bench.run(2_000)
+    assert {g.self_test for g in gyro_health(bench.messages).values()} == {m.SelfTest.PASSED}
+
+
+def test_a_watchdog_reset_costs_no_self_test(bench: Bench) -> None:
+    bench.run(1_000)
+    bench.fault("reset=watchdog")
+    found = [g for g in bench.run(2_000) if isinstance(g, m.Gyros)]
+    assert not any(-32768 in g[1:] for g in found)
+    assert {g.self_test for g in gyro_health(bench.messages).values()} == {m.SelfTest.NOT_RUN}
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause"),
+    [
+        ("absent", m.Fault.NO_ANSWER),
+        ("zeros", m.Fault.NO_ANSWER),
+        ("drdy_stuck", m.Fault.ALWAYS_READY),
+        ("drdy_low", m.Fault.NEVER_READY),
+    ],
+)
+def test_a_barometer_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -> None:
+    bench.run(1_000)
+    bench.fault(f"scp1000={kind}")
+    bench.run(4_000)
+    found = bench.run(1_000)
+    assert kinds(found)["Pressure"] == 0
+    assert bench.status.errors_pressure > 0
+    assert bench.status.fault_pressure == cause
+    assert not bench.status.healthy & m.Healthy.PRESSURE
+    assert kinds(found)["Ping"] >= 28
+    bench.fault("scp1000=ok")
+    bench.run(4_000)
+    assert kinds(bench.run(1_000))["Pressure"] >= 8
+
+
+@pytest.mark.parametrize(("kind", "cause"), [("no_eeprom", m.Fault.EEPROM), ("no_start", m.Fault.NEVER_STARTED)])
+def test_a_barometer_that_does_not_start_is_not_believed(bench: Bench, kind: str, cause: m.Fault) -> None:
+    bench.fault(f"scp1000={kind}")
+    assert kinds(bench.run(3_000))["Pressure"] == 0
+    assert bench.status.errors_pressure > 0
+    assert bench.status.fault_pressure == cause
+    bench.fault("scp1000=ok")
+    assert kinds(bench.run(3_000))["Pressure"] >= 8
+
+
+def test_the_barometer_has_two_modes(bench: Bench) -> None:
+    rows = quiet_rows(5_000)
+    rows["pressure"] = 405_303
+    bench.run(500)
+    bench.ask(m.Configure(0xFF, 0, 200, 10, m.PressureMode.HIGH_RESOLUTION))
+    bench.run(1_500, rows[:1_500])
+    slow = [p for p in bench.run(5_000, rows) if isinstance(p, m.Pressure)]
+    assert 8 <= len(slow) <= 10  # 1.8 Hz
+    assert {p.pressure for p in slow} == {405_300}  # 17 bits
+    bench.ask(m.Configure(0xFF, 0, 200, 10, m.PressureMode.HIGH_SPEED))
+    bench.run(500, rows[:500])
+    fast = [p for p in bench.run(5_000, rows) if isinstance(p, m.Pressure)]
+    assert 42 <= len(fast) <= 46  # 9 Hz
+    assert {p.pressure for p in fast} == {405_296}  # 15 bits
+    assert bench.status.errors_pressure == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause"),
+    [("absent", m.Fault.NO_ANSWER), ("nack", m.Fault.NO_ANSWER), ("bad_value", m.Fault.BAD_VALUE)],
+)
+def test_a_compass_that_fails_says_so(bench: Bench, kind: str, cause: m.Fault) -> None:
+    bench.run(500)
+    bench.fault(f"compass={kind}")
+    bench.run(200)
+    found = bench.run(2_000)
+    assert not any(isinstance(c, m.Compass) and c.bearing != 65535 for c in found)
+    assert bench.status.errors_compass > 0
+    assert bench.status.fault_compass == cause
+    assert kinds(found)["Ping"] >= 2 * 28
+
+
+def test_a_compass_that_stretches_the_clock_is_borne(bench: Bench) -> None:
+    bench.fault("compass=stretch")
+    bench.run(1_000)
+    assert {c.bearing for c in bench.run(1_000) if isinstance(c, m.Compass)} == {900}
+
+
+def test_every_fault_that_is_documented_exists(bench: Bench) -> None:
+    rows = re.findall(r"^\| (`[a-z_0-9`, ]+`) \| (.*) \|$", (ROOT / "tools/twin/README.md").read_text(), flags=re.M)
+    switches = [
+        f"{name}={value}"
+        for names, values in rows
+        for name in re.findall(r"`(\w+)`", names)
+        for value in re.findall(r"`(\w+)`", values)
+    ]
+    assert len(switches) > 45
+    for switch in switches:
+        bench.fault(switch)
+    bench.run(10)

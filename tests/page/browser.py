@@ -1,0 +1,128 @@
+"""A browser on the live page of the demo's walk, tracked in a thread at any multiple of real time.
+
+With ECHOSTEP_PICTURES=1 the pictures of the manual are made anew.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from board_runs import ROOT
+from echostep.foot.steps import Step
+from echostep.guidance.guided_run import GuidedRun
+from echostep.page.live import LivePage
+from echostep.page.server import Address
+from echostep.path import PathSegment
+from echostep.plan.model import Pose, load_plan
+from echostep.plan.routing import RoutePlace
+from echostep.ports.chunks import Chunk, portion_of
+from echostep.simulation.devices.beacon_gateway import with_beacons
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.scenario import START_NS, demo_scenario
+from echostep.tracker import Tracker
+
+PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
+LOCAL = Address(port=0)
+PHONE = {"viewport": {"width": 360, "height": 640}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
+DESK = {"viewport": {"width": 1100, "height": 640}}
+LOOKS: dict[str, dict[str, Any]] = {
+    "bright": {**PHONE, "color_scheme": "light"},
+    "dark": {**DESK, "color_scheme": "dark"},
+    "contrast": {**PHONE, "contrast": "more"},
+}
+
+
+@cache
+def demo_walk(*, beacons: bool) -> tuple[Pose, list[Chunk]]:
+    """Where the demo's walk begins, and its chunks."""
+    scenario = demo_scenario(PLAN, 1, PythonBoard(seed=1))
+    return scenario.start, list(with_beacons(scenario, PLAN, 1) if beacons else scenario.chunks())
+
+
+class Walk:
+    """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it; `guide`: with beacons, to a place."""
+
+    def __init__(self, begin_s: float, pace: float, guide: RoutePlace | None = None) -> None:
+        start, self._chunks = demo_walk(beacons=guide is not None)
+        self._first_ns = self._chunks[0].t_arrival_ns
+        self._tracker = Tracker(PLAN, start, seed=1)
+        self._pace = pace
+        self._stop = threading.Event()
+        guided = GuidedRun(self._tracker, guide) if guide else None
+        self.page = LivePage(self._tracker, "A simulated walk", LOCAL, guided)
+        self._begin = sum(chunk.t_arrival_ns - self._first_ns < begin_s * 1e9 for chunk in self._chunks)
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self.taken = 0
+        self.told_s: list[float] = []  # for each step, how long after the landing its bytes had come
+        told = self._tracker.front_end.path.add_step
+
+        def step(landed: Step) -> list[PathSegment]:
+            self.told_s.append(self._now_s - landed.t_end_s)
+            return told(landed)
+
+        self._tracker.front_end.path.add_step = step  # type: ignore[assignment, method-assign]
+
+    def __enter__(self) -> Walk:
+        self.page.__enter__()
+        for chunk in self._chunks[: self._begin]:
+            self._take(chunk)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+        self.page.__exit__(None, None, None)
+
+    def _run(self) -> None:
+        began, first_ns = time.monotonic(), self._chunks[self._begin].t_arrival_ns
+        for chunk in self._chunks[self._begin :]:
+            ahead_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / self._pace - (time.monotonic() - began)
+            if self._stop.wait(max(ahead_s, 0.0)):
+                return
+            for said in self.page.pop_check_ins():
+                self.taken += 1
+                self._take(Chunk("person", chunk.t_arrival_ns, said))
+            self._take(chunk)
+
+    def _take(self, chunk: Chunk) -> None:
+        self._now_s = (chunk.t_arrival_ns - START_NS) * 1e-9
+        portion = portion_of([chunk])
+        self.page.note_arrival()
+        self._tracker.take(portion)
+        self.page.publish(portion)
+
+
+def looking(browser: Any, url: str, look: str) -> Any:
+    page = browser.new_context(**LOOKS[look]).new_page()
+    page.wrong = []
+    page.on("pageerror", lambda error: page.wrong.append(str(error)))
+    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
+    page.goto(url)
+    wait_for(page, "echostep.scene.frame && echostep.scene.frame.told")
+    return page
+
+
+def until(holds: Callable[[], bool], timeout_s: float = 60.0) -> bool:
+    deadline = time.monotonic() + timeout_s
+    while not holds():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def wait_for(page: Any, holds: str) -> None:
+    """Until an expression holds (the page's own policy forbids Playwright's waiting)."""
+    assert until(lambda: bool(page.evaluate(holds))), holds
+
+
+def picture(page: Any, name: str, tmp_path: Path) -> None:
+    page.screenshot(path=(PICTURES or tmp_path) / f"page-{name}.png")

@@ -1,0 +1,72 @@
+"""Frames of the page for tests: a scene, a server, a client that reads the socket."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from board_runs import ROOT
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.page.elements.echo_lines import EchoLine
+from echostep.page.elements.scene import PageScene, ParticleSample
+from echostep.page.mailbox import Mailbox
+from echostep.page.server import Address, PageServer
+from echostep.plan.model import load_plan
+
+PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+
+
+LOCAL = Address(port=0)
+
+
+def told(
+    x_m: float = 2.0, y_m: float = 7.5, t_s: float = 1.0, status: TrackStatus = TrackStatus.TRACKING, sd_m: float = 0.1
+) -> Estimate:
+    return Estimate(t_s, x_m, y_m, sd_m**2, 0.0, sd_m**2, 0.0, 0.02, 1, status)
+
+
+def scene(t_s: float = 1.0, trail_count: int = 0, particles: int = 300) -> PageScene:
+    x = np.linspace(1.0, 3.0, particles, dtype=np.float32)
+    cloud = ParticleSample(x, x + 5.0, np.full(particles, 200, np.uint8), np.zeros(particles, np.uint8))
+    return PageScene(
+        time.monotonic_ns(),
+        t_s,
+        told(t_s=t_s),
+        cloud,
+        (EchoLine(t_s, 0, 2.0, 7.5, 1.6, 1.0, None),),
+        None,
+        trail_count,
+        "",
+    )
+
+
+def opened_url(url: str) -> ClientConnection:
+    return connect(f"ws{url[4:]}socket", origin=Origin("/".join(url.split("/")[:3])), max_size=None)
+
+
+def header(received: str | bytes) -> dict[str, Any]:
+    assert isinstance(received, bytes)
+    length = int.from_bytes(received[:4], "little")
+    return dict(json.loads(received[4 : 4 + length]))
+
+
+def next_frame(page: ClientConnection) -> dict[str, Any]:
+    return header(page.recv(timeout=5))
+
+
+@contextlib.contextmanager
+def served(mailbox: Mailbox | None = None) -> Iterator[tuple[PageServer, Mailbox]]:
+    mailbox = mailbox or Mailbox(PLAN, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        yield server, mailbox
+
+
+def opened(server: PageServer) -> ClientConnection:
+    return opened_url(server.url)

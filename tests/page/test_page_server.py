@@ -1,0 +1,218 @@
+"""The page's server: frames to many pages, slow pages, access, noise."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import time
+import urllib.error
+import urllib.request
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from echostep.errors import EchostepError
+from echostep.page import protocol
+from echostep.page.elements.scene import ParticleSample
+from echostep.page.mailbox import MOST_CHECK_INS, Mailbox
+from echostep.page.server import MOST_PAGES, Address, PageServer
+from echostep.page.session import MOST_UNDRAWN
+from echostep.ports.check_in import CheckIn
+from page.frames import PLAN, header, next_frame, opened, scene, served
+
+
+def test_a_page_gets_plan_walls_and_frames() -> None:
+    with served() as (server, mailbox):
+        mailbox.trail.add(1.0, 2.0, 0)
+        mailbox.publish(scene(trail_count=1))
+        with opened(server) as page:
+            hello = json.loads(page.recv(timeout=5))
+            frame = next_frame(page)
+        walls = urllib.request.urlopen(f"{server.url}walls/0", timeout=5).read()
+    assert hello["plan"]["levels"][0]["rooms"][0]["name"] == "Office 1"
+    assert np.array_equal(np.frombuffer(walls, "<f4").reshape(-1, 4), PLAN.levels[0].solid.astype("<f4"))
+    assert frame["trail"] == {"from": 0, "count": 1}
+    assert frame["cloud"]["count"] == 300
+
+
+def test_the_cloud_is_quantised_to_a_millimetre() -> None:
+    rng = np.random.default_rng(0)
+    x, y = (rng.uniform(-20.0, 20.0, 999).astype(np.float32) for _ in range(2))
+    sent = protocol.frame(
+        replace(scene(), particles=None),
+        1,
+        b"",
+        0,
+        ParticleSample(x, y, np.zeros(999, np.uint8), np.zeros(999, np.uint8)),
+        None,
+        None,
+    )
+    head = header(sent)["cloud"]
+    at = 4 + int.from_bytes(sent[:4], "little")
+    for column, k, origin in ((x, 0, "x0_m"), (y, 1, "y0_m")):
+        back = head[origin] + head["step_m"] * np.frombuffer(sent, "<u2", 999, at + 2 * 999 * k)
+        assert np.abs(back - column).max() < 1e-3
+
+
+def test_a_page_that_sleeps_is_sent_nothing_and_catches_up() -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene(0.0))
+        with opened(server) as page:
+            page.recv(timeout=5)
+            serials = [next_frame(page)["seq"]]
+            for k in range(100):
+                mailbox.trail.add(float(k), 0.0, 0)
+                mailbox.publish(scene(float(k), trail_count=k + 1))
+                time.sleep(0.002)
+            with contextlib.suppress(TimeoutError):
+                while True:
+                    serials.append(header(page.recv(timeout=0.3))["seq"])
+            assert len(serials) == MOST_UNDRAWN
+            for serial in serials:
+                page.send(json.dumps({"kind": "drawn", "seq": serial}))
+            frame = next_frame(page)
+    assert frame["t_s"] == 99.0
+    trail = frame["trail"]
+    assert trail["from"] + trail["count"] == 100
+
+
+def test_the_tracker_never_waits_for_ten_pages_that_are_stuck() -> None:
+    with served() as (server, mailbox), contextlib.ExitStack() as stack:
+        for _ in range(10):
+            stack.enter_context(opened(server))
+        longest_s = 0.0
+        for k in range(300):
+            began = time.perf_counter()
+            mailbox.publish(scene(float(k), particles=10_000))
+            longest_s = max(longest_s, time.perf_counter() - began)
+            time.sleep(0.001)
+        assert server.pages == 10
+    assert longest_s < 0.05  # making the scene of 10,000 is in it
+
+
+@pytest.mark.parametrize(
+    ("origin", "host"),
+    [
+        ("http://evil.example", None),
+        ("null", None),
+        ("", None),
+        (None, "evil.example"),
+        ("http://evil.example:80", "evil.example:80"),
+    ],
+)
+def test_another_site_is_refused(origin: str | None, host: str | None) -> None:
+    with served() as (server, _):
+        own = server.url.rstrip("/")
+        with pytest.raises((InvalidStatus, ConnectionClosed)):
+            connect_as(server, own if origin is None else origin, host).recv(timeout=5)
+        assert server.access_control.refused == 1
+        assert server.pages == 0
+
+
+def connect_as(server: PageServer, origin: str, host: str | None) -> ClientConnection:
+    headers = {"Origin": origin} if origin else {}
+    if host is None:
+        return connect(f"ws{server.url[4:]}socket", additional_headers=headers, origin=None)
+    name, port = server.url[7:].rstrip("/").split(":")
+    return connect(f"ws://{host}/socket", additional_headers=headers, sock=socket.create_connection((name, int(port))))
+
+
+def test_without_the_token_nothing_answers() -> None:
+    with PageServer(Mailbox(PLAN, "test", replay=False), Address("0.0.0.0", 0)) as server:
+        port, token = server.url.split(":")[2].split("/")[:2]
+        local = f"http://127.0.0.1:{port}"
+        assert len(token) >= 20
+        for path in ("", "static/main.js", "walls/0", f"{token[:-1]}/", "../"):
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(f"{local}/{path}", timeout=5)
+            assert refused.value.code == 404
+        with pytest.raises(InvalidStatus):
+            connect(f"ws{local[4:]}/socket", origin=Origin(local))
+        page = urllib.request.urlopen(f"{local}/{token}/", timeout=5)
+        assert b"echostep" in page.read()
+        assert "script-src 'self'" in page.headers["content-security-policy"]
+        with connect(f"ws{local[4:]}/{token}/socket", origin=Origin(local)) as page_socket:
+            assert json.loads(page_socket.recv(timeout=5))["kind"] == "hello"
+
+
+def test_noise_is_counted_and_the_page_goes_on() -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        with opened(server) as page:
+            noise: list[str | bytes] = [
+                "",
+                "{",
+                "[]",
+                "null",
+                '{"kind":"sudo"}',
+                '{"kind":["x"]}',
+                '{"kind":"go_to","x_m":1e999}',
+                b"\x00\xff",
+            ]
+            for sent in noise:
+                page.send(sent)
+            page.send('{"kind":"go_to","x_m":5,"y_m":7.5}')
+            deadline = time.monotonic() + 5
+            page.recv(timeout=5)
+            frame = next_frame(page)
+            page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
+            while frame["guidance"] is None and time.monotonic() < deadline:
+                frame = next_frame(page)
+        assert frame["guidance"]["left_m"] == pytest.approx(3.0)
+        assert server.counts.unknown == len(noise)
+
+
+def test_too_long_or_too_many_messages_end_the_socket_alone() -> None:
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        for message, count in (("x" * 5000, 1), ("{}", 1000)):
+            with opened(server) as page, pytest.raises(ConnectionClosed):
+                send_and_listen(page, message, count)
+        assert server.counts.flooding == 1
+        with opened(server) as page:
+            assert json.loads(page.recv(timeout=5))["kind"] == "hello"
+
+
+def send_and_listen(page: ClientConnection, message: str, count: int) -> None:
+    for _ in range(count):
+        page.send(message)
+    for _ in range(5):
+        page.recv(timeout=5)
+
+
+def test_so_many_pages_and_no_more() -> None:
+    with served() as (server, _), contextlib.ExitStack() as stack:
+        for _ in range(MOST_PAGES):
+            stack.enter_context(opened(server)).recv(timeout=5)
+        with opened(server) as late, pytest.raises(ConnectionClosed):
+            late.recv(timeout=5)
+        assert server.pages == MOST_PAGES
+
+
+def test_check_ins_that_nobody_takes_are_refused() -> None:
+    said = '{"kind":"check_in","x_m":1,"y_m":2,"heading_rad":null,"sd_m":0.5}'
+    with served() as (server, mailbox), opened(server) as page:
+        page.recv(timeout=5)
+        for _ in range(MOST_CHECK_INS + 1):
+            page.send(said)
+        assert json.loads(page.recv(timeout=5)) == {"kind": "refused", "what": "check_in"}
+        assert list(mailbox.pop_check_ins()) == [CheckIn(1.0, 2.0, None, 0.5)] * MOST_CHECK_INS
+    with served(Mailbox(PLAN, "a replay", replay=True)) as (server, mailbox), opened(server) as page:
+        assert json.loads(page.recv(timeout=5))["replay"]
+        page.send(said)
+        assert json.loads(page.recv(timeout=5))["kind"] == "refused"
+        assert not list(mailbox.pop_check_ins())
+
+
+def test_an_address_that_is_taken_is_named_or_another_is_found() -> None:
+    with served() as (server, _):
+        port = int(server.url.rstrip("/").rsplit(":", 1)[1])
+        with pytest.raises(EchostepError, match=f"--port {port}"):
+            PageServer(Mailbox(PLAN, "test", replay=False), Address(port=port))
+    with pytest.raises(EchostepError, match="no-such-host"):
+        PageServer(Mailbox(PLAN, "test", replay=False), Address("no-such-host.invalid", 0))
