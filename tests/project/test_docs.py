@@ -69,6 +69,18 @@ def test_a_named_file_of_the_project_exists(page: Path) -> None:
         assert "NAME" in path or any((root / path).exists() for root in roots), path
 
 
+@pytest.mark.parametrize("flow", ["echo", "step", "tap", "plan file"])
+def test_a_code_flow_names_what_its_files_hold(flow: str) -> None:
+    """Each `name` of a code flow stands in one of the files that the flow names."""
+    text = (ROOT / "host/DESIGN.md").read_text().partition(f"## Code flow of one {flow}\n")[2].partition("\n## ")[0]
+    files = re.findall(r"`([\w/]+\.(?:py|c|js))`", text)
+    assert len(files) > 3
+    roots = {path: ROOT if path.startswith("firmware/") else ROOT / "host/echostep" for path in files}
+    source = "".join((root / path).read_text() for path, root in roots.items())
+    for name in re.findall(r"`(?:[A-Z]\w+\.)?(\w+)`", text):
+        assert re.search(rf"\b{name}\b", source), name
+
+
 def test_every_make_target_that_is_named_exists() -> None:
     listed = subprocess.run(["make", "-s", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     targets = {line.split()[0] for line in listed.splitlines()}
