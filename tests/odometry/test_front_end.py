@@ -6,6 +6,7 @@ import heapq
 import math
 import random
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ Told = list[tuple[object, ...]]
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 
 
+@cache
 def recorded() -> list[Chunk]:
     """A short walk whose foot is held up for a while and later falls silent, with damage on both ports and a port that nobody knows."""
     rng = random.Random(8)
@@ -47,9 +49,6 @@ def recorded() -> list[Chunk]:
         if n % 1000 == 0:
             chunks.append(Chunk("kettle", chunk.t_arrival_ns, b"?"))
     return sorted(chunks, key=lambda chunk: chunk.t_arrival_ns)
-
-
-CHUNKS = recorded()
 
 
 def front_end() -> FrontEnd:
@@ -83,14 +82,17 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
     )
 
 
-WHOLE = taken(CHUNKS, [])
+@cache
+def whole() -> tuple[Told, tuple[object, ...]]:
+    """What the recorded walk gives in one portion."""
+    return taken(recorded(), [])
 
 
 def test_the_recorded_walk_has_all_that_matters() -> None:
-    kinds = {len(piece) for piece in WHOLE[0]}
+    kinds = {len(piece) for piece in whole()[0]}
     assert kinds == {1, 4}
     ours = front_end()
-    pieces = ours.process(portion_of(CHUNKS))
+    pieces = ours.process(portion_of(recorded()))
     passages = [piece for piece in pieces if isinstance(piece, MeasuredSegment)]
     assert sum(len(p.t_s) for p in passages) > 200
     assert any(p.segment.unobserved for p in passages)
@@ -101,29 +103,29 @@ def test_the_recorded_walk_has_all_that_matters() -> None:
     assert ours.identity is not None
 
 
-@given(st.lists(st.integers(0, len(CHUNKS)), max_size=40))
+@given(st.lists(st.integers(0, 1 << 20), max_size=40))
 @settings(max_examples=25, deadline=None)
 def test_any_portions_tell_the_same(cuts: list[int]) -> None:
-    assert taken(CHUNKS, cuts) == WHOLE
+    assert taken(recorded(), cuts) == whole()
 
 
 def test_chunk_by_chunk_tells_the_same() -> None:
-    assert taken(CHUNKS, list(range(len(CHUNKS)))) == WHOLE
+    assert taken(recorded(), list(range(len(recorded())))) == whole()
 
 
-@given(st.integers(0, 1 << 32), st.lists(st.integers(0, 2 * len(CHUNKS)), max_size=10))
+@given(st.integers(0, 1 << 32), st.lists(st.integers(0, 1 << 20), max_size=10))
 @settings(max_examples=25, deadline=None)
 def test_bytes_that_arrived_together_may_be_cut_anywhere(seed: int, cuts: list[int]) -> None:
     rng = random.Random(seed)
     finer = []
-    for chunk in CHUNKS:
+    for chunk in recorded():
         at = rng.randrange(len(chunk.data) + 1)
         finer += (
             [replace(chunk, data=part) for part in (chunk.data[:at], chunk.data[at:])]
             if chunk.port != "kettle"
             else [chunk]
         )
-    assert taken(finer, cuts) == WHOLE
+    assert taken(finer, cuts) == whole()
 
 
 def test_pings_without_a_foot_are_bounded_and_counted() -> None:
@@ -234,7 +236,7 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
 def test_the_rangers_delay_moves_their_pings() -> None:
     late = FrontEnd(MtxTiming(), RangerSettings(delay_s=0.01), FootSettings(), GaitSettings())
     times = [
-        np.concatenate([piece.t_s for piece in ours.process(portion_of(CHUNKS)) if isinstance(piece, MeasuredSegment)])
+        np.concatenate([piece.t_s for piece in ours.process(portion_of(recorded())) if isinstance(piece, MeasuredSegment)])
         for ours in (front_end(), late)
     ]
     both = min(map(len, times)) - 10
