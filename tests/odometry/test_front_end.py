@@ -236,7 +236,9 @@ def test_waiting_is_like_its_naive_twin(seed: int, cuts: list[int], age_s: float
 def test_the_rangers_delay_moves_their_pings() -> None:
     late = FrontEnd(MtxTiming(), RangerSettings(delay_s=0.01), FootSettings(), GaitSettings())
     times = [
-        np.concatenate([piece.t_s for piece in ours.process(portion_of(recorded())) if isinstance(piece, MeasuredSegment)])
+        np.concatenate(
+            [piece.t_s for piece in ours.process(portion_of(recorded())) if isinstance(piece, MeasuredSegment)]
+        )
         for ours in (front_end(), late)
     ]
     both = min(map(len, times)) - 10

@@ -1,0 +1,30 @@
+"""Outboxes on a real network."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from echostep.team.endpoint import parse_endpoint
+from echostep.team.mqtt import MqttTransport
+from echostep.team.outbox import Outbox
+from echostep.team.report import Report
+from team.team_reports import POSITION, report
+
+
+def until(true: Callable[[], object], seconds: float = 15.0) -> None:
+    end_s = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end_s, "waited in vain"
+        time.sleep(0.01)
+
+
+def at(t_s: float, name: str = "anna") -> Report:
+    return report(name, position=replace(POSITION, t_s=t_s))
+
+
+def box_to(url: str, words: list[str] | None = None, name: str = "anna", run: str = "0123abcd") -> Outbox:
+    said: list[str] = [] if words is None else words
+    endpoint = parse_endpoint(url)
+    return Outbox(MqttTransport(endpoint, "red", name, run), str(endpoint), said.append)
