@@ -14,13 +14,13 @@ import pytest
 from command_line import echostep
 from echostep.evaluate.fischer2008.simulator import _WALKER, OURS, PAPER, PDR, fuse, guided_return
 from echostep.evaluate.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95
-from echostep.simulation.world.beacon_ground import OUTLIER_M, disturb, ground, is_in_reach, measured
+from echostep.simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
 
 
 def test_source_turns_the_heading_once_by_the_side_of_approach() -> None:
     sources, inside = np.array([[5.0, 1.0, 2.0, 0.5]]), np.zeros(1, bool)
-    east = [disturb(sources, inside, x, 0.0, 0.0) for x in np.arange(0.0, 10.0, 0.1)]
-    west = [disturb(sources, inside, x, 0.0, math.pi) for x in np.arange(10.0, 0.0, -0.1)]
+    east = [disturbance(sources, inside, x, 0.0, 0.0) for x in np.arange(0.0, 10.0, 0.1)]
+    west = [disturbance(sources, inside, x, 0.0, math.pi) for x in np.arange(10.0, 0.0, -0.1)]
     assert [v for v in east if v] == [0.5]  # on his left
     assert [v for v in west if v] == [-0.5]
 
@@ -29,7 +29,7 @@ def test_measurements_have_the_papers_spread() -> None:
     world = ground(NOMINAL, np.random.default_rng(1))
     rng = np.random.default_rng(2)
     x, y, axis = world.beacons[3]
-    seen = np.array([measured(world, 3, x + 3.0, y, rng) for _ in range(20_000)])
+    seen = np.array([measure(world, 3, x + 3.0, y, rng) for _ in range(20_000)])
     far = seen[:, 0] > 3.0 + OUTLIER_M / 2
     assert abs(far.mean() - 0.1) < 0.01
     assert abs(seen[~far, 0].std() - 0.05) < 0.002

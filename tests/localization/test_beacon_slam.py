@@ -127,7 +127,7 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
                 BeaconMeasurement(k, range_m, math.nan),
             )
             update_by_measurement(particles, beliefs, health, measurement, MODEL, OPEN, rng)
-        chosen = rng.choice(n, n, p=np.exp(weight) / np.exp(weight).sum())
+        chosen = np.sort(rng.choice(n, n, p=np.exp(weight) / np.exp(weight).sum()))
         weight[:], x[:], y[:] = 0.0, x[chosen], y[chosen]
         resample_beliefs(beliefs, chosen)
     assert health.each[:2, TIMES_MOVED].tolist() == [0.0, 0.0]

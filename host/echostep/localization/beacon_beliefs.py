@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import kernel
+from echostep.jit import kernel, lean_kernel
 from echostep.localization.beacon_model import BeaconModel
 
 TWO_PI = 2.0 * math.pi
@@ -98,20 +98,36 @@ def _set_variances(cov: Floats, place_var: float, axis_var: float) -> None:
 
 @kernel
 def resample_beliefs(beliefs: BeaconBeliefs, chosen: Ints) -> None:
-    """Copy the beliefs of the chosen particles (n,) in place; their number stays."""
-    mean, cov = beliefs.mean[chosen], beliefs.cov[chosen]
-    beliefs.mean[:] = mean
-    beliefs.cov[:] = cov
-    beliefs.doubt[:] = beliefs.doubt[chosen]
+    """Copy the beliefs of the chosen particles (n,), in ascending order, in place; their number stays."""
+    particles = len(beliefs.mean)
+    _gather_rows(beliefs.mean.reshape(particles, -1), chosen)
+    _gather_rows(beliefs.cov.reshape(particles, -1), chosen)
+    _gather_rows(beliefs.doubt, chosen)
 
 
-@kernel
+@lean_kernel
+def _gather_rows(rows: Floats, chosen: Ints) -> None:
+    """Set rows[i] = rows[chosen[i]] in place, for ascending `chosen`; `rows` (n, columns).
+
+    Sources above their target are copied from the first row on, those below it from the last row back: each source is read before it is overwritten.
+    """
+    for i in range(len(chosen)):
+        if chosen[i] > i:
+            for k in range(rows.shape[1]):
+                rows[i, k] = rows[chosen[i], k]
+    for i in range(len(chosen) - 1, -1, -1):
+        if chosen[i] < i:
+            for k in range(rows.shape[1]):
+                rows[i, k] = rows[chosen[i], k]
+
+
+@lean_kernel
 def wrap_angle(angle: float) -> float:
     """The same angle in [-pi, pi), for kernels. It rounds differently from `angles.wrap`, and results depend on the last bit."""
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
-@kernel
+@lean_kernel
 def correct(
     mean: Floats, cov: Floats, hx: float, hy: float, h_axis: float, innovation: float, noise_var: float
 ) -> None:

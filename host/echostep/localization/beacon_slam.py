@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, lean_kernel
 from echostep.localization.beacon_beliefs import (
     AXIS,
     AXIS_AXIS,
@@ -99,7 +99,7 @@ def update_by_measurement(
     return size
 
 
-@kernel
+@lean_kernel
 def reweight(
     particles: ParticleArrays, beliefs: BeaconBeliefs, measurement: BeaconMeasurement, model: BeaconModel, walls: WallIndex
 ) -> tuple[float, float]:  # fmt: skip
@@ -139,7 +139,7 @@ def reweight(
     return in_place / total, _normalise(log_weight, top)
 
 
-@kernel
+@lean_kernel
 def _normalise(log_weight: Floats, top: float) -> float:
     """Subtract the greatest log-weight; returns the effective size."""
     weights, squares = 0.0, 0.0
@@ -151,7 +151,7 @@ def _normalise(log_weight: Floats, top: float) -> float:
     return weights * weights / squares
 
 
-@kernel
+@lean_kernel
 def _range_density(
     mean: Floats, cov: Floats, x: float, y: float, range_m: float, model: BeaconModel, outliers: float, in_place: float
 ) -> float:
@@ -178,7 +178,7 @@ def _range_density(
     return density
 
 
-@kernel
+@lean_kernel
 def _bearing_density(
     mean: Floats, cov: Floats, x: float, y: float, bearing: float, model: BeaconModel, learn: bool
 ) -> float:

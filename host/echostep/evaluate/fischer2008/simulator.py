@@ -30,7 +30,7 @@ from echostep.localization.beacon_slam import (
 )
 from echostep.localization.particle_kernels import Move, ParticleArrays, propagate_without_walls, systematic
 from echostep.plan.polyline import along, nearest, way_m
-from echostep.simulation.world.beacon_ground import BeaconGround, disturb, is_in_reach, measured
+from echostep.simulation.world.beacon_ground import BeaconGround, disturbance, is_in_reach, measure
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 
@@ -213,7 +213,7 @@ def _walk(world: BeaconGround, w: _Walker, inside: Bools) -> None:
     step = SPEED_M_S * TICK_S
     w.x += step * math.cos(w.heading)
     w.y += step * math.sin(w.heading)
-    w.error += disturb(world.sources, inside, w.x, w.y, w.heading)
+    w.error += disturbance(world.sources, inside, w.x, w.y, w.heading)
     x, y = step * math.cos(w.heading + w.error), step * math.sin(w.heading + w.error)
     w.walk_x, w.walk_y = w.walk_x + x, w.walk_y + y
     w.piece_x, w.piece_y = w.piece_x + x, w.piece_y + y
@@ -233,7 +233,7 @@ def _listen(
     for k in range(len(world.beacons)):
         if is_in_reach(world, k, w.x, w.y):
             heard, heard_ticks[k] = True, tick
-            range_m, bearing = measured(world, k, w.x, w.y, rng)
+            range_m, bearing = measure(world, k, w.x, w.y, rng)
             _hear(cloud, k, range_m, bearing, model, walls, rng)
     if not heard:
         w.silent_tick = tick
@@ -251,7 +251,7 @@ def _correct(world: BeaconGround, rules: _Rules, rng: np.random.Generator, w: _W
     closest, closest_m, closest_bearing = -1, np.inf, 0.0
     for k in range(len(world.beacons)):
         if is_in_reach(world, k, w.x, w.y):
-            range_m, bearing = measured(world, k, w.x, w.y, rng)
+            range_m, bearing = measure(world, k, w.x, w.y, rng)
             if range_m < closest_m:
                 closest, closest_m, closest_bearing = k, range_m, bearing
     if closest >= 0:
@@ -392,9 +392,9 @@ def _way_in(
             for k in range(count - 1, -1, -1):
                 world.works[k] = (count - 1 - k) * total <= (tick * step + DROPPED_BEFORE_M) * (count - 1)
                 if is_in_reach(world, k, x, y):
-                    range_m, bearing = measured(world, k, x, y, rng)
+                    range_m, bearing = measure(world, k, x, y, rng)
                     _hear(cloud, k, range_m, bearing, model, walls, rng)
-        error += disturb(world.sources, inside, x, y, heading)
+        error += disturbance(world.sources, inside, x, y, heading)
         dx, dy = dx + step * math.cos(heading + error), dy + step * math.sin(heading + error)
     return error
 

@@ -1,8 +1,7 @@
 """The world of a guided return [Fischer 2008, 4]: a trail on open ground, beacons dropped along it, magnetic sources beside it.
 
-In: a seed and how dense, far-reaching and noisy things are. Out: a `BeaconGround` of plain arrays, and kernels for what happens on it: how a source
-turns the measured heading, which beacon is_in_reach the boot, and what it measures. Owns nothing. The paper does not print its trail: each seed draws
-another.
+In: settings and a random generator. Out: a `BeaconGround` of plain arrays, and kernels for what happens on it: how a source turns the measured
+heading, which beacon hears the boot, and what it measures. Owns nothing. The paper does not print its trail: each seed draws another one.
 """
 
 from __future__ import annotations
@@ -17,22 +16,26 @@ from echostep.arrays import Bools, Floats
 from echostep.jit import kernel
 from echostep.plan.polyline import along, way_m
 
-LEGS = (4, 7)  # straight parts of a trail
-LEG_M = (12.0, 25.0)
-TURNS_RAD = (math.radians(30.0), math.radians(110.0))
-ASIDE_M = 0.3  # distance of the beacons from the path, standard deviation per axis
-CLEARANCE_M = (
-    8.0  # distance of a trail from its own earlier parts; by reason: on open ground a path does not cross itself
-)
+OUTLIER_M = 3.0  # added to a range [Fischer 2008, 4.1.1]
+
+# The constants below are by reason: the paper prints none of them.
+PARTS = (4, 7)  # straight parts of a trail
+PART_M = (12.0, 25.0)
+TURNS_RAD = (math.radians(30.0), math.radians(110.0))  # between parts, to either side
+ASIDE_M = 0.3  # standard deviation per axis of a dropped beacon's place about the trail
+CLEARANCE_M = 8.0  # between parts of a trail that do not meet: on open ground a path need not cross itself
+MOVED_M = 4.0  # standard deviation per axis of the displacement of a moved beacon
+SOURCE_SHARE = (0.1, 0.8)  # of the trail's length: where sources lie
 
 
 @dataclass(frozen=True, slots=True)
 class GroundSettings:
     """[Fischer 2008, 4.1]: `range_sd_m`, `bearing_sd_deg` of the beacons' measurements, `outliers` the share of ranges with 3 m too much.
 
-    `spacing_m`, `reach_m`: between beacons along the trail, and how far one is_in_reach. `place_sd_m`, `axis_sd_deg`: how well place (per axis) and
-    orientation of a beacon are known. `sources` magnetic sources a trail, each within `source_aside_m` of it, with radius and amplitude drawn
-    from the ranges. `moved`, `dead`: share of beacons that were kicked away by some metres, or stopped, before the way back.
+    `spacing_m`: between beacons along the trail; `reach_m`: greatest distance at which a beacon hears the boot. `place_sd_m` (per axis),
+    `axis_sd_deg`: standard deviations of a beacon's believed place and axis. `sources`: magnetic sources per trail, each within `source_aside_m` of
+    it per axis, with radius and amplitude drawn from the ranges. `moved`, `dead`: share of beacons that are moved by MOVED_M, or stop working,
+    before the way back.
     """
 
     range_sd_m: float = 0.05
@@ -51,9 +54,10 @@ class GroundSettings:
 
 
 class BeaconGround(NamedTuple):
-    """`trail` (k, 2) from the deepest point to the exit; `beacons` (b, 3): x, y, axis, as they are on the way back; `dropped` (b, 3): where they fell
+    """The ground, on which b beacons and s sources lie.
 
-    on the way in; `believed` (b, 3): where the system thinks they fell; `works` (b,); `sources` (s, 4): x, y, radius, amplitude in radians.
+    `trail` (k, 2): from the deepest point to the exit. Beacons (b, 3) are x, y, axis: `beacons` on the way back, `dropped` on the way in,
+    `believed` as the system has them; `works` (b,). `sources` (s, 4): x, y, radius (m), amplitude (rad).
     """
 
     trail: Floats
@@ -68,11 +72,8 @@ class BeaconGround(NamedTuple):
     reach_m: float
 
 
-OUTLIER_M = 3.0  # [Fischer 2008, 4.1.1]
-
-
 def ground(settings: GroundSettings, rng: np.random.Generator, trail: Floats | None = None) -> BeaconGround:
-    """A ground with its own trail (or this one, (k, 2)), beacons and sources."""
+    """A ground with beacons and sources along a trail (k, 2), by default a random one."""
     trail = draw_trail(rng) if trail is None else trail
     total = way_m(trail)
     count = max(int(total / settings.spacing_m) + 1, 2)
@@ -85,8 +86,8 @@ def ground(settings: GroundSettings, rng: np.random.Generator, trail: Floats | N
     believed[:, :2] += settings.place_sd_m * rng.standard_normal((count, 2))
     believed[:, 2] += math.radians(settings.axis_sd_deg) * rng.standard_normal(count)
     beacons = dropped.copy()
-    kicked = rng.random(count) < settings.moved
-    beacons[kicked, :2] += 4.0 * rng.standard_normal((int(kicked.sum()), 2))
+    moved = rng.random(count) < settings.moved
+    beacons[moved, :2] += MOVED_M * rng.standard_normal((int(moved.sum()), 2))
     works = rng.random(count) >= settings.dead
     return BeaconGround(
         trail, beacons, dropped, believed, works, _sources(settings, trail, rng), settings.range_sd_m,
@@ -95,19 +96,19 @@ def ground(settings: GroundSettings, rng: np.random.Generator, trail: Floats | N
 
 
 def draw_trail(rng: np.random.Generator) -> Floats:
-    """Straight parts joined by turns of either sense, (k, 2); drawn again until it keeps clear of itself."""
+    """Straight parts joined by turns to either side, (k, 2); drawn again until its parts keep CLEARANCE_M."""
     while True:
-        count = int(rng.integers(LEGS[0], LEGS[1] + 1))
+        count = int(rng.integers(PARTS[0], PARTS[1] + 1))
         turns = rng.uniform(*TURNS_RAD, count) * rng.choice([-1.0, 1.0], count)
         heading = rng.uniform(-math.pi, math.pi) + np.cumsum(turns)
-        legs = rng.uniform(*LEG_M, count)[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
-        trail = np.vstack([np.zeros(2), np.cumsum(legs, axis=0)])
+        parts = rng.uniform(*PART_M, count)[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+        trail = np.vstack([np.zeros(2), np.cumsum(parts, axis=0)])
         if _clear(trail):
             return trail
 
 
 def _clear(trail: Floats) -> bool:
-    """Whether parts of a trail that do not meet keep their distance."""
+    """Whether parts of a trail that do not meet keep CLEARANCE_M."""
     from shapely import LineString
 
     parts = [LineString(trail[k : k + 2]) for k in range(len(trail) - 1)]
@@ -115,23 +116,24 @@ def _clear(trail: Floats) -> bool:
 
 
 def _sources(settings: GroundSettings, trail: Floats, rng: np.random.Generator) -> Floats:
-    found = np.empty((settings.sources, 4))
+    """Sources (s, 4) at random places along the trail."""
+    sources = np.empty((settings.sources, 4))
     for k in range(settings.sources):
-        x, y, _ = along(trail, rng.uniform(0.1, 0.8) * way_m(trail))
+        x, y, _ = along(trail, rng.uniform(*SOURCE_SHARE) * way_m(trail))
         aside = rng.uniform(-settings.source_aside_m, settings.source_aside_m, 2)
-        found[k] = (
+        sources[k] = (
             x + aside[0], y + aside[1], rng.uniform(*settings.source_radius_m),
             math.radians(rng.uniform(*settings.source_deg)),
         )  # fmt: skip
-    return found
+    return sources
 
 
 @kernel
-def disturb(sources: Floats, inside: Bools, x: float, y: float, heading: float) -> float:
-    """What the sources add to the measured heading when the wearer comes to (x, y) [Fischer 2008, 4.1.2].
+def disturbance(sources: Floats, inside: Bools, x: float, y: float, heading: float) -> float:
+    """What the sources add to the measured heading (rad) on a step to (x, y) [Fischer 2008, 4.1.2].
 
-    Coming nearer than a source's radius turns the heading by its amplitude, once; the sign is the side on which it is passed. What was added stays:
-    the sensor's own filter remembers the fields behind it. `inside` (s,) is kept up to date.
+    Entering a source's radius turns the heading by its amplitude, once; the sign is the side on which the source is passed. The turn stays: the
+    sensor's own filter remembers earlier fields. `inside` (s,): whether the last step was within each radius; updated.
     """
     added = 0.0
     for k in range(len(sources)):
@@ -152,7 +154,7 @@ def is_in_reach(world: BeaconGround, k: int, x: float, y: float) -> bool:
 
 
 @kernel
-def measured(world: BeaconGround, k: int, x: float, y: float, rng: np.random.Generator) -> tuple[float, float]:
+def measure(world: BeaconGround, k: int, x: float, y: float, rng: np.random.Generator) -> tuple[float, float]:
     """Range (m) and bearing (rad, from the beacon's axis) that beacon k measures to a boot at (x, y) [Fischer 2008, 4.1.1]."""
     dx, dy = x - world.beacons[k, 0], y - world.beacons[k, 1]
     range_m = math.hypot(dx, dy) + world.range_sd_m * rng.standard_normal()
