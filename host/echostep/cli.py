@@ -115,8 +115,8 @@ def demo(
     port: Port = None,
 ) -> None:
     """Track a simulated walk through a simulated building."""
-    from echostep.commands import demo as demo_run
-    from echostep.commands.options import OutputOptions
+    from echostep.session import demo as demo_run
+    from echostep.session.options import OutputOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet)
@@ -144,8 +144,8 @@ def live(
     guide: GuideTo = None,
 ) -> None:
     """Track a wearer live and record everything. Without an MTx the board's leg gyros are used."""
-    from echostep.commands import live as live_run
-    from echostep.commands.options import OutputOptions, PortOptions, TrackingOptions
+    from echostep.session import live as live_run
+    from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet)
@@ -164,8 +164,8 @@ def record(
     beacons: BeaconsPort = None,
 ) -> None:
     """Record the ports without tracking."""
-    from echostep.commands import live as live_run
-    from echostep.commands.options import PortOptions
+    from echostep.session import live as live_run
+    from echostep.session.options import PortOptions
 
     live_run.record(PortOptions(board, mtx, beacons, seconds), out)
 
@@ -191,8 +191,8 @@ def replay(
     guide: GuideTo = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
-    from echostep.commands import replay as replay_run
-    from echostep.commands.options import OutputOptions, TrackingOptions
+    from echostep.session import replay as replay_run
+    from echostep.session.options import OutputOptions, TrackingOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page) or sys.stdout.isatty(), outlet)
@@ -357,7 +357,7 @@ def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
 
 
 def _pose(text: str | None) -> Pose | None:
-    from echostep.commands.metadata import parse_pose
+    from echostep.session.metadata import parse_pose
 
     return None if text is None else parse_pose(text)
 

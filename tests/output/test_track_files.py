@@ -14,8 +14,6 @@ import pytest
 from pyarrow import parquet
 
 from command_line import echostep
-from echostep.commands.options import TrackingOptions
-from echostep.commands.replay import tracker_of
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.output.track_files import export as write
@@ -23,6 +21,8 @@ from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import load_plan
 from echostep.recording.edit import info
 from echostep.recording.recorder import Recorder, open_recording
+from echostep.session.options import TrackingOptions
+from echostep.session.replay import tracker_of
 from walks import DEMO, walk_chunks
 
 

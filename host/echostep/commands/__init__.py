@@ -1,4 +1,4 @@
-"""One module per group of commands of the command line; each is imported when its command runs.
+"""Commands that are not a tracked run: offline files, floors, plans, recordings, beacons, studies.
 
-In: the options that were given. Out: files, views, lines on the terminal. Owns one `Session` per tracked run.
+In: options of the command line. Out: files and text. Owns nothing. Each module is imported when its command runs.
 """

@@ -15,10 +15,10 @@ from urllib.parse import urlsplit
 import numpy as np
 import serial
 
-from echostep.commands.console import console
 from echostep.errors import EchostepError
 from echostep.localization.metrics import load_truth
 from echostep.plan.importers.formats import open_plan
+from echostep.session.console import console
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 
 BAUD = 115200

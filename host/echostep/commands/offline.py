@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.commands.console import console
 from echostep.errors import EchostepError
 from echostep.foot.alignment import aligned
 from echostep.foot.steps import Track, walk_track
@@ -22,6 +21,7 @@ from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, wri
 from echostep.output.track_plot import draw_foot
 from echostep.papers import fischer2008
 from echostep.recording.capture import Decoder, as_json, read_capture
+from echostep.session.console import console
 from echostep.xsens.onboard_filter import orientations
 
 SCALE_RANGE = (0.5, 2.0)  # of --scale; by reason: beyond it the lengths of the leg are wrong

@@ -55,10 +55,10 @@ def export(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
 ) -> None:
     """Track a recording and write its track for other programs."""
-    from echostep.commands.metadata import parse_pose
-    from echostep.commands.options import TrackingOptions
-    from echostep.commands.replay import tracker_of
     from echostep.output.track_files import export as export_track
+    from echostep.session.metadata import parse_pose
+    from echostep.session.options import TrackingOptions
+    from echostep.session.replay import tracker_of
 
     tracking = TrackingOptions(plan, None if start is None else parse_pose(start), settings, seed)
     print(export_track(file, plan, out, lambda recording, on: tracker_of(recording, on, tracking)))

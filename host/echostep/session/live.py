@@ -14,17 +14,17 @@ from pathlib import Path
 
 from echostep.board.frames import encode
 from echostep.board.messages import Identify
-from echostep.commands.chunk_streams import portions_of, recorded, with_check_ins
-from echostep.commands.console import console, print_notices
-from echostep.commands.metadata import clock_metadata, run_metadata, version_metadata
-from echostep.commands.options import OutputOptions, PortOptions, TrackingOptions
-from echostep.commands.results import output_folder
-from echostep.commands.session import Session
 from echostep.guidance.guided_run import destination
 from echostep.page.live import LivePage
 from echostep.plan.importers.formats import open_plan
 from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk, SerialPorts
 from echostep.recording.recorder import Recorder
+from echostep.session.chunk_streams import portions_of, recorded, with_check_ins
+from echostep.session.console import console, print_notices
+from echostep.session.metadata import clock_metadata, run_metadata, version_metadata
+from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
+from echostep.session.results import output_folder
+from echostep.session.session import Session
 from echostep.settings import parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker

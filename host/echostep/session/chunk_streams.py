@@ -10,11 +10,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 
-from echostep.commands.console import print_notices
 from echostep.page.live import LivePage
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.recording.recorder import Recorder
+from echostep.session.console import print_notices
 
 LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
 

@@ -15,9 +15,6 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from echostep.commands.console import console
-from echostep.commands.options import OutputOptions
-from echostep.commands.results import Result, write_results
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate
@@ -28,6 +25,9 @@ from echostep.page.live import LivePage
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Portion
 from echostep.recording.recorder import Recorder
+from echostep.session.console import console
+from echostep.session.options import OutputOptions
+from echostep.session.results import Result, write_results
 from echostep.tracker import Tracker
 
 if TYPE_CHECKING:

@@ -10,18 +10,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 
-from echostep.commands.chunk_streams import paced, portions_of, recorded, with_check_ins
-from echostep.commands.console import console, print_notices
-from echostep.commands.metadata import run_metadata
-from echostep.commands.options import OutputOptions
-from echostep.commands.results import output_folder
-from echostep.commands.session import Session
 from echostep.localization.metrics import load_truth
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.recorder import Recorder
+from echostep.session.chunk_streams import paced, portions_of, recorded, with_check_ins
+from echostep.session.console import console, print_notices
+from echostep.session.metadata import run_metadata
+from echostep.session.options import OutputOptions
+from echostep.session.results import output_folder
+from echostep.session.session import Session
 from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import Board, BoardProcess, PythonBoard
 from echostep.simulation.scenario import Scenario, demo_scenario

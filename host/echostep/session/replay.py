@@ -8,16 +8,16 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from echostep.commands.console import console
-from echostep.commands.metadata import CHECK_IN_START, recorded_seed, recorded_start
-from echostep.commands.options import OutputOptions, TrackingOptions
-from echostep.commands.results import output_folder
-from echostep.commands.session import Session
 from echostep.guidance.guided_run import destination
 from echostep.localization.metrics import load_truth
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Plan
 from echostep.recording.recorder import Recording, open_recording
+from echostep.session.console import console
+from echostep.session.metadata import CHECK_IN_START, recorded_seed, recorded_start
+from echostep.session.options import OutputOptions, TrackingOptions
+from echostep.session.results import output_folder
+from echostep.session.session import Session
 from echostep.settings import parse_settings, read_settings
 from echostep.tracker import Tracker
 

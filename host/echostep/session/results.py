@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from echostep.commands.console import console
 from echostep.errors import EchostepError
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.metrics import Errors, Truth, errors
 from echostep.output.track_plot import draw_track, write_track
+from echostep.session.console import console
 from echostep.tracker import Tracker
 
 
