@@ -1,4 +1,5 @@
-"""Where bytes come from: serial ports, UDP, check-ins from the page.
+"""Sources of bytes: serial ports, UDP, check-ins from the page.
 
-In: URLs of ports. Out: `Chunk(port, t_arrival_ns, data)`, and `Portion`s of many chunks as columns. Owns the open ports. Decodes nothing.
+In: URLs of ports. Out: `Chunk(port, t_arrival_ns, data)`, and `Portion`s of many chunks as columns. Owns the open ports. Bytes are not decoded
+here, except those of check-ins.
 """

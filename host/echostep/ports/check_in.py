@@ -1,7 +1,7 @@
 """Check-in: the wearer's position, entered by hand.
 
-In: what was tapped on the page. Out: the bytes of a chunk of the port `PERSON`, and `CheckIn`s from such bytes. Owns nothing. The bytes are recorded
-like those of any port, so that a replay has the same check-ins in the same order; like those of any port they may be damaged or hostile.
+In: a position from the page. Out: the bytes of a chunk of the port `PERSON`, and `CheckIn`s from such bytes. Owns nothing.
+The bytes are recorded like those of any port, so a replay has the same check-ins in the same order. They may be damaged or hostile.
 """
 
 from __future__ import annotations
@@ -12,19 +12,18 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from echostep.plan.json_fields import LIMIT_M
-from echostep.plan.model import Pose
 
-PERSON = "person"
+PERSON = "person"  # name of the port
 # All by reason.
-MOST_BYTES = 512  # of one check-in
+MOST_BYTES = 512  # of one encoded check-in
 MOST_LEVELS = 1000
-LEAST_SD_M, MOST_SD_M = 0.05, 100.0
-HEADING_SD_RAD = math.radians(15.0)  # of a heading that was entered
+LEAST_SD_M, MOST_SD_M = 0.05, 100.0  # m, per axis; an entered value is limited to this range
+HEADING_SD_RAD = math.radians(15.0)  # of an entered heading
 
 
 @dataclass(frozen=True, slots=True)
 class CheckIn:
-    """A position (x_m, y_m) on a level, with standard deviation `sd_m` per axis; `heading_rad` is None when it was not entered."""
+    """A position (x_m, y_m) on a level, with standard deviation `sd_m` per axis. `heading_rad` is None when only a position was entered."""
 
     x_m: float
     y_m: float
@@ -32,18 +31,13 @@ class CheckIn:
     sd_m: float
     level: int = 0
 
-    @property
-    def pose(self) -> Pose:
-        """Position and heading; east when none was entered."""
-        return Pose(self.x_m, self.y_m, self.heading_rad or 0.0, self.level)
-
     def encode(self) -> bytes:
-        """Bytes of a chunk."""
+        """The check-in as JSON: the bytes of a chunk."""
         return json.dumps(asdict(self)).encode()
 
 
 def parse_check_in(payload: bytes) -> CheckIn | None:
-    """The check-in of a chunk; None for bytes that are not one."""
+    """The check-in of a chunk; None when the bytes are not a valid check-in."""
     if len(payload) > MOST_BYTES:
         return None
     try:
@@ -67,6 +61,6 @@ def check_in_of(tree: Any) -> CheckIn | None:
 
 
 def _number(value: Any) -> float | None:
-    """A finite number within the limits of a plan's coordinates; None for anything else."""
+    """The value as a float; None when it is not a finite number within the limits of a plan's coordinates."""
     fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LIMIT_M
     return float(value) if fits else None

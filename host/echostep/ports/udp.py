@@ -1,7 +1,7 @@
-"""A UDP address as a port that is read like a serial one.
+"""A UDP address with the methods of a serial port.
 
-In: a URL, udp://HOST:PORT. Out: the bytes of the datagrams that come there, each between two zeros, so that a damaged one spoils no other (frames
-end in zeros, protocol/README.md). Owns the socket.
+In: a URL, udp://HOST:PORT. Out: the bytes of the received datagrams. A zero is put before and after each datagram: frames end in zeros
+(protocol/README.md), so a damaged datagram does not damage its neighbours. Owns the socket.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from urllib.parse import urlsplit
 
 from echostep.errors import EchostepError
 
-READ_TIMEOUT_S = 0.1
-MOST = 65536  # bytes a read
-KERNEL_BUFFER = 1 << 20
+READ_TIMEOUT_S = 0.1  # by reason: the reading thread sees `close` in time
+READ_BYTES = 65536  # of one read; no datagram is larger: its length field has 16 bits [RFC 768]
+KERNEL_BUFFER_BYTES = 1 << 20  # by reason: datagrams wait there while the host is busy
 
 
 class UdpPort:
-    """Bound to one address; raises EchostepError when that is not possible."""
+    """A socket bound to the URL's address; raises EchostepError when the URL is not valid or the address cannot be bound."""
 
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)
@@ -30,7 +30,7 @@ class UdpPort:
             raise EchostepError(f"{url}: expected udp://HOST:PORT, for instance udp://127.0.0.1:9000")
         self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KERNEL_BUFFER)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KERNEL_BUFFER_BYTES)
             self._socket.bind((host, port))
             self._socket.setblocking(False)
         except OSError as error:
@@ -39,24 +39,24 @@ class UdpPort:
 
     @property
     def in_waiting(self) -> int:
-        """How much a read may bring."""
-        return MOST
+        """Largest useful `size` of a read, bytes; the number of waiting bytes is not known."""
+        return READ_BYTES
 
     def read(self, size: int) -> bytes:
-        """All datagrams that wait, at most about `size` bytes; nothing when none came for `READ_TIMEOUT_S`."""
+        """Waiting datagrams until `size` bytes are reached; empty after `READ_TIMEOUT_S` without a datagram."""
         ready, _, _ = select.select([self._socket], [], [], READ_TIMEOUT_S)
         received = bytearray()
         while ready and len(received) < size:
             try:
-                received += b"\0" + self._socket.recv(MOST) + b"\0"
+                received += b"\0" + self._socket.recv(READ_BYTES) + b"\0"
             except BlockingIOError:
                 break
         return bytes(received)
 
     def write(self, sent: bytes) -> int:
-        """A gateway takes no orders: nothing is sent."""
+        """Discard the bytes: a gateway receives no commands. Returns their number, as a serial port does."""
         return len(sent)
 
     def close(self) -> None:
-        """Give the address back."""
+        """Close the socket."""
         self._socket.close()
