@@ -34,7 +34,7 @@ LIMIT_S = 1.0
 
 WRITER = """
 import os, struct, sys, time
-from echostep.recording.recorder import Note, Recorder
+from echostep.recording.recorder import DerivedMessage, Recorder
 from echostep.ports.chunks import Chunk
 from echostep.output.foxglove import pose
 path, pipe = sys.argv[1], int(sys.argv[2])
@@ -48,7 +48,7 @@ with Recorder(path, {"note": "to be killed"}) as recorder:
         if not number % 400:
             sorted(busy)  # one call into C: no other thread runs meanwhile
         if not number % 40:
-            recorder.notes(pose(now, (1.0, 2.0, 0.0), 0.5))
+            recorder.write_derived(pose(now, (1.0, 2.0, 0.0), 0.5))
         os.write(pipe, struct.pack("<Qq", number, now))
         time.sleep(0.0012)
 """

@@ -23,7 +23,7 @@ def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stdout + done.stderr  # 1 when the RMSE is above 0.30 m
     assert "foot real" in done.stdout
-    assert "echoes simulated" in open_recording(tmp_path / "walk.mcap").about["note"]
+    assert "echoes simulated" in open_recording(tmp_path / "walk.mcap").metadata["note"]
     assert (tmp_path / "track.png").stat().st_size > 10_000
 
 

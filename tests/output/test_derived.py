@@ -39,7 +39,7 @@ def tracked(out: Path | None, plan: Plan, most: int = 50) -> list[Estimate]:
         new = tracker.take(portion)
         estimates += new
         if recorder:
-            recorder.notes(derived.take(portion, new))
+            recorder.write_derived(derived.take(portion, new))
     if recorder:
         recorder.close()
     return estimates

@@ -19,7 +19,7 @@ from echostep.localization.estimate import Estimate
 from echostep.output.track_files import export as write
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import load_plan
-from echostep.recording.edit import info
+from echostep.recording.contents import info
 from echostep.recording.recorder import Recorder, open_recording
 from echostep.session.options import TrackingOptions
 from echostep.session.replay import tracker_of
@@ -92,7 +92,7 @@ def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: li
 def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> None:
     out = export(folder, "again.mcap")
     assert tuple(open_recording(out).chunks()) == walk_chunks()
-    assert open_recording(out).about == {"seed": "3", "note": "a test"}
+    assert open_recording(out).metadata == {"seed": "3", "note": "a test"}
     told = "\n".join(info(out))
     assert "/estimate" in told
     assert told.endswith("whole")

@@ -21,9 +21,10 @@ from mcap.writer import CompressionType, Writer
 from echostep.errors import EchostepError
 from echostep.output.derived import PRESSURE
 from echostep.ports.chunks import Chunk
-from echostep.recording.edit import cut, info, repair
+from echostep.recording.contents import info
+from echostep.recording.edit import cut, repair
 from echostep.recording.mcap_records import RAW_ENCODING
-from echostep.recording.recorder import Note, Recorder, open_recording
+from echostep.recording.recorder import DerivedMessage, Recorder, open_recording
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
 FIXTURE = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -37,7 +38,9 @@ def recorded() -> bytes:
             for k, chunk in enumerate(CHUNKS):
                 recorder.write(chunk)
                 if not k % 10:
-                    recorder.note(Note(PRESSURE, chunk.t_arrival_ns, {"ticks": k, "pressure_pa": 101_325.0}))
+                    recorder.write_derived(
+                        [DerivedMessage(PRESSURE, chunk.t_arrival_ns, {"ticks": k, "pressure_pa": 101_325.0})]
+                    )
         return path.read_bytes()
 
 
@@ -99,7 +102,7 @@ def test_no_terminal_obeys_a_strangers_recording(tmp_path: Path) -> None:
 
 def test_mending_a_whole_file_changes_nothing_in_it(tmp_path: Path) -> None:
     assert saved(write(tmp_path / "a.mcap"), tmp_path) == CHUNKS
-    assert open_recording(tmp_path / "out.mcap").about == {"seed": "4", "start_x_y_rad": "1.0,2.0,0.0"}
+    assert open_recording(tmp_path / "out.mcap").metadata == {"seed": "4", "start_x_y_rad": "1.0,2.0,0.0"}
     assert "nothing was wrong" in "\n".join(repair(tmp_path / "a.mcap", tmp_path / "b.mcap"))
 
 

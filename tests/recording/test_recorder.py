@@ -21,8 +21,8 @@ from mcap.writer import CompressionType, Writer
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import LATEST_NS, Chunk
-from echostep.recording.mcap_records import MCAP_MAGIC, RECORD_LIMIT, opened, port_of
-from echostep.recording.recorder import PIECE, Recorder, open_recording
+from echostep.recording.mcap_records import MCAP_MAGIC, RECORD_LIMIT, decompress_chunk, port_of
+from echostep.recording.recorder import READ_BYTES, Recorder, open_recording
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]
 
@@ -37,7 +37,7 @@ def write(path: Path, chunks: list[Chunk] = CHUNKS) -> bytes:
 def test_round_trip(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap")
     recording = open_recording(tmp_path / "a.mcap")
-    assert recording.about == {"seed": "4", "note": "a test"}
+    assert recording.metadata == {"seed": "4", "note": "a test"}
     assert list(recording.chunks()) == CHUNKS
     assert not recording.truncated
 
@@ -101,7 +101,7 @@ def test_a_recording_comes_in_portions_that_join_to_all_of_it(tmp_path: Path) ->
 
 
 def test_a_chunk_larger_than_a_portion_is_read(tmp_path: Path) -> None:
-    chunks = [Chunk("board", 1, bytes(3 * PIECE)), Chunk("board", 2, b"after")]
+    chunks = [Chunk("board", 1, bytes(3 * READ_BYTES)), Chunk("board", 2, b"after")]
     write(tmp_path / "a.mcap", chunks)
     assert list(open_recording(tmp_path / "a.mcap").chunks()) == chunks
 
@@ -115,7 +115,7 @@ def test_a_source_that_can_wait_is_never_more_than_half_a_second_ahead_of_the_fi
     recorder = Recorder(tmp_path / "a.mcap", {})
     for chunk in CHUNKS:
         recorder.write(chunk)
-        recorder.settle(chunk)
+        recorder.wait_for_disk(chunk)
     found = list(open_recording(tmp_path / "a.mcap").chunks())
     assert found == CHUNKS[: len(found)]
     assert CHUNKS[-1].t_arrival_ns - found[-1].t_arrival_ns <= 500_000_000
@@ -148,7 +148,7 @@ def test_a_recording_that_another_tool_has_packed_into_chunks_is_the_same(
         writer.add_metadata("echostep", {"seed": "4", "note": "a test"})
         writer.finish()  # type: ignore[no-untyped-call]
     recording = open_recording(tmp_path / "b.mcap")
-    assert recording.about == {"seed": "4", "note": "a test"}
+    assert recording.metadata == {"seed": "4", "note": "a test"}
     assert list(recording.chunks()) == CHUNKS
     assert not recording.truncated
 
@@ -159,14 +159,14 @@ def test_a_recording_that_another_tool_has_packed_into_chunks_is_the_same(
 def test_a_damaged_chunk_is_left_closed(compression: str, junk: bytes, claimed: int) -> None:
     name = compression.encode()
     body = struct.pack("<QQQII", 0, 0, claimed, 0, len(name)) + name + struct.pack("<Q", len(junk)) + junk
-    assert opened(body) in (None, b"", junk)
+    assert decompress_chunk(body) in (None, b"", junk)
 
 
 def test_a_chunk_that_would_fill_the_memory_is_left_closed() -> None:
     squeezed = zstandard.ZstdCompressor(level=19).compress(bytes(RECORD_LIMIT + 5))
     head = struct.pack("<QQQII", 0, 0, 10, 0, 4) + b"zstd" + struct.pack("<Q", len(squeezed))
     assert len(squeezed) < 100_000
-    assert opened(head + squeezed) is None
+    assert decompress_chunk(head + squeezed) is None
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAP0\r\n"])

@@ -94,8 +94,8 @@ def test_a_disk_that_stays_full_costs_no_more_memory_than_the_limit(
         recorder.close()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert recorder.lost > 850
-    assert any(f"{recorder.lost} chunks were not recorded" in line for line in recorder.notices)
+    assert recorder.lost_chunks > 850
+    assert any(f"{recorder.lost_chunks} chunks were not recorded" in line for line in recorder.notices)
     assert RAW_LIMIT > 1 << 20
 
 

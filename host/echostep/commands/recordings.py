@@ -20,9 +20,9 @@ Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="The recor
 @app.command()
 def info(file: Recording) -> None:
     """Show what a recording holds, and whether it is whole."""
-    from echostep.recording import edit
+    from echostep.recording import contents
 
-    print("\n".join(edit.info(file)))
+    print("\n".join(contents.info(file)))
 
 
 @app.command()

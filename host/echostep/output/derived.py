@@ -1,7 +1,7 @@
 """Derived messages of a recording, for viewers: estimates, steps, echoes, pressure, status of the board.
 
-In: portions, and the estimates that the tracker made of them. Out: `Note`s for the recorder. Owns a board reader, the last estimate and the drawn
-track; it reads the counts and the clock of the tracker and changes nothing. A replay does not read these messages.
+In: portions, and the estimates that the tracker made of them. Out: `DerivedMessage`s for the recorder. Owns a board reader, the last estimate and the
+drawn track; it reads the counts and the clock of the tracker and changes nothing. A replay does not read these messages.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from echostep.output.foxglove import (
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Plan
 from echostep.ports.chunks import BOARD, Portion
-from echostep.recording.recorder import Note, Topic
+from echostep.recording.recorder import DerivedMessage, Topic
 from echostep.tracker import Tracker
 
 PRESSURE_PA, TEMPERATURE_C = 0.25, 0.05  # units of a count
@@ -112,9 +112,9 @@ class Derived:
         self._track: list[Place] = []
         self._last_echo: dict[int, tuple[int, float]] = {}
 
-    def take(self, portion: Portion, estimates: list[Estimate]) -> list[Note]:
+    def take(self, portion: Portion, estimates: list[Estimate]) -> list[DerivedMessage]:
         """The messages of a portion: from its board frames by kind, then from its estimates."""
-        notes: list[Note] = []
+        notes: list[DerivedMessage] = []
         from_board = portion.of(BOARD)
         if from_board.received:
             frames = self._board.frames(from_board.received)
@@ -124,7 +124,7 @@ class Derived:
             notes += self._estimate(estimate)
         return notes
 
-    def _echoes(self, frames: Frames, t_ns: Any) -> list[Note]:
+    def _echoes(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
         frame_index, pings = frames.rows(_IDS[Ping])
         notes = []
         for k, ping, range_m in zip(
@@ -134,10 +134,10 @@ class Derived:
             if body["heard"]:
                 body |= {"range_m": range_m, "time_of_flight_us": int(ping["time_of_flight_us"])}
                 self._last_echo[which] = int(t_ns[k]), range_m
-            notes.append(Note(ECHO[which], int(t_ns[k]), body))
+            notes.append(DerivedMessage(ECHO[which], int(t_ns[k]), body))
         return notes
 
-    def _status(self, frames: Frames, t_ns: Any) -> list[Note]:
+    def _status(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
         frame_index, rows = frames.rows(_IDS[Status])
         streams = self._tracker.streams
         own = {
@@ -151,11 +151,11 @@ class Derived:
             "particles": self._tracker.state.particle_count,
         }
         return [
-            Note(STATUS, int(t_ns[k]), {**Status.unpack(row.tobytes())._asdict(), **own})
+            DerivedMessage(STATUS, int(t_ns[k]), {**Status.unpack(row.tobytes())._asdict(), **own})
             for k, row in zip(frame_index.tolist(), rows, strict=True)
         ]
 
-    def _estimate(self, e: Estimate) -> list[Note]:
+    def _estimate(self, e: Estimate) -> list[DerivedMessage]:
         numbers = {k: v for k, v in dataclasses.asdict(e).items() if not isinstance(v, float) or math.isfinite(v)}
         if not {"t_s", "x_m", "y_m", "heading_rad"} <= numbers.keys():
             return []
@@ -167,7 +167,7 @@ class Derived:
             "heading_deg": math.degrees(e.heading_rad),
             "radius95_m": ellipse.major_m,
         }
-        notes = [Note(ESTIMATE, t_ns, body)]
+        notes = [DerivedMessage(ESTIMATE, t_ns, body)]
         notes += pose(t_ns, (e.x_m, e.y_m, e.z_m), e.heading_rad)
         notes += self._location(e, t_ns)
         notes += self._step(e, t_ns)
@@ -175,7 +175,7 @@ class Derived:
         self._last = e
         return notes
 
-    def _location(self, e: Estimate, t_ns: int) -> list[Note]:
+    def _location(self, e: Estimate, t_ns: int) -> list[DerivedMessage]:
         georeference = self._tracker.plan.georeference
         if self._earth is None or georeference is None:
             return []
@@ -184,7 +184,7 @@ class Derived:
         covariance = (ee, en, 0.0, en, nn, 0.0, 0.0, 0.0, e.z_sd_m**2)
         return [location(t_ns, longitude, latitude, e.z_m, covariance)]
 
-    def _step(self, e: Estimate, t_ns: int) -> list[Note]:
+    def _step(self, e: Estimate, t_ns: int) -> list[DerivedMessage]:
         """The message of a step: from the last estimate of the previous step to the first estimate with a higher step count."""
         before = self._last
         if before is None or e.step <= before.step:
@@ -196,9 +196,9 @@ class Derived:
         }  # fmt: skip
         if duration_s > 0.0:
             body["speed_m_s"] = length_m / duration_s
-        return [Note(STEP, t_ns, body)]
+        return [DerivedMessage(STEP, t_ns, body)]
 
-    def _scene(self, e: Estimate, t_ns: int) -> Note:
+    def _scene(self, e: Estimate, t_ns: int) -> DerivedMessage:
         """Track, ellipse and echo beams of an estimate; with the first one also the walls."""
         here = (e.x_m, e.y_m, e.z_m)
         self._track.append(here)
@@ -235,7 +235,7 @@ def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) ->
     return east, c * s * (xx_m2 - yy_m2) + (c * c - s * s) * xy_m2, north
 
 
-def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
+def _pressures(frames: Frames, t_ns: Any) -> list[DerivedMessage]:
     frame_index, rows = frames.rows(_IDS[Pressure])
     notes = []
     for k, row in zip(frame_index.tolist(), rows, strict=True):
@@ -244,7 +244,7 @@ def _pressures(frames: Frames, t_ns: Any) -> list[Note]:
         body: dict[str, Any] = {"ticks": int(row["ticks"]), "pressure_pa": PRESSURE_PA * int(row["pressure"])}
         if row["temperature"] != PRESSURE_TEMPERATURE_INVALID:
             body["temperature_c"] = round(TEMPERATURE_C * int(row["temperature"]), 3)
-        notes.append(Note(PRESSURE, int(t_ns[k]), body))
+        notes.append(DerivedMessage(PRESSURE, int(t_ns[k]), body))
     return notes
 
 

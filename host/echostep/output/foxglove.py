@@ -1,7 +1,7 @@
 """Messages that viewers of recordings (Foxglove, PlotJuggler) show without a plug-in.
 
-In: positions, headings, a plan. Out: `Note`s for a `Recorder`: JSON with JSON Schemas, those of Foxglove where one fits [Foxglove, message schemas],
-else flat objects of numbers, which can be plotted. Owns nothing. The schemas contain only the fields that are filled.
+In: positions, headings, a plan. Out: `DerivedMessage`s for a `Recorder`: JSON with JSON Schemas, those of Foxglove where one fits
+[Foxglove, message schemas], else flat objects of numbers, which can be plotted. Owns nothing. The schemas contain only the fields that are filled.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from echostep.plan.model import Level
-from echostep.recording.recorder import Note, Topic
+from echostep.recording.recorder import DerivedMessage, Topic
 
 MAP_FRAME, TRUNK_FRAME = "map", "trunk"
 NUMBER, TEXT, WHOLE, TRUTH = {"type": "number"}, {"type": "string"}, {"type": "integer"}, {"type": "boolean"}
@@ -108,12 +108,14 @@ def about_vertical(heading_rad: float) -> dict[str, float]:
     return {"x": 0.0, "y": 0.0, "z": math.sin(0.5 * heading_rad), "w": math.cos(0.5 * heading_rad)}
 
 
-def pose(t_ns: int, xyz_m: Place, heading_rad: float) -> list[Note]:
+def pose(t_ns: int, xyz_m: Place, heading_rad: float) -> list[DerivedMessage]:
     """Position and heading of the trunk: as a pose, and as a frame that a 3D view can follow."""
     stamp, here, turn = time_of(t_ns), vector(xyz_m), about_vertical(heading_rad)
     return [
-        Note(POSE, t_ns, {"timestamp": stamp, "frame_id": MAP_FRAME, "pose": {"position": here, "orientation": turn}}),
-        Note(
+        DerivedMessage(
+            POSE, t_ns, {"timestamp": stamp, "frame_id": MAP_FRAME, "pose": {"position": here, "orientation": turn}}
+        ),
+        DerivedMessage(
             FRAME,
             t_ns,
             {
@@ -127,7 +129,9 @@ def pose(t_ns: int, xyz_m: Place, heading_rad: float) -> list[Note]:
     ]
 
 
-def location(t_ns: int, longitude: float, latitude: float, height_m: float, covariance_m2: Sequence[float]) -> Note:
+def location(
+    t_ns: int, longitude: float, latitude: float, height_m: float, covariance_m2: Sequence[float]
+) -> DerivedMessage:
     """A position in longitude and latitude (WGS 84, degrees); `covariance_m2` (9,), row by row: east, north, up."""
     body = {
         "timestamp": time_of(t_ns),
@@ -138,13 +142,13 @@ def location(t_ns: int, longitude: float, latitude: float, height_m: float, cova
         "position_covariance": list(covariance_m2),
         "position_covariance_type": COVARIANCE_KNOWN,
     }
-    return Note(LOCATION, t_ns, body)
+    return DerivedMessage(LOCATION, t_ns, body)
 
 
-def scene(t_ns: int, **drawn: tuple[int, Color, Sequence[Place]]) -> Note:
+def scene(t_ns: int, **drawn: tuple[int, Color, Sequence[Place]]) -> DerivedMessage:
     """Lines on the map by name, each (kind, color, points (m)); a later line of the same name replaces the earlier one."""
     entities = [_entity(t_ns, name, *what) for name, what in drawn.items()]
-    return Note(SCENE, t_ns, {"deletions": [], "entities": entities})
+    return DerivedMessage(SCENE, t_ns, {"deletions": [], "entities": entities})
 
 
 def walls(level: Level) -> tuple[int, Color, list[Place]]:

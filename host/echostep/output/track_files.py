@@ -101,14 +101,14 @@ def _flat(columns: Columns) -> Columns:
 def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[Estimate]) -> None:
     """Write the recorded bytes again, with the messages derived from them now."""
     derived = Derived(tracker)
-    with Recorder(out, recording.about) as recorder:
+    with Recorder(out, recording.metadata) as recorder:
         for portion in with_progress(recording, f"tracking {recording.path.name}"):
             for chunk in portion.chunks():
                 recorder.write(chunk)
-                recorder.settle(chunk)
+                recorder.wait_for_disk(chunk)
             new = tracker.take(portion)
             estimates += new
-            recorder.notes(derived.take(portion, new))
+            recorder.write_derived(derived.take(portion, new))
     if recorder.notices:
         raise EchostepError(recorder.notices[0])
 

@@ -1,4 +1,4 @@
-"""Recordings: every chunk as it arrived, in an MCAP file, and back again.
+"""Recordings: all received chunks in an MCAP file, written, read, described, cut and repaired.
 
-In: chunks, or a file. Out: a file, or portions of chunks. Owns the file while it is written. Recovery, cutting and repair of files are here too.
+In: chunks, or a file. Out: a file, or portions of chunks. Owns the file while it is written.
 """

@@ -1,7 +1,8 @@
-"""A file that a thread of its own writes: who has something to write never waits for the disk.
+"""A file that is written by its own thread, so that the caller never waits for the disk.
 
-In: bytes, at any time. Out: the same bytes in the file, with the operating system within a twentieth of a second and on the disk within one.
-Owns the file, the thread, and what the disk has not taken yet. A disk that takes no more is announced, and tried again every second.
+In: bytes, at any time. Out: the same bytes in the file: passed to the operating system every `WRITE_S` and to the disk every `SYNC_S`.
+Owns the file, the thread, and the buffer of bytes that are not written yet. A disk that refuses bytes is reported once, and tried again
+every `RETRY_S`.
 """
 
 from __future__ import annotations
@@ -15,118 +16,119 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 
-DRAIN_S = 0.05
-SYNC_S = 0.5
-RETRY_S = 1.0
-SETTLE_S = 1.0  # nobody waits longer for a disk that takes nothing
-CLOSE_S = 10.0
+# All by reason: a killed process loses less than a tenth of a second, a power failure less than a second.
+WRITE_S = 0.05  # between two writes
+SYNC_S = 0.5  # between two fsync
+RETRY_S = 1.0  # between two attempts on a disk that refuses bytes
+MAX_WAIT_S = 1.0  # of `wait_until_written`
+CLOSE_S = 10.0  # longest wait for the thread when the file is closed
+MOST_NOTICES = 8  # kept; the oldest is dropped
 
 
-class Spool:
-    """Append-only; raises EchostepError when the file cannot be made. `notices` says in words what happens to the disk."""
+class BackgroundWriter:
+    """An append-only file; raises EchostepError when it cannot be created. `notices` holds messages about the disk."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self.notices: deque[str] = deque(maxlen=8)
-        self.failed = False  # the disk took nothing when it was asked last
+        self.notices: deque[str] = deque(maxlen=MOST_NOTICES)
+        self.failed = False  # the disk refused the bytes of the last write
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
         except OSError as error:
             raise EchostepError(f"{path}: cannot write: {error.strerror}") from error
         self._lock = threading.Condition()
-        self._pending = bytearray()
-        self._written = 0  # bytes that the operating system has
-        self._length = 0
+        self._pending = bytearray()  # not yet seen by the thread
+        self._written = 0  # bytes passed to the operating system
+        self._length = 0  # bytes accepted by `write`
         self._closing = False
-        self._thread = threading.Thread(target=self._drain, name="spool", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
         self._thread.start()
 
     @property
-    def behind(self) -> int:
-        """Bytes that the operating system does not have yet."""
+    def unwritten_bytes(self) -> int:
+        """Bytes that are not yet passed to the operating system."""
         return self._length - self._written
 
-    def write(self, piece: bytes) -> int:
-        """Take bytes; never waits."""
+    def write(self, data: bytes) -> int:
+        """Append to the buffer; never waits for the disk."""
         with self._lock:
-            self._pending += piece
-            self._length += len(piece)
-        return len(piece)
+            self._pending += data
+            self._length += len(data)
+        return len(data)
 
     def tell(self) -> int:
-        """Bytes taken so far."""
+        """Bytes accepted so far: the position in the file, as the MCAP writer asks for it."""
         return self._length
 
-    def settle(self) -> None:
-        """Wait until the operating system has everything; not at all for a disk that is full, and never for longer than a second."""
-        end = time.monotonic() + SETTLE_S
+    def wait_until_written(self) -> None:
+        """Wait until the operating system has all bytes, for at most `MAX_WAIT_S`; return at once when the disk refuses bytes."""
+        end_s = time.monotonic() + MAX_WAIT_S
         with self._lock:
-            while self.behind and not self.failed and (left := end - time.monotonic()) > 0.0:
+            while self.unwritten_bytes and not self.failed and (left_s := end_s - time.monotonic()) > 0.0:
                 self._lock.notify_all()
-                self._lock.wait(min(left, DRAIN_S))
+                self._lock.wait(min(left_s, WRITE_S))
 
     def close(self) -> None:
-        """Write what is left, as far as the disk takes it, and close the file."""
+        """Write the rest of the buffer and close the file; a notice tells how many bytes the disk refused."""
         with self._lock:
             self._closing = True
             self._lock.notify_all()
         self._thread.join(CLOSE_S)
-        if self.behind:
-            self.notices.append(f"{self.path}: the last {self.behind} bytes are not on the disk")
+        if self.unwritten_bytes:
+            self.notices.append(f"{self.path}: the last {self.unwritten_bytes} bytes are not on the disk")
         if not self._thread.is_alive():
             os.close(self._file)
 
-    def _drain(self) -> None:
-        """The thread: until closed, and then once more."""
-        left, synced_s, dirty = b"", time.monotonic(), False
+    def _run(self) -> None:
+        """The thread: write the buffer until `close` is called, and once more after it."""
+        unwritten, synced_s, dirty = b"", time.monotonic(), False
         while True:
             with self._lock:
                 if not self._closing:
-                    self._lock.wait(RETRY_S if self.failed else DRAIN_S)
+                    self._lock.wait(RETRY_S if self.failed else WRITE_S)
                 closing = self._closing
-                left += bytes(self._pending)
+                unwritten += bytes(self._pending)
                 self._pending.clear()
-            taken = self._pour(left)
+            count = self._write_to_file(unwritten)
             with self._lock:
-                left = left[taken:]
-                self._written += taken
+                unwritten = unwritten[count:]
+                self._written += count
                 self._lock.notify_all()
-            dirty = dirty or taken > 0
+            dirty = dirty or count > 0
             if dirty and (closing or time.monotonic() - synced_s >= SYNC_S):
                 self._sync()
                 synced_s, dirty = time.monotonic(), False
             if closing:
                 return
 
-    def _pour(self, left: bytes) -> int:
-        """How many bytes the operating system took."""
-        taken = 0
-        view = memoryview(left)
+    def _write_to_file(self, data: bytes) -> int:
+        """Pass bytes to the operating system; returns how many it accepted."""
+        count = 0
+        view = memoryview(data)
         try:
-            while taken < len(left):
-                taken += os.write(self._file, view[taken:])
+            while count < len(data):
+                count += os.write(self._file, view[count:])
         except OSError as error:
             if not self.failed:
                 self.failed = True
-                self.notices.append(
-                    f"{self.path}: {_words(error)}; tracking goes on, what comes now is not recorded yet"
-                )
-            return taken
-        if self.failed and left:
+                self.notices.append(f"{self.path}: {_reason(error)}; tracking goes on, new bytes are not recorded yet")
+            return count
+        if self.failed and data:
             self.failed = False
             self.notices.append(f"{self.path}: the disk takes bytes again; the recording goes on")
-        return taken
+        return count
 
     def _sync(self) -> None:
+        """Ask the operating system to bring the file to the disk; pipes and some file systems have no fsync."""
         try:
             os.fsync(self._file)
         except OSError as error:
             if error.errno not in (errno.EINVAL, errno.ENOTSUP) and not self.failed:
-                self.notices.append(f"{self.path}: {_words(error)}")
+                self.notices.append(f"{self.path}: {_reason(error)}")
 
 
-def _words(error: OSError) -> str:
+def _reason(error: OSError) -> str:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return "the disk is full"
     return f"the disk takes no more: {error.strerror}"

@@ -1,7 +1,10 @@
-"""The records of an MCAP file: runs of messages as columns, all others as opcode and body.
+"""Records of an MCAP file [MCAP format specification, mcap.dev/spec]: runs of messages as columns, other records as opcode and body.
 
-In: bytes of a file, from anybody, with anything wrong in them. Out: `Portion`s of what the ports delivered, and records. Owns nothing.
-Messages of other channels than the ports' bytes are passed over. Chunks, compressed or not, are opened.
+In: bytes of a file, possibly damaged or hostile. Out: `Portion`s of the ports' messages, and records. Owns nothing.
+Messages of other channels than the ports' are skipped. Chunk records, compressed or not, are decompressed.
+
+    record   opcode u8 | length u64 | body                                     HEAD_SIZE = 9 bytes before the body
+    message  channel u16 | sequence u32 | log time u64 | publish time u64 | data      opcode MESSAGE, MESSAGE_SIZE = 22 bytes before the data
 """
 
 from __future__ import annotations
@@ -20,134 +23,143 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Metadata, Schema
-from mcap.records import Chunk as Batch
+from mcap.records import Chunk as ChunkRecord
 
 from echostep.arrays import Ints, Octets
 from echostep.jit import kernel
 from echostep.ports.chunks import LATEST_NS, Portion
 
+# Layout of the records, bytes [MCAP format specification].
 MCAP_MAGIC = b"\x89MCAP0\r\n"
-RECORD_LIMIT = 1 << 28  # bytes of one record, of one chunk when opened
-_HEAD = struct.Struct("<BQ")  # opcode, length
 HEAD_SIZE = 9
-MESSAGE = 0x05  # its opcode
-MESSAGE_SIZE = 22  # channel u16, sequence u32, log time u64, publish time u64; the bytes follow
-RAW_ENCODING = "application/octet-stream"
+MESSAGE = 0x05  # opcode
+MESSAGE_SIZE = 22
+LOG_TIME_OFFSET = 6  # in the body of a message
+CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
+_HEAD = struct.Struct("<BQ")
 
-Record = TypeVar("Record", Header, Schema, Channel, Metadata, Batch)
+RAW_ENCODING = "application/octet-stream"  # message encoding of the ports' channels
+# By reason: bounds the memory that a damaged file can ask for.
+RECORD_LIMIT = 1 << 28  # bytes of one record, and of one decompressed chunk
+ZSTD_WINDOW = 1 << 27  # bytes
+
+Record = TypeVar("Record", Header, Schema, Channel, Metadata, ChunkRecord)
 
 
 @dataclass
-class Ports:
-    """The ports of the channels seen so far: their names, and by channel id the place among the names, -1: no port's channel."""
+class PortChannels:
+    """Ports of the channels read so far: `names`, and by channel number the index into `names`; -1 for a channel of no port."""
 
     names: tuple[str, ...] = ()
-    of_channel: Ints = field(default_factory=lambda: np.full(1 << 16, -1, np.int64))
+    port_of_channel: Ints = field(default_factory=lambda: np.full(CHANNEL_IDS, -1, np.int64))
 
     def add(self, body: bytes) -> None:
-        """Take a channel record into account, if it is one of a port's bytes."""
-        if (found := parsed(Channel, body)) and (name := port_of(found)):
+        """Add the channel of a channel record, if it carries a port's bytes."""
+        if (channel := parse_record(Channel, body)) and (name := port_of(channel)):
             self.names = tuple(dict.fromkeys((*self.names, name)))
-            self.of_channel[found.id] = self.names.index(name)
+            self.port_of_channel[channel.id] = self.names.index(name)
 
 
 def port_of(channel: Channel) -> str:
-    """The port whose bytes a channel carries; empty for any other channel."""
+    """Name of the port whose bytes a channel carries; empty for any other channel."""
     if channel.message_encoding != RAW_ENCODING or not channel.topic.endswith("/bytes"):
         return ""
     return channel.topic.removeprefix("/").removesuffix("/bytes")
 
 
-def record_at(buffer: bytes, at: int) -> tuple[tuple[int, bytes] | None, int]:
-    """Opcode and body of the record at `at`, or None and how many bytes are missing."""
-    if len(buffer) - at < HEAD_SIZE:
-        return None, at + HEAD_SIZE - len(buffer)
-    opcode, length = _HEAD.unpack_from(buffer, at)
-    body = buffer[at + HEAD_SIZE : at + HEAD_SIZE + length]
+def read_record(buffer: bytes, offset: int) -> tuple[tuple[int, bytes] | None, int]:
+    """Opcode and body of the record at `offset`, and 0; None and the number of missing bytes when the buffer ends before the record."""
+    if len(buffer) - offset < HEAD_SIZE:
+        return None, offset + HEAD_SIZE - len(buffer)
+    opcode, length = _HEAD.unpack_from(buffer, offset)
+    body = buffer[offset + HEAD_SIZE : offset + HEAD_SIZE + length]
     return ((opcode, body), 0) if len(body) == length else (None, length - len(body))
 
 
-def messages(buffer: bytes, at: int, ports: Ports) -> tuple[Portion | None, int]:
-    """The ports' messages in the unbroken run of complete messages from `at` on, if there are any, and where it ends."""
-    most = (len(buffer) - at) // (HEAD_SIZE + MESSAGE_SIZE)
+def read_messages(buffer: bytes, offset: int, channels: PortChannels) -> tuple[Portion | None, int]:
+    """The ports' messages among the consecutive complete message records from `offset` on, and the offset after these records."""
+    most = (len(buffer) - offset) // (HEAD_SIZE + MESSAGE_SIZE)
     port, t_arrival_ns, start, end = (np.empty(most, np.int64) for _ in range(4))
-    found, at = _sweep(np.frombuffer(buffer, np.uint8), at, ports.of_channel, port, t_arrival_ns, start, end)
-    portion = Portion(ports.names, port[:found], t_arrival_ns[:found], start[:found], end[:found], buffer)
-    return (portion if found else None), at
+    count, offset = _read_message_run(
+        np.frombuffer(buffer, np.uint8), offset, channels.port_of_channel, port, t_arrival_ns, start, end
+    )
+    portion = Portion(channels.names, port[:count], t_arrival_ns[:count], start[:count], end[:count], buffer)
+    return (portion if count else None), offset
 
 
-def opened(body: bytes) -> bytes | None:
-    """The records inside a chunk; None when it is damaged, larger than anybody's or compressed in an unknown way."""
-    batch = parsed(Batch, body)
-    if batch is None or batch.uncompressed_size > RECORD_LIMIT:
+def decompress_chunk(body: bytes) -> bytes | None:
+    """The records in a chunk record; None when it is damaged, larger than `RECORD_LIMIT` or compressed in an unknown way."""
+    chunk = parse_record(ChunkRecord, body)
+    if chunk is None or chunk.uncompressed_size > RECORD_LIMIT:
         return None
     try:
-        inside = _expanded(batch.compression, batch.data, batch.uncompressed_size)
+        records = _decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):  # RuntimeError: lz4
         return None
-    if inside is None or len(inside) != batch.uncompressed_size:
+    if records is None or len(records) != chunk.uncompressed_size:
         return None
-    return inside if not batch.uncompressed_crc or zlib.crc32(inside) == batch.uncompressed_crc else None
+    return records if not chunk.uncompressed_crc or zlib.crc32(records) == chunk.uncompressed_crc else None
 
 
-def _expanded(compression: str, squeezed: bytes, size: int) -> bytes | None:
-    """Never more than one byte more than is claimed, however much there is."""
+def _decompress(compression: str, compressed: bytes, size: int) -> bytes | None:
+    """At most `size` + 1 bytes: one byte too many shows that the stated size is wrong. None for an unknown compression."""
     if compression == "zstd":
-        with zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(squeezed) as stream:
+        with zstandard.ZstdDecompressor(max_window_size=ZSTD_WINDOW).stream_reader(compressed) as stream:
             return stream.read(size + 1)
     if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(squeezed, max_length=size + 1))
-    return squeezed if not compression else None
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(compressed, max_length=size + 1))
+    return compressed if not compression else None
 
 
-def inside_of(buffer: bytes, ports: Ports) -> Iterator[Portion | tuple[int, bytes]]:
-    """Portions and records of an opened chunk."""
-    at = 0
+def records_in_chunk(buffer: bytes, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
+    """Portions and other records (opcode, body) of a decompressed chunk, in order."""
+    offset = 0
     while True:
-        portion, at = messages(buffer, at, ports)
+        portion, offset = read_messages(buffer, offset, channels)
         if portion:
             yield portion
-        record, _ = record_at(buffer, at)
+        record, _ = read_record(buffer, offset)
         if record is None:
             return
-        if record[0] == Opcode.CHANNEL:
-            ports.add(record[1])
+        opcode, body = record
+        if opcode == Opcode.CHANNEL:
+            channels.add(body)
         yield record
-        at += HEAD_SIZE + len(record[1])
+        offset += HEAD_SIZE + len(body)
 
 
 @kernel
-def _sweep(
-    buffer: Octets, at: int, port_of: Ints, port: Ints, t_arrival_ns: Ints, start: Ints, end: Ints
+def _read_message_run(
+    buffer: Octets, offset: int, port_of_channel: Ints, port: Ints, t_arrival_ns: Ints, start: Ints, end: Ints
 ) -> tuple[int, int]:
-    """Fill the columns from message records of the ports; returns how many there were, and where another record or the end came."""
-    found = 0
-    while at + HEAD_SIZE <= len(buffer) and buffer[at] == MESSAGE:
-        length = number_at(buffer, at + 1, 8)
-        body = at + HEAD_SIZE
+    """Fill the columns of a portion from consecutive message records; returns the number of rows, and the offset of the first other record."""
+    count = 0
+    while offset + HEAD_SIZE <= len(buffer) and buffer[offset] == MESSAGE:
+        length = read_uint(buffer, offset + 1, 8)
+        body = offset + HEAD_SIZE
         if not 0 <= length <= len(buffer) - body:
             break
-        at = body + length
-        if length >= MESSAGE_SIZE and port_of[number_at(buffer, body, 2)] >= 0:
-            port[found] = port_of[number_at(buffer, body, 2)]
-            log_time_ns = number_at(buffer, body + 6, 8)
-            t_arrival_ns[found] = log_time_ns if 0 <= log_time_ns <= LATEST_NS else LATEST_NS
-            start[found], end[found] = body + MESSAGE_SIZE, at
-            found += 1
-    return found, at
+        offset = body + length
+        if length >= MESSAGE_SIZE and port_of_channel[read_uint(buffer, body, 2)] >= 0:
+            port[count] = port_of_channel[read_uint(buffer, body, 2)]
+            log_time_ns = read_uint(buffer, body + LOG_TIME_OFFSET, 8)
+            t_arrival_ns[count] = log_time_ns if 0 <= log_time_ns <= LATEST_NS else LATEST_NS
+            start[count], end[count] = body + MESSAGE_SIZE, offset
+            count += 1
+    return count, offset
 
 
 @kernel
-def number_at(buffer: Octets, at: int, size: int) -> int:
-    """A little-endian number; from 2^63 on negative."""
+def read_uint(buffer: Octets, offset: int, size: int) -> int:
+    """A little-endian unsigned number of `size` bytes; negative from 2^63 on."""
     value = 0
     for k in range(size):
-        value |= (buffer[at + k] & 0xFF) << 8 * k
+        value |= (buffer[offset + k] & 0xFF) << 8 * k
     return value
 
 
-def parsed(kind: type[Record], body: bytes) -> Record | None:
-    """A record by the library's own reader; None when the body is damaged."""
+def parse_record(kind: type[Record], body: bytes) -> Record | None:
+    """A record as the MCAP library parses it; None when the body is damaged."""
     try:
         return kind.read(ReadDataStream(BytesIO(body)))
     except (McapError, struct.error, UnicodeDecodeError, OverflowError, MemoryError):

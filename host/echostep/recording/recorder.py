@@ -1,7 +1,8 @@
-"""Recordings: every chunk in an MCAP file, on its way to the disk before anything else sees it.
+"""Recordings: every chunk is written to an MCAP file before it is used, and read again as portions.
 
-In: chunks in order of arrival, and what was derived from them. Out: a file, and the same chunks again. Owns the open file.
-Unchunked MCAP, written by a thread of its own (`spool`): what a crash leaves behind is readable up to its last moment, and no disk slows the tracker.
+In: chunks in order of arrival, and messages derived from them. Out: a file, and the same chunks again. Owns the open file.
+The file is MCAP without chunk records, written by a thread (`background_writer`). After a crash it is readable up to its last whole record, and
+a slow disk does not delay the tracker.
 """
 
 from __future__ import annotations
@@ -21,30 +22,31 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk, Portion
-from echostep.recording.background_writer import Spool
+from echostep.recording.background_writer import BackgroundWriter
 from echostep.recording.mcap_records import (
     HEAD_SIZE,
     MCAP_MAGIC,
     RAW_ENCODING,
     RECORD_LIMIT,
-    Ports,
-    inside_of,
-    messages,
-    opened,
-    parsed,
-    record_at,
+    PortChannels,
+    decompress_chunk,
+    parse_record,
+    read_messages,
+    read_record,
+    records_in_chunk,
 )
 
-METADATA_NAME = "echostep"
-SETTLE_NS = 500_000_000
-PIECE = 1 << 18  # bytes of a file that are read at once: about five seconds of a walk
-RAW_LIMIT = 1 << 26  # bytes that wait for a full disk: an hour and a half
-DERIVED_LIMIT = 1 << 20
+METADATA_NAME = "echostep"  # of the metadata record
+# All by reason.
+WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
+READ_BYTES = 1 << 18  # of one read of a file: about five seconds of a walk
+RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
+DERIVED_LIMIT = 1 << 20  # unwritten bytes from which on derived messages are skipped: they can be computed again
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A channel of derived messages: JSON objects of a JSON Schema (`schema`, as text) with a name that viewers know."""
+    """A channel of derived messages: JSON objects of the JSON Schema `schema` (text); viewers know the schema by `schema_name`."""
 
     name: str
     schema_name: str
@@ -52,7 +54,7 @@ class Topic:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class DerivedMessage:
     """One derived message; `t_ns` on the clock of the arrivals."""
 
     topic: Topic
@@ -61,63 +63,60 @@ class Note:
 
 
 class Recorder:
-    """Writes chunks to a new file; raises EchostepError when the file cannot be made."""
+    """Writes chunks to a new file; raises EchostepError when the file cannot be created."""
 
-    def __init__(self, path: Path | str, about: Mapping[str, str]) -> None:
-        """`about`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
-        self._spool = Spool(path)
+    def __init__(self, path: Path | str, metadata: Mapping[str, str]) -> None:
+        """`metadata`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
+        self._file = BackgroundWriter(path)
         self._writer = Writer(
-            self._spool,  # type: ignore[arg-type]  # it writes and tells, no more is asked
+            self._file,  # type: ignore[arg-type]  # the writer calls only `write` and `tell`
             compression=CompressionType.NONE,
             index_types=IndexType.ALL,
             use_chunking=False,
             enable_data_crcs=True,
         )
         self._writer.start(profile="", library="echostep")
-        self._writer.add_metadata(METADATA_NAME, dict(about))
-        self._channels: dict[str, int] = {}
+        self._writer.add_metadata(METADATA_NAME, dict(metadata))
+        self._channels: dict[str, int] = {}  # by port or topic
         self._sequence = 0
-        self._settled_ns: int | None = None
-        self.lost = 0  # chunks, after the disk had been full for long
-        self.skipped = 0  # derived messages, while it was
+        self._waited_ns: int | None = None  # arrival time of the chunk of the last wait
+        self.lost_chunks = 0  # not recorded: more than `RAW_LIMIT` bytes waited for the disk
+        self.skipped_messages = 0  # derived ones, not recorded: more than `DERIVED_LIMIT` bytes waited
 
     @property
     def notices(self) -> deque[str]:
-        """What happened to the disk, in words; for the caller to tell and to clear."""
-        return self._spool.notices
+        """Messages about the disk; the caller prints and clears them."""
+        return self._file.notices
 
     def write(self, chunk: Chunk) -> None:
-        """Keep one chunk; never waits for the disk."""
-        if self._spool.behind > RAW_LIMIT:
-            self.lost += 1
+        """Record one chunk; never waits for the disk."""
+        if self._file.unwritten_bytes > RAW_LIMIT:
+            self.lost_chunks += 1
             return
-        channel = self._channels.get(chunk.port) or self._register(chunk.port)
-        self._writer.add_message(channel, chunk.t_arrival_ns, chunk.data, chunk.t_arrival_ns, self._sequence)
+        channel = self._channels.get(chunk.port) or self._register_port(chunk.port)
+        self._add_message(channel, chunk.t_arrival_ns, chunk.data)
+
+    def wait_for_disk(self, chunk: Chunk) -> None:
+        """Wait for the file once per `WAIT_NS` of arrival time; for sources that can be slowed down."""
+        if self._waited_ns is None or chunk.t_arrival_ns - self._waited_ns >= WAIT_NS:
+            self._waited_ns = chunk.t_arrival_ns
+            self._file.wait_until_written()
+
+    def write_derived(self, messages: Iterable[DerivedMessage]) -> None:
+        """Record derived messages; they are skipped while the disk is behind, in favour of the chunks."""
+        for message in messages:
+            if self._file.unwritten_bytes > DERIVED_LIMIT:
+                self.skipped_messages += 1
+                continue
+            channel = self._channels.get(message.topic.name) or self._register_topic(message.topic)
+            body = json.dumps(message.body, allow_nan=False, separators=(",", ":")).encode()
+            self._add_message(channel, message.t_ns, body)
+
+    def _add_message(self, channel: int, t_ns: int, data: bytes) -> None:
+        self._writer.add_message(channel, t_ns, data, t_ns, self._sequence)
         self._sequence += 1
 
-    def settle(self, chunk: Chunk) -> None:
-        """Wait for the disk when it is half a second of arrivals behind this chunk: for sources that can wait."""
-        if self._settled_ns is None or chunk.t_arrival_ns - self._settled_ns >= SETTLE_NS:
-            self._settled_ns = chunk.t_arrival_ns
-            self._spool.settle()
-
-    def notes(self, notes: Iterable[Note]) -> None:
-        """Keep derived messages."""
-        for note in notes:
-            self.note(note)
-
-    def note(self, note: Note) -> None:
-        """Keep a derived message, unless the disk is busy with the bytes."""
-        if self._spool.behind > DERIVED_LIMIT:
-            self.skipped += 1
-            return
-        topic = note.topic
-        channel = self._channels.get(topic.name) or self._register_topic(topic)
-        body = json.dumps(note.body, allow_nan=False, separators=(",", ":")).encode()
-        self._writer.add_message(channel, note.t_ns, body, note.t_ns, self._sequence)
-        self._sequence += 1
-
-    def _register(self, port: str) -> int:
+    def _register_port(self, port: str) -> int:
         self._channels[port] = self._writer.register_channel(f"/{port}/bytes", RAW_ENCODING, schema_id=0)
         return self._channels[port]
 
@@ -127,28 +126,30 @@ class Recorder:
         return self._channels[topic.name]
 
     def close(self) -> None:
-        """Finish the file."""
+        """Write summary and footer, and close the file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self._spool.close()
-        if self.lost:
-            self.notices.append(f"{self._spool.path}: {self.lost} chunks were not recorded")
+        self._file.close()
+        if self.lost_chunks:
+            self.notices.append(f"{self._file.path}: {self.lost_chunks} chunks were not recorded")
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
         self.close()
 
 
 @dataclass
 class Recording:
-    """A recording on disk: `about` as it was given, and the chunks; `truncated` is set when the file ends too early."""
+    """A recording on disk: its metadata and its chunks. `truncated` is set when the file ends without a footer."""
 
     path: Path
-    about: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, str] = field(default_factory=dict)
     truncated: bool = False
-    fraction: float = 0.0  # of the file read so far
-    closed: int = 0  # chunks of the file that could not be opened
+    fraction: float = 0.0  # of the file, read so far
+    unreadable_chunks: int = 0  # chunk records of the file that could not be decompressed
 
     def chunks(self) -> Iterator[Chunk]:
         """Chunks in the order in which they were recorded."""
@@ -156,66 +157,67 @@ class Recording:
             yield from portion.chunks()
 
     def portions(self) -> Iterator[Portion]:
-        """The same, many at a time."""
-        for read in self._records():
-            if isinstance(read, Portion):
-                yield read
+        """The same chunks as portions of many."""
+        for record in self._records():
+            if isinstance(record, Portion):
+                yield record
         self.fraction = 1.0
 
     def _records(self) -> Iterator[Portion | tuple[int, bytes]]:
-        """Messages by the portion, other records as opcode and body, in order, up to the footer or to where the file ends too early."""
-        ports = Ports()
+        """Messages as portions, other records as opcode and body, in order; ends at the footer or before the first incomplete record."""
+        channels = PortChannels()
         with self.path.open("rb") as file:
             size = max(1, os.fstat(file.fileno()).st_size)
-            place = len(file.read(len(MCAP_MAGIC)))
+            buffer_begin = len(file.read(len(MCAP_MAGIC)))  # offset of `buffer` in the file
             self.truncated = True
             rest, missing = b"", 0
-            while missing <= RECORD_LIMIT and (more := file.read(max(PIECE, missing))):
-                buffer, at = rest + more, 0
+            while missing <= RECORD_LIMIT and (more := file.read(max(READ_BYTES, missing))):
+                buffer, offset = rest + more, 0
                 while True:
-                    portion, at = messages(buffer, at, ports)
-                    self.fraction = (place + at) / size
+                    portion, offset = read_messages(buffer, offset, channels)
+                    self.fraction = (buffer_begin + offset) / size
                     if portion:
                         yield portion
-                    record, missing = record_at(buffer, at)
+                    record, missing = read_record(buffer, offset)
                     if record is None:
                         break
-                    if record[0] == Opcode.FOOTER:
+                    opcode, body = record
+                    if opcode == Opcode.FOOTER:
                         self.truncated = False
                         return
-                    if record[0] == Opcode.CHANNEL:
-                        ports.add(record[1])
-                    if record[0] == Opcode.CHUNK:
-                        yield from self._opened(record[1], ports)
+                    if opcode == Opcode.CHANNEL:
+                        channels.add(body)
+                    if opcode == Opcode.CHUNK:
+                        yield from self._records_in_chunk(body, channels)
                     yield record
-                    at += HEAD_SIZE + len(record[1])
-                place, rest = place + at, buffer[at:]
+                    offset += HEAD_SIZE + len(body)
+                buffer_begin, rest = buffer_begin + offset, buffer[offset:]
 
-    def _opened(self, body: bytes, ports: Ports) -> Iterator[Portion | tuple[int, bytes]]:
-        inside = opened(body)
-        if inside is None:
-            self.closed += 1
+    def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
+        records = decompress_chunk(body)
+        if records is None:
+            self.unreadable_chunks += 1
             return
-        yield from inside_of(inside, ports)
+        yield from records_in_chunk(records, channels)
 
 
 def open_recording(path: Path | str) -> Recording:
-    """A recording and its metadata; raises EchostepError when the file is missing or is none of ours."""
-    recording, found_bytes = Recording(Path(path)), False
+    """A recording and its metadata; raises EchostepError when the file is missing or holds no recorded bytes."""
+    recording, has_bytes = Recording(Path(path)), False
     try:
         with recording.path.open("rb") as file:
-            ours = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
-        for read in recording._records() if ours else ():
-            if isinstance(read, Portion):
-                found_bytes = True
-                if recording.about:
+            is_mcap = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
+        for record in recording._records() if is_mcap else ():
+            if isinstance(record, Portion):
+                has_bytes = True
+                if recording.metadata:
                     break
                 continue
-            opcode, body = read
-            if opcode == Opcode.METADATA and (found := parsed(Metadata, body)) and found.name == METADATA_NAME:
-                recording.about = dict(found.metadata)
+            opcode, body = record
+            if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)) and stored.name == METADATA_NAME:
+                recording.metadata = dict(stored.metadata)
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the recording: {error.strerror}") from error
-    if found_bytes:
+    if has_bytes:
         return recording
     raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")

@@ -1,9 +1,9 @@
-"""Every message of a recording, whatever is wrong with the file.
+"""Recovery: every readable message of a recording, however damaged the file is.
 
-In: an MCAP file, whole, cut off, with damage in the middle, of our own recorder or packed by another tool. Out: its messages in the order of
-the file, of ports and derived ones alike, and what had to be passed over. Owns the place in the file.
+In: an MCAP file: complete, truncated, damaged in the middle, from our recorder or rewritten by another tool. Out: its messages in the order of
+the file, both the ports' and derived ones, and the byte ranges without valid records. Owns the read position in the file.
 
-Where a record makes no sense, the next place is looked for from which several records in a row do.
+Where a record is not valid, the scan goes on at the next offset from which several consecutive records are valid.
 """
 
 from __future__ import annotations
@@ -22,27 +22,29 @@ from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.jit import kernel
 from echostep.recording.mcap_records import (
+    CHANNEL_IDS,
     HEAD_SIZE,
     MCAP_MAGIC,
     MESSAGE,
     MESSAGE_SIZE,
     RECORD_LIMIT,
-    number_at,
-    opened,
-    parsed,
+    decompress_chunk,
+    parse_record,
+    read_uint,
 )
 from echostep.recording.recorder import METADATA_NAME
 
-CHUNK = 0x06
+# [MCAP format specification]
+CHUNK = 0x06  # opcode
 LAST_OPCODE = 0x0F
-CHAIN = 4  # so many records in a row make sense by chance in no file
-FOOTER_SIZE = 20
-SMALL = 1 << 20  # bytes; nothing but messages and chunks is larger
-_MESSAGE = struct.Struct("<HIQQ")
-_HEAD = struct.Struct("<BQ")
+FOOTER_SIZE = 20  # bytes of its body
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+# By reason.
+VALID_RUN = 4  # so many consecutive records are not valid by chance
+OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
 
 
-class Entry(NamedTuple):
+class RecordedMessage(NamedTuple):
     """One message of a channel; times in nanoseconds on the clock of the arrivals."""
 
     channel: Channel
@@ -53,108 +55,105 @@ class Entry(NamedTuple):
 
 
 @dataclass
-class Salvage:
-    """`entries` fills the rest: `about` as the recorder was told, `skipped` (byte ranges without sense), `closed` (chunks that cannot be opened)."""
+class Recovery:
+    """Scan of one file; the fields are filled while `messages` is iterated."""
 
     path: Path
-    about: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, str] = field(default_factory=dict)  # as given to the recorder
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
-    skipped: list[tuple[int, int]] = field(default_factory=list)
-    closed: int = 0
-    finished: bool = False  # the file has an end, as a recorder that was closed gives it
-    size: int = 0
-    at: int = 0
-    _known: Bools = field(default_factory=lambda: np.zeros(1 << 16, np.bool_))
+    damaged: list[tuple[int, int]] = field(default_factory=list)  # byte ranges (begin, end) without valid records
+    unreadable_chunks: int = 0  # chunk records that cannot be decompressed
+    has_footer: bool = False  # the recorder was closed
+    size: int = 0  # of the file, bytes
+    byte_offset: int = 0  # of the record that was read last
+    _is_channel: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))  # by channel number
 
     @property
     def fraction(self) -> float:
-        """Of the file, read so far."""
-        return self.at / max(self.size, 1)
+        """Fraction of the file read so far."""
+        return self.byte_offset / max(self.size, 1)
 
-    @property
-    def lost_bytes(self) -> int:
-        """All that was passed over."""
-        return sum(end - begin for begin, end in self.skipped)
-
-    def entries(self) -> Iterator[Entry]:
-        """All messages; raises EchostepError when the file cannot be read or is no MCAP file at all."""
-        file = _mapped(self.path)
+    def messages(self) -> Iterator[RecordedMessage]:
+        """All readable messages; raises EchostepError when the file cannot be read or is not an MCAP file."""
+        file = _map_file(self.path)
         self.size = len(file)
         if file[: len(MCAP_MAGIC)].tobytes() != MCAP_MAGIC:
             raise EchostepError(f"{self.path}: not a recording: it does not begin as an MCAP file does")
         self._read_summary(file)
-        for begin, end, what in self._walk(file, len(MCAP_MAGIC)):
-            self.at = begin
-            if what is None:
-                self.skipped.append((begin, end))
-            elif isinstance(what, Entry):
-                yield what
+        for begin, end, content in self._scan(file, len(MCAP_MAGIC)):
+            self.byte_offset = begin
+            if content is None:
+                self.damaged.append((begin, end))
+            elif isinstance(content, RecordedMessage):
+                yield content
             else:
-                yield from self._inside(what)
-        self.at = self.size
+                yield from self._messages_in_chunk(content)
+        self.byte_offset = self.size
 
-    def _walk(self, file: Octets, at: int) -> Iterator[tuple[int, int, Entry | bytes | None]]:
-        """Begin, end and content of each message and each chunk (its body); None for bytes without sense."""
+    def _scan(self, file: Octets, begin: int) -> Iterator[tuple[int, int, RecordedMessage | bytes | None]]:
+        """Begin, end and content from offset `begin` on: a message, the body of a chunk record, or None for a range without valid records."""
         view = memoryview(file)  # type: ignore[arg-type]
         size = len(file)
-        while at < size:
-            end = _record_end(file, at, self._known)
+        while begin < size:
+            end = _record_end(file, begin, self._is_channel)
             if end < 0:
-                end = _next_chain(file, at + 1, self._known)
-                yield at, end, None
-                at = end
+                end = _next_valid_run(file, begin + 1, self._is_channel)
+                yield begin, end, None
+                begin = end
                 continue
-            opcode, body = view[at], at + HEAD_SIZE
+            opcode, body = view[begin], begin + HEAD_SIZE
             if opcode == MESSAGE:
-                channel, sequence, t_ns, publish_ns = _MESSAGE.unpack_from(view, body)
-                entry = Entry(
-                    self.channels[channel], sequence, t_ns, publish_ns, bytes(view[body + MESSAGE_SIZE : end])
-                )
-                yield at, end, entry
+                yield begin, end, self._message(view[body:end])
             elif opcode == CHUNK:
-                yield at, end, bytes(view[body:end])
+                yield begin, end, bytes(view[body:end])
             elif opcode == Opcode.FOOTER and end + len(MCAP_MAGIC) >= size:
-                self.finished = bytes(view[end:size]) == MCAP_MAGIC
+                self.has_footer = bytes(view[end:size]) == MCAP_MAGIC
                 return
             else:
-                self._keep(opcode, bytes(view[body:end]))
-            at = end
+                self._register(opcode, bytes(view[body:end]))
+            begin = end
 
-    def _inside(self, body: bytes) -> Iterator[Entry]:
-        inside = opened(body)
-        if inside is None:
-            self.closed += 1
+    def _message(self, body: memoryview) -> RecordedMessage:
+        channel, sequence, t_ns, publish_ns = _MESSAGE.unpack_from(body)
+        return RecordedMessage(self.channels[channel], sequence, t_ns, publish_ns, bytes(body[MESSAGE_SIZE:]))
+
+    def _messages_in_chunk(self, body: bytes) -> Iterator[RecordedMessage]:
+        records = decompress_chunk(body)
+        if records is None:
+            self.unreadable_chunks += 1
             return
-        for _, _, what in self._walk(np.frombuffer(inside, np.uint8), 0):
-            if isinstance(what, Entry):
-                yield what
+        for _, _, content in self._scan(np.frombuffer(records, np.uint8), 0):
+            if isinstance(content, RecordedMessage):
+                yield content
 
-    def _keep(self, opcode: int, body: bytes) -> None:
-        """Channels, schemas and what the recorder was told."""
-        if opcode == Opcode.CHANNEL and (channel := parsed(Channel, body)):
+    def _register(self, opcode: int, body: bytes) -> None:
+        """Keep a channel, a schema or the recorder's metadata; ignore other records."""
+        if opcode == Opcode.CHANNEL and (channel := parse_record(Channel, body)):
             self.channels[channel.id] = channel
-            self._known[channel.id] = True
-        elif opcode == Opcode.SCHEMA and (schema := parsed(Schema, body)):
+            self._is_channel[channel.id] = True
+        elif opcode == Opcode.SCHEMA and (schema := parse_record(Schema, body)):
             self.schemas[schema.id] = schema
-        elif opcode == Opcode.METADATA and (said := parsed(Metadata, body)) and said.name == METADATA_NAME:
-            self.about = dict(said.metadata)
+        elif opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)) and stored.name == METADATA_NAME:
+            self.metadata = dict(stored.metadata)
 
     def _read_summary(self, file: Octets) -> None:
-        """Channels and schemas stand once more at the end of a finished file: good to know when the beginning is damaged."""
-        at = len(file) - len(MCAP_MAGIC) - FOOTER_SIZE - HEAD_SIZE
-        if at < len(MCAP_MAGIC) or file[-len(MCAP_MAGIC) :].tobytes() != MCAP_MAGIC or file[at] != Opcode.FOOTER:
+        """Register the channels and schemas repeated at the end of a closed file, for the case that its beginning is damaged."""
+        footer = len(file) - len(MCAP_MAGIC) - FOOTER_SIZE - HEAD_SIZE
+        ends_as_mcap = file[-len(MCAP_MAGIC) :].tobytes() == MCAP_MAGIC
+        if footer < len(MCAP_MAGIC) or not ends_as_mcap or file[footer] != Opcode.FOOTER:
             return
-        start = number_at(file, at + HEAD_SIZE, 8)
-        while len(MCAP_MAGIC) <= start < at:
-            end = _record_end(file, start, self._known)
+        begin = read_uint(file, footer + HEAD_SIZE, 8)
+        while len(MCAP_MAGIC) <= begin < footer:
+            end = _record_end(file, begin, self._is_channel)
             if end < 0:
                 return
-            self._keep(int(file[start]), file[start + HEAD_SIZE : end].tobytes())
-            start = end
+            self._register(int(file[begin]), file[begin + HEAD_SIZE : end].tobytes())
+            begin = end
 
 
-def _mapped(path: Path) -> Octets:
+def _map_file(path: Path) -> Octets:
+    """The bytes of a file, mapped into memory."""
     try:
         if not path.stat().st_size:
             raise EchostepError(f"{path}: not a recording: the file is empty")
@@ -166,29 +165,29 @@ def _mapped(path: Path) -> Octets:
 
 
 @kernel
-def _record_end(file: Octets, at: int, known: Bools) -> int:
-    """Where the record at `at` ends; -1 when it makes no sense."""
-    body = at + HEAD_SIZE
+def _record_end(file: Octets, begin: int, is_channel: Bools) -> int:
+    """Offset after the record at `begin`; -1 when that record is not valid: opcode, length, or the channel of a message."""
+    body = begin + HEAD_SIZE
     if body > len(file):
         return -1
-    opcode, length = file[at], number_at(file, at + 1, 8)
+    opcode, length = file[begin], read_uint(file, begin + 1, 8)
     if not 1 <= opcode <= LAST_OPCODE or not 0 <= length <= min(RECORD_LIMIT, len(file) - body):
         return -1
     if opcode == MESSAGE:
-        return body + length if length >= MESSAGE_SIZE and known[number_at(file, body, 2)] else -1
-    return body + length if opcode == CHUNK or length <= SMALL else -1
+        return body + length if length >= MESSAGE_SIZE and is_channel[read_uint(file, body, 2)] else -1
+    return body + length if opcode == CHUNK or length <= OTHER_LIMIT else -1
 
 
 @kernel
-def _next_chain(file: Octets, at: int, known: Bools) -> int:
-    """The next place from which records make sense, several in a row or up to the end of the file; the end when there is none."""
-    for begin in range(at, len(file) - HEAD_SIZE + 1):
-        place, links = begin, 0
-        while links < CHAIN and place >= 0:
-            place = _record_end(file, place, known)
-            links += 1
-            if place == len(file) or place == len(file) - len(MCAP_MAGIC):
+def _next_valid_run(file: Octets, first: int, is_channel: Bools) -> int:
+    """Smallest offset >= `first` from which `VALID_RUN` consecutive records, or all up to the end, are valid; the file's length if there is none."""
+    for begin in range(first, len(file) - HEAD_SIZE + 1):
+        offset, records = begin, 0
+        while records < VALID_RUN and offset >= 0:
+            offset = _record_end(file, offset, is_channel)
+            records += 1
+            if offset == len(file) or offset == len(file) - len(MCAP_MAGIC):
                 return begin
-        if place >= 0:
+        if offset >= 0:
             return begin
     return len(file)

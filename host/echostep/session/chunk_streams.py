@@ -48,7 +48,7 @@ def recorded(
         if chunk is not None:
             recorder.write(chunk)
             if wait_for_disk:
-                recorder.settle(chunk)
+                recorder.wait_for_disk(chunk)
         print_notices(recorder.notices)
         yield chunk
 

@@ -25,12 +25,12 @@ from echostep.tracker import Tracker
 def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
     """Track a recording; start, settings and seed are the recorded ones unless `tracking` gives others."""
     recording, plan = open_recording(path), open_plan(tracking.plan_path)
-    if recording.about.get("plan_sha256", plan.digest) != plan.digest:
+    if recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {tracking.plan_path} is not the plan that {path} was tracked on.")
     truth = load_truth(truth_path) if truth_path else None
     tracker = tracker_of(recording, plan, tracking)
     output_folder(output.folder)
-    if note := recording.about.get("note"):
+    if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
     guide_to = destination(tracking.guide_to, plan) if tracking.guide_to else None
     session = Session(tracker, f"echostep replay {path.name}", "replay", output, guide_to)
@@ -50,7 +50,7 @@ def tracker_of(recording: Recording, plan: Plan, tracking: TrackingOptions) -> T
 
     Raises EchostepError when one of them is missing or damaged.
     """
-    metadata, path = recording.about, recording.path
+    metadata, path = recording.metadata, recording.path
     settings_path = tracking.settings_path
     text = read_settings(settings_path) if settings_path else metadata.get("settings_toml", "")
     settings = parse_settings(text, str(settings_path or path))

@@ -104,7 +104,7 @@ class Session:
                     estimates = self._take(portion)
                     self._show(estimates, view)
                     if recorder:
-                        recorder.notes(derived.take(portion, estimates))
+                        recorder.write_derived(derived.take(portion, estimates))
             except KeyboardInterrupt:
                 self._interrupted = True
 
