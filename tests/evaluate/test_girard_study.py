@@ -18,7 +18,7 @@ from echostep.evaluate import girard2011 as study
 from echostep.evaluate.echoes.study import echoes_study
 from echostep.evaluate.report import Row, summary, write_json
 from echostep.evaluate.runs import SeededRuns
-from echostep.evaluate.study import Request, run_study
+from echostep.evaluate.study import StudyRequest, run_study
 from echostep.simulation.people.marker_walk import STEP_M, lay_markers, walk_markers
 from echostep.simulation.world import sites
 
@@ -90,7 +90,7 @@ def test_the_command_writes_json_parquet_and_the_picture(tmp_path: Path) -> None
 
 
 def test_what_rangers_hear(tmp_path: Path) -> None:
-    run_study(echoes_study(fit=False), Request(1, 1, tmp_path / "e.json", tmp_path))
+    run_study(echoes_study(fit=False), StudyRequest(1, 1, tmp_path / "e.json", tmp_path))
     rows = {row["name"]: row for row in json.loads((tmp_path / "e.json").read_text())["rows"]}
     assert (tmp_path / "figures1-5.png").stat().st_size > 50_000
     for name in ("incidence", "near and far", "oblique", "limits", "door frames"):

@@ -32,9 +32,9 @@ def girard2011(
 ) -> None:
     """The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated)."""
     from echostep.evaluate.girard2011 import STUDY
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(STUDY, Request(runs, seed, json, out, scheduler))
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
 
 
 @app.command()
@@ -48,9 +48,9 @@ def echoes(
 ) -> None:
     """What simulated rangers hear, and how well the tracker's likelihood expects it."""
     from echostep.evaluate.echoes.study import echoes_study
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(echoes_study(fit=fit), Request(1, seed, json, out))
+    run_study(echoes_study(fit=fit), StudyRequest(1, seed, json, out))
 
 
 @app.command()
@@ -63,9 +63,9 @@ def lee2010(
 ) -> None:
     """The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated)."""
     from echostep.evaluate.lee2010.study import STUDY
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(STUDY, Request(runs, seed, json, out, scheduler))
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
 
 
 @app.command()
@@ -77,10 +77,10 @@ def trails(
     scheduler: Scheduler = None,
 ) -> None:
     """The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated)."""
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
     from echostep.evaluate.trails.study import STUDY
 
-    run_study(STUDY, Request(runs, seed, json, out, scheduler))
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
 
 
 @app.command("legs")
@@ -93,9 +93,9 @@ def legs_command(
 ) -> None:
     """Walks of 5 m by many people without calibration, and what each fault of the sensors does (simulated)."""
     from echostep.evaluate.legs import STUDY
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(STUDY, Request(runs, seed, json, out, scheduler))
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
 
 
 @app.command("floors")
@@ -108,9 +108,9 @@ def floors_command(
 ) -> None:
     """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
     from echostep.evaluate.floors import STUDY
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(STUDY, Request(runs, seed, json, out, scheduler))
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
 
 
 @app.command("storeys")
@@ -126,9 +126,9 @@ def storeys_command(
 ) -> None:
     """Walks through all floors of a building by stairs and lift (simulated)."""
     from echostep.evaluate.multi_floor import storeys_study
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(storeys_study(folder), Request(runs, seed, json, out, scheduler))
+    run_study(storeys_study(folder), StudyRequest(runs, seed, json, out, scheduler))
 
 
 @app.command("feet")
@@ -143,10 +143,10 @@ def feet_command(
 ) -> None:
     """The foot on real recordings, one setting for all, beside the peers' figures."""
     from echostep.evaluate.feet.study import feet_study, recordings_in
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
     recordings = recordings_in(folder)
-    run_study(feet_study(recordings, out, left_out=left_out), Request(len(recordings), 0, json, out or Path()))
+    run_study(feet_study(recordings, out, left_out=left_out), StudyRequest(len(recordings), 0, json, out or Path()))
 
 
 @app.command()
@@ -159,6 +159,6 @@ def fischer2008(
 ) -> None:
     """The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated)."""
     from echostep.evaluate.fischer2008.study import fischer2008_study
-    from echostep.evaluate.study import Request, run_study
+    from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(fischer2008_study(runs, seed), Request(runs, seed, json, out, scheduler))
+    run_study(fischer2008_study(runs, seed), StudyRequest(runs, seed, json, out, scheduler))

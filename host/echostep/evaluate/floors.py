@@ -21,7 +21,7 @@ from echostep.barometer import vertical_model as vertical
 from echostep.barometer.altitude import BarometerSettings, Pressures
 from echostep.barometer.floor_filter import FloorFilter, Floors
 from echostep.evaluate.report import Row, Table, rows_by_name
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
 from echostep.simulation.people.vertical_day import VerticalMove, climb
 from echostep.simulation.world.air_pressure import Weather, device_temperatures, pressures
@@ -136,7 +136,7 @@ def _summary(rows: Sequence[Row]) -> Row:
     }
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
     title = f"Floors by pressure, {request.runs} simulated runs of 20 minutes, weather of 1 hPa/h"
     return [Table(title, shown, COLUMNS)]

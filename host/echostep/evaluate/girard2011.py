@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.map_filter import MapFilter
 from echostep.papers.girard2011 import Girard, GirardSettings
 from echostep.path import MeasuredSegment, PathSegment
@@ -35,7 +35,7 @@ from echostep.simulation.world.sites import (
 )
 from echostep.walls.echo_sources import Walls
 
-System = Callable[[SimulatedSite, MarkerWalk, int], Iterator["Output"]]
+System = Callable[[SimulatedSite, MarkerWalk, int], Iterator["MethodOutput"]]
 
 STEP_SD_M = 0.02  # of a careful step, per axis
 AFTER_HALL_S = 10.0
@@ -62,7 +62,7 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Output:
+class MethodOutput:
     """Output of a system after a step: the estimate, and its cloud (n, 2) for the pictures; `inside` is None where it states no ellipse."""
 
     at_m: tuple[float, float]
@@ -105,16 +105,16 @@ def one_run(seed: int) -> list[Row]:
     return rows
 
 
-def dead_reckoned(_site: SimulatedSite, walk: MarkerWalk, _seed: int) -> Iterator[Output]:
+def dead_reckoned(_site: SimulatedSite, walk: MarkerWalk, _seed: int) -> Iterator[MethodOutput]:
     """Fixed steps in the measured directions [Girard 2011, Figure 10]."""
     way = np.column_stack([np.cos(walk.heading_rad), np.sin(walk.heading_rad)]) * STEP_M
     for x, y in (walk.trunk_m[0] + np.cumsum(way, axis=0)).tolist():
-        yield Output((x, y), None, np.array([[x, y]]))
+        yield MethodOutput((x, y), None, np.array([[x, y]]))
 
 
 def girard(
     site: SimulatedSite, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True
-) -> Iterator[Output]:
+) -> Iterator[MethodOutput]:
     """The paper's filter: on its plan or without, with one pair of pings a step or without."""
     walls = site.plan if model else None
     x0, y0 = walk.trunk_m[0].tolist()
@@ -122,10 +122,10 @@ def girard(
     for k, heading in enumerate(walk.heading_rad.tolist()):
         pair = (float(walk.pair_m[k + 1, 0]), float(walk.pair_m[k + 1, 1])) if ranging else None
         at = filter_.step(STEP_M * math.cos(heading), STEP_M * math.sin(heading), heading, pair)
-        yield Output(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
+        yield MethodOutput(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
 
 
-def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[Output]:
+def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[MethodOutput]:
     """The default filter: the same steps and headings, and every ping of the walk."""
     x0, y0 = walk.trunk_m[0].tolist()
     start = Pose(x0, y0, walk.start_heading_rad)
@@ -138,7 +138,7 @@ def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[Output
         found = map_filter.update(_measured_segment(step, walk, since_s))
         since_s = step.t1_s
         cloud = np.column_stack([map_filter.cloud.x_m, map_filter.cloud.y_m])
-        yield Output((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
+        yield MethodOutput((found.x_m, found.y_m), found.holds(*walk.trunk_m[k + 1].tolist()), cloud)
 
 
 SYSTEMS: dict[str, System] = {
@@ -173,7 +173,7 @@ def _walk(site: SimulatedSite, seed: int) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers)
 
 
-def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[Output]) -> Row:
+def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> Row:
     errors = [
         math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
     ]
@@ -204,7 +204,7 @@ def _summary(runs: list[Row]) -> Row:
     return row
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """The table, with the paper's rows at its end."""
     printed = [row | {"name": f"{row['name']}, the paper"} for row in PAPER]
     title = f"Position error in metres, {request.runs} simulated runs; below, the paper's one real run"

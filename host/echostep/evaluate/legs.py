@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.evaluate.report import Row, Table, rows_by_name
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
@@ -112,7 +112,7 @@ def _summary(rows: list[Row]) -> Row:
     return found | {f"{key}_percent": round(float(value), 2) for key, value in figures.items()}
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"About {WAY_M:g} m by {request.runs} people, legs known, no calibration (simulated)"
     return [Table(title, rows, COLUMNS, ("Error of the distance from standing to standing.",))]
 

@@ -19,7 +19,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.particles import ANY_LEVEL
 from echostep.plan.importers.formats import open_plan
@@ -143,7 +143,7 @@ def _summary(rows: Sequence[Row]) -> Row:
     return found | {"longest_wrong_s": over("longest_wrong_s", max)}
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
     real = any(row["name"] == WESTPORT for row in rows)
     notes = () if real else ("Without --data westport-house is left out.",)

@@ -1,6 +1,6 @@
 """The frame of every study: runs -> rows -> summary rows -> tables -> JSON -> Parquet -> pictures.
 
-In: a `Study` and a `Request`. Out: tables on the terminal, files. Owns the order of these stages.
+In: a `Study` and a `StudyRequest`. Out: tables on the terminal, files. Owns the order of these stages.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from echostep.evaluate.runs import Run, SeededRuns
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class StudyRequest:
     """Options of a command: `runs` from `seed` on, the file for `json`, the folder `out` for the journal, Parquet and pictures.
 
     `scheduler`: address of a Dask scheduler; None: the cores of this machine.
@@ -41,14 +41,14 @@ class Study:
     name: str
     run: Run
     summarize: Callable[[list[Row]], list[Row]]
-    tables: Callable[[list[Row], Request], Sequence[Table]]
+    tables: Callable[[list[Row], StudyRequest], Sequence[Table]]
     draw: Callable[[Path, int, list[Row]], None] | None = None
     seeds: range | None = None
     journal: bool = True
     parquet: Literal["runs", "summary"] | None = "runs"
 
 
-def run_study(study: Study, request: Request) -> list[Row]:
+def run_study(study: Study, request: StudyRequest) -> list[Row]:
     """Run the study, print its tables and write its files; returns the summary rows. Raises EchostepError when a file cannot be written."""
     rows_of_runs = _rows(study, request)
     rows = study.summarize(rows_of_runs)
@@ -63,7 +63,7 @@ def run_study(study: Study, request: Request) -> list[Row]:
     return rows
 
 
-def _rows(study: Study, request: Request) -> list[Row]:
+def _rows(study: Study, request: StudyRequest) -> list[Row]:
     """Rows of all runs in order of their seeds."""
     seeds = study.seeds if study.seeds is not None else range(request.seed, request.seed + request.runs)
     if not study.journal:

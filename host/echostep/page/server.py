@@ -30,7 +30,7 @@ from echostep.page import protocol
 from echostep.page.access import LOOPBACK, AccessControl
 from echostep.page.elements.guidance import RouteFinder
 from echostep.page.mailbox import Mailbox
-from echostep.page.session import PageCounts, Session
+from echostep.page.session import PageCounts, PageSession
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
@@ -54,7 +54,7 @@ class PageServer:
 
     def __init__(self, mailbox: Mailbox, address: Address = Address()) -> None:
         self.counts = PageCounts()
-        self.sessions: set[Session] = set()
+        self.sessions: set[PageSession] = set()
         self._mailbox = mailbox
         self._route_finder = RouteFinder(mailbox.plan)
         self._listener = open_listener(address)
@@ -131,7 +131,7 @@ class PageServer:
             self.counts.refused += 1
             await websocket.close(TRY_AGAIN_LATER)
             return
-        session = Session(websocket, self._mailbox, self._route_finder, self.counts)
+        session = PageSession(websocket, self._mailbox, self._route_finder, self.counts)
         self.sessions.add(session)
         try:
             session.wake()

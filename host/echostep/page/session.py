@@ -38,7 +38,7 @@ class PageCounts:
     flooding: int = 0
 
 
-class Session:
+class PageSession:
     """Serves one page until it disconnects."""
 
     def __init__(self, socket: WebSocket, mailbox: Mailbox, route_finder: RouteFinder, counts: PageCounts) -> None:

@@ -17,7 +17,7 @@ from echostep.evaluate.echoes.findings import FINDINGS
 from echostep.evaluate.echoes.likelihood import fitted, log_p
 from echostep.evaluate.echoes.pictures import draw_effects
 from echostep.evaluate.report import Row, Table, console
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.simulation.people.marker_walk import lay_markers, walk_markers
 from echostep.simulation.world.acoustics import SRF02, directivity_db
@@ -51,7 +51,7 @@ def draw_figures(folder: Path, seed: int, _rows: list[Row]) -> None:
     console.print(f"{path}")
 
 
-def _tables(rows: list[Row], _request: Request) -> list[Table]:
+def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
     found = [row for row in rows if "set" not in row]
     settings = [row for row in rows if "set" in row]
     tables = [Table("Simulated pings, and how the likelihood expects them", found, COLUMNS)]

@@ -16,7 +16,7 @@ from echostep.evaluate.feet.leave_one_out import add_left_out, describe, leave_o
 from echostep.evaluate.feet.metrics import Figure, way
 from echostep.evaluate.feet.pictures import draw_tracks
 from echostep.evaluate.report import Row, Table, console
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
 
@@ -57,7 +57,7 @@ def _rows_of_all(recordings: list[FootRecording], tracks: list[Track], *, left_o
     return rows + pace_rows(recordings)
 
 
-def _tables(rows: list[Row], _request: Request) -> list[Table]:
+def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
     """The figures of the recordings; below, those of the live foot."""
     live = [f"{row['metric']}: {row['value']:.4f}" for row in rows if row["set"] == LIVE]
     figures = [row for row in rows if row["set"] != LIVE]

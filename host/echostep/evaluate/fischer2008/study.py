@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.evaluate.fischer2008.simulator import OBEDIENT, OURS, PAPER, PDR, ObedientPerson, guided_return
 from echostep.evaluate.report import Row, Table, rows_by_name
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.simulation.world.beacon_ground import GroundSettings, ground
 
 BATCH = 50  # returns a task
@@ -94,7 +94,7 @@ def fischer2008_study(runs: int, seed: int) -> Study:
     )
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """Success rates with 95 % intervals, in percent."""
     printed = [
         r | {"percent": 100 * r["success"], "low_percent": 100 * r["low95"], "high_percent": 100 * r["high95"]}

@@ -28,7 +28,7 @@ from echostep.evaluate.lee2010.walks import (
     storeys,
 )
 from echostep.evaluate.report import Row, Table, rows_by_name
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.simulation.people.walker import Walk
 
 PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
@@ -91,7 +91,7 @@ def _summary(rows: list[Row]) -> Row:
     return found
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"Lee and Lee 2010: {request.runs} simulated runs, metres; last, the paper's one real lap"
     return [Table(title, [*rows, *PRINTED], COLUMNS, (LEGEND,))]
 

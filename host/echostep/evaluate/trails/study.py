@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
-from echostep.evaluate.study import Request, Study
+from echostep.evaluate.study import Study, StudyRequest
 from echostep.evaluate.trails.pictures import draw_trails
 from echostep.evaluate.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 from echostep.simulation.people.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
@@ -81,7 +81,7 @@ def _summary(rows: list[Row]) -> Row:
     return found | printed
 
 
-def _tables(rows: list[Row], request: Request) -> list[Table]:
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """One table for each rate; below the last one the printed and simulated errors of the way."""
     tables = []
     for rate_hz in RATES_HZ:

@@ -81,7 +81,7 @@ def _near_walls(points: Floats, walls: Floats, reach_m: float) -> Floats:
     return np.ascontiguousarray(walls[keep])
 
 
-class Rangers(NamedTuple):
+class RangerPair(NamedTuple):
     """Both rangers at one place: position, and the unit vector of the left ranger's axis; the right one's is opposite."""
 
     x: float
@@ -112,7 +112,7 @@ def _nearest_echoes(
     nearest, threshold_db = np.zeros((2, 2)), np.zeros((2, 2))
     lit = np.zeros(len(walls), np.int64)
     for k in range(len(heading)):
-        rangers = Rangers(trunk[k, 0], trunk[k, 1], -math.sin(heading[k]), math.cos(heading[k]))
+        rangers = RangerPair(trunk[k, 0], trunk[k, 1], -math.sin(heading[k]), math.cos(heading[k]))
         nearest[:] = a.maximum_m + 1e-9
         threshold_db[:, OWN] = a.threshold_db + a.threshold_sd_db * noise[k, :, 0]
         threshold_db[:, CROSS] = a.threshold_db + a.threshold_sd_db * noise[k, :, 2]
@@ -128,7 +128,7 @@ def _nearest_echoes(
 
 
 @kernel
-def _find_lit(rangers: Rangers, walls: Floats, a: Acoustics, lit: Ints) -> int:
+def _find_lit(rangers: RangerPair, walls: Floats, a: Acoustics, lit: Ints) -> int:
     """Fill `lit` with the indices of the walls that reach into a ranger's cone; returns their number."""
     cosine = math.sqrt(1.0 - min(FIRST_NULL / a.size, 1.0) ** 2)
     count = 0
@@ -140,7 +140,7 @@ def _find_lit(rangers: Rangers, walls: Floats, a: Acoustics, lit: Ints) -> int:
 
 
 @kernel
-def _search_walls(rangers: Rangers, search: Search) -> None:
+def _search_walls(rangers: RangerPair, search: Search) -> None:
     """Echoes straight back from the foot of the perpendicular on each wall."""
     walls, a, nearest = search.walls, search.acoustics, search.nearest_m
     for w in search.lit:
@@ -156,7 +156,7 @@ def _search_walls(rangers: Rangers, search: Search) -> None:
 
 
 @kernel
-def _search_edges(rangers: Rangers, edges: Floats, search: Search) -> None:
+def _search_edges(rangers: RangerPair, edges: Floats, search: Search) -> None:
     """Echoes straight back from the ends of walls, (e, 6) of `wall_edges`; none from the inside of a corner."""
     a, nearest = search.acoustics, search.nearest_m
     for e in range(len(edges)):
@@ -173,7 +173,7 @@ def _search_edges(rangers: Rangers, edges: Floats, search: Search) -> None:
 
 
 @kernel
-def _search_wall_pairs(rangers: Rangers, search: Search) -> None:
+def _search_wall_pairs(rangers: RangerPair, search: Search) -> None:
     """Echoes by two walls: to the sending ranger (a corner) or to the other one [Girard 2011, Figure 3b].
 
     p: the rangers; b, c: the points of reflection on the first and the last wall. i: mirror image of p in the last wall; j: that of i in the
@@ -206,7 +206,7 @@ def _search_wall_pairs(rangers: Rangers, search: Search) -> None:
 
 @kernel
 def _consider_pair(
-    rangers: Rangers,
+    rangers: RangerPair,
     b: tuple[float, float],
     c: tuple[float, float],
     range_m: float,
@@ -231,7 +231,7 @@ def _consider_pair(
 
 
 @kernel
-def _direction(rangers: Rangers, x: float, y: float) -> tuple[int, float, float]:
+def _direction(rangers: RangerPair, x: float, y: float) -> tuple[int, float, float]:
     """Which ranger a point faces (0 left, 1 right), its distance, and its angle off that ranger's axis."""
     away = max(math.hypot(x - rangers.x, y - rangers.y), 1e-9)
     along = ((x - rangers.x) * rangers.axis_x + (y - rangers.y) * rangers.axis_y) / away
