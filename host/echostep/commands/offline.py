@@ -16,8 +16,11 @@ from echostep.errors import EchostepError
 from echostep.foot.alignment import aligned
 from echostep.foot.steps import Track, walk_track
 from echostep.legs.stride import StrideSettings
-from echostep.offline import leg_csv
 from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
+from echostep.offline.leg_csv import load_legs
+from echostep.offline.leg_lengths import calibrated_scale, checked_lengths
+from echostep.offline.leg_summary import describe_legs, write_leg_track
+from echostep.offline.leg_track import PROFILES as LEG_PROFILES
 from echostep.output.track_plot import draw_foot
 from echostep.papers import fischer2008
 from echostep.recording.capture import Decoder, as_json, read_capture
@@ -74,23 +77,22 @@ class LegOptions:
 def legs(path: Path, out: Path, options: LegOptions) -> None:
     """Track a recorded leg with this project's method or that of a paper."""
     profile, scale = options.profile, options.scale
-    if profile not in leg_csv.PROFILES:
-        raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(leg_csv.PROFILES)}")
+    if profile not in LEG_PROFILES:
+        raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(LEG_PROFILES)}")
     if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
         raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
-    lengths = leg_csv.segments(options.thigh_m, options.shank_m, scale or 1.0)
-    samples = leg_csv.load_legs(path)
+    lengths = checked_lengths(options.thigh_m, options.shank_m, scale or 1.0)
+    samples = load_legs(path)
     for note in samples.notes:
         console.print(f"{path.name}: {note}")
     if lengths.measured_to_floor and profile == "default":
         ankle = f"{lengths.to_ankle_m:.3f} m to the ankle"
         console.print(f"--shank {options.shank_m:g} is taken as knee to floor: {ankle}")
-    track = leg_csv.PROFILES[profile](samples, StrideSettings(lengths, calibrated=scale is not None))
-    leg_csv.write_leg_track(out, track)
-    console.print(f"{path.name}: {leg_csv.describe_legs(track)}")
+    track = LEG_PROFILES[profile](samples, StrideSettings(lengths, calibrated=scale is not None))
+    write_leg_track(out, track)
+    console.print(f"{path.name}: {describe_legs(track)}")
     if options.walked_m is not None:
-        distance_m = float(track.rows[-1, 1]) if len(track.rows) else 0.0
-        factor = leg_csv.calibrated_scale(distance_m, options.walked_m)
+        factor = calibrated_scale(track.distance_m, options.walked_m)
         console.print(f"--scale {(scale or 1.0) * factor:.4f} makes this walk {options.walked_m:g} m long")
 
 

@@ -22,7 +22,7 @@ from echostep.commissioning.fitting import Fit, fit_compass, fit_gyros, fit_legs
 from echostep.commissioning.probe import ProbeResult, probe
 from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep.errors import EchostepError
-from echostep.offline.leg_csv import segments
+from echostep.offline.leg_lengths import checked_lengths
 from echostep.ports.chunks import BOARD
 from echostep.settings import parse_settings, read_settings
 
@@ -63,7 +63,9 @@ PARTS = (
         "legs",
         "Legs: stand for two seconds, walk {walked_m:g} m straight on, and stand again.",
         WALK_S,
-        lambda probed, gyro, wearer: fit_legs(probed, gyro, segments(wearer.thigh_m, wearer.shank_m), wearer.walked_m),
+        lambda probed, gyro, wearer: fit_legs(
+            probed, gyro, checked_lengths(wearer.thigh_m, wearer.shank_m), wearer.walked_m
+        ),
     ),
 )
 
@@ -99,7 +101,7 @@ def _chosen_parts(names: list[str]) -> list[Part]:
 
 
 def _check_wearer(wearer: Wearer) -> None:
-    segments(wearer.thigh_m, wearer.shank_m)
+    checked_lengths(wearer.thigh_m, wearer.shank_m)
     if not WALKED_RANGE_M[0] <= wearer.walked_m <= WALKED_RANGE_M[1]:
         raise EchostepError(
             f"--walked {wearer.walked_m:g}: expected {WALKED_RANGE_M[0]:g} to {WALKED_RANGE_M[1]:g} m, best 10"

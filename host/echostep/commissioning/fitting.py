@@ -18,7 +18,7 @@ from echostep.legs.heading import compass_heading, fit_compass_errors
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
-from echostep.offline.leg_csv import calibrated_scale
+from echostep.offline.leg_lengths import calibrated_scale
 
 Values = dict[str, float | bool]
 Fit = tuple[dict[str, Values], str]

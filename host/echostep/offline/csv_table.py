@@ -19,10 +19,11 @@ from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 
 LONGEST_LINE = 10_000  # characters; by reason: no line of numbers is longer
-Result = TypeVar("Result")
-
 EARLY_ROWS = 2000  # rows after which a file of garbage is given up
 MOST_BAD = 0.5  # share of rows without a number in a required column
+TIME_UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))  # per second
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +100,17 @@ def _check_share(rows: int, bad: int) -> None:
         raise ValueError("no samples")
     if bad > MOST_BAD * rows:
         raise ValueError(f"{100 * bad / rows:.0f} % of the first {rows} rows have no number in some column")
+
+
+def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
+    """Message for a sample rate (Hz) outside of the range, with the likely unit of t_s or else the advice for it; empty inside."""
+    if range_hz[0] <= rate <= range_hz[1]:
+        return ""
+    for unit, factor in TIME_UNITS:
+        if range_hz[0] <= rate * factor <= range_hz[1]:
+            return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds"
+    advice = too_slow if rate < range_hz[0] else too_fast
+    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
 
 
 def number_of(text: str) -> float:

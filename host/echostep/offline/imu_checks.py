@@ -1,7 +1,7 @@
-"""What is wrong with the samples of a recorded foot IMU, or with the track that came of them: said in words, with what to do.
+"""Checks of the samples of a recorded foot IMU, and of the track computed from them.
 
-In: the table (n, 7 or more) of time s, specific force m/s2 and angular rate rad/s; a `Track`. Out: complaints (the samples cannot be
-used), notes (they can, with care). Owns nothing. A track from wrong units or a dead sensor would look right and be wrong.
+In: the table (n, 7 or more) of time s, specific force m/s2 and angular rate rad/s; a `Track`. Out: messages with advice: a complaint when the
+samples cannot be used, notes when they can with care. Owns nothing. Without these checks, wrong units or a dead sensor give a plausible, wrong track.
 """
 
 from __future__ import annotations
@@ -13,34 +13,49 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.foot.steps import Track
+from echostep.offline.csv_table import rate_complaint
 
-CALMEST_SHARE = 0.1  # of the samples: a foot that stands
-GRAVITY_RANGE_M_S2 = (7.0, 13.0)
-G_RANGE = (0.7, 1.3)
+TIME = 0  # columns of the table
+FORCE = slice(1, 4)
+RATE = slice(4, 7)
+SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
+
+# The source of these limits is not recorded.
+CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
+GRAVITY_RANGE_M_S2 = (7.0, 13.0)  # of the specific force at rest
+G_RANGE = (0.7, 1.3)  # of the same in units of gravity
 FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s
-RATE_RANGE_HZ = (45.0, 550.0)
-REGULAR_SHARE = 0.01  # of the sorted times may follow each other too closely
-BACK_SHARE, REPEATED_SHARE = 0.02, 0.6
-STEEP = (15.0, 4.0)  # m/s2, rad/s: equal readings beyond are a sensor at its limit
-CLIPPED_SHARE = 1e-3
-DEAD_S = 2.0
-MOVING_RAD_S = 0.5
-FASTEST_WALK_M_S = 8.0
-FORCED_SAMPLES, LOST_SHARE = 5, 0.2  # rests against belief, and what that leaves unknown of the way
-HIGHEST_STEP_M = 1.0
+FASTEST_QUANTILE = 0.999  # of the rates, compared with it
+RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
+REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
+BACK_SHARE = 0.02  # largest share of rows whose time goes back
+REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
+MISSING_SHARE = 0.02  # share of missing samples that is reported
+STEEP = (15.0, 4.0)  # m/s2, rad/s: equal readings beyond these are a sensor at its limit; as in `foot.zupt_ins`
+CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
+FEWEST_REPEATS = 3  # of equal neighbours at the limit
+FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
+DEAD_S = 2.0  # longest time without a change while the foot moves
+MOVING_RAD_S = 0.5  # rate of a moving foot
+MOVING_SHARE = 0.1  # of a stretch without a change in which the foot moves
+SHORTEST_STEP_S = 0.05  # lower bound of a step's duration where its speed is computed
+FASTEST_WALK_M_S = 8.0  # median speed of the foot over a step
+FORCED_SAMPLES = 5  # samples of rest accepted against the innovation gate
+LOST_SHARE = 0.2  # standard deviation of the end over the length of the path
+HIGHEST_STEP_M = 1.0  # median rise of a step
 
 
 def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows with a number in each of the first seven columns."""
-    whole = np.isfinite(table[:, :7]).all(axis=1)
+    """The rows with a number in each of the first seven columns, and a note on those left out."""
+    whole = np.isfinite(table[:, :SENSOR_COLUMNS]).all(axis=1)
     if whole.all():
         return table, ()
     return table[whole], (f"{int((~whole).sum())} rows without a number in some column: skipped",)
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows in order of their times, when that makes them regular: shuffled rows are mended, a clock that was set back is not."""
-    t_s = table[:, 0]
+    """The rows sorted by time, with a note, if sorting makes the times regular: this repairs shuffled rows, but not a clock that was set back."""
+    t_s = table[:, TIME]
     back = int((np.diff(t_s) < 0.0).sum())
     if back == 0:
         return table, ()
@@ -53,11 +68,12 @@ def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def complaint(table: Floats, columns: Sequence[str]) -> str:
-    """What makes the samples unusable, in words; empty when nothing does."""
-    return _time_complaint(table[:, 0]) or _dead_complaint(table, columns) or _unit_complaint(table)
+    """Why the samples cannot be used, as a message; empty when they can."""
+    return _time_complaint(table[:, TIME]) or _dead_complaint(table, columns) or _unit_complaint(table)
 
 
 def _time_complaint(t_s: Floats) -> str:
+    """Message for times (n,) that go back, repeat, or have another unit."""
     steps = np.diff(t_s)
     back = float((steps < 0).mean()) if len(steps) else 0.0
     if back > BACK_SHARE:
@@ -69,72 +85,65 @@ def _time_complaint(t_s: Floats) -> str:
         return "t_s does not advance"
     if (steps == 0.0).mean() > REPEATED_SHARE:
         return f"t_s repeats itself in {100 * (steps == 0.0).mean():.0f} % of the rows: are several recordings mixed?"
-    rate = 1.0 / float(np.median(forward))
-    if RATE_RANGE_HZ[0] <= rate <= RATE_RANGE_HZ[1]:
-        return ""
-    for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)):
-        if RATE_RANGE_HZ[0] <= rate * factor <= RATE_RANGE_HZ[1]:
-            return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds"
-    advice = "a foot needs 50 at least" if rate < RATE_RANGE_HZ[0] else "average them down to 500 or fewer"
-    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
+    return rate_complaint(
+        1.0 / float(np.median(forward)), RATE_RANGE_HZ, "a foot needs 50 at least", "average them down to 500 or fewer"
+    )
 
 
 def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
-    """A column that never changes, or that stops changing while the foot moves."""
+    """Message for a column that never changes, or else for the one that stays unchanged longest while the foot moves."""
     longest, dead = DEAD_S, ""
-    for k, name in enumerate(columns[1:7], start=1):
-        if len(table) > 100 and np.ptp(table[:, k]) == 0.0:
+    for k, name in enumerate(columns[1:SENSOR_COLUMNS], start=1):
+        if len(table) > FEWEST_ROWS and np.ptp(table[:, k]) == 0.0:
             return f"{name} is constant: is that sensor alive?"
-        others = [at for at in (4, 5, 6) if at != k]
+        others = [column for column in range(RATE.start, RATE.stop) if column != k]
         moving = np.linalg.norm(table[:, others], axis=1) > MOVING_RAD_S
         for begin, end in _runs(np.diff(table[:, k]) == 0.0):
-            span = float(table[end, 0] - table[begin, 0])
-            if span > longest and moving[begin:end].mean() > 0.1:
-                longest, since = span, float(table[begin, 0])
+            span = float(table[end, TIME] - table[begin, TIME])
+            if span > longest and moving[begin:end].mean() > MOVING_SHARE:
+                longest, since = span, float(table[begin, TIME])
                 dead = f"{name} does not change for {span:.1f} s from {since:.2f} s on, while the foot moves: is that sensor alive?"
     return dead
 
 
 def _runs(same: Bools) -> list[tuple[int, int]]:
-    """Begin and end of each stretch of true."""
+    """Index of the first true value of each run, and of the first false one after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _unit_complaint(table: Floats) -> str:
+    """Message for forces in g or without gravity, and for rates in deg/s."""
     force = _resting_force(table)
     if G_RANGE[0] <= force <= G_RANGE[1]:
         return f"ax, ay, az look like g (at rest they are {force:.2f}): multiply them by 9.80665"
     if not GRAVITY_RANGE_M_S2[0] <= force <= GRAVITY_RANGE_M_S2[1]:
         return f"ax, ay, az are {force:.3g} at rest, gravity is 9.8 m/s2: wrong unit, or gravity was removed"
-    fastest = float(np.quantile(np.abs(table[:, 4:7]), 0.999))
+    fastest = float(np.quantile(np.abs(table[:, RATE]), FASTEST_QUANTILE))
     if fastest > FASTEST_FOOT_RAD_S:
         return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180"
     return ""
 
 
 def _resting_force(table: Floats) -> float:
-    """Specific force while the foot turns least: a runner's median is far above gravity."""
-    rate = np.linalg.norm(table[:, 4:7], axis=1)
+    """Median specific force (m/s2) while the foot turns least; over all samples of a run the median is far above gravity."""
+    rate = np.linalg.norm(table[:, RATE], axis=1)
     calm = rate <= np.quantile(rate, CALMEST_SHARE)
-    return float(np.median(np.linalg.norm(table[calm, 1:4], axis=1)))
+    return float(np.median(np.linalg.norm(table[calm, FORCE], axis=1)))
 
 
 def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:
-    """What a reader of the track should know of the samples."""
+    """Faults of the samples that make the track less certain, a line each."""
     found = []
-    t_s = table[:, 0]
-    steps = np.diff(t_s)
+    steps = np.diff(table[:, TIME])
     if repeated := int((steps == 0.0).sum()):
         found.append(f"{repeated} rows repeat the time before them: skipped")
     if back := int((steps < 0.0).sum()):
         found.append(f"t_s goes back {back} times: was the clock set?")
-    forward = steps[steps > 0.0]
-    missing = 1.0 - len(forward) * float(np.median(forward)) / float(forward.sum())
-    if missing > 0.02:
+    if (missing := missing_share(steps)) > MISSING_SHARE:
         found.append(f"{100 * missing:.0f} % of the samples are missing: the track is less certain")
-    for k, name in enumerate(columns[1:7], start=1):
-        if clipped := _clipped(table[:, k], STEEP[0] if k < 4 else STEEP[1]):
+    for k, name in enumerate(columns[1:SENSOR_COLUMNS], start=1):
+        if clipped := _clipped(table[:, k], STEEP[0] if k < RATE.start else STEEP[1]):
             limit, share = clipped
             found.append(
                 f"{name} is cut off at {limit:.4g} in {100 * share:.1f} % of the rows: the sensor's range is too small, the track is less certain"
@@ -142,37 +151,46 @@ def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def missing_share(steps: Floats) -> float:
+    """Share of missing samples, by the differences of time (n,): one less the number of samples over that of median periods."""
+    forward = steps[steps > 0.0]
+    return 1.0 - len(forward) * float(np.median(forward)) / float(forward.sum())
+
+
 def _clipped(column: Floats, steep: float) -> tuple[float, float] | None:
-    """The limit that this column reads again and again, and in which share of the rows."""
+    """The extreme value that a column (n,) repeats, and its share of the rows; None when it repeats none beyond `steep`."""
     for limit in (float(column.max()), float(column.min())):
-        at = column == limit
-        again = at[1:] & at[:-1]
-        if abs(limit) > steep and again.sum() >= 3 and at.mean() > CLIPPED_SHARE:
+        at_limit = column == limit
+        repeated = at_limit[1:] & at_limit[:-1]
+        if abs(limit) > steep and repeated.sum() >= FEWEST_REPEATS and at_limit.mean() > CLIPPED_SHARE:
             return limit, float((np.abs(column) >= abs(limit)).mean())
     return None
 
 
 def contradiction(track: Track) -> str:
-    """How a track contradicts what feet do, in words; empty when it does not."""
+    """How a track contradicts the motion of a foot, as a message; empty when it does not."""
     steps, counts = track.steps, track.counts
     if not track.stance.any():
         return "the foot never stands in these samples: is it a foot, and are the units m/s2 and rad/s?"
-    speeds = [np.hypot(*s.move_m[:2]) / max(s.t_end_s - s.t_start_s, 0.05) for s in steps]
+    speeds = [np.hypot(*s.move_m[:2]) / max(s.t_end_s - s.t_start_s, SHORTEST_STEP_S) for s in steps]
     if speeds and float(np.median(speeds)) > FASTEST_WALK_M_S:
         return f"half of the steps are faster than {np.median(speeds):.0f} m/s: are the units m/s2 and rad/s?"
     if steps and float(np.median([abs(s.move_m[2]) for s in steps])) > HIGHEST_STEP_M:
         return "half of the steps rise or fall by more than a metre: are the units m/s2 and rad/s, and the axes right-handed?"
     if counts.forced > FORCED_SAMPLES and end_sd_m(track) > LOST_SHARE * sum(np.hypot(*s.move_m[:2]) for s in steps):
-        return "the foot stands where its motion says that it cannot: are the units m/s2 and rad/s, and the axes right-handed?"
+        return "the foot is at rest where its computed motion excludes it: are the units m/s2 and rad/s, and the axes right-handed?"
     return ""
 
 
 def end_sd_m(track: Track) -> float:
-    """Standard deviation (m) of the end's horizontal distance from the truth, by the steps' covariances and the growth of the yaw's error."""
+    """Standard deviation (m) of the horizontal position error at the end, from the steps' covariances and the growth of the yaw's error.
+
+    A yaw error at a step turns the path after it about that step.
+    """
     steps = track.steps
     if not steps:
         return 0.0
-    places = np.cumsum([step.move_m[:2] for step in steps], axis=0)
+    positions = np.cumsum([step.move_m[:2] for step in steps], axis=0)
     own = sum(float(step.covariance[0, 0] + step.covariance[1, 1]) for step in steps)
     turns = np.array([step.heading_sd_rad for step in steps])
-    return math.sqrt(own + float(turns**2 @ ((places[-1] - places) ** 2).sum(axis=1)))
+    return math.sqrt(own + float(turns**2 @ ((positions[-1] - positions) ** 2).sum(axis=1)))

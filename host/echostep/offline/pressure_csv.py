@@ -19,16 +19,29 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.barometer.altitude import COLDEST_C, HIGHEST_PA, LOWEST_PA, WARMEST_C, Pressures
 from echostep.barometer.floor_filter import Floors
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import MOST_BAD, CsvLimits, header_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import (
+    MOST_BAD,
+    CsvLimits,
+    header_of,
+    lines_of,
+    open_samples,
+    rate_complaint,
+    read_rows,
+)
 
 COLUMNS = ("t_s", "pressure_pa")
 TEMPERATURE = "temperature_c"
 FLOOR_COLUMNS = ("t_s", "floor", "probability", "height_m")
+TIME, PRESSURE, AIR_TEMPERATURE = range(3)  # columns of a table of samples
+
+# The source of these limits is not recorded.
 LIMITS = CsvLimits(line_chars=1000, lines=19_999_999, early_rows=None)
-RATE_HZ = (0.45, 55.0)
-BACK_SHARE = 0.01
-LONGEST_GAP_S = 5.0
-UNITS = (
+RATE_HZ = (0.45, 55.0)  # 0.5 to 50 Hz with a margin of 10 %
+BACK_SHARE = 0.01  # largest share of rows whose time goes back
+LONGEST_GAP_S = 5.0  # a longer gap is reported
+MOST_GAPS = 3  # reported one by one
+KELVIN_FROM = 200.0  # a median temperature above this number is likely in kelvins
+UNITS = (  # name, and pascals in it
     ("hPa", 100.0),
     ("kPa", 1000.0),
     ("bar", 1e5),
@@ -36,12 +49,12 @@ UNITS = (
     ("inHg", 3386.39),
     ("a quarter of a pascal (SCP1000 counts)", 0.25),
 )
-SEA_PA = (80_000.0, 108_000.0)  # where people live, to guess a unit
+USUAL_PA = (80_000.0, 108_000.0)  # pressures from about 2000 m of height down to the sea, to guess a unit
 
 
 @dataclass(frozen=True, slots=True)
 class PressureRecord:
-    """`samples`, and `notes`: what was found and mended, a line each."""
+    """`samples`, and `notes` on rows that were skipped and on gaps, a line each."""
 
     samples: Pressures
     notes: tuple[str, ...]
@@ -53,7 +66,7 @@ def load_pressures(path: Path | str) -> PressureRecord:
 
 
 def _table(lines: Iterator[str]) -> tuple[Floats, Ints]:
-    """Columns (n, 3), NaN where there is no number, and the line of each row."""
+    """Time, pressure and temperature (n, 3), NaN where there is no number, and the line number of each row (n,)."""
     header, separator = header_of(next(lines, ""))
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(
@@ -69,8 +82,19 @@ def _table(lines: Iterator[str]) -> tuple[Floats, Ints]:
 
 
 def _checked(table: Floats, lines: Ints) -> PressureRecord:
-    """The rows that are samples; raises ValueError when too few are, or when they are something else."""
-    whole: Bools = np.asarray(np.isfinite(table[:, :2]).all(axis=1))
+    """The usable samples of a table (n, 3) with line numbers (n,); raises ValueError when too few are usable, or when the unit is wrong."""
+    table, lines, notes = _usable_rows(table, lines)
+    _check_rate(table[:, TIME])
+    notes += _gap_notes(table[:, TIME], lines)
+    if np.ptp(table[:, PRESSURE]) == 0.0:
+        raise ValueError("pressure_pa never changes: is the sensor read?")
+    temperature, more = _temperatures(table[:, AIR_TEMPERATURE], lines)
+    return PressureRecord(Pressures(table[:, TIME], table[:, PRESSURE], temperature), (*notes, *more))
+
+
+def _usable_rows(table: Floats, lines: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
+    """Rows with a possible pressure and increasing times, their line numbers, and notes on the rows left out."""
+    whole: Bools = np.asarray(np.isfinite(table[:, : len(COLUMNS)]).all(axis=1))
     if not whole.all() and (~whole).mean() > MOST_BAD:
         raise ValueError(
             f"line {lines[~whole][0]}: no number in {_field(table[~whole][0])}, as in {100 * (~whole).mean():.0f} % of the rows"
@@ -79,47 +103,49 @@ def _checked(table: Floats, lines: Ints) -> PressureRecord:
     table, lines = table[whole], lines[whole]
     if len(table) < 2:
         raise ValueError("no samples: two rows with numbers at least are needed")
-    _check_unit(table[:, 1], lines)
-    possible = (table[:, 1] >= LOWEST_PA) & (table[:, 1] <= HIGHEST_PA)
+    _check_unit(table[:, PRESSURE], lines)
+    possible = (table[:, PRESSURE] >= LOWEST_PA) & (table[:, PRESSURE] <= HIGHEST_PA)
     notes += _note(~possible, lines, f"with pressure_pa outside of {LOWEST_PA:.0f} to {HIGHEST_PA:.0f} Pa: skipped")
     table, lines = table[possible], lines[possible]
-    again = np.concatenate([[False], np.diff(table[:, 0]) == 0.0])
+    again = np.concatenate([[False], np.diff(table[:, TIME]) == 0.0])
     notes += _note(again, lines, "with the t_s of the row before: skipped")
     table, lines = table[~again], lines[~again]
-    back = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
+    back = np.flatnonzero(np.diff(table[:, TIME]) < 0.0)
     if len(back) > max(1.0, BACK_SHARE * len(table)):
         raise ValueError(
             f"line {lines[back[0] + 1]}: t_s does not advance, as in {len(back)} rows: sort the rows by t_s, one recording in a file"
         )
-    later = np.concatenate([[True], table[1:, 0] > np.maximum.accumulate(table[:, 0])[:-1]])
+    later = np.concatenate([[True], table[1:, TIME] > np.maximum.accumulate(table[:, TIME])[:-1]])
     notes += _note(~later, lines, "not later than the row before: skipped")
-    table, lines = table[later], lines[later]
-    _check_rate(table[:, 0])
-    gaps = np.flatnonzero(np.diff(table[:, 0]) > LONGEST_GAP_S)
-    notes += tuple(
-        f"line {lines[k + 1]}: {table[k + 1, 0] - table[k, 0]:.0f} s without a sample: judged by the pressure before and after"
-        for k in gaps[:3]
+    return table[later], lines[later], notes
+
+
+def _gap_notes(t_s: Floats, lines: Ints) -> tuple[str, ...]:
+    """Notes on the first long gaps between the times (n,)."""
+    gaps = np.flatnonzero(np.diff(t_s) > LONGEST_GAP_S)
+    return tuple(
+        f"line {lines[k + 1]}: {t_s[k + 1] - t_s[k]:.0f} s without a sample: judged by the pressure before and after"
+        for k in gaps[:MOST_GAPS]
     )
-    if np.ptp(table[:, 1]) == 0.0:
-        raise ValueError("pressure_pa never changes: is the sensor read?")
-    temperature, more = _temperatures(table[:, 2], lines)
-    return PressureRecord(Pressures(table[:, 0], table[:, 1], temperature), (*notes, *more))
 
 
 def _field(row: Floats) -> str:
-    return COLUMNS[0] if not math.isfinite(row[0]) else COLUMNS[1]
+    """Name of the first column without a number."""
+    return COLUMNS[TIME] if not math.isfinite(row[TIME]) else COLUMNS[PRESSURE]
 
 
 def _note(bad: Any, lines: Ints, what: str) -> tuple[str, ...]:
+    """A note with the number of rows where `bad` (n,) is true and the line of the first; none without such rows."""
     return (f"{int(bad.sum())} rows {what} (first: line {lines[bad][0]})",) if bad.any() else ()
 
 
 def _check_unit(pressure: Floats, lines: Ints) -> None:
+    """Raise ValueError, with the likely unit, when the median pressure is not that of air in pascals."""
     middle = float(np.median(pressure))
     if LOWEST_PA <= middle <= HIGHEST_PA:
         return
     for unit, factor in UNITS:
-        if SEA_PA[0] <= middle * factor <= SEA_PA[1]:
+        if USUAL_PA[0] <= middle * factor <= USUAL_PA[1]:
             raise ValueError(
                 f"line {lines[0]}: pressure_pa is {pressure[0]:g}: is it in {unit}? multiply it by {factor:g} to have pascals"
             )
@@ -129,28 +155,24 @@ def _check_unit(pressure: Floats, lines: Ints) -> None:
 
 
 def _check_rate(t_s: Floats) -> None:
+    """Raise ValueError when the sample rate is outside of RATE_HZ."""
     rate = 1.0 / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
-    if RATE_HZ[0] <= rate <= RATE_HZ[1]:
-        return
-    for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)):
-        if RATE_HZ[0] <= rate * factor <= RATE_HZ[1]:
-            raise ValueError(
-                f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds"
-            )
-    advice = "two seconds between samples are the most" if rate < RATE_HZ[0] else "average them down to 50 or fewer"
-    raise ValueError(f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}")
+    if wrong := rate_complaint(
+        rate, RATE_HZ, "two seconds between samples are the most", "average them down to 50 or fewer"
+    ):
+        raise ValueError(wrong)
 
 
 def _temperatures(column: Floats, lines: Ints) -> tuple[Floats | None, tuple[str, ...]]:
-    """The column, None when it is of no use; a note when it is strange."""
+    """The temperatures (n,), None when the column has no number; a note when values are outside of the possible range."""
     known = np.isfinite(column)
     if not known.any():
         return None, ()
     strange = known & ~((column >= COLDEST_C) & (column <= WARMEST_C))
     if not strange.any():
         return column, ()
-    note = f"{int(strange.sum())} temperature_c outside of {COLDEST_C:.0f} to {WARMEST_C:.0f} degC: not believed (first: line {lines[strange][0]})"
-    return column, (f"{note}; are they kelvins?" if float(np.median(column[known])) > 200.0 else note,)
+    note = f"{int(strange.sum())} temperature_c outside of {COLDEST_C:.0f} to {WARMEST_C:.0f} degC: ignored (first: line {lines[strange][0]})"
+    return column, (f"{note}; are they kelvins?" if float(np.median(column[known])) > KELVIN_FROM else note,)
 
 
 def write_floors(path: Path | str, floors: Floors) -> None:

@@ -23,7 +23,7 @@ from echostep.evaluate.lee2010.walks import (
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.trunk_path import WearerSettings
-from echostep.offline.leg_csv import track_default
+from echostep.offline.leg_track import track_default
 from echostep.papers import lee2010
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of

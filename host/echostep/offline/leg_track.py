@@ -1,0 +1,162 @@
+"""The track of a recorded leg, by this project's method or by that of Lee and Lee 2010.
+
+In: `LegSamples`, `StrideSettings`. Out: `LegTrack`. Owns nothing. The estimators are the same as live.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.legs import swing_detection as leg_swings
+from echostep.legs.clipping import repair_clipping
+from echostep.legs.heading import Heading
+from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
+from echostep.legs.strides import StrideEstimator
+from echostep.offline.leg_csv import LegSamples
+from echostep.papers import lee2010
+
+# The source of these limits is not recorded.
+START_SD_RAD = math.radians(3.0)  # of a heading given for the start
+TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning
+SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged
+STANDING_MARGIN_S = 0.2  # left out at either end of standing
+SIGN_TURN_RAD = math.radians(30.0)  # least turning that shows the sign of the belt's gyro
+FEWEST_READINGS = 20  # of the compass that show it
+
+
+@dataclass(frozen=True, slots=True)
+class LegTrack:
+    """`rows` (n, 6): time s, distance m, speed m/s, heading rad, x, y m. `strides`: none by the paper's method.
+
+    `source`: sensors of the heading, in words; `heading_sd_rad`: at the end. `notes`: a line each.
+    """
+
+    rows: Floats
+    strides: tuple[Stride, ...]
+    counts: LegCounts | None
+    source: str
+    heading_sd_rad: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def distance_m(self) -> float:
+        """Length of the whole path."""
+        return float(self.rows[-1, 1]) if len(self.rows) else 0.0
+
+
+def track_default(samples: LegSamples, settings: StrideSettings, heading_rad: float | None = None) -> LegTrack:
+    """The method of this project: strides by both gyros of the leg, heading by belt gyro and compass; `heading_rad` at the start, if known."""
+    legs = StrideEstimator(settings)
+    thigh, shank = repair_clipping(samples.t_s, np.column_stack([samples.thigh, samples.shank])).T
+    strides = (*legs.feed(samples.t_s, thigh, shank), *legs.finish())
+    sign, sign_notes = belt_sign(samples)
+    heading = Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD)
+    still = standing(strides, samples.t_s)
+    angles = heading.feed(
+        samples.t_s, np.where(np.isnan(samples.belt), 0.0, sign * samples.belt), samples.compass, still
+    )
+    if np.isnan(samples.belt).all() and np.isnan(samples.compass).all():
+        angles = np.zeros_like(angles)
+    rows = _rows(samples.t_s, strides, angles[:, 0])
+    accepted = heading.read - heading.refused
+    compass_notes = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
+    notes = (*sign_notes, *compass_notes, *_doubts(strides))
+    strides = with_turns(strides, samples.t_s, angles[:, 0])
+    return LegTrack(rows, strides, legs.counts, _source(samples), float(angles[-1, 1]), notes)
+
+
+def track_lee2010(samples: LegSamples, settings: StrideSettings) -> LegTrack:
+    """The method of Lee and Lee 2010 at 10 Hz; the sign of each gyro is found by `Swings`."""
+    rates = np.column_stack([samples.thigh, samples.shank])
+    swings = leg_swings.Swings()
+    watched_s = np.cumsum(np.minimum(np.diff(samples.t_s, prepend=samples.t_s[0]), lee2010.LONGEST_GAP_S))
+    grid = np.arange(0.0, watched_s[-1], 1.0 / leg_swings.GRID_HZ)
+    even = np.column_stack([np.interp(grid, watched_s, column) for column in rates.T])
+    thigh, shank = swings.sign if swings.decide(even, final=True) else (1.0, 1.0)
+    sign, sign_notes = belt_sign(samples)
+    lee = lee2010.LeeSettings(legs=lee2010.Lee2010Legs(settings.segments.thigh_m, settings.segments.shank_m))
+    walker = lee2010.Walker(lee)
+    if np.isnan(samples.compass).all():
+        walker.heading = lee2010.Fused(0.0, 0.0)
+    belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
+    rows = walker.feed(samples.t_s, thigh * samples.thigh, shank * samples.shank, belt, samples.compass)
+    return LegTrack(rows, (), None, _source(samples), math.sqrt(walker.heading.variance), sign_notes)
+
+
+PROFILES = {"default": track_default, "lee2010": track_lee2010}
+
+
+def _doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
+    """Notes on strides that contradict a walk forward."""
+    steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
+    if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
+        return ("most steps go backward: are the columns of thigh and shank exchanged?",)
+    if len(steps) > 2 and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) > 0.5 * len(steps):
+        return ("most of this is no walk that one leg can observe: do not trust the distance",)
+    return () if steps else ("no step was seen",)
+
+
+def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:
+    """The strides, with `Flag.TURNING` where the trunk's heading (n,) at `t_s` (n,) turns."""
+    flagged = []
+    for stride in strides:
+        h0, h1 = np.interp([stride.t_start_s, stride.t_end_s], t_s, heading)
+        span = stride.t_end_s - stride.t_start_s
+        turns = span > SHORTEST_TURN_S and abs(h1 - h0) / span > TURNING_RAD_S
+        flagged.append(replace(stride, flags=stride.flags | Flag.TURNING) if turns else stride)
+    return tuple(flagged)
+
+
+def standing(strides: tuple[Stride, ...], t_s: Floats) -> Bools:
+    """Whether the wearer stands at each time (n,)."""
+    still = np.zeros(len(t_s), np.bool_)
+    for stride in strides:
+        if Flag.STANDING in stride.flags:
+            still |= (t_s > stride.t_start_s + STANDING_MARGIN_S) & (t_s < stride.t_end_s - STANDING_MARGIN_S)
+    return still
+
+
+def belt_sign(samples: LegSamples) -> tuple[float, tuple[str, ...]]:
+    """Sign of the belt's gyro by the compass, and a note when it is -1; without a compass a positive rate is a turn to the left.
+
+    The angles of both are compared without their linear trend, which holds the gyro's bias.
+    """
+    read = np.isfinite(samples.compass)
+    if np.isnan(samples.belt).all() or read.sum() < FEWEST_READINGS:
+        return 1.0, ()
+    turned = np.cumsum(np.nan_to_num(samples.belt) * np.diff(samples.t_s, prepend=samples.t_s[0]))[read]
+    compass, t_s = np.unwrap(samples.compass[read]), samples.t_s[read]
+    turned, compass = (column - np.polyval(np.polyfit(t_s, column, 1), t_s) for column in (turned, compass))
+    if min(np.ptp(turned), np.ptp(compass)) < SIGN_TURN_RAD or (turned * compass).sum() >= 0.0:
+        return 1.0, ()
+    return -1.0, ("belt gyro worn the other way round, by the compass",)
+
+
+def _source(samples: LegSamples) -> str:
+    """Sensors of the heading, in words."""
+    belt, compass = (not bool(np.isnan(column).all()) for column in (samples.belt, samples.compass))
+    if belt and compass:
+        return "belt gyro and compass"
+    if belt:
+        return "belt gyro alone, from 0: its sign is taken for left positive"
+    return "compass alone" if compass else "none: a straight line is drawn"
+
+
+def _rows(t_s: Floats, strides: tuple[Stride, ...], heading: Floats) -> Floats:
+    """Rows of `LegTrack` (n, 6): the distance grows evenly within each stride, the position moves along the heading (n,)."""
+    knots = [(float(t_s[0]), 0.0)]
+    distance_m = 0.0
+    for stride in strides:
+        if stride.t_start_s > knots[-1][0]:
+            knots.append((stride.t_start_s, distance_m))
+        distance_m += stride.length_m
+        knots.append((max(stride.t_end_s, knots[-1][0]), distance_m))
+    distance = np.interp(t_s, *np.array(knots).T)
+    move = np.diff(distance, prepend=0.0)
+    speed = np.array([0.0, *(move[1:] / np.diff(t_s))])
+    x, y = np.cumsum(move * np.cos(heading)), np.cumsum(move * np.sin(heading))
+    return np.column_stack([t_s, distance, speed, np.arctan2(np.sin(heading), np.cos(heading)), x, y])
