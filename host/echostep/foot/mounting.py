@@ -3,8 +3,8 @@
 In: the attitude at each sample of a swing. Out: the angle from the foot's yaw to the direction of its toe. The caller owns the sums.
 
 Gravity at rest gives the level (`ins.set_level`). The foot tips about the axis from its right to its left, and much further toe down than
-toe up: over the ball at push-off, whether it steps forward, backward or sideways, and towards the floor on stairs [Perry 1992]. So the second
-moment of the tilt gives the axis, its third moment the sign; the direction of the steps is not used.
+toe up: over the ball at push-off in steps forward, backward and sideways, and towards the floor on stairs [Perry 1992]. So the second
+moment of the tilt gives the axis, and its third moment the sign. The direction of the steps is not used.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from echostep.foot import ins
 from echostep.foot.ins import Nav, Vector
 from echostep.jit import lean_kernel
 
-ENOUGH_RAD2_S = (
-    0.1  # second moment of the tilt; less than one whole stride's, as the first half step of a walk may tip toe up only
+# By reason: a whole stride has a larger second moment of the tilt; the first half step of a walk has less, and may tip toe up only.
+ENOUGH_RAD2_S = 0.1
+LEAST_ANISOTROPY = (
+    0.6  # of the second moment: 1 is a tilt about one axis, 0 one about all axes alike; source not recorded
 )
-ROUND = 0.6  # least anisotropy of the second moment: 1 is a tilt about one axis, 0 one about all axes alike
-MEMORY = 0.95  # weight of the sums of earlier swings, per swing
+MEMORY = 0.95  # weight of the sums of earlier swings, per swing; source not recorded
 
 
 @lean_kernel
@@ -29,7 +30,8 @@ def tilt(nav: Nav) -> Vector:
     r = ins.rotation(nav.attitude)
     yaw = ins.heading(nav)
     c, s = math.cos(yaw), math.sin(yaw)
-    ahead = (c * r[0][0] + s * r[1][0], c * r[0][1] + s * r[1][1], c * r[0][2] + s * r[1][2])  # yaw undone
+    # Rows of the attitude without its yaw.
+    ahead = (c * r[0][0] + s * r[1][0], c * r[0][1] + s * r[1][1], c * r[0][2] + s * r[1][2])
     left = (c * r[1][0] - s * r[0][0], c * r[1][1] - s * r[0][1], c * r[1][2] - s * r[0][2])
     level_x, level_y, level_z = nav.level[0], nav.level[1], nav.level[2]
     x = 0.5 * (ins.dot(r[2], level_y) - ins.dot(left, level_z))
@@ -56,7 +58,7 @@ def toe(square: Floats, cube: Floats) -> float:
     """Angle (rad) from the foot's yaw to its toe; NaN while the foot has not tipped enough."""
     whole = square[0] + square[2]
     along = math.hypot(square[0] - square[2], 2.0 * square[1])
-    if whole < ENOUGH_RAD2_S or along < ROUND * whole:
+    if whole < ENOUGH_RAD2_S or along < LEAST_ANISOTROPY * whole:
         return math.nan
     left = 0.5 * math.atan2(2.0 * square[1], square[0] - square[2])
     if cube[0] * math.cos(left) + cube[1] * math.sin(left) < 0.0:

@@ -14,8 +14,23 @@ import numpy as np
 from echostep.arrays import Bools, Floats, Ints
 from echostep.foot import ins, stance, zupt_ins
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
+from echostep.foot.zupt_ins import (
+    COVARIANCE,
+    END_S,
+    HEADING,
+    HEADING_SD,
+    KIND,
+    MOVE,
+    ROW_EVENT_COUNT,
+    ROW_HEADING,
+    ROW_IN_STANCE,
+    ROW_POSITION,
+    ROW_SIZE,
+    START_S,
+    TOE,
+)
 
-NO_MAG: Floats = np.empty((0, 3))
+NO_MAG: Floats = np.empty((0, 3))  # in the place of magnetometer samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +117,7 @@ class FootEvents:
 
 
 class Foot:
-    """Live processing; equal samples give equal events, bit for bit, in whatever portions they are fed."""
+    """Live processing; equal samples give the same events, bit for bit, in blocks of any size."""
 
     def __init__(self, settings: FootSettings | None = None, noise: ins.Noise | None = None) -> None:
         self._zupt = np.zeros(1, zupt_ins.ZUPT_STATE)
@@ -143,14 +158,14 @@ class Foot:
 
         Raises ValueError for other shapes.
         """
-        return self._run(t_s, accel, gyro, mag, np.empty((0, zupt_ins.ROW_SIZE)))
+        return self._run(t_s, accel, gyro, mag, np.empty((0, ROW_SIZE)))
 
     def track(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None = None) -> FootEvents:
         """As `feed`, with the sample after which each event was known."""
-        rows = np.zeros((len(t_s), zupt_ins.ROW_SIZE))
+        rows = np.zeros((len(t_s), ROW_SIZE))
         events = self._run(t_s, accel, gyro, mag, rows)
-        known = np.searchsorted(rows[:, 5], np.arange(1, len(events) + 1))
-        return FootEvents(events, known, rows[:, 3], rows[:, 4] > 0.0)
+        known = np.searchsorted(rows[:, ROW_EVENT_COUNT], np.arange(1, len(events) + 1))
+        return FootEvents(events, known, rows[:, ROW_HEADING], rows[:, ROW_IN_STANCE] > 0.0)
 
     def _run(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None, rows: Floats) -> list[Step | Stance]:
         """Events of the samples; fills `rows` (n, ROW_SIZE), or nothing where it is empty."""
@@ -174,15 +189,15 @@ def walk_track(
     noise: ins.Noise | None = None,
     mag: Floats | None = None,
 ) -> Track:
-    """The whole walk of samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s at once, equal to what `Foot` gives live."""
+    """Track of a whole walk, samples t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live."""
     foot = Foot(settings, noise)
-    rows = np.zeros((len(t_s), zupt_ins.ROW_SIZE))
+    rows = np.zeros((len(t_s), ROW_SIZE))
     events = foot._run(t_s, accel, gyro, mag, rows)
     return Track(
         np.asarray(t_s, np.float64),
-        rows[:, :3],
-        rows[:, 3],
-        rows[:, 4] > 0.0,
+        rows[:, ROW_POSITION : ROW_POSITION + 3],
+        rows[:, ROW_HEADING],
+        rows[:, ROW_IN_STANCE] > 0.0,
         events,
         foot.counts,
         compass=foot.compass,
@@ -191,10 +206,10 @@ def walk_track(
 
 def _event(row: Floats) -> Step | Stance:
     """The event of a row (EVENT_SIZE,)."""
-    kind, start, end, dx, dy, dz = row[:6].tolist()
-    heading, heading_sd, toe = row[15:].tolist()
-    if kind == zupt_ins.STANCE:
-        return Stance(start, end, heading)
-    return Step(
-        start, end, (dx, dy, dz), row[6:15].reshape(3, 3).copy(), heading, heading_sd, None if math.isnan(toe) else toe
-    )
+    start_s, end_s, heading, toe = row[[START_S, END_S, HEADING, TOE]].tolist()
+    if row[KIND] == zupt_ins.STANCE:
+        return Stance(start_s, end_s, heading)
+    dx, dy, dz = row[MOVE : MOVE + 3].tolist()
+    covariance = row[COVARIANCE : COVARIANCE + 9].reshape(3, 3).copy()
+    toe_rad = None if math.isnan(toe) else toe
+    return Step(start_s, end_s, (dx, dy, dz), covariance, heading, float(row[HEADING_SD]), toe_rad)

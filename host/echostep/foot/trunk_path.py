@@ -1,9 +1,10 @@
-"""From the foot's stances to the trunk's path.
+"""The trunk's path from the steps and stances of one foot.
 
 In: `Step` and `Stance` of one foot (walk frame). Out: `PathSegment`s: straight pieces of the trunk's path between anchors. Owns the last anchor.
 
-The trunk passes over the foot in the middle of the stance [Perry 1992, mid stance]; between two such moments it moves evenly. A person who stands
-keeps the trunk over the foot, but for half a usual stance at either end.
+The trunk passes over the foot in the middle of the stance [Perry 1992, mid stance]; between two such moments it moves evenly.
+While the wearer stands, the trunk stays over the foot, except for half a usual stance at either end.
+An anchor is the trunk's time, position and heading at such a moment.
 """
 
 from __future__ import annotations
@@ -20,12 +21,21 @@ from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step
 from echostep.path import STANDING_PIECE_S, PathSegment
 
+# The source of these limits is not recorded.
+HALVES = 7  # stances whose median duration counts
+STANCE_RANGE_S = (0.1, 0.8)  # duration of a stance in walking; longer ones are standing
+HALF_STANCE_RANGE_S = (0.1, 0.35)
+STRAIGHT_STEP_M = 0.6  # least length of a step that shows the direction of travel
+STRAIGHT_STEP_RAD = math.radians(15.0)  # largest turn of such a step
+FORWARD_RAD = math.radians(45.0)  # largest angle of a forward step to the toe
+TOE_MEMORY = 20  # steps that the mean of the toe angle remembers
+
 
 @dataclass(frozen=True, slots=True)
 class GaitSettings:
-    """Where the foot is: `foot_left_m` to the left of the trunk (negative: right foot); `half_stance_s` until it has been observed.
+    """`foot_left_m`: distance of the foot to the left of the trunk (negative: right foot). `half_stance_s`: used until stances are observed.
 
-    `anchor_sd_m`: how exactly the trunk passes over the foot, per axis; not the same for every person, but from step to step.
+    `anchor_sd_m`: standard deviation per axis of the trunk's position over the foot; the error varies from step to step.
     """
 
     foot_left_m: float = -0.08
@@ -34,58 +44,58 @@ class GaitSettings:
 
 
 class TrunkPath:
-    """Turns stances into legs; every leg begins where the one before it ended."""
+    """Converts stances and steps into path segments; each segment begins where the one before it ended."""
 
     def __init__(self, settings: GaitSettings) -> None:
         self._settings = settings
         self._anchor: tuple[float, float, float, float] | None = None  # t, x, y, heading
         self._foot_xy = (0.0, 0.0)
-        self._stance_begin_s = 0.0
-        self._halves: deque[float] = deque([settings.half_stance_s], maxlen=7)
+        self._halves: deque[float] = deque([settings.half_stance_s], maxlen=HALVES)
         self._toe = ToeAngle()
         self.steps = 0
 
     def add_standing(self, t_s: Floats, foot_heading_rad: Floats) -> list[tuple[int, PathSegment]]:
-        """The foot is still at all of `t_s` (n,): what becomes known of the trunk, and at which of them."""
+        """Segments of standing while the foot is still at all times `t_s` (n,), each with the index of the sample that completes it."""
         if self._anchor is None and len(t_s):
-            self._stance_begin_s = float(t_s[0])
             heading = float(foot_heading_rad[0]) + self._toe.angle_rad
-            self._anchor = (self._stance_begin_s, *self._trunk(heading), heading)
-        found: list[tuple[int, PathSegment]] = []
-        until = t_s - self._half_s()
+            self._anchor = (float(t_s[0]), *self._trunk_xy(heading), heading)
+        segments: list[tuple[int, PathSegment]] = []
+        until_s = t_s - self._half_s()
         while self._anchor is not None:
-            at = int(np.searchsorted(until - self._anchor[0], STANDING_PIECE_S))
-            if at == len(t_s):
+            sample_index = int(np.searchsorted(until_s - self._anchor[0], STANDING_PIECE_S))
+            if sample_index == len(t_s):
                 break
-            found.append((at, self._stay(float(until[at]))))
-        return found
+            segments.append((sample_index, self._standing_segment(float(until_s[sample_index]))))
+        return segments
 
     def add_stance(self, stance: Stance) -> list[PathSegment]:
-        """A stance is over."""
-        legs = []
-        until = stance.t_end_s - self._half_s()
-        if self._anchor is not None and until > self._anchor[0]:
-            legs.append(self._stay(until))
-        length = stance.t_end_s - stance.t_start_s
-        if 0.1 < length < 0.8:
-            self._halves.append(0.5 * length)
-        return legs
+        """The segment of standing up to half a stance before the end of this stance, if there is any."""
+        segments = []
+        until_s = stance.t_end_s - self._half_s()
+        if self._anchor is not None and until_s > self._anchor[0]:
+            segments.append(self._standing_segment(until_s))
+        duration_s = stance.t_end_s - stance.t_start_s
+        if STANCE_RANGE_S[0] < duration_s < STANCE_RANGE_S[1]:
+            self._halves.append(0.5 * duration_s)
+        return segments
 
     def add_step(self, step: Step) -> list[PathSegment]:
-        """The foot has landed."""
+        """The segment to the middle of the stance after this step."""
         self.steps += 1
         self._toe.learn(step)
         dx, dy = float(step.move_m[0]), float(step.move_m[1])
         self._foot_xy = (self._foot_xy[0] + dx, self._foot_xy[1] + dy)
-        self._stance_begin_s = step.t_end_s
         heading = step.heading_rad + self._toe.angle_rad
         variance = 0.5 * (float(step.covariance[0][0]) + float(step.covariance[1][1]))
-        leg = self._go(step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad)
+        segment = self._moving_segment(
+            step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad
+        )
         rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
-        return [replace(leg, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd)]
+        return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd)]
 
-    def _go(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
-        x, y = self._trunk(heading)
+    def _moving_segment(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
+        """The segment from the last anchor to a new one over the foot; without a last one, an empty segment of one second."""
+        x, y = self._trunk_xy(heading)
         t0, x0, y0, heading0 = self._anchor or (t_s - 1.0, x, y, heading)
         t_s = max(t_s, t0)
         self._anchor = (t_s, x, y, heading)
@@ -93,7 +103,8 @@ class TrunkPath:
             t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m
         )
 
-    def _stay(self, t_s: float) -> PathSegment:
+    def _standing_segment(self, t_s: float) -> PathSegment:
+        """The segment from the last anchor to the same position at `t_s`, the new anchor."""
         assert self._anchor is not None
         t0, x, y, heading = self._anchor
         self._anchor = (t_s, x, y, heading)
@@ -101,34 +112,35 @@ class TrunkPath:
             t0, t_s, 0.0, 0.0, heading, heading, 0.0, 0.0, self.steps, self._settings.anchor_sd_m, 0.0, 0.0
         )
 
-    def _trunk(self, heading: float) -> tuple[float, float]:
-        """Where the trunk is above this foot; left of the heading is (-sin, cos)."""
+    def _trunk_xy(self, heading: float) -> tuple[float, float]:
+        """Position of the trunk over the foot, for this heading of the trunk; left of the heading is (-sin, cos)."""
         left = self._settings.foot_left_m
         return self._foot_xy[0] + left * math.sin(heading), self._foot_xy[1] - left * math.cos(heading)
 
     def _half_s(self) -> float:
-        return min(max(median(self._halves), 0.1), 0.35)
+        """Half the usual duration of a stance."""
+        return min(max(median(self._halves), HALF_STANCE_RANGE_S[0]), HALF_STANCE_RANGE_S[1])
 
 
 class ToeAngle:
-    """The angle from the foot's yaw to the direction of travel, learnt from straight forward steps."""
-
-    LONGEST_MEMORY = 20
+    """The angle from the foot's yaw to the direction of travel: running mean over straight forward steps."""
 
     def __init__(self) -> None:
         self.angle_rad = 0.0
-        self._seen = 0
+        self._count = 0
         self._last_heading: float | None = None
 
     def learn(self, step: Step) -> None:
-        """Take a step into account when it is long, straight and forward."""
+        """Update the mean by this step if it is long, straight and forward."""
         before, self._last_heading = self._last_heading, step.heading_rad
         dx, dy = float(step.move_m[0]), float(step.move_m[1])
-        if before is None or math.hypot(dx, dy) < 0.6 or abs(wrap(step.heading_rad - before)) > math.radians(15.0):
+        if before is None or math.hypot(dx, dy) < STRAIGHT_STEP_M:
+            return
+        if abs(wrap(step.heading_rad - before)) > STRAIGHT_STEP_RAD:
             return
         mean_heading = before + 0.5 * wrap(step.heading_rad - before)
         error = wrap(math.atan2(dy, dx) - mean_heading - self.angle_rad)
-        if abs(error) > math.radians(45.0):
+        if abs(error) > FORWARD_RAD:
             return
-        self._seen = min(self._seen + 1, self.LONGEST_MEMORY)
-        self.angle_rad += error / (self._seen + 1)
+        self._count = min(self._count + 1, TOE_MEMORY)
+        self.angle_rad += error / (self._count + 1)

@@ -39,10 +39,21 @@ DOUBT_S = 0.1  # of stances against the innovation gate: the level is wrong
 ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
 FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, kerb or ramp
 
-STEP, STANCE = 0.0, 1.0
-EVENT_SIZE = 18  # kind, start, end, move (3), covariance (9), heading, heading sd, toe
+STEP, STANCE = 0.0, 1.0  # kinds of event
+KIND, START_S, END_S, MOVE, COVARIANCE, HEADING, HEADING_SD, TOE = (
+    0,
+    1,
+    2,
+    3,
+    6,
+    15,
+    16,
+    17,
+)  # columns of an event: MOVE has 3, COVARIANCE 9
+EVENT_SIZE = 18
 EVENTS_PER_SAMPLE = 2
-ROW_SIZE = 6  # position (3), heading, in stance, events so far
+ROW_POSITION, ROW_HEADING, ROW_IN_STANCE, ROW_EVENT_COUNT = 0, 3, 4, 5  # columns of a row: ROW_POSITION has 3
+ROW_SIZE = 6
 
 
 class ZuptState(Protocol):
@@ -151,10 +162,11 @@ def process(foot: FootState, samples: Samples, output: Output) -> int:
             for i in range(3):
                 s.force[i], s.rate[i] = accel[k, i], gyro[k, i]
         if len(rows):
-            rows[k, 0], rows[k, 1], rows[k, 2] = nav.position[0], nav.position[1], nav.position[2]
-            rows[k, 3] = ins.heading(nav)
-            rows[k, 4] = s.in_stance
-            rows[k, 5] = event_count
+            for i in range(3):
+                rows[k, ROW_POSITION + i] = nav.position[i]
+            rows[k, ROW_HEADING] = ins.heading(nav)
+            rows[k, ROW_IN_STANCE] = s.in_stance
+            rows[k, ROW_EVENT_COUNT] = event_count
     return event_count
 
 
@@ -353,14 +365,14 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_
 @lean_kernel
 def _write_step(s: ZuptState, nav: Nav, row: Floats) -> None:
     """Fill an event row with the step since `origin`; fade the sums of the mounting."""
-    row[0], row[1], row[2] = STEP, s.stance_end_s, s.stance_begin_s
+    row[KIND], row[START_S], row[END_S] = STEP, s.stance_end_s, s.stance_begin_s
     for i in range(3):
-        row[3 + i] = nav.position[i] - s.origin[i]
+        row[MOVE + i] = nav.position[i] - s.origin[i]
         for j in range(3):
-            row[6 + 3 * i + j] = nav.P[POS + i, POS + j]
-    row[15] = s.rest_yaw_rad
-    row[16] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
-    row[17] = mounting.toe(s.tilt_square, s.tilt_cube)
+            row[COVARIANCE + 3 * i + j] = nav.P[POS + i, POS + j]
+    row[HEADING] = s.rest_yaw_rad
+    row[HEADING_SD] = math.sqrt(max(nav.P[YAW, YAW] - s.yaw_variance, 0.0))
+    row[TOE] = mounting.toe(s.tilt_square, s.tilt_cube)
     for i in range(3):
         s.tilt_square[i] *= mounting.MEMORY
         s.tilt_cube[i] *= mounting.MEMORY
@@ -377,8 +389,9 @@ def _settle(s: ZuptState, nav: Nav) -> None:
 def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, event_count: int) -> int:
     """Write the stance, which ended with its last rest, and apply the magnetometer's yaw correction."""
     row = events[event_count]
-    row[0], row[1], row[2], row[15] = STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s), s.rest_yaw_rad
-    s.stance_end_s = row[2]
+    row[KIND], row[START_S], row[END_S] = STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s)
+    row[HEADING] = s.rest_yaw_rad
+    s.stance_end_s = row[END_S]
     s.in_stance = 0
     if not s.settled:
         _settle(s, nav)

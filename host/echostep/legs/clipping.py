@@ -1,8 +1,8 @@
-"""Rates of gyros that were cut off at the end of their range: what they left out is drawn in.
+"""Reconstruction of peaks that a gyro has clipped at the end of its range.
 
-In: times and rates of sensors that clip, in blocks. Out: the same, a little later, with each cut-off top replaced by a smooth one. Owns the samples
-that wait for the end of a top. A shank swings at 350 to 450 deg/s, an ADIS16100 ends at 300: without the top its angle would be short by some degrees
-in every stride, and a bias would be made of that.
+In: times and rates of sensors that clip, in blocks. Out: the same, a little later, with each clipped peak replaced by a cubic. Owns the samples
+that wait for the end of a peak. A shank swings at 350 to 450 deg/s; the range of an ADIS16100 ends at 300. Without the peaks its angle would lose
+some degrees in every stride, and the estimator would take this loss for a bias of the gyro.
 """
 
 from __future__ import annotations
@@ -11,59 +11,65 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 
-NEAR = 0.985  # of the limit: a bias may have been taken away
-EDGE = 2  # samples on either side that tell the slopes
-LONGEST = 100  # samples at the limit: no swing, a broken sensor
-HIGHEST = 1.8  # of the limit
-SAME_PAIRS = 3  # of equal neighbours at an extreme, which a sensor within its range does not show
-FASTEST_WITHIN_RAD_S = 2.0
+# The source of these values is not recorded.
+NEAR = 0.985  # share of the limit from which a rate counts as clipped: a bias may have been subtracted from it
+EDGE = 2  # samples on either side of a peak, which give the slopes
+LONGEST = 100  # samples at the limit; more of them are a broken sensor, not a swing
+HIGHEST = 1.8  # largest reconstructed rate, as a multiple of the limit
+SAME_PAIRS = 3  # equal neighbours at an extreme, which a sensor within its range does not show
+SLOWEST_LIMIT_RAD_S = 2.0  # no gyro on a leg has a smaller range
 
 
 class ClippingRepair:
-    """Feed it blocks; the samples come back in order, `EDGE` samples late, those of a top when it is over."""
+    """Takes samples in blocks and returns them in order: `EDGE` samples late, those of a peak after its end."""
 
     def __init__(self, low: Floats, high: Floats) -> None:
         """`low`, `high` (k,): the ends of the range of each column; infinite where there is none."""
         self._low, self._high = NEAR * low, NEAR * high
         self._waiting = np.empty((0, 1 + len(low)))
-        self._ready = 0  # of those that wait: gone already, kept for their slopes
+        self._returned = 0  # of those that wait: returned already, kept for their slopes
 
     def feed(self, t_s: Floats, rates: Floats) -> tuple[Floats, Floats]:
-        """Times (n,) and rates (n, k) that are certain now."""
+        """Times (n,) and rates (n, k) of the samples that no later sample can change."""
         rows = np.vstack([self._waiting, np.column_stack([t_s, rates])])
-        at_end: Bools = (rows[:, 1:] >= self._high) | (rows[:, 1:] <= self._low)
-        clipped = np.logical_or.reduce(at_end, axis=1)
+        at_limit: Bools = (rows[:, 1:] >= self._high) | (rows[:, 1:] <= self._low)
+        clipped = np.logical_or.reduce(at_limit, axis=1)
         until = len(rows) - EDGE
-        while until > self._ready and clipped[until : until + EDGE].any() and len(rows) - until < LONGEST:
+        while until > self._returned and clipped[until : until + EDGE].any() and len(rows) - until < LONGEST:
             until -= 1
         return self._release(rows, until)
 
     def finish(self) -> tuple[Floats, Floats]:
-        """No more samples: those that wait."""
+        """The samples that still wait; no more may follow."""
         return self._release(self._waiting, len(self._waiting))
 
     def _release(self, rows: Floats, until: int) -> tuple[Floats, Floats]:
-        until = max(until, self._ready)
-        mended = self._mended(rows)[self._ready : until]
+        """Times and repaired rates of the rows (n, 1 + k) up to `until`; the others wait."""
+        until = max(until, self._returned)
+        repaired = self._repaired(rows)[self._returned : until]
         keep = max(until - EDGE, 0)
-        self._waiting, self._ready = rows[keep:], until - keep
-        return mended[:, 0], mended[:, 1:]
+        self._waiting, self._returned = rows[keep:], until - keep
+        return repaired[:, 0], repaired[:, 1:]
 
-    def _mended(self, rows: Floats) -> Floats:
-        found = rows.copy()
+    def _repaired(self, rows: Floats) -> Floats:
+        """The rows (n, 1 + k), time first, with the peaks of all columns reconstructed."""
+        repaired = rows.copy()
         for k, (low, high) in enumerate(zip(self._low.tolist(), self._high.tolist(), strict=True), start=1):
-            for limit, at in ((high, rows[:, k] >= high), (low, rows[:, k] <= low)):
-                if at.any():
-                    _draw_tops(found[:, 0], found[:, k], at, limit / NEAR)
-        return found
+            for limit, clipped in ((high, rows[:, k] >= high), (low, rows[:, k] <= low)):
+                if clipped.any():
+                    _reconstruct_peaks(repaired[:, 0], repaired[:, k], clipped, limit / NEAR)
+        return repaired
 
 
-def _draw_tops(t_s: Floats, rate: Floats, at: Bools, limit: float) -> None:
-    """Replace each stretch at the limit by the cubic that goes on from the slopes beside it, in place."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(np.int8)))
+def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) -> None:
+    """Replace each clipped stretch of `rate` (n,) in place by a cubic Hermite spline through the samples beside it, with their slopes.
+
+    A stretch stays as it is if it has one sample only, is too long, or has no unclipped samples on both sides.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], clipped, [False]]).astype(np.int8)))
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         a, b = begin - 1, end
-        if a < 1 or b + 1 >= len(rate) or end - begin < 2 or end - begin > LONGEST or at[a - 1] or at[b + 1]:
+        if a < 1 or b + 1 >= len(rate) or end - begin < 2 or end - begin > LONGEST or clipped[a - 1] or clipped[b + 1]:
             continue
         span = float(t_s[b] - t_s[a])
         before, after = t_s[a] - t_s[a - 1], t_s[b + 1] - t_s[b]
@@ -77,24 +83,24 @@ def _draw_tops(t_s: Floats, rate: Floats, at: Bools, limit: float) -> None:
             + (3 * u**2 - 2 * u**3) * rate[b]
             + (u**3 - u**2) * m1
         )
-        way = np.sign(limit)
-        rate[begin:end] = way * np.clip(way * cubic, way * rate[begin:end], HIGHEST * abs(limit))
+        side = np.sign(limit)
+        rate[begin:end] = side * np.clip(side * cubic, side * rate[begin:end], HIGHEST * abs(limit))
 
 
 def find_clipping_limits(rates: Floats) -> tuple[Floats, Floats]:
-    """Where the sensors (n, k) end, by stretches of equal readings at their extremes; infinite for those that do not show it."""
+    """Lower and upper limits (k,) of sensors with rates (n, k), by equal neighbouring readings at their extremes; infinite where none are found."""
     low, high = np.full(rates.shape[1], -np.inf), np.full(rates.shape[1], np.inf)
     for k, column in enumerate(rates.T):
-        for ends, extreme in ((low, float(column.min())), (high, float(column.max()))):
+        for limits, extreme in ((low, float(column.min())), (high, float(column.max()))):
             cut = column == extreme
-            if abs(extreme) > FASTEST_WITHIN_RAD_S and (cut[1:] & cut[:-1]).sum() >= SAME_PAIRS:
-                ends[k] = extreme
+            if abs(extreme) > SLOWEST_LIMIT_RAD_S and (cut[1:] & cut[:-1]).sum() >= SAME_PAIRS:
+                limits[k] = extreme
     return low, high
 
 
 def repair_clipping(t_s: Floats, rates: Floats) -> Floats:
-    """A whole record (n, k), mended."""
-    whole = ClippingRepair(*find_clipping_limits(rates))
-    _, first = whole.feed(t_s, rates)
-    _, rest = whole.finish()
+    """The rates (n, k) of a whole record, with peaks reconstructed at the limits found in it."""
+    repair = ClippingRepair(*find_clipping_limits(rates))
+    _, first = repair.feed(t_s, rates)
+    _, rest = repair.finish()
     return np.vstack([first, rest])

@@ -1,13 +1,13 @@
-"""Heading of the trunk from a gyro that turns with it and a compass that is disturbed.
+"""Heading of the trunk from a gyro that turns with it and a disturbed compass.
 
 In: yaw rates, compass headings (rad, counter-clockwise from the map's x), whether the wearer stands. Out: heading with its standard deviation. Owns
-the filter's state: heading, gyro bias, and how the wearer's iron turns the compass; `fit_compass_errors` finds that iron from a turn on the spot.
+the filter's state: heading, gyro bias, and the compass errors by the wearer's iron; `fit_compass_errors` estimates these from a turn on the spot.
 
-CompassErrors that moves with a compass, hard or soft, errs its heading h by A + B sin h + C cos h + D sin 2h + E cos 2h [National
-Geospatial-Intelligence Agency 2004, Handbook of Magnetic Compass Adjustment]. A says where the device is mounted and cannot be told from the
-heading itself: it is left 0. CompassErrors of the building errs it by 7 degrees from place to place, much the same for some metres: so one reading
-counts little, and readings that turn while the gyro does not count for nothing. The foot's magnetometer (`compass`) is the same idea for a field
-of three axes.
+Hard and soft iron that moves with a compass adds the error A + B sin h + C cos h + D sin 2h + E cos 2h to its heading h [National
+Geospatial-Intelligence Agency 2004, Handbook of Magnetic Compass Adjustment]. A depends on the mounting of the device and cannot be separated from
+the heading itself: it is left 0. Iron of the building adds errors of about 7 degrees that vary from place to place and stay alike for some metres.
+Therefore one reading has a small weight, and readings that turn while the gyro does not are rejected. `foot.magnetometer` applies the same
+principle to a field of three axes.
 """
 
 from __future__ import annotations
@@ -21,20 +21,33 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
 
-HEADING, BIAS, IRON = 0, 1, 2  # places in the state
+HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
 SIZE = 6
-FULL_TURN_RAD = math.radians(330.0)
-LARGEST_IRON_RAD = math.radians(60.0)
-FAR_OFF_SD = 3.0
-FITS = 6
-BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose means differ by less than CALM_RAD_S
+
+# The source of these values is not recorded.
+GATE_SD = 3.0  # gate on the innovation
+STEP_S = 0.1  # of the covariance's propagation; also the compass period until two readings show it
+SHORTEST_PERIOD_S = 0.02  # of the compass
+MISSING_WALK_RAD = math.radians(30.0)  # random walk of the heading per root second while the gyro is missing
+CALIBRATED_SHARE = 0.25  # of `iron_sd_rad` once calibrated
+SECOND_SHARE = 0.5  # sd of D and E over that of B and C
+BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose mean rates differ by less than CALM_RAD_S
 CALM_BINS = 7
 CALM_RAD_S = math.radians(1.0)
+
+# Fit of the compass errors; source not recorded.
+FULL_TURN_RAD = math.radians(330.0)
+FEWEST_READINGS = 20
+LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as that of the earth
+FITS = 6  # linearizations
+REWEIGHTINGS = 3  # of the readings in each, for outliers
+SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals
+MAD_TO_SD = 1.4826  # of a normal distribution
 
 
 @dataclass(frozen=True, slots=True)
 class CompassErrors:
-    """B, C, D, E (rad): a compass shows B sin h + C cos h + D sin 2h + E cos 2h too much at heading h. `rms_rad`: what a fit left over."""
+    """B, C, D, E (rad): error B sin h + C cos h + D sin 2h + E cos 2h of a compass at heading h. `rms_rad`: residual of the fit."""
 
     sin1: float = 0.0
     cos1: float = 0.0
@@ -43,16 +56,18 @@ class CompassErrors:
     rms_rad: float = 0.0
 
     def error(self, heading_rad: float) -> float:
-        """What the compass shows too much."""
+        """Compass heading less true heading."""
         return float(np.array([self.sin1, self.cos1, self.sin2, self.cos2]) @ _harmonics(heading_rad))
 
 
 @dataclass(frozen=True, slots=True)
 class HeadingSettings:
-    """How wrong gyro and compass are: the building's `disturbance_rad` stays the same for about `same_s`; `steady_rad` is how far gyro and compass
-    may part in a second. `drift_rad_s2` is the random walk of the bias in a root second, `walk_rad` that of the heading. `iron_sd_rad` of what is not
-    calibrated. `rest_sd_rad_s`: how somebody who stands still turns nevertheless, in a tenth of a second. `first_sd_rad`: of the first reading of the
-    compass; small where only turns against it count.
+    """Errors of gyro and compass.
+
+    `disturbance_rad`: compass error by the building, sd; it stays alike for about `same_s`. `steady_rad`: largest difference between the turns of
+    gyro and compass within a second. `walk_rad` and `drift_rad_s2`: random walk of heading and of gyro bias per root second. `bias_sd_rad_s`: bias
+    at the start, sd. `rest_sd_rad_s`: mean rate of a resting trunk over 0.1 s, sd. `first_sd_rad`: first reading of the compass, sd; small where
+    only turns relative to it matter. `iron_sd_rad`: error by the wearer's iron, sd, without calibration; `iron`: the calibration.
     """
 
     disturbance_rad: float = math.radians(8.0)
@@ -68,59 +83,70 @@ class HeadingSettings:
 
 
 class Heading:
-    """A Kalman filter of heading, gyro bias and iron; equal samples give equal headings, in whatever portions they come."""
+    """Kalman filter of heading, gyro bias and iron; equal samples give equal headings, in blocks of any size."""
 
     def __init__(
         self, settings: HeadingSettings | None = None, heading_rad: float | None = None, sd_rad: float = 0.0
     ) -> None:
-        """`heading_rad`: at the beginning, with `sd_rad`; None: the first reading of the compass tells, or it counts from 0."""
+        """`heading_rad`: at the start, with `sd_rad`; None: given by the first reading of the compass, 0 without one."""
         self.settings = s = settings or HeadingSettings()
         self.state = np.zeros(SIZE)
-        iron_sd = 0.25 * s.iron_sd_rad if s.iron else s.iron_sd_rad
+        iron_sd = CALIBRATED_SHARE * s.iron_sd_rad if s.iron else s.iron_sd_rad
         self.P = np.diag(
-            [sd_rad**2, s.bias_sd_rad_s**2, iron_sd**2, iron_sd**2, (0.5 * iron_sd) ** 2, (0.5 * iron_sd) ** 2]
+            [
+                sd_rad**2,
+                s.bias_sd_rad_s**2,
+                iron_sd**2,
+                iron_sd**2,
+                (SECOND_SHARE * iron_sd) ** 2,
+                (SECOND_SHARE * iron_sd) ** 2,
+            ]
         )
         if s.iron:
             self.state[IRON:] = s.iron.sin1, s.iron.cos1, s.iron.sin2, s.iron.cos2
         self.known = self._given = heading_rad is not None
-        self._spun = False
+        self._has_rate = False
         if heading_rad is not None:
             self.state[HEADING] = heading_rad
         self.read = self.refused = 0
         self._t_s: float | None = None
-        self._since_s = 0.0  # since P was moved on
-        self._turned = 0.0  # by the gyro since the compass was read, a running difference over a second
-        self._last: tuple[float, float] | None = None  # time and compass of the reading before
-        self._parted = 0.0
-        self._period_s = 0.1
-        self._bin = (-1, 0.0, 0, True)  # its number, sum and count of rates, whether the legs stand in all of it
-        self._bins: deque[float] = deque(maxlen=CALM_BINS)  # means of the last ones in which they did
+        self._since_s = 0.0  # since P was propagated
+        self._turned = 0.0  # by the gyro since the last reading of the compass
+        self._last: tuple[float, float] | None = None  # time and heading of the last reading of the compass
+        self._difference = 0.0  # compass turn less gyro turn, fading within a second
+        self._period_s = STEP_S  # of the compass
+        self._bin = (-1, 0.0, 0, True)  # number, sum and count of rates, whether the legs stand in all of it
+        self._bins: deque[float] = deque(maxlen=CALM_BINS)  # mean rates of the last bins in which the legs stand
 
     def feed(self, t_s: Floats, rate_rad_s: Floats, compass_rad: Floats, still: Bools | None = None) -> Floats:
-        """(n, 2) heading (not wrapped) and its standard deviation at samples (n,); compass NaN where it was not read."""
-        found = np.empty((len(t_s), 2))
+        """(n, 2) heading (not wrapped) and its standard deviation after samples (n,); compass NaN where it was not read.
+
+        `still` (n,): whether the legs stand.
+        """
+        headings = np.empty((len(t_s), 2))
         rests = np.zeros(len(t_s), np.bool_) if still is None else still
         samples = zip(t_s.tolist(), rate_rad_s.tolist(), compass_rad.tolist(), rests.tolist(), strict=True)
         for k, (t, rate, compass, rest) in enumerate(samples):
-            self._turn(t, rate)
-            self._watch(t, rate, rest)
+            self._propagate(t, rate)
+            self._update_if_resting(t, rate, rest)
             if not math.isnan(compass):
-                self._see(t, compass)
-            found[k] = self.state[HEADING], math.sqrt(self.P[HEADING, HEADING])
-        return found
+                self._compass_update(t, compass)
+            headings[k] = self.state[HEADING], math.sqrt(self.P[HEADING, HEADING])
+        return headings
 
     @property
     def bias_sd_rad_s(self) -> float:
-        """How well the gyro's bias is known."""
+        """Standard deviation of the gyro's bias."""
         return math.sqrt(self.P[BIAS, BIAS])
 
     @property
     def iron(self) -> CompassErrors:
-        """The wearer's iron, as far as it is known."""
+        """Estimated compass errors by the wearer's iron."""
         b, c, d, e = self.state[IRON:].tolist()
         return CompassErrors(b, c, d, e)
 
-    def _turn(self, t_s: float, rate: float) -> None:
+    def _propagate(self, t_s: float, rate: float) -> None:
+        """Turn the heading by one rate; a missing one (NaN) inflates its variance."""
         if self._t_s is None or t_s <= self._t_s:
             self._t_s = t_s if self._t_s is None else self._t_s
             return
@@ -129,22 +155,22 @@ class Heading:
         self.state[HEADING] += turned
         self._turned += turned
         if math.isnan(rate):
-            self.P[HEADING, HEADING] += (math.radians(30.0)) ** 2 * dt
-        elif not self._spun:
-            self._begin()
+            self.P[HEADING, HEADING] += MISSING_WALK_RAD**2 * dt
+        elif not self._has_rate:
+            self._start_gyro()
         self._since_s += dt
-        if self._since_s >= 0.1:
-            self._grow()
+        if self._since_s >= STEP_S:
+            self._propagate_covariance()
 
-    def _begin(self) -> None:
-        """The gyro speaks for the first time: until then only the compass told, and tells no more exactly than it does."""
-        self._spun = True
+    def _start_gyro(self) -> None:
+        """First rate of the gyro: the heading known so far is the compass's, so its standard deviation is that of a first reading."""
+        self._has_rate = True
         if self.known and not self._given:
             self.P[HEADING] = self.P[:, HEADING] = 0.0
             self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
 
-    def _grow(self) -> None:
-        """Move the covariance on."""
+    def _propagate_covariance(self) -> None:
+        """Propagate the covariance by the time since it was done last."""
         dt, self._since_s = self._since_s, 0.0
         f = np.eye(SIZE)
         f[HEADING, BIAS] = -dt
@@ -152,8 +178,8 @@ class Heading:
         self.P[HEADING, HEADING] += self.settings.walk_rad**2 * dt
         self.P[BIAS, BIAS] += self.settings.drift_rad_s2**2 * dt
 
-    def _watch(self, t_s: float, rate: float, still: bool) -> None:
-        """Whose legs stand may turn on the spot or begin to walk: only in the middle of a calm stretch does the gyro show its bias."""
+    def _update_if_resting(self, t_s: float, rate: float, still: bool) -> None:
+        """Detect rest and update the bias. While the legs stand the trunk may still turn, so only the middle of a calm stretch is used."""
         number, total, count, all_still = self._bin
         if number == int(t_s / BIN_S):
             self._bin = (number, total + rate, count + 1, all_still and still)
@@ -164,20 +190,20 @@ class Heading:
             return
         self._bins.append(total / count)
         if len(self._bins) == CALM_BINS and max(self._bins) - min(self._bins) < CALM_RAD_S:
-            self._rest(self._bins[CALM_BINS // 2])
+            self._zero_rate_update(self._bins[CALM_BINS // 2])
 
-    def _rest(self, rate: float) -> None:
-        """Who stands does not turn: the gyro shows its bias."""
-        off = rate - float(self.state[BIAS])
-        if abs(off) < FAR_OFF_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
+    def _zero_rate_update(self, rate: float) -> None:
+        """A trunk at rest does not turn: its rate is a measurement of the bias."""
+        innovation = rate - float(self.state[BIAS])
+        if abs(innovation) < GATE_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
             row = np.zeros(SIZE)
             row[BIAS] = 1.0
-            self._update(row, off, self.settings.rest_sd_rad_s**2)
+            self._update(row, innovation, self.settings.rest_sd_rad_s**2)
 
-    def _see(self, t_s: float, compass: float) -> None:
-        """One reading of the compass."""
+    def _compass_update(self, t_s: float, compass: float) -> None:
+        """One reading of the compass: the first one sets an unknown heading; a later one must be steady and within the gate."""
         self.read += 1
-        self._grow()
+        self._propagate_covariance()
         heading = float(self.state[HEADING])
         if not self.known:
             self.known = True
@@ -187,81 +213,93 @@ class Heading:
             self._last, self._turned = (t_s, compass), 0.0
             return
         harmonics = _harmonics(heading)
-        off = wrap(compass - heading - float(self.state[IRON:] @ harmonics))
-        if not self._steady(t_s, compass) or abs(off) > self._gate():
+        innovation = wrap(compass - heading - float(self.state[IRON:] @ harmonics))
+        if not self._steady(t_s, compass) or abs(innovation) > self._gate():
             self.refused += 1
             return
         row = np.zeros(SIZE)
         row[HEADING], row[IRON:] = 1.0, harmonics
-        again = max(1.0, self.settings.same_s / self._period_s)
-        self._update(row, off, again * self.settings.disturbance_rad**2)
+        alike = max(1.0, self.settings.same_s / self._period_s)  # readings with the same disturbance
+        self._update(row, innovation, alike * self.settings.disturbance_rad**2)
 
     def _gate(self) -> float:
+        """Largest innovation (rad) of the compass."""
         iron = float(np.trace(self.P[IRON:, IRON:]))
-        return FAR_OFF_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
+        return GATE_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
 
     def _steady(self, t_s: float, compass: float) -> bool:
-        """Whether compass and gyro turned alike lately."""
+        """Whether compass and gyro turned alike within about the last second."""
         before, self._last = self._last, (t_s, compass)
         turned, self._turned = self._turned, 0.0
         if before is None:
-            self._period_s = 0.1
+            self._period_s = STEP_S
             return True
-        self._period_s = max(t_s - before[0], 0.02)
+        self._period_s = max(t_s - before[0], SHORTEST_PERIOD_S)
         fade = math.exp(-self._period_s)
-        self._parted = fade * self._parted + wrap(compass - before[1] - turned)
-        return abs(self._parted) < self.settings.steady_rad
+        self._difference = fade * self._difference + wrap(compass - before[1] - turned)
+        return abs(self._difference) < self.settings.steady_rad
 
-    def _update(self, row: Floats, off: float, variance: float) -> None:
-        towards = self.P @ row
-        gain = towards / (row @ towards + variance)
-        self.state += gain * off
-        self.P = self.P - np.outer(gain, towards)
+    def _update(self, row: Floats, innovation: float, variance: float) -> None:
+        """Kalman update by a scalar measurement with the measurement row (SIZE,)."""
+        covariance = self.P @ row
+        gain = covariance / (row @ covariance + variance)
+        self.state += gain * innovation
+        self.P = self.P - np.outer(gain, covariance)
         self.P = 0.5 * (self.P + self.P.T)
 
 
 def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> CompassErrors:
-    """The iron of a wearer who turned on the spot, once round or more, from samples (n,); raises ValueError that says what is wrong with the turn.
+    """Compass errors by the wearer's iron, from samples (n,) of a full turn on the spot; raises ValueError that names the fault of the turn.
 
-    Gyro and compass differ by an angle, a bias times time, and the iron: least squares of all six, each reading's own angle by the gyro.
+    Compass less gyro is an offset, a bias times time, and the iron. All six parameters are fitted by least squares, relinearized at the new headings.
     """
     turned = np.concatenate([[0.0], np.cumsum(np.diff(t_s) * 0.5 * (rate_rad_s[1:] + rate_rad_s[:-1]))])
     read = np.isfinite(compass_rad)
-    if read.sum() < 20:
+    if read.sum() < FEWEST_READINGS:
         raise ValueError("fewer than 20 readings of the compass: is it connected?")
-    at, turn, shown = t_s[read] - t_s[0], turned[read], np.unwrap(compass_rad[read])
-    if float(np.ptp(turn)) < FULL_TURN_RAD:
-        raise ValueError(
-            f"the turn covers {math.degrees(float(np.ptp(turn))):.0f} degrees: turn once round on the spot, slowly"
-        )
-    if float(np.ptp(shown)) < 0.5 * FULL_TURN_RAD:
-        raise ValueError("the compass does not follow the turn: is it stuck, or is there a magnet beside it?")
-    if (shown[-1] - shown[0]) * (turn[-1] - turn[0]) < 0.0:
+    time, turn, compass = t_s[read] - t_s[0], turned[read], np.unwrap(compass_rad[read])
+    _check_turn(turn, compass)
+    if (compass[-1] - compass[0]) * (turn[-1] - turn[0]) < 0.0:
         turn = -turn
-    offset, drift, iron = float(np.mean(shown - turn)), 0.0, np.zeros(4)
+    offset, drift, iron = float(np.mean(compass - turn)), 0.0, np.zeros(4)
     for _ in range(FITS):
-        h = turn + offset + drift * at
-        columns = np.column_stack([np.ones_like(h), at - at.mean(), *_harmonics(h)])
-        off = shown - h
-        weight = np.ones_like(off)
-        for _ in range(3):  # a few readings may be wrong altogether
-            found = np.linalg.lstsq(columns * weight[:, None], off * weight, rcond=None)[0]
-            left = off - columns @ found
-            spread = max(1.4826 * float(np.median(np.abs(left))), math.radians(0.2))
-            weight = np.minimum(1.0, 2.0 * spread / np.maximum(np.abs(left), 1e-9)) ** 0.5
-        offset += float(found[0]) - float(found[1]) * float(at.mean())
-        drift += float(found[1])
-        iron = found[2:]
+        h = turn + offset + drift * time
+        columns = np.column_stack([np.ones_like(h), time - time.mean(), *_harmonics(h)])
+        solution, residuals = _robust_least_squares(columns, compass - h)
+        offset += float(solution[0]) - float(solution[1]) * float(time.mean())
+        drift += float(solution[1])
+        iron = solution[2:]
     if float(np.hypot(iron[0], iron[1])) > LARGEST_IRON_RAD:
         raise ValueError(
             "the iron beside the compass is stronger than the earth's field: move the compass away from it"
         )
     b, c, d, e = iron.tolist()
-    return CompassErrors(b, c, d, e, float(np.sqrt(np.mean(left**2))))
+    return CompassErrors(b, c, d, e, float(np.sqrt(np.mean(residuals**2))))
+
+
+def _check_turn(turn: Floats, compass: Floats) -> None:
+    """Raise ValueError unless both the gyro's angle (n,) and the compass (n,), not wrapped, show the turn."""
+    if float(np.ptp(turn)) < FULL_TURN_RAD:
+        raise ValueError(
+            f"the turn covers {math.degrees(float(np.ptp(turn))):.0f} degrees: turn once round on the spot, slowly"
+        )
+    if float(np.ptp(compass)) < 0.5 * FULL_TURN_RAD:
+        raise ValueError("the compass does not follow the turn: is it stuck, or is there a magnet beside it?")
+
+
+def _robust_least_squares(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Solution (k,) for columns (n, k) and values (n,), and the residuals (n,); outliers get less weight in each of the REWEIGHTINGS."""
+    weight = np.ones_like(values)
+    for _ in range(REWEIGHTINGS):
+        solution = np.asarray(np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=None)[0], np.float64)
+        residuals = values - columns @ solution
+        spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), SMALLEST_SPREAD_RAD)
+        weight = np.minimum(1.0, 2.0 * spread / np.maximum(np.abs(residuals), 1e-9)) ** 0.5
+    return solution, residuals
 
 
 def compass_heading(bearing_rad: Floats) -> Floats:
-    """Map heading, counter-clockwise from x, of bearings clockwise from north."""
+    """Headings (rad) counter-clockwise from the map's x (east), of bearings clockwise from north."""
     return 0.5 * math.pi - bearing_rad
 
 

@@ -1,12 +1,18 @@
-"""How far the hips go while one leg carries them: two segments over a foot that rolls.
+"""Travel of the hips over one standing leg: thigh and shank over a foot that rolls.
 
-In: angles of thigh and shank against the vertical over a stance (rad, positive when the lower end is in front), when the heel touched, the
-stride's time. Out: travel of the hips over the floor, forward and up. Owns the constants of the model and nothing else.
+In: angles of thigh and shank against the vertical over a stance (rad, positive when the lower end is in front), phases of the stride, phase of the
+heel strike. Out: travel of the hips over the floor, forward and up. Owns the constants of the model and nothing else.
 
-The hip is L1 sin(thigh) + L2 sin(shank) behind the ankle. The ankle itself moves: it comes forward as the foot comes down about the heel, and
-again as the foot rises about the ball [Perry 1992, heel and forefoot rocker]. How far the foot is pitched is what the shank says, less the angle
-of the ankle, whose curve is the normal one. The legs do the same half a stride apart: so what this leg shows of any half stride in its stance is
-a step of the hips. Their turn (pelvic rotation) adds to what one hip joint does.
+              hip       ankle - hip, forward: L1 sin(thigh) + L2 sin(shank)
+     thigh L1 |         hip - ankle, up:      L1 cos(thigh) + L2 cos(shank)
+             knee
+     shank L2 |
+            ankle       The foot turns about the heel until it is flat, later about the ball.
+         heel --- ball
+
+The ankle itself moves forward as the foot comes down about the heel, and again as the foot rises about the ball [Perry 1992, heel and forefoot
+rocker]. The pitch of the foot is the lean of the shank less the angle of the ankle, which is taken from its normal curve. Both legs are assumed to
+move alike, half a stride apart: so the travel in any half stride of this leg's stance is a step. Pelvic rotation adds to the travel of one hip joint.
 """
 
 from __future__ import annotations
@@ -20,28 +26,29 @@ from echostep.arrays import Floats
 
 # Dorsiflexion of the ankle every 4 % of the stride from heel strike to toe off, degrees [Perry 1992; Winter 2009; Kadaba 1990, read to a degree].
 DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 14, 14, 11, 5, -4, -10, -14, -14)
-DORSIFLEXION_STEP = 0.04
-ANKLE_HEIGHT = (
-    0.16  # of the shank: 0.039 of the body's height, the shank is 0.246 [Winter 2009, after Drillis and Contini]
-)
-BALL_AHEAD, HEEL_BEHIND = 0.30, 0.11  # of the shank: from the ankle to the ball of the foot and to where the heel rolls
-FLAT = 0.08  # share of the stride at which the foot is flat on the floor [Perry 1992, loading response]
-HEEL_RISES = 0.25  # not before
-TOE_OFF = 0.62
-PELVIS = 1.017  # of a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
-HALVES = (0.06, 0.08, 0.10)  # where half strides begin, foot all but flat
-ALONE = (0.14, 0.42)  # phases
-# A shank so much longer than the thigh is measured to the floor: 0.285 of the height, not 0.246; the thigh has 0.245 [Winter 2009]; people differ.
-WITH_FOOT = 1.14
-TO_FLOOR = 0.285 / 0.246
+DORSIFLEXION_STEP = 0.04  # phase between two values
+# In lengths of the shank: 0.039 of the body's height over 0.246 [Winter 2009, after Drillis and Contini].
+ANKLE_HEIGHT = 0.16
+# In lengths of the shank, from the ankle to the ball of the foot and to the rolling point of the heel; source not recorded.
+BALL_AHEAD, HEEL_BEHIND = 0.30, 0.11
+FLAT = 0.08  # phase from which the foot is flat on the floor [Perry 1992, loading response]
+HEEL_RISES = 0.25  # earliest phase of heel rise; source not recorded
+TOE_OFF = 0.62  # phase; source not recorded
+PELVIS = 1.017  # factor on a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
+HALVES = (0.06, 0.08, 0.10)  # phases at which half strides begin, with the foot nearly flat; source not recorded
+SINGLE_SUPPORT = (0.14, 0.42)  # phases between which the foot is flat and carries alone; source not recorded
+# Least shank over thigh of a shank measured to the floor: to the floor it is 0.285 of the height, to the ankle 0.246, the thigh is 0.245
+# [Winter 2009]; the limit lies between 1.00 and 1.16, as persons differ.
+SHANK_TO_FLOOR_RATIO = 1.14
+FLOOR_TO_ANKLE_RATIO = 0.285 / 0.246
 
 MEAN_THIGH_RAD, MEAN_SHANK_RAD = math.radians(7.0), math.radians(-14.2)  # over a normal stride, by the same curves
-STANDING_THIGH_RAD, STANDING_SHANK_RAD = math.radians(0.0), math.radians(-3.0)  # the weight is before the ankles
+STANDING_THIGH_RAD, STANDING_SHANK_RAD = math.radians(0.0), math.radians(-3.0)  # the weight is in front of the ankles
 
 
 @dataclass(frozen=True, slots=True)
 class LegLengths:
-    """`thigh_m` from hip to knee, `shank_m` from knee to ankle, `scale` of all that they make: what a walk of known length has told."""
+    """`thigh_m`: hip to knee. `shank_m`: knee to ankle, or to the floor. `scale`: factor on all lengths, from a walk of known length."""
 
     thigh_m: float = 0.43
     shank_m: float = 0.43
@@ -49,51 +56,55 @@ class LegLengths:
 
     @property
     def measured_to_floor(self) -> bool:
-        """Whether the shank given is so long that it must contain the foot."""
-        return self.shank_m > WITH_FOOT * self.thigh_m
+        """Whether the shank is so long that it must include the foot."""
+        return self.shank_m > SHANK_TO_FLOOR_RATIO * self.thigh_m
 
     @property
     def to_ankle_m(self) -> float:
-        """Knee to ankle."""
-        return self.shank_m / TO_FLOOR if self.measured_to_floor else self.shank_m
+        """Length from knee to ankle."""
+        return self.shank_m / FLOOR_TO_ANKLE_RATIO if self.measured_to_floor else self.shank_m
+
+    def ankle_ahead_m(self, thigh: float, shank: float) -> float:
+        """Distance (m, not scaled) of the ankle in front of the hip, for angles in rad."""
+        return float(self.thigh_m * np.sin(thigh) + self.to_ankle_m * np.sin(shank))
 
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """`forward_m`, `up_m` (n,): where the hips are during a stance, from an arbitrary zero; `phase` (n,) of the stride, 0 at heel strike."""
+    """`forward_m`, `up_m` (n,): position of the hips during a stance, with arbitrary zero; `phase` (n,) of the stride, 0 at heel strike."""
 
     phase: Floats
     forward_m: Floats
     up_m: Floats
 
     def half(self, begin: float) -> tuple[float, float]:
-        """How far forward and up in the half stride from a phase on."""
-        at = np.array([begin, begin + 0.5])
-        forward, up = (np.interp(at, self.phase, c) for c in (self.forward_m, self.up_m))
+        """Travel (m) forward and up in the half stride that begins at a phase."""
+        ends = np.array([begin, begin + 0.5])
+        forward, up = (np.interp(ends, self.phase, c) for c in (self.forward_m, self.up_m))
         return float(forward[1] - forward[0]), float(up[1] - up[0])
 
     def passed(self) -> float:
-        """How far forward while this leg carries alone and its foot is flat."""
-        begin, end = np.interp(ALONE, self.phase, self.forward_m)
+        """Travel (m) forward in single support, with a flat foot."""
+        begin, end = np.interp(SINGLE_SUPPORT, self.phase, self.forward_m)
         return float(end - begin)
 
     def stride(self) -> tuple[float, float]:
-        """Forward and up in a whole stride: both legs do what this one does."""
+        """Travel (m) forward and up in a whole stride: twice the mean of the half strides, as both legs move alike."""
         halves = np.array([self.half(begin) for begin in HALVES]).mean(axis=0)
         return 2.0 * PELVIS * float(halves[0]), 2.0 * float(halves[1])
 
 
-def knee_at(phase: Floats, thigh: Floats, shank: Floats, at: float) -> float:
-    """Flexion of the knee at a phase."""
-    return float(np.interp(at, phase, thigh - shank))
+def knee_at(phase: Floats, thigh: Floats, shank: Floats, wanted_phase: float) -> float:
+    """Flexion (rad) of the knee at one phase, from angles (n,) at phases (n,)."""
+    return float(np.interp(wanted_phase, phase, thigh - shank))
 
 
 def travel(
     phase: Floats, thigh: Floats, shank: Floats, segments: LegLengths, struck: float | None = 0.0, *, rolls: bool = True
 ) -> Travel:
-    """The hips over the standing foot at phases (n,) of the stride; `struck`: phase of the heel's strike, None when the foot stood already.
+    """Travel of the hips over the standing foot at phases (n,); `struck`: phase of the heel strike, None when the foot stood before.
 
-    `rolls`: the foot rises about its ball; on stairs it hardly does while it carries.
+    `rolls`: whether the foot rises about its ball; on stairs it hardly does while it carries.
     """
     shank_m = segments.to_ankle_m
     ankle_ahead = segments.thigh_m * np.sin(thigh) + shank_m * np.sin(shank)
@@ -106,23 +117,23 @@ def travel(
 
 
 def heel_rise(phase: Floats, shank: Floats) -> Floats:
-    """How far the foot is pitched toe down (n,), rad: what of the shank's lean the ankle does not take."""
+    """Pitch of the foot (n,), rad, toe down: the forward lean of the shank less the dorsiflexion of the ankle."""
     grid = DORSIFLEXION_STEP * np.arange(len(DORSIFLEXION_DEG))
     ankle = np.interp(phase, grid, np.radians(DORSIFLEXION_DEG))
-    found: Floats = np.where(phase > HEEL_RISES, np.clip(-shank - ankle, 0.0, None), 0.0)
-    return found
+    pitch: Floats = np.where(phase > HEEL_RISES, np.clip(-shank - ankle, 0.0, None), 0.0)
+    return pitch
 
 
 def _about_ball(pitch: Floats, shank_m: float) -> tuple[Floats, Floats]:
-    """The ankle's way forward and up when the foot turns about the ball."""
+    """Displacement (m) of the ankle forward and up when the foot has turned about the ball by `pitch` (n,)."""
     ahead, high = BALL_AHEAD * shank_m, ANKLE_HEIGHT * shank_m
     c, s = np.cos(pitch), np.sin(pitch)
     return ahead * (1.0 - c) + high * s, ahead * s - high * (1.0 - c)
 
 
 def _about_heel(phase: Floats, shank: Floats, struck: float, shank_m: float) -> Floats:
-    """The ankle's way forward, until the foot is flat, from where it will stand; the ankle is neutral at the strike [Perry 1992]."""
+    """Forward displacement (m) of the ankle relative to the flat foot; the ankle is neutral at the strike [Perry 1992]."""
     toe_up = max(float(np.interp(struck, phase, shank)), 0.0) * np.clip(1.0 - (phase - struck) / FLAT, 0.0, 1.0)
     high, behind = ANKLE_HEIGHT * shank_m, HEEL_BEHIND * shank_m
-    found: Floats = -high * np.sin(toe_up) - behind * (1.0 - np.cos(toe_up))
-    return found
+    forward: Floats = -high * np.sin(toe_up) - behind * (1.0 - np.cos(toe_up))
+    return forward

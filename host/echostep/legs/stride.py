@@ -1,4 +1,4 @@
-"""A stride and its flags, and the settings and counts of their estimator.
+"""A stride and its flags; settings and counts of the estimator.
 
 In: nothing. Out: `Stride`, `Flag`, `StrideSettings`, `LegCounts`, and the uncertainty of a sum of strides. Owns nothing.
 """
@@ -17,10 +17,10 @@ class Flag(enum.Flag):
     """Properties of a stride."""
 
     NONE = 0
-    EDGE = enum.auto()  # the beginning or the end of a walk: not a whole stride
+    EDGE = enum.auto()  # beginning or end of a walk: not a whole stride
     STANDING = enum.auto()
-    UNSEEN = enum.auto()  # in place or sideways: the length is not known
-    BACKWARD = enum.auto()  # the length is not known
+    UNSEEN = enum.auto()  # in place or sideways: the length is unknown
+    BACKWARD = enum.auto()  # the length is unknown
     STAIRS_UP = enum.auto()
     STAIRS_DOWN = enum.auto()
     SLOW = enum.auto()
@@ -31,9 +31,9 @@ class Flag(enum.Flag):
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """The hips went `length_m` forward and `rise_m` up from `t_start_s` to `t_end_s`; `length_sd_m` holds for this stride alone.
+    """Travel of the hips from `t_start_s` to `t_end_s`: `length_m` forward, `rise_m` up; `length_sd_m`: independent error of this stride.
 
-    `scale_sd`: relative standard deviation of the scale that all strides of this wearer share; not in `length_sd_m`.
+    `scale_sd`: relative standard deviation of the scale common to all strides of the wearer; not included in `length_sd_m`.
     """
 
     t_start_s: float
@@ -46,13 +46,13 @@ class Stride:
 
     @property
     def speed_m_s(self) -> float:
-        """Mean speed."""
+        """Mean speed; 0 for a stride without duration."""
         return self.length_m / (self.t_end_s - self.t_start_s) if self.t_end_s > self.t_start_s else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class StrideSettings:
-    """The wearer's `segments`; `calibrated`: their scale was found by a walk of known length."""
+    """`segments`: lengths of the wearer's leg. `calibrated`: whether their scale is from a walk of known length."""
 
     segments: LegLengths = field(default_factory=LegLengths)
     calibrated: bool = False
@@ -60,7 +60,7 @@ class StrideSettings:
 
 @dataclass(slots=True)
 class LegCounts:
-    """Samples that came; `impossible` (not finite or beyond any leg) and `not_later` ones were skipped."""
+    """Counts of samples: all; skipped as `impossible` (not finite, or beyond any leg) or `not_later`. `gaps`: times without samples."""
 
     samples: int = 0
     impossible: int = 0
@@ -69,7 +69,7 @@ class LegCounts:
 
 
 def distance_sd_m(strides: Iterable[Stride]) -> float:
-    """Standard deviation of the sum of lengths: scale errors add linearly, the others by squares."""
+    """Standard deviation (m) of the sum of lengths: scale errors add linearly, independent errors in squares."""
     each = list(strides)
-    alike = sum(s.length_m * s.scale_sd for s in each)
-    return math.sqrt(alike**2 + sum(s.length_sd_m**2 for s in each))
+    common = sum(s.length_m * s.scale_sd for s in each)
+    return math.sqrt(common**2 + sum(s.length_sd_m**2 for s in each))

@@ -1,15 +1,14 @@
-"""Strides from two gyros on one leg: samples of thigh and shank -> what the hips did, stride by stride.
+"""Strides from two gyros on one leg: the travel of the hips, stride by stride.
 
 In: time and pitch rates of thigh and shank, 50 to 500 Hz, either sign. Out: `Stride`s in order of time. Owns the angles, the gyros' biases and
-what has not yet become a stride. `kinematics` gives the travel of the hips over a stance, `swing_detection` the swings and the sign of each
-gyro.
+the bout under way. `kinematics` gives the travel of the hips over a stance, `swing_detection` the swings and the sign of each gyro.
 
-A stride goes from one middle of a swing to the next. Before the first and after the last the hips move over the standing foot; these pieces are
-reported, too. A gyro knows no vertical: at rest the leg is upright, and over a stride its mean is the usual one; its bias is what it says at rest,
-and what is left of its angle after a stride.
+A stride goes from mid swing to mid swing. Before the first and after the last mid swing the hips move over the standing foot; these edges are
+reported, too. A gyro does not measure the vertical: the leg is taken as upright at rest, and its mean angle over a stride as the usual one.
+Each gyro's bias is its rate at rest, and the change of its angle over a stride.
 
-One leg in the sagittal plane sees neither sideways nor backward steps, nor steps in place: they are flagged, their length is 0, and their
-uncertainty holds what they may have been.
+Two gyros in the sagittal plane of one leg do not give the length of strides sideways, backward or in place: these are flagged, their length is 0,
+and their standard deviation covers the possible length.
 """
 
 from __future__ import annotations
@@ -32,35 +31,36 @@ from echostep.legs.kinematics import (
 )
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.swing_detection import GRID_HZ, Swings
-from echostep.legs.walking_bout import Bout, GyroBias, edge_pace, stairs_flag
+from echostep.legs.walking_bout import Bout, GyroBias, edge_pace, pace_flag, stairs_flag
 
-LONGEST_GAP_S = 0.25
+# The source of a value without a citation is not recorded.
+LONGEST_GAP_S = 0.25  # integrated over
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
-UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0
-FASTEST_RAD_S = 35.0
-SHORTEST_M = 0.25  # a stride: less is a step in place or sideways
-LEAST_PASSED = 0.12  # of the stride, which the hips pass over the foot that stands alone; 0.25 to 0.3 in walking
-LONGEST_ON_STAIRS_M = 1.0
+UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0  # growth of the sd in a gap, and for how long it grows
+FASTEST_RAD_S = 35.0  # a larger rate is impossible
+SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
+LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
+LONGEST_ON_STAIRS_M = 1.0  # length of a stride
 STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses differ by 2 cm each [DIN 18065]
-STAIRS_WEIGHT = 0.15  # of what the angles say
-PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
+STAIRS_WEIGHT = 0.15  # of the length by the angles
 LEVEL_STRIDE_M = 0.85  # longer than any on stairs
-LEVEL_GAIN = 0.15
-CLOSURE_SD_RAD = math.radians(2.5)  # of an angle after a stride
-SCALE_SD = 0.035  # of all strides of a person whose legs alone are known
-CALIBRATED_SD = 0.012
-OWN_SD_M = 0.04  # of one stride, beside it
-EDGE_SD_M = 0.08  # of a beginning or an end
-BLIND_SD_M = 0.4  # of what this leg cannot see
-REST_SD_RAD_S = math.radians(0.15)
-LOOK = 3  # places on either side for a rate
+LEVEL_GAIN = 0.15  # of the correction of mean angles per stride
+CLOSURE_SD_RAD = math.radians(2.5)  # of the change of an angle over a stride
+SCALE_SD = 0.035  # of the common scale of all strides, by the lengths of the leg alone
+CALIBRATED_SD = 0.012  # the same after a walk of known length
+OWN_SD_M = 0.04  # of one stride, besides
+EDGE_SD_M = 0.08  # of an edge of a walk
+BLIND_SD_M = 0.4  # of a stride that this leg does not show
+REST_SD_RAD_S = math.radians(0.15)  # of the bias by one window of rest
+LOOK = 3  # grid samples on either side, from which a rate is computed
+SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
-STAYS = 0.44  # phase after which a foot that stays does not rise
-FORGET = 500
+STAYS = 0.44  # last phase of a foot that stays on the floor
+FORGET = 500  # grid samples no longer needed, from which on they are dropped
 
 
 class StrideEstimator:
-    """Strides from samples, returned when they are certain; the portions in which samples are fed do not matter."""
+    """Strides from samples, returned when no later sample can change them; equal samples give equal strides, in blocks of any size."""
 
     def __init__(self, settings: StrideSettings | None = None) -> None:
         self.settings = settings or StrideSettings()
@@ -68,17 +68,17 @@ class StrideEstimator:
         self.swings = Swings()
         self.bias = (GyroBias(), GyroBias())
         self._last: tuple[float, float, float] | None = None  # t, thigh, shank of the newest sample
-        self._turned = (0.0, 0.0)  # since the first sample, with the sensor's sign and bias
+        self._turned = (0.0, 0.0)  # angles since the first sample, with the sensors' signs and biases
         self._origin_s = 0.0
         self._thigh: list[float] = []  # `_turned` every 1 / GRID_HZ
         self._shank: list[float] = []
-        self._moved = 0
-        self._done = 0  # places of the grid that were looked at
+        self._moved = 0  # grid samples with a moving shank
+        self._done = 0  # grid samples searched for swings and rest
         self._bout = Bout(0, stood=False)
         self._still_since: int | None = None
-        self._top = (0.0, 0)  # of the swing under way: rate, place
-        self._found: list[Stride] = []
-        self._keep = 0  # places before it can be forgotten
+        self._peak = (0.0, 0)  # of the swing under way: rate, grid index
+        self._strides: list[Stride] = []
+        self._keep = 0  # first grid index still needed
 
     @property
     def standing_since_s(self) -> float | None:
@@ -86,11 +86,11 @@ class StrideEstimator:
         return None if self._still_since is None else self._time(self._still_since)
 
     def feed(self, t_s: Floats, thigh: Floats, shank: Floats) -> list[Stride]:
-        """Samples (n,) each: time, rates in rad/s."""
+        """Strides completed by samples (n,): time, rates in rad/s."""
         for sample in zip(t_s.tolist(), thigh.tolist(), shank.tolist(), strict=True):
             self._integrate(*sample)
-        found, self._found = self._found, []
-        return found
+        strides, self._strides = self._strides, []
+        return strides
 
     def finish(self) -> list[Stride]:
         """The strides still under way; no samples may follow."""
@@ -98,11 +98,11 @@ class StrideEstimator:
             self._advance(len(self._thigh))
             if self._still_since is None and len(self._thigh) > 1:
                 self._end_bout(len(self._thigh) - 1, stands=False)
-        found, self._found = self._found, []
-        return found
+        strides, self._strides = self._strides, []
+        return strides
 
     def _integrate(self, t_s: float, thigh: float, shank: float) -> None:
-        """One sample: integrate to it and put the angles on the grid."""
+        """Integrate to one sample and interpolate the angles on the grid."""
         self.counts.samples += 1
         if not abs(thigh) < FASTEST_RAD_S or not abs(shank) < FASTEST_RAD_S or not math.isfinite(t_s):
             self.counts.impossible += 1
@@ -122,13 +122,13 @@ class StrideEstimator:
         turned = tuple(
             a + 0.5 * (t_s - t0) * (x + y) for a, x, y in zip(self._turned, before, (thigh, shank), strict=True)
         )
-        while (at_s := self._origin_s + len(self._thigh) / GRID_HZ) <= t_s:
-            share = (at_s - t0) / (t_s - t0)
+        while (grid_s := self._origin_s + len(self._thigh) / GRID_HZ) <= t_s:
+            share = (grid_s - t0) / (t_s - t0)
             self._append(*(a + share * (b - a) for a, b in zip(self._turned, turned, strict=True)))
         self._turned, self._last = (turned[0], turned[1]), (t_s, thigh, shank)
 
     def _append(self, thigh: float, shank: float) -> None:
-        """Append a value to the grid."""
+        """Append angles to the grid; search them once the signs are known."""
         self._thigh.append(thigh)
         self._shank.append(shank)
         if self.swings.known:
@@ -153,17 +153,17 @@ class StrideEstimator:
             if self._still_since is None and len(self._thigh) > 1:
                 self._end_bout(len(self._thigh) - 1, stands=False)
         span_s = t_s - t0
-        way = pace * span_s if span_s < BRIDGED_S else 0.0
-        self._add_stride(t0, t_s, way, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
+        length = pace * span_s if span_s < BRIDGED_S else 0.0
+        self._add_stride(t0, t_s, length, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
         self._origin_s, self._turned = t_s, (0.0, 0.0)
         self._thigh, self._shank, self._done = [0.0], [0.0], 0
-        self._bout, self._still_since, self._top, self._keep = Bout(0, stood=False), None, (0.0, 0), 0
+        self._bout, self._still_since, self._peak, self._keep = Bout(0, stood=False), None, (0.0, 0), 0
 
     def _rates(self) -> Floats:
         return np.diff(np.column_stack([self._thigh, self._shank]), axis=0) * GRID_HZ
 
     def _advance(self, until: int) -> None:
-        """Look at the places up to `until`."""
+        """Search the grid up to index `until` for swings and rest."""
         while self._done < until:
             k = self._done
             self._done += 1
@@ -177,15 +177,15 @@ class StrideEstimator:
         self._drop()
 
     def _watch_swing(self, k: int, rate: float) -> None:
-        """A swing is over when the shank's rate has fallen well below its peak."""
-        if rate > max(self.swings.threshold(), self._top[0]):
-            self._top = (rate, k)
-        top, at = self._top
-        if top > 0.0 and rate < 0.35 * top:
-            self._top = (0.0, 0)
-            if not self._bout.peaks or at - self._bout.peaks[-1] >= leg_swings.SHORTEST_CYCLE:
-                self.swings.saw(top)
-                self._swing(at)
+        """Detect the end of a swing: the shank's rate (rad/s) at grid index k is well below its peak."""
+        if rate > max(self.swings.threshold(), self._peak[0]):
+            self._peak = (rate, k)
+        peak, peak_index = self._peak
+        if peak > 0.0 and rate < SWING_END * peak:
+            self._peak = (0.0, 0)
+            if not self._bout.peaks or peak_index - self._bout.peaks[-1] >= leg_swings.SHORTEST_CYCLE:
+                self.swings.add_peak(peak)
+                self._add_swing(peak_index)
         peaks = self._bout.peaks
         if peaks and k - peaks[-1] > leg_swings.LONGEST_CYCLE:
             self._end_bout(k, stands=True)
@@ -212,7 +212,7 @@ class StrideEstimator:
             self._still_since = first
         for bias, sign, rate in zip(self.bias, self.swings.sign, rates.mean(axis=0).tolist(), strict=True):
             bias.learn(sign * rate, REST_SD_RAD_S)
-        self._bout = Bout(k, stood=True, level=(STANDING_THIGH_RAD, STANDING_SHANK_RAD), level_at=k, pace_m_s=0.0)
+        self._bout = Bout(k, stood=True, level=(STANDING_THIGH_RAD, STANDING_SHANK_RAD), level_index=k, pace_m_s=0.0)
 
     def _end_standing(self, k: int) -> None:
         """Report standing up to grid index k."""
@@ -223,8 +223,8 @@ class StrideEstimator:
         self._bout.begin = min(max(self._bout.begin, begin), k)
         self._keep = begin
 
-    def _swing(self, k: int) -> None:
-        """The middle of a swing: a stride is complete, and with the first one the way to it."""
+    def _add_swing(self, k: int) -> None:
+        """Complete a stride by the mid swing at grid index k; the first stride also completes the edge before it."""
         bout = self._bout
         bout.peaks.append(k)
         if len(bout.peaks) < 2:
@@ -234,7 +234,7 @@ class StrideEstimator:
         if len(bout.peaks) > 2 or not bout.stood:
             self._learn_closure(previous, k)
         if bout.level is None:
-            bout.level, bout.level_at = (0.0, 0.0), previous
+            bout.level, bout.level_index = (0.0, 0.0), previous
             thigh, shank = self._angles(previous, k)
             bout.level = (MEAN_THIGH_RAD - float(thigh.mean()), MEAN_SHANK_RAD - float(shank.mean()))
         thigh, shank = self._angles(previous, k)
@@ -249,69 +249,65 @@ class StrideEstimator:
         self._keep = previous
 
     def _stride(self, thigh: Floats, shank: Floats) -> tuple[float, float, Flag, float]:
-        """Length and rise of the stride whose angles these are, from one middle of a swing to the next."""
+        """Length, rise, flags and sd of the stride with these angles (n,), from mid swing to mid swing."""
         cycle = len(shank) - 1
-        strike = leg_swings.strike_after(shank)
+        strike = leg_swings.heel_strike_index(shank)
         phase = np.arange(len(shank)) / cycle - strike / cycle
         stance = phase[strike:], thigh[strike:], shank[strike:]
-        self._bout.reach_m = self._ahead_m(thigh[strike], shank[strike])
-        self._bout.trail_m = -self._ahead_m(*(np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank)))
-        stairs = stairs_flag(knee_at(*stance, at=0.02), knee_at(*stance, at=0.5))
+        self._bout.reach_m = self.settings.segments.ankle_ahead_m(thigh[strike], shank[strike])
+        self._bout.trail_m = -self.settings.segments.ankle_ahead_m(
+            *(np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank))
+        )
+        stairs = stairs_flag(knee_at(*stance, wanted_phase=0.02), knee_at(*stance, wanted_phase=0.5))
         way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
         length = way.stride()[0]
         rates = np.column_stack([np.diff(thigh), np.diff(shank)])
-        if leg_swings.leads(rates) < leg_swings.BACKWARD:
+        if leg_swings.thigh_lead(rates) < leg_swings.BACKWARD_LEAD:
             return 0.0, 0.0, Flag.BACKWARD, max(BLIND_SD_M, abs(length))
         if length < SHORTEST_M or way.passed() < LEAST_PASSED * length:
             return 0.0, 0.0, Flag.UNSEEN, BLIND_SD_M
         if stairs and length < LONGEST_ON_STAIRS_M:
             length = STAIRS_M + STAIRS_WEIGHT * (length - STAIRS_M)
             return length, STAIRS_RISE_M if Flag.STAIRS_UP in stairs else -STAIRS_RISE_M, stairs, 2.0 * OWN_SD_M
-        return length, 0.0, self._pace_flag(length * GRID_HZ / cycle), OWN_SD_M
-
-    def _pace_flag(self, speed_m_s: float) -> Flag:
-        """Slow or fast, against the length of the leg [Froude 1868; Alexander 1989]."""
-        segments = self.settings.segments
-        relative = speed_m_s / math.sqrt(9.81 * (segments.thigh_m + segments.to_ankle_m))
-        return Flag.SLOW if relative < PACES[0] else Flag.FAST if relative > PACES[1] else Flag.NONE
+        return length, 0.0, pace_flag(length * GRID_HZ / cycle, self.settings.segments), OWN_SD_M
 
     def _learn_closure(self, begin: int, end: int) -> None:
-        """After a stride a leg is where it was: what is left is bias."""
+        """Update the biases by the change of the angles over a stride, which is 0 without bias."""
         span_s = (end - begin) / GRID_HZ
         for bias, sign, angle in zip(self.bias, self.swings.sign, (self._thigh, self._shank), strict=True):
             bias.learn(sign * (angle[end] - angle[begin]) / span_s, CLOSURE_SD_RAD / span_s)
 
     def _relevel(self, k: int, thigh: Floats, shank: Floats, length_m: float) -> None:
-        """Go on from the angles at the end of a stride, drawn a little toward those whose mean over the stride is the usual one.
+        """Set the level to the angles at the end of a stride, corrected in part so that their mean over the stride is the usual one.
 
-        Not after a short one, which may be on stairs.
+        A short stride is not corrected, as it may be on stairs.
         """
         ends, gain = [], LEVEL_GAIN if length_m > LEVEL_STRIDE_M else 0.0
         for angle, usual in ((thigh, MEAN_THIGH_RAD), (shank, MEAN_SHANK_RAD)):
             off = float(angle.mean()) - usual
             ends.append(float(angle[-1]) - gain * off)
-        self._bout.level, self._bout.level_at = (ends[0], ends[1]), k
+        self._bout.level, self._bout.level_index = (ends[0], ends[1]), k
 
     def _begin_piece(self, peak: int, pace_m_s: float) -> float:
-        """How far from the beginning of the walk to the first middle of a swing."""
+        """Travel (m) from the beginning of the walk to its first mid swing."""
         bout = self._bout
         span = peak - bout.begin
         thigh, shank = self._angles(bout.begin, peak)
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
-        off = leg_swings.toe_off_before(rate, span - 1, 0)
+        off = leg_swings.toe_off_index(rate, span - 1, 0)
         phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
         stood = bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
         stance = 0 if stood else int(np.argmax(phase > 0.0))
         swinging = 1.0
         if bout.stood or (stood and phase[0] < -0.1):
-            swinging = edge_pace(-self._ahead_m(thigh[off], shank[off]), bout.trail_m)
+            swinging = edge_pace(-self.settings.segments.ankle_ahead_m(thigh[off], shank[off]), bout.trail_m)
         way = travel(phase, thigh, shank, self.settings.segments, struck=None)
         length = PELVIS * float(way.forward_m[off] - way.forward_m[stance])
         return length + pace_m_s * (stance + swinging * (span - off)) / GRID_HZ
 
     def _calm(self, rate: Floats) -> bool:
-        """Whether the shank (rates (n,)) was on a foot that stood: no swing in it."""
-        return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.OF_USUAL
+        """Whether the shank's rates (n,) hold no swing, so that the foot stands."""
+        return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.PEAK_SHARE
 
     def _end_bout(self, end: int, *, stands: bool) -> None:
         """End the bout at this grid index, because the leg stands or because the samples end."""
@@ -324,10 +320,10 @@ class StrideEstimator:
         self._keep = end - leg_swings.STILL
 
     def _end_step(self, peak: int, end: int, *, stands: bool) -> None:
-        """There was one swing only: a step, or a foot that was lifted."""
+        """End a bout with one swing only: a step, or a lifted foot."""
         bout = self._bout
         if bout.level is None:
-            bout.level, bout.level_at = (MEAN_THIGH_RAD, 0.0), peak
+            bout.level, bout.level_index = (MEAN_THIGH_RAD, 0.0), peak
         begins = self._begin_piece(peak, bout.pace_m_s or 0.0) if peak > bout.begin else 0.0
         length = begins + (self._end_piece(peak, end, stands=stands) if end > peak else 0.0)
         if length < SHORTEST_M:
@@ -335,11 +331,11 @@ class StrideEstimator:
         self._add_edge(bout.begin, end, length)
 
     def _end_piece(self, peak: int, end: int, *, stands: bool) -> float:
-        """How far from the last middle of a swing to the end of the walk."""
+        """Travel (m) from the last mid swing to the end of the walk."""
         bout, span = self._bout, end - peak
         pace = bout.pace_m_s or 0.0
         thigh, shank = self._angles(peak, end)
-        strike = leg_swings.strike_after(shank)
+        strike = leg_swings.heel_strike_index(shank)
         phase = (np.arange(strike, len(shank)) - strike) / bout.cycle
         last = len(phase) - 1
         if stands:
@@ -348,38 +344,39 @@ class StrideEstimator:
             last = min(last, int(TOE_OFF * bout.cycle))
         way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
         length = PELVIS * float(way.forward_m[last] - way.forward_m[0])
-        swinging = edge_pace(self._ahead_m(thigh[strike], shank[strike]), bout.reach_m) if stands else 1.0
+        swinging = (
+            edge_pace(self.settings.segments.ankle_ahead_m(thigh[strike], shank[strike]), bout.reach_m)
+            if stands
+            else 1.0
+        )
         return length + pace * (swinging * strike + span - strike - last) / GRID_HZ
 
-    def _ahead_m(self, thigh: float, shank: float) -> float:
-        """How far the ankle is before the hip."""
-        segments = self.settings.segments
-        return float(segments.thigh_m * np.sin(thigh) + segments.to_ankle_m * np.sin(shank))
-
     def _add_edge(self, begin: int, end: int, length: float) -> None:
-        """A beginning or an end is certain; beside strides that cannot be seen it cannot either."""
+        """Report an edge of a walk; beside a stride of unknown length its length is unknown, too."""
         blind = self._bout.blind
-        way, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
-        self._add_stride(self._time(begin), self._time(end), way, sd, 0.0, Flag.EDGE | blind)
+        length, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
+        self._add_stride(self._time(begin), self._time(end), length, sd, 0.0, Flag.EDGE | blind)
 
     def _angles(self, begin: int, end: int) -> tuple[Floats, Floats]:
-        """Angles (n,) of thigh and shank at the places begin..end, by the present biases from the last known level."""
+        """Angles (n,) of thigh and shank at grid indices begin..end, from the last level with the present biases."""
         bout = self._bout
         level = bout.level or (0.0, 0.0)
-        places = np.arange(begin, end + 1)
-        found = []
-        for turned, sign, bias, at in zip((self._thigh, self._shank), self.swings.sign, self.bias, level, strict=True):
-            angle = sign * (np.array(turned[begin : end + 1]) - turned[bout.level_at])
-            found.append(at + angle - bias.value * (places - bout.level_at) / GRID_HZ)
-        return found[0], found[1]
+        indices = np.arange(begin, end + 1)
+        angles = []
+        for turned, sign, bias, start in zip(
+            (self._thigh, self._shank), self.swings.sign, self.bias, level, strict=True
+        ):
+            angle = sign * (np.array(turned[begin : end + 1]) - turned[bout.level_index])
+            angles.append(start + angle - bias.value * (indices - bout.level_index) / GRID_HZ)
+        return angles[0], angles[1]
 
     def _time(self, k: int) -> float:
         return self._origin_s + k / GRID_HZ
 
     def _add_stride(self, t0: float, t1: float, length: float, sd: float, rise: float, flags: Flag) -> None:
-        """A stride is certain."""
+        """Report a stride."""
         scale_sd = CALIBRATED_SD if self.settings.calibrated else SCALE_SD
-        self._found.append(Stride(t0, t1, length, sd, scale_sd, rise, flags))
+        self._strides.append(Stride(t0, t1, length, sd, scale_sd, rise, flags))
 
     def _drop(self) -> None:
         """Drop grid values that are no longer needed."""
@@ -392,8 +389,8 @@ class StrideEstimator:
         self._done -= k
         bout = self._bout
         bout.begin -= k
-        bout.level_at -= k
+        bout.level_index -= k
         bout.peaks = [peak - k for peak in bout.peaks]
         if self._still_since is not None:
             self._still_since -= k
-        self._top = (self._top[0], self._top[1] - k)
+        self._peak = (self._peak[0], self._peak[1] - k)

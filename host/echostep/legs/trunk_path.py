@@ -1,9 +1,10 @@
 """The trunk's path from the gyros of one leg and the belt, and the compass.
 
-In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `gait.Leg`s, as the foot's path gives them. Owns the strides'
-and the heading's estimators.
+In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `PathSegment`s, as from the foot. Owns the estimators of
+strides and heading, and the latest headings.
 
-Lengths come from `legs`, directions from `heading`, both in a walk frame of their own: x is where the compass, or the wearer at first, points.
+Lengths come from `strides`, directions from `heading`, in a walk frame of their own: its x axis is that of the compass, or without one the wearer's
+first heading.
 """
 
 from __future__ import annotations
@@ -23,25 +24,26 @@ from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.path import STANDING_PIECE_S, PathSegment
 
-TURN_SD_RAD = math.radians(0.7)  # in a stride, beside what the compass takes away again
+RANGE_RAD_S = math.radians(300.0)  # of the gyros [ADIS16100 datasheet]
+# The source of these values is not recorded.
+TURN_SD_RAD = math.radians(0.7)  # growth of the yaw error in a stride, without the part that the compass corrects
 FRAME_SD_RAD = math.radians(
     1.0
-)  # of the walk frame, which is where the compass pointed at first: what it says later tells the gyro's bias
-RANGE_RAD_S = math.radians(300.0)  # [ADIS16100 datasheet]
-SLOW_RAD_S = math.radians(10.0)  # of a leg that stands, with its gyro's bias
-SETTING_OFF_S = 1.0  # the first step
-SCALE_SD = 0.004  # by which the scale of strides wanders from one to the next
-CURVE_SD = 0.5  # of what a curve takes from a stride's length: he does not turn evenly
-TWIST_RAD = math.radians(12.0)  # so far the pelvis turns to and fro in a straight stride, which costs no way
-REMEMBERED_S = 12.0  # of headings: longer than any stride waits to be told
-RECENT_S = 0.3  # who stands is told of so much later
+)  # first compass heading in the walk frame, which it defines; later ones show the gyro's bias
+SLOW_RAD_S = math.radians(10.0)  # largest rate of a standing leg, with the gyro's bias
+SETTING_OFF_S = 1.0  # duration of the motion in an edge of a walk
+SCALE_SD = 0.004  # random walk of the strides' scale per stride
+CURVE_SD = 0.5  # sd over the shortening of a stride in a curve: the trunk does not turn evenly
+TWIST_RAD = math.radians(12.0)  # range of the pelvis' rotation in a straight stride, which does not shorten it
+REMEMBERED_S = 12.0  # of headings: longer than any delay of a stride
+RECENT_S = 0.3  # delay of the segments of standing
 
 
 @dataclass(frozen=True, slots=True)
 class WearerSettings:
-    """Hip to knee and knee to ankle of the wearer; `leg_scale`: how much longer his strides are than these tell, from a walk of known length.
+    """`thigh_m`: hip to knee. `shank_m`: knee to ankle. `leg_scale`: factor on all stride lengths, from a walk of known length.
 
-    `leg_left_m`: where the leg with the gyros swings, to the left of the trunk (negative: the right leg); in a curve the outer leg goes farther.
+    `leg_left_m`: distance of the leg with the gyros to the left of the trunk (negative: right leg); in a curve the outer leg moves farther.
     """
 
     thigh_m: float = 0.43
@@ -61,56 +63,58 @@ class GyroBlock(NamedTuple):
 
 
 class LegPath:
-    """Feed it blocks of samples; what comes out does not depend on their size, but for when it comes."""
+    """Path segments from blocks of samples; the size of the blocks changes only the time at which a segment is returned."""
 
     def __init__(self, settings: WearerSettings, iron: CompassErrors | None = None) -> None:
-        """`iron`: the compass', when it was calibrated."""
-        segments = LegLengths(settings.thigh_m, settings.shank_m, settings.leg_scale)
-        self._legs = StrideEstimator(StrideSettings(segments, calibrated=settings.leg_scale != 1.0))
-        self._unclipped = ClippingRepair(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
+        """`iron`: errors of the compass, when it was calibrated."""
+        lengths = LegLengths(settings.thigh_m, settings.shank_m, settings.leg_scale)
+        self._strides = StrideEstimator(StrideSettings(lengths, calibrated=settings.leg_scale != 1.0))
+        self._clipping = ClippingRepair(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
         self._left_m = settings.leg_left_m
         self._heading = Heading(HeadingSettings(iron=iron, first_sd_rad=FRAME_SD_RAD))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
-        self._told_s = -math.inf  # up to where legs were told
-        self._begun = False
+        self._covered_s = -math.inf  # end of the last segment
+        self._begun = False  # whether there was a stride
         self.steps = 0
 
     def feed(self, block: GyroBlock) -> list[PathSegment]:
-        """The legs that a block makes certain, in order of time, without gaps once the first is told."""
+        """Segments completed by a block, in order of time."""
         still = (np.abs(block.thigh) < SLOW_RAD_S) & (np.abs(block.calf) < SLOW_RAD_S)
-        found = self._heading.feed(block.t_s, block.belt, block.compass, still)
-        self._headings.extend(zip(block.t_s.tolist(), found[:, 0].tolist(), strict=True))
+        headings = self._heading.feed(block.t_s, block.belt, block.compass, still)
+        self._headings.extend(zip(block.t_s.tolist(), headings[:, 0].tolist(), strict=True))
         while self._headings and self._headings[0][0] < block.t_s[-1] - REMEMBERED_S:
             self._headings.popleft()
-        t_s, rates = self._unclipped.feed(block.t_s, np.column_stack([block.thigh, block.calf]))
-        told = [self._leg(stride) for stride in self._legs.feed(t_s, rates[:, 0], rates[:, 1])]
-        legs = [leg for leg in told if leg is not None]
-        since_s = self._legs.standing_since_s
+        t_s, rates = self._clipping.feed(block.t_s, np.column_stack([block.thigh, block.calf]))
+        strides = self._strides.feed(t_s, rates[:, 0], rates[:, 1])
+        segments = [segment for stride in strides if (segment := self._stride_segment(stride)) is not None]
+        since_s = self._strides.standing_since_s
         until_s = float(block.t_s[-1]) - RECENT_S
-        if since_s is not None and until_s - max(self._told_s, since_s) >= STANDING_PIECE_S:
-            legs.append(self._stay(max(self._told_s, since_s), until_s))
-        return legs
+        if since_s is not None and until_s - max(self._covered_s, since_s) >= STANDING_PIECE_S:
+            segments.append(self._standing_segment(max(self._covered_s, since_s), until_s))
+        return segments
 
     @property
     def remembered_s(self) -> float:
-        """Since when headings are."""
+        """Time of the oldest heading remembered; infinite without any."""
         return self._headings[0][0] if self._headings else math.inf
 
     def heading_rad(self, t_s: float) -> float:
-        """Heading of the trunk at a time not long ago."""
+        """Heading of the trunk (not wrapped) at a time since `remembered_s`, interpolated."""
         times, headings = zip(*self._headings, strict=True)
         return float(np.interp(t_s, times, headings))
 
-    def _leg(self, stride: Stride) -> PathSegment | None:
-        """A stride as a leg; what of it was told as standing is left out."""
-        t0, t1 = max(stride.t_start_s, self._told_s), stride.t_end_s
+    def _stride_segment(self, stride: Stride) -> PathSegment | None:
+        """The segment of a stride, without the time already covered by standing; None when nothing is left."""
+        t0, t1 = max(stride.t_start_s, self._covered_s), stride.t_end_s
         if t1 <= t0:
             return None
         share = (t1 - t0) / (stride.t_end_s - stride.t_start_s)
-        self._told_s = t1
+        self._covered_s = t1
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
-        begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0  # who turns on the spot goes nowhere before
+        begun = (
+            t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
+        )  # no way before: the wearer may turn on the spot
         ahead, aside = self._direction(max(t0, begun), t1)
         length = share * stride.length_m
         if Flag.EDGE not in stride.flags and length > 0.0:
@@ -125,12 +129,16 @@ class LegPath:
             scale_sd=scale_sd,
         )  # fmt: skip
 
-    def _stay(self, t0: float, t1: float) -> PathSegment:
-        self._told_s = t1
+    def _standing_segment(self, t0: float, t1: float) -> PathSegment:
+        """The segment of standing from t0 to t1."""
+        self._covered_s = t1
         return PathSegment(t0, t1, 0.0, 0.0, self.heading_rad(t0), self.heading_rad(t1), 0.0, 0.0, self.steps)
 
     def _direction(self, t0: float, t1: float) -> tuple[float, float]:
-        """Where an even pace along the headings of a stride leads, per metre: less far in a curve; the pelvis twists to and fro in it."""
+        """Mean of (cos, sin) of the headings from t0 to t1: displacement per metre at an even pace, shorter than 1 in a curve.
+
+        The rotation of the pelvis to and fro does not count as a curve.
+        """
         times, headings = (np.array(column) for column in zip(*self._headings, strict=True))
         within = headings[(times >= t0) & (times <= t1)]
         if not len(within):
@@ -139,25 +147,25 @@ class LegPath:
         return float(np.cos(within).mean() / twist), float(np.sin(within).mean() / twist)
 
 
-def segment_after(leg: PathSegment, from_s: float) -> PathSegment:
-    """What is left of a leg from a time on."""
-    if from_s <= leg.t0_s:
-        return leg
-    share = (leg.t1_s - from_s) / (leg.t1_s - leg.t0_s)
+def segment_after(segment: PathSegment, from_s: float) -> PathSegment:
+    """The part of a segment from a time on."""
+    if from_s <= segment.t0_s:
+        return segment
+    share = (segment.t1_s - from_s) / (segment.t1_s - segment.t0_s)
     return PathSegment(
-        from_s, leg.t1_s, share * leg.dx_m, share * leg.dy_m, leg.heading_rad(from_s), leg.heading1_rad,
-        math.sqrt(share) * leg.sd_m, math.sqrt(share) * leg.turn_sd_rad, leg.step, leg.anchor_sd_m,
-        share * leg.rise_m, leg.rise_sd_m, leg.scale_sd,
+        from_s, segment.t1_s, share * segment.dx_m, share * segment.dy_m, segment.heading_rad(from_s), segment.heading1_rad,
+        math.sqrt(share) * segment.sd_m, math.sqrt(share) * segment.turn_sd_rad, segment.step, segment.anchor_sd_m,
+        share * segment.rise_m, segment.rise_sd_m, segment.scale_sd,
     )  # fmt: skip
 
 
-def rotated_segment(leg: PathSegment, angle_rad: float, scale: float = 1.0) -> PathSegment:
-    """The same leg in a walk frame that is rotated_segment by an angle against its own, and longer."""
+def rotated_segment(segment: PathSegment, angle_rad: float, scale: float = 1.0) -> PathSegment:
+    """The segment rotated by an angle about z and scaled, as seen in another walk frame."""
     if angle_rad == 0.0 and scale == 1.0:
-        return leg
+        return segment
     c, s = scale * math.cos(angle_rad), scale * math.sin(angle_rad)
     return PathSegment(
-        leg.t0_s, leg.t1_s, c * leg.dx_m - s * leg.dy_m, s * leg.dx_m + c * leg.dy_m,
-        leg.heading0_rad + angle_rad, leg.heading1_rad + angle_rad, leg.sd_m, leg.turn_sd_rad, leg.step,
-        leg.anchor_sd_m, leg.rise_m, leg.rise_sd_m, leg.scale_sd,
+        segment.t0_s, segment.t1_s, c * segment.dx_m - s * segment.dy_m, s * segment.dx_m + c * segment.dy_m,
+        segment.heading0_rad + angle_rad, segment.heading1_rad + angle_rad, segment.sd_m, segment.turn_sd_rad, segment.step,
+        segment.anchor_sd_m, segment.rise_m, segment.rise_sd_m, segment.scale_sd,
     )  # fmt: skip
