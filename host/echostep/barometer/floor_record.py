@@ -1,6 +1,6 @@
-"""What a record says about the building and the day: storeys that nobody told, stays on floors, metres climbed.
+"""Evaluation of a whole record of pressures: unknown heights of the floors, stays on floors, metres climbed.
 
-In: `Pressures`, `Floors`. Out: heights of storeys, `Stay`s, the sums. Owns nothing.
+In: `Pressures`, `Floors`. Out: heights of the floors, `Stay`s, sums, a description. Owns nothing.
 """
 
 from __future__ import annotations
@@ -16,23 +16,32 @@ from echostep.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
 from echostep.barometer.vertical_model import CLAIMED
 from echostep.errors import EchostepError
 
-Way = tuple[int, int, float]  # from one storey to another, and metres up
+Change = tuple[int, int, float]  # of floor: index before, index after, rise (m)
 
-MOVING_P = 0.5
-SHORTEST_STAY_S, SHORTEST_END_S, SETTLES_S, LEVEL_S = 4.0, 1.0, 3.0, 8.0
-MOST_ROUNDS, SETTLED_M = 4, 0.02
-PASSED_S, PASSED_P = 2.0, 0.8  # so short, or so probably on the way, is a stay on a storey that is known
-EDGE_S = 1.5  # of a stay, which may be part of the way
-SHIFTS_M = 3.0  # more is no pressure of the building
-DRIFTS_S = 120.0  # of stays that show the drift
-NOISE_TIMES_S, SMOOTH_PA = (0.5, 1.0), 0.02
-SAME_STOREY_M, LOWEST_STOREY_M = 1.2, 2.0
-FEWEST_HZ = 10.0
+# The source of these limits is not recorded.
+MOVING_P = 0.5  # probability of changing floors from which a sample is not part of a stay
+SHORTEST_STAY_S = 4.0
+SHORTEST_END_S = 1.0  # the same for the first and the last stay of a record
+SETTLES_S = 3.0  # of an arrival; the median height over it is compared with that before the departure
+LEVEL_S = 8.0  # at either end of a stay, for the pressure's height there
+MOST_ROUNDS = 4  # of stays and heights found in turn
+SETTLED_M = 0.02  # largest change of the heights in the last round
+PASSED_S, PASSED_P = 2.0, 0.8  # shortest stay and probability of changing floors once the heights are known roughly
+EDGE_S = 1.5  # left out at either end of a stay, as it may belong to the change of floors
+SHIFTS_M = 3.0  # a round that lowers the highest floor by more is undone
+DRIFTS_S = 120.0  # total time of stays from which the weather's drift is computed
+NOISE_TIMES_S = (0.5, 1.0)  # over which means show slow errors
+SMOOTH_PA = 0.02  # steps between readings up to this are not quantization
+SAME_STOREY_M = 1.2  # a smaller difference of heights is the same floor
+LOWEST_STOREY_M = 2.0  # a floor without changes is kept if it is so far from all others
+THINNED_HZ = 10.0  # highest rate after thinning
+FEWEST_MEANS = 5  # for a noise
+SURE_P = 0.9  # median probability from which the floor is stated without a warning
 
 
 @dataclass(frozen=True, slots=True)
 class Stay:
-    """On a floor from one time to another."""
+    """Time on one floor, given by its index."""
 
     floor: int
     from_s: float
@@ -40,9 +49,9 @@ class Stay:
 
 
 def thinned(samples: Pressures) -> tuple[Pressures, Ints]:
-    """Means of neighbours, ten a second at most, and which mean each sample is part of."""
+    """Means of neighbouring samples, at most THINNED_HZ, and the index of each sample's mean (n,)."""
     rate = 1.0 / float(np.median(np.diff(samples.t_s)))
-    many = max(1, int(np.ceil(rate / FEWEST_HZ - 0.1)))
+    many = max(1, int(np.ceil(rate / THINNED_HZ - 0.1)))
     group = np.arange(len(samples.t_s)) // many
     count = np.bincount(group)
 
@@ -54,9 +63,9 @@ def thinned(samples: Pressures) -> tuple[Pressures, Ints]:
 
 
 def noise_of_record(samples: Pressures, few: Pressures) -> float:
-    """Noise (Pa, 1 sd) of the thinned samples `few`, as large as it must be were each one's its own.
+    """Standard deviation (Pa) of independent noise on the thinned samples `few` that covers all errors of the record.
 
-    Errors that last, as those of coarse steps and of a filter in the sensor, are seen in means over longer times.
+    Quantization and a filter in the sensor make errors that last; they are estimated from means over NOISE_TIMES_S.
     """
     steps = np.diff(np.unique(samples.pressure_pa))
     steps = steps[steps > SMOOTH_PA]
@@ -65,25 +74,26 @@ def noise_of_record(samples: Pressures, few: Pressures) -> float:
     for seconds in NOISE_TIMES_S:
         many = round(seconds * rate)
         whole = len(few.t_s) // many * many if many > 1 else 0
-        if whole >= 5 * many > 0:
+        if whole >= FEWEST_MEANS * many > 0:
             found = max(found, math.sqrt(many) * noise_of(few.pressure_pa[:whole].reshape(-1, many).mean(axis=1)))
     return found
 
 
 def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
-    """Heights (k,) above the lowest storey of all those where the wearer stayed; raises EchostepError when he stayed on one only.
+    """Heights (k,) above the lowest floor of all floors with a stay; raises EchostepError when there is one only.
 
-    Each way between two stays leads to a storey that is known by its height, or to a new one; the heights are then those that fit all ways best.
-    With these storeys the stays are found anew, and the heights by what pressure says at both ends of each way, until nothing changes.
+    1. Rises between stays give changes of floor: the floor after a change is a known one of the same height, or a new one.
+    2. Least squares over all changes gives the heights.
+    3. The floor filter with these heights gives the stays; the pressures at the ends of stays give the rises; repeat from 2 until nothing changes.
     """
-    ways = _first_ways(_rises(Altitude(settings).smooth(samples)))
-    heights = _apart(_fitted(ways, np.zeros(len({name for way in ways for name in way[:2]}) or 1)))
+    changes = _first_changes(_rises(Altitude(settings).smooth(samples)))
+    heights = _apart(_fitted(changes, np.zeros(len({index for change in changes for index in change[:2]}) or 1)))
     claimed, used = AirColumn(settings).rows(samples)
     for _ in range(MOST_ROUNDS if len(heights) > 1 else 0):
         before = heights
         visited = stays(FloorFilter(heights, settings).smooth(samples), PASSED_S, PASSED_P)
-        heights = _apart(_fitted(_ways(visited, samples.t_s[used], claimed[:, CLAIMED]), before))
-        if before[-1] - heights[-1] > SHIFTS_M:  # stays that he had are lost
+        heights = _apart(_fitted(_changes(visited, samples.t_s[used], claimed[:, CLAIMED]), before))
+        if before[-1] - heights[-1] > SHIFTS_M:  # stays were lost
             heights = before
         if len(heights) == len(before) and np.abs(heights - before).max() < SETTLED_M:
             break
@@ -92,30 +102,35 @@ def find_storeys(samples: Pressures, settings: BarometerSettings) -> Floats:
     return np.round(heights, 2)
 
 
-def _first_ways(rises: list[float]) -> list[Way]:
-    """Ways between storeys, numbered as they are met, out of rises between stays."""
-    known, ways, here = [0.0], [], 0
+def _first_changes(rises: list[float]) -> list[Change]:
+    """Changes of floor from the rises (m) between stays; floors are numbered in the order of their first stay."""
+    known, changes, here = [0.0], [], 0
     for rise in rises:
-        at = known[here] + rise
-        there = int(np.argmin(np.abs(np.array(known) - at)))
-        if abs(known[there] - at) > SAME_STOREY_M:
+        height = known[here] + rise
+        there = int(np.argmin(np.abs(np.array(known) - height)))
+        if abs(known[there] - height) > SAME_STOREY_M:
             there = len(known)
-            known.append(at)
+            known.append(height)
         if there != here:
-            ways.append((here, there, rise))
+            changes.append((here, there, rise))
         here = there
-    return ways
+    return changes
 
 
-def _ways(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Way]:
-    """Ways between stays, with the rise that pressure claims between the seconds before one and after the other, less the weather's drift."""
+def _changes(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Change]:
+    """Changes of floor between stays, by the height from pressure, `claimed_m` (n,) at `t_s` (n,), less the weather's drift.
+
+    The rise goes from the last LEVEL_S of one stay to the first LEVEL_S of the next. The drift is that within the stays.
+    """
 
     def level(from_s: float, to_s: float) -> tuple[float, float]:
+        """Mean time and median height in a span, which holds one sample at least."""
         seconds = (t_s >= from_s) & (t_s <= to_s)
         seconds[np.abs(t_s - 0.5 * (from_s + to_s)).argmin()] = True
         return float(t_s[seconds].mean()), float(np.median(claimed_m[seconds]))
 
     def inner(stay: Stay) -> tuple[float, float]:
+        """The stay without its edges."""
         edge = min(EDGE_S, 0.25 * (stay.to_s - stay.from_s))
         return stay.from_s + edge, stay.to_s - edge
 
@@ -129,26 +144,29 @@ def _ways(visited: list[Stay], t_s: Floats, claimed_m: Floats) -> list[Way]:
     ]
 
 
-def _fitted(ways: list[Way], before_m: Floats) -> Floats:
-    """Heights of the storeys of all ways, by least squares, above the lowest; one far from them that no way leads to moves with its neighbours."""
-    names = sorted({name for a, b, _ in ways for name in (a, b)})
-    if not names:
+def _fitted(changes: list[Change], before_m: Floats) -> Floats:
+    """Heights above the lowest floor, by least squares over all changes; `before_m` (k,): heights before, by index.
+
+    A floor without a change moves as its neighbours in height do; it is dropped when it is close to another one.
+    """
+    indices = sorted({index for here, there, _ in changes for index in (here, there)})
+    if not indices:
         return np.zeros(1)
-    table, wanted = np.zeros((len(ways) + 1, len(names))), np.zeros(len(ways) + 1)
-    for row, (a, b, rise) in enumerate(ways):
-        table[row, names.index(a)], table[row, names.index(b)], wanted[row] = -1.0, 1.0, rise
-    table[-1, 0] = 1.0
-    found = np.linalg.lstsq(table, wanted, rcond=None)[0] + before_m[names[0]]
-    order = np.argsort(before_m[names])
-    moved = before_m + np.interp(before_m, before_m[names][order], (found - before_m[names])[order])
-    passed = np.abs(moved[:, None] - found).min(axis=1) >= LOWEST_STOREY_M
-    passed[names] = False
-    heights = np.sort(np.concatenate([found, moved[passed]]))
+    design, rises = np.zeros((len(changes) + 1, len(indices))), np.zeros(len(changes) + 1)
+    for row, (here, there, rise) in enumerate(changes):
+        design[row, indices.index(here)], design[row, indices.index(there)], rises[row] = -1.0, 1.0, rise
+    design[-1, 0] = 1.0  # the first of these floors stays at its height
+    fitted = np.linalg.lstsq(design, rises, rcond=None)[0] + before_m[indices[0]]
+    order = np.argsort(before_m[indices])
+    moved = before_m + np.interp(before_m, before_m[indices][order], (fitted - before_m[indices])[order])
+    unvisited = np.abs(moved[:, None] - fitted).min(axis=1) >= LOWEST_STOREY_M
+    unvisited[indices] = False
+    heights = np.sort(np.concatenate([fitted, moved[unvisited]]))
     return np.asarray(heights - heights[0])
 
 
 def _apart(heights_m: Floats) -> Floats:
-    """Those that are a storey above the one below, the lowest at 0."""
+    """The heights (sorted) that are CLOSEST_M or more above the kept one below; the lowest is 0."""
     kept = [0.0]
     for height in heights_m.tolist():
         if height - kept[-1] >= CLOSEST_M:
@@ -157,7 +175,7 @@ def _apart(heights_m: Floats) -> Floats:
 
 
 def _rises(heights: Heights) -> list[float]:
-    """Metres between each two neighbouring stays: what moved between level stretches. At the ends of a record a second is a stay."""
+    """Rise (m) between each two neighbouring stays, which are long stretches without vertical motion; rises within one floor are left out."""
     level = heights.moving < MOVING_P
     edges = np.flatnonzero(np.diff(np.concatenate([[0], level.astype(np.int8), [0]])))
     stays = [
@@ -165,25 +183,25 @@ def _rises(heights: Heights) -> list[float]:
         for a, b in edges.reshape(-1, 2).tolist()
         if heights.t_s[b - 1] - heights.t_s[a] >= (SHORTEST_END_S if a == 0 or b == len(level) else SHORTEST_STAY_S)
     ]
-    if len(stays) < 2:  # one way without a stay
+    if len(stays) < 2:  # one change of floors from the first sample to the last
         stays = [(0, 1), (len(level) - 1, len(level))]
-    found = []
+    rises = []
     for (_, leaves), (arrives, ends) in zip(stays, stays[1:], strict=False):
         before = heights.height_m[leaves - 1]
         settled = np.searchsorted(heights.t_s[:ends], heights.t_s[arrives] + SETTLES_S)
-        found.append(float(np.median(heights.height_m[arrives : max(settled, arrives + 1)]) - before))
-    return [rise for rise in found if abs(rise) > SAME_STOREY_M]
+        rises.append(float(np.median(heights.height_m[arrives : max(settled, arrives + 1)]) - before))
+    return [rise for rise in rises if abs(rise) > SAME_STOREY_M]
 
 
 def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S, moving_p: float = MOVING_P) -> list[Stay]:
-    """Times on each floor in their order; a floor that is only passed on the way does not count, the same floor again goes on."""
+    """Stays in order of time: stretches of one floor, shorter ones left out except at the ends; neighbouring stays on the same floor are one."""
     still = floors.up + floors.down < moving_p
     found: list[Stay] = []
-    at = np.where(still, floors.floor, -1)
-    edges = np.flatnonzero(np.diff(at, prepend=-2, append=-2))
+    floor_or_none = np.where(still, floors.floor, -1)
+    edges = np.flatnonzero(np.diff(floor_or_none, prepend=-2, append=-2))
     for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        floor, t0, t1 = int(at[a]), float(floors.t_s[a]), float(floors.t_s[b - 1])
-        if floor < 0 or (t1 - t0 < shortest_s and a > 0 and b < len(at)):
+        floor, t0, t1 = int(floor_or_none[a]), float(floors.t_s[a]), float(floors.t_s[b - 1])
+        if floor < 0 or (t1 - t0 < shortest_s and a > 0 and b < len(floor_or_none)):
             continue
         if found and found[-1].floor == floor:
             t0 = found.pop().from_s
@@ -192,13 +210,13 @@ def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S, moving_p: float =
 
 
 def climbed_m(heights_m: Floats, visited: list[Stay]) -> tuple[float, float]:
-    """Metres up and metres down between the stays, by the storeys' heights."""
+    """Metres up and metres down between the stays, by the heights of the floors (k,)."""
     rises = np.diff([heights_m[stay.floor] for stay in visited])
     return float(rises[rises > 0].sum()), float(np.abs(rises[rises < 0]).sum())
 
 
 def describe(floors: Floors) -> str:
-    """Stays, metres climbed and how sure the start is, a line each."""
+    """Stays, metres climbed, and a warning when the floor is uncertain, a line each."""
     visited = stays(floors)
     lines = [f"floor {s.floor} ({floors.heights_m[s.floor]:g} m): {s.from_s:.0f} to {s.to_s:.0f} s" for s in visited]
     up, down = climbed_m(floors.heights_m, visited)
@@ -206,9 +224,9 @@ def describe(floors: Floors) -> str:
         f"{len(visited)} stays on {len({s.floor for s in visited})} floors; climbed {up:.1f} m up, {down:.1f} m down; {len(floors.t_s)} samples"
     )
     sure = floors.probability[np.arange(len(floors.t_s)), floors.floor]
-    if float(np.median(sure)) < 0.9:
+    if float(np.median(sure)) < SURE_P:
         lines.append(
-            f"which floor it is, is not certain (median probability {np.median(sure):.2f}): what he climbed fits several; "
+            f"which floor it is, is not certain (median probability {np.median(sure):.2f}): the climbs fit several; "
             "give the first with --start FLOOR"
         )
     return "\n".join(lines)

@@ -1,6 +1,6 @@
-"""`echostep floors`: a recorded barometer, its floors as CSV, in words and as a picture.
+"""`echostep floors`: the floors of a recorded barometer as CSV, in words and as a picture.
 
-In: a file, heights. Out: files and words. Owns nothing.
+In: a CSV file of pressures, the heights of the floors or `auto`. Out: a CSV file, a picture, a summary on the console. Owns nothing.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from echostep.errors import EchostepError
 from echostep.offline.pressure_csv import load_pressures, write_floors
 
 console = Console(soft_wrap=True, highlight=False)
+MOST_POINTS = 5000  # about, of a curve in the picture
 
 
 def floors(path: Path, heights: str, out: Path, start: int | None, *, plot: bool) -> None:
-    """Write the floors of a record and say what was visited; raises EchostepError for what cannot be used."""
-    wanted = None if heights.strip().lower() == "auto" else parse_heights(heights)
-    if start is not None and wanted is None:
+    """Write the floors of a record and print the stays; raises EchostepError for options or samples that cannot be used."""
+    given_m = None if heights.strip().lower() == "auto" else parse_heights(heights)
+    if start is not None and given_m is None:
         raise EchostepError("--start is an index into --heights: with --heights auto there are none yet")
-    if start is not None and wanted is not None and not 0 <= start < len(wanted):
-        raise EchostepError(f"--start {start}: the floors of --heights are 0 to {len(wanted) - 1}")
+    if start is not None and given_m is not None and not 0 <= start < len(given_m):
+        raise EchostepError(f"--start {start}: the floors of --heights are 0 to {len(given_m) - 1}")
     record = load_pressures(path)
     for note in record.notes:
         console.print(f"{path}: {note}", markup=False)
-    found = _named(path, record.samples, wanted, start)
+    found = _floors_of(path, record.samples, given_m, start)
     write_floors(out, found)
-    if wanted is None:
-        console.print("storeys found: --heights " + ",".join(f"{h:g}" for h in found.heights_m))
+    if given_m is None:
+        console.print("floors found: --heights " + ",".join(f"{h:g}" for h in found.heights_m))
     console.print(describe(found), markup=False)
     if plot:
         picture = out.with_suffix(".png")
@@ -42,7 +43,7 @@ def floors(path: Path, heights: str, out: Path, start: int | None, *, plot: bool
 
 
 def record_floors(samples: Pressures, heights_m: Floats, start: int | None = None) -> Floors:
-    """Floors at all samples of a record, each by all of it; its own noise is measured, ten samples a second are looked at."""
+    """Floors at all samples (n,), each by the whole record: smoothed at about 10 Hz, with the noise measured on the record."""
     few, group = thinned(samples)
     prior = np.ones(len(heights_m)) if start is None else np.eye(len(heights_m))[start]
     found = FloorFilter(heights_m, BarometerSettings(noise_of_record(samples, few)), prior).smooth(few)
@@ -51,7 +52,8 @@ def record_floors(samples: Pressures, heights_m: Floats, start: int | None = Non
     )  # fmt: skip
 
 
-def _named(path: Path, samples: Pressures, heights_m: Floats | None, start: int | None) -> Floors:
+def _floors_of(path: Path, samples: Pressures, heights_m: Floats | None, start: int | None) -> Floors:
+    """Floors of the record, with heights found from it where none are given; errors name the file."""
     try:
         if heights_m is None:
             few, _ = thinned(samples)
@@ -62,7 +64,7 @@ def _named(path: Path, samples: Pressures, heights_m: Floats | None, start: int 
 
 
 def parse_heights(text: str) -> Floats:
-    """Heights of the storeys out of "0,3.5,7"; raises EchostepError."""
+    """Heights (k,) of the floors from text such as "0,3.5,7"; raises EchostepError."""
     try:
         found = [float(cell) for cell in text.split(",")]
     except ValueError as error:
@@ -73,14 +75,14 @@ def parse_heights(text: str) -> Floats:
 
 
 def draw_floors(path: Path, floors: Floors, title: str) -> None:
-    """Height over time on the storeys, and the probability of each floor, as a PNG."""
+    """Write a PNG with the height over time, the heights of the floors, and the probability of each floor."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 6.5), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    few = slice(None, None, max(1, len(floors.t_s) // 5000))
+    few = slice(None, None, max(1, len(floors.t_s) // MOST_POINTS))
     for k, height in enumerate(floors.heights_m):
         above.axhline(height, color="#cccccc", linewidth=0.8)
         above.text(1.005, height, f"{k}", transform=above.get_yaxis_transform(), va="center", fontsize=8)
