@@ -1,9 +1,12 @@
-"""Types of numpy arrays that annotations use everywhere.
+"""Types of numpy arrays that annotations use everywhere, and the numpy dtype of a record that a Protocol describes.
 
-In: nothing. Out: names of array types. Owns nothing.
+In: a Protocol class with annotated fields. Out: names of array types; dtypes of records. Owns nothing.
 """
 
 from __future__ import annotations
+
+import inspect
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,3 +16,22 @@ Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Octets = NDArray[np.uint8]
+
+_SCALARS = {"float": "f8", "int": "i8"}
+_ARRAYS = {"Floats": "f8", "Ints": "i8"}
+
+
+def record_dtype(protocol: type, array_size: int | None = None, **sizes: int) -> np.dtype[np.void]:
+    """Dtype with one field for each annotation of `protocol`, those of its bases first: float, int, Floats or Ints.
+
+    An array has `sizes[name]` values, or `array_size` where every array has the same. The module of `protocol` must postpone the evaluation of its
+    annotations. A kernel reads and writes the fields of such a record as attributes.
+    """
+    fields: list[Any] = []
+    for base in reversed(protocol.__mro__):
+        for name, kind in inspect.get_annotations(base).items():
+            if kind in _SCALARS:
+                fields.append((name, _SCALARS[kind]))
+            else:
+                fields.append((name, _ARRAYS[kind], sizes[name] if array_size is None else array_size))
+    return np.dtype(fields)

@@ -1,18 +1,23 @@
 """The tracker: chunks in, estimates out. The only module where the stages meet.
 
-In: chunks in order of arrival. Out: estimates. Owns the front end, the filter and the random generator. Live, replay and simulation all use
-`Tracker.take`. No wall clock is read here: equal chunks give equal estimates, bit for bit, in portions of any size.
+In: chunks in order of arrival. Out: estimates; for views, copies of the state (`TrackerState`, `StreamState`, `Particles`). Owns the front end,
+the filter and the random generator. Live, replay and simulation all use `Tracker.take`. No wall clock is read here: equal chunks give equal
+estimates, bit for bit, in portions of any size.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.board.gateway import BeaconReading, Gateway
+from echostep.arrays import Floats, Ints
+from echostep.board.findings import BoardReports
+from echostep.board.frames import FrameCounts
+from echostep.board.gateway import BeaconReading, Gateway, GatewayCounts
+from echostep.board.messages import Identity, Status
 from echostep.errors import EchostepError
 from echostep.legs.heading import CompassErrors
 from echostep.localization.beacon_map import BeaconPlace
@@ -20,19 +25,69 @@ from echostep.localization.estimate import Estimate, estimate, unobserved
 from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.particle_kernels import Move, systematic
 from echostep.localization.particles import CloudSettings
-from echostep.odometry.front_end import FrontEnd
+from echostep.odometry.front_end import FrontEnd, FrontEndCounts
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
 from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
 from echostep.settings import Settings
-from echostep.tracker_state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
+from echostep.xsens.reader import MtxCounts
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
 KNOWN_SD_RAD = 0.5  # of a heading; by reason: with a larger one the particles are spread over all headings
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerState:
+    """The tracker after the newest chunk.
+
+    `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `plan_explained`: running mean log-likelihood of the
+    echoes under the plan (about 1 when tracked well), NaN before the first segment. `beacon_numbers`: by slot. `beacon_heard_s`: time of the newest
+    reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
+    """
+
+    estimate: Estimate | None
+    last_segment: PathSegment | None
+    pending_segments: tuple[PathSegment, ...]
+    waits_for_start: bool
+    check_ins: int
+    bad_check_ins: int
+    particle_count: int
+    plan_explained: float
+    beacon_numbers: tuple[int, ...]
+    beacon_heard_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class StreamState:
+    """Counts of each input stream since the start, and the newest reports of the board.
+
+    `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples.
+    """
+
+    board: FrameCounts
+    mtx: MtxCounts
+    gateway: GatewayCounts
+    front_end: FrontEndCounts
+    pings: int
+    synchronised: bool
+    board_restarts: int
+    status: Status | None
+    identity: Identity | None
+    reports: BoardReports
+
+
+@dataclass(frozen=True, slots=True)
+class Particles:
+    """n particles: `x_m`, `y_m` (n,) in the map, `level` (n,) index in the plan, `log_weight` (n,), 0 for the heaviest of all particles."""
+
+    x_m: Floats
+    y_m: Floats
+    level: Ints
+    log_weight: Floats
 
 
 class Tracker:

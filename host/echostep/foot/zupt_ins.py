@@ -11,9 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
-from echostep.arrays import Floats
+from echostep.arrays import Floats, record_dtype
 from echostep.foot import ins, mounting, stance
 from echostep.foot import magnetometer as magnetic
 from echostep.foot.ins import POS, TILT, VEL, YAW, Nav
@@ -132,8 +130,7 @@ class Output(NamedTuple):
     rows: Floats
 
 
-_NUMPY = {"float": ("f8",), "int": ("i8",), "Floats": ("f8", 3)}
-ZUPT_STATE = np.dtype([(name, *_NUMPY[kind]) for name, kind in ZuptState.__annotations__.items()])
+ZUPT_STATE = record_dtype(ZuptState, array_size=3)
 
 
 @lean_kernel

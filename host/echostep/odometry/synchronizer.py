@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Floats, Ints, record_dtype
 from echostep.jit import kernel
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 
@@ -32,8 +32,7 @@ class _State(Protocol):
     dropout_s: float  # time of the last dropout
 
 
-_NUMPY = {"float": "f8", "int": "i8"}
-_STATE = np.dtype([(name, _NUMPY[kind]) for name, kind in _State.__annotations__.items()])
+_STATE = record_dtype(_State)
 
 
 class _NewPings(NamedTuple):

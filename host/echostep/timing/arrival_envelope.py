@@ -1,10 +1,18 @@
-"""Arrival times -> a device's clock on the host's clock, by a lower envelope.
+"""A device's clock on the host's clock, by the lower envelope of its arrival times.
 
-In: device seconds and arrival times. Out: the mapping between both. Owns nothing: the least delayed arrival of each of the last seconds is in an
-`ArrivalClock` that the caller keeps.
-Delays only add: the true line lies below all points (device time, arrival - device time) and touches the least delayed ones, so the lower
-convex hull of each second's least delayed point holds both the offset and the drift [Moon, Skelly, Towsley 1999]. Among the lines that touch
-it, the one of the most probable drift is taken: few undelayed points say little about a drift, and what crystals do is known.
+In: device seconds and arrival times. Out: device seconds -> host seconds, and back. Owns nothing: the caller keeps the `ArrivalClock`.
+
+One point for each message: x = device time, y = lag = arrival time - device time. Bytes are never early, so the true line of offset and drift
+lies below all points and touches the least delayed ones. The line is fitted to the lower convex hull of the least delayed point of each second
+[Moon, Skelly, Towsley 1999]. Of all lines that touch the hull from below, the most probable one is used: exponential delays, and a
+Gaussian prior on the drift. The prior matters while few points are undelayed.
+
+    lag |   .     .
+        |  .   .     .      . delayed arrivals
+        |      .   . ___o
+        |   _o----o~        o vertices of the lower hull, the line touches one of them
+        |o~
+        +------------------ device time
 """
 
 from __future__ import annotations
@@ -16,35 +24,29 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 
-BUCKET_S = 1.0
-KEPT_BUCKETS = 60
-DRIFT_SD = 130e-6  # between two crystals
-LEAST_DELAY_S = 20e-6  # no delay is known better
+BUCKET_S = 1.0  # device time for which one point is kept; by reason
+KEPT_BUCKETS = 60  # one minute; by reason
+DRIFT_SD = 130e-6  # s/s, standard deviation of the drift between two crystals; by reason
+LEAST_DELAY_S = 20e-6  # lower bound of the mean delay in the fit; by reason: the resolution of arrival times
 
 
 class ArrivalClock(Protocol):
-    """The line and what it is drawn through: of each of the last seconds (`bucket`) the device time and how late its bytes came."""
+    """The fitted line, lag = offset_s + drift * (device time - pivot_s), and its points, one per bucket."""
 
-    kept: int
-    bucket: Ints
-    device_s: Floats
-    late_s: Floats
-    begun: int
-    origin_ns: int
+    kept: int  # buckets in use, the oldest first
+    bucket: Ints  # (KEPT_BUCKETS,) number of each bucket
+    device_s: Floats  # (KEPT_BUCKETS,) device time of its least delayed message
+    lag_s: Floats  # (KEPT_BUCKETS,) lag of that message, on the host's clock from `origin_ns`
+    begun: int  # whether there was an arrival
+    origin_ns: int  # first arrival time
     offset_s: float
     drift: float
     pivot_s: float
 
 
-FIELDS = [
-    ("kept", "i8"), ("bucket", "i8", KEPT_BUCKETS), ("device_s", "f8", KEPT_BUCKETS), ("late_s", "f8", KEPT_BUCKETS),
-    ("begun", "i8"), ("origin_ns", "i8"), ("offset_s", "f8"), ("drift", "f8"), ("pivot_s", "f8"),
-]  # fmt: skip
-
-
 @kernel
-def begin(clock: ArrivalClock) -> None:
-    """Forget everything."""
+def reset(clock: ArrivalClock) -> None:
+    """Discard all points and the line."""
     clock.kept = 0
     clock.begun = 0
     clock.origin_ns = 0
@@ -53,34 +55,34 @@ def begin(clock: ArrivalClock) -> None:
 
 @kernel
 def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
-    """One arrival; device seconds need not be in order."""
+    """Add one arrival and fit the line again if it changes. Device seconds may be out of order."""
     if not clock.begun:
         clock.begun = 1
         clock.origin_ns = t_arrival_ns
-    late = (t_arrival_ns - clock.origin_ns) * 1e-9 - device_s
+    lag = (t_arrival_ns - clock.origin_ns) * 1e-9 - device_s
     bucket = int(device_s // BUCKET_S)
     last = clock.kept - 1
     if last < 0 or bucket > clock.bucket[last]:
         if clock.kept == KEPT_BUCKETS:
             clock.bucket[:-1] = clock.bucket[1:].copy()
             clock.device_s[:-1] = clock.device_s[1:].copy()
-            clock.late_s[:-1] = clock.late_s[1:].copy()
+            clock.lag_s[:-1] = clock.lag_s[1:].copy()
         else:
             clock.kept += 1
             last += 1
-        clock.bucket[last], clock.device_s[last], clock.late_s[last] = bucket, device_s, late
+        clock.bucket[last], clock.device_s[last], clock.lag_s[last] = bucket, device_s, lag
         _fit(clock)
-    elif bucket == clock.bucket[last] and late < clock.late_s[last]:
-        clock.device_s[last], clock.late_s[last] = device_s, late
-        if late < clock.offset_s + clock.drift * (device_s - clock.pivot_s):
+    elif bucket == clock.bucket[last] and lag < clock.lag_s[last]:
+        clock.device_s[last], clock.lag_s[last] = device_s, lag
+        if lag < clock.offset_s + clock.drift * (device_s - clock.pivot_s):
             _fit(clock)
 
 
 @kernel
 def _fit(clock: ArrivalClock) -> None:
-    """The most probable line under all points: exponential delays, and a drift that is a crystal's."""
+    """Fit the most probable line under all points; the mean delay is the mean height of the points above the hull at the pivot."""
     n = clock.kept
-    x, y = clock.device_s[:n], clock.late_s[:n]
+    x, y = clock.device_s[:n], clock.lag_s[:n]
     hull = lower_hull(x, y)
     total_x, total_y = 0.0, 0.0
     for k in range(n):
@@ -97,7 +99,7 @@ def _fit(clock: ArrivalClock) -> None:
 
 @kernel
 def _height(x: Floats, y: Floats, hull: Ints, pivot: float) -> float:
-    """Of the hull at the pivot."""
+    """Height of the hull at the pivot, interpolated between two vertices."""
     for k in range(len(hull) - 1):
         a, b = hull[k], hull[k + 1]
         if x[b] >= pivot:
@@ -109,9 +111,10 @@ def _height(x: Floats, y: Floats, hull: Ints, pivot: float) -> float:
 def most_probable_slope(x: Floats, y: Floats, hull: Ints, pivot: float, weight: float) -> float:
     """Slope that maximises weight * (height at the pivot of the line touching the hull from below) - slope^2 / (2 DRIFT_SD^2).
 
-    Under a line through the vertex x the height falls by slope * (x - pivot), so each vertex has its own best slope, within those of its edges.
+    The height at the pivot of a line through vertex x is y - slope * (x - pivot). So each vertex has its own best slope, limited to the slopes of
+    its two edges; the best vertex wins.
     """
-    best, found, low = -np.inf, 0.0, -1.0
+    best_gain, best_slope, low = -np.inf, 0.0, -1.0
     for k in range(len(hull)):
         a = hull[k]
         high = 1.0
@@ -120,22 +123,22 @@ def most_probable_slope(x: Floats, y: Floats, hull: Ints, pivot: float, weight: 
             high = (y[b] - y[a]) / (x[b] - x[a])
         slope = min(max(-(DRIFT_SD * DRIFT_SD) * weight * (x[a] - pivot), low), high)
         gain = weight * (y[a] - slope * (x[a] - pivot)) - 0.5 * (slope / DRIFT_SD) * (slope / DRIFT_SD)
-        if gain > best:
-            best, found = gain, slope
+        if gain > best_gain:
+            best_gain, best_slope = gain, slope
         low = high
-    return found
+    return best_slope
 
 
 @kernel
 def to_arrival_s(clock: ArrivalClock, device_s: float) -> float:
-    """Host seconds at which undelayed bytes of that device time arrive; 0 before the first update."""
-    late = clock.offset_s + clock.drift * (device_s - clock.pivot_s)
-    return clock.origin_ns * 1e-9 + device_s + late
+    """Host seconds at which undelayed bytes of device time `device_s` arrive; `device_s` itself before the first update."""
+    lag = clock.offset_s + clock.drift * (device_s - clock.pivot_s)
+    return clock.origin_ns * 1e-9 + device_s + lag
 
 
 @kernel
 def to_device_s(clock: ArrivalClock, arrival_s: float) -> float:
-    """Device seconds of bytes that arrive then and were not delayed."""
+    """Device seconds of undelayed bytes that arrive at `arrival_s` on the host's clock."""
     local = arrival_s - clock.origin_ns * 1e-9
     return (local - clock.offset_s + clock.drift * clock.pivot_s) / (1.0 + clock.drift)
 
@@ -155,4 +158,5 @@ def lower_hull(x: Floats, y: Floats) -> Ints:
 
 @kernel
 def _turn(x: Floats, y: Floats, a: int, b: int, c: int) -> float:
+    """Twice the signed area of the triangle a, b, c: positive for a left turn."""
     return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])

@@ -1,7 +1,7 @@
 """Wrapping device counters -> device seconds that never wrap.
 
-In: counter values with their time of arrival. Out: seconds since the device's first reset. Owns nothing: the state is a `DeviceClock` that the
-caller keeps. Restarts are followed by arrival times.
+In: counter values with their arrival times. Out: seconds since the device's first reset. Owns nothing: the caller keeps the `DeviceClock`.
+After a restart of the device, its arrival time sets the new epoch.
 """
 
 from __future__ import annotations
@@ -10,40 +10,36 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from echostep.arrays import record_dtype
 from echostep.jit import kernel
 from echostep.timing import arrival_envelope as arrival
-from echostep.timing.arrival_envelope import ArrivalClock
+from echostep.timing.arrival_envelope import KEPT_BUCKETS, ArrivalClock
 
-AHEAD_S = 1.0  # a device cannot be further ahead of the arrival of its bytes than this: it restarted, or the bytes lie
-BEHIND_S = 1.0  # messages may be this much older than the newest one (a ping is sent when its ranging is over)
-JUMPS_TO_RESTART = 3
+AHEAD_S = 1.0  # a counter further ahead of its arrival is impossible: a restart or damaged bytes; by reason
+BEHIND_S = 1.0  # greatest age of a message relative to the newest one; by reason: a ping is sent after its ranging
+JUMPS_TO_RESTART = 3  # impossible values in a row that make a restart; by reason
 
 
 class DeviceClock(ArrivalClock, Protocol):
-    """A counter of `modulus` values, one each `unit_s`; `newest` is unwrapped and counts from `epoch_s`.
-
-    `jumps` are values that could not be true, `jumped` those since the last that could. `newest_s` belongs to the timeline: `t_s` of the newest
-    message, NaN before it.
-    """
+    """A counter of `modulus` values, one step each `unit_s`, and its arrival clock."""
 
     unit_s: float
     modulus: int
-    started: int
-    newest: int
+    started: int  # whether there was a value
+    newest: int  # newest value, unwrapped
     newest_arrival_ns: int
-    epoch_s: float
-    jumped: int
+    epoch_s: float  # device seconds of the unwrapped value 0
+    jumped: int  # impossible values since the last possible one
     restarts: int
-    jumps: int
-    newest_s: float
+    jumps: int  # impossible values that were dropped
+    newest_s: float  # used by the timeline: `t_s` of the newest message, NaN before it
 
 
-_NUMPY = {"float": "f8", "int": "i8"}
-CLOCK = np.dtype([*arrival.FIELDS, *((name, _NUMPY[kind]) for name, kind in DeviceClock.__annotations__.items())])
+CLOCK = record_dtype(DeviceClock, array_size=KEPT_BUCKETS)
 
 
 def new_clock(unit_s: float, modulus: int) -> Any:
-    """A clock that has not been read yet."""
+    """The clock of a counter that has no value yet."""
     clock = np.zeros(1, CLOCK)[0]
     clock["unit_s"], clock["modulus"], clock["newest_s"] = unit_s, modulus, np.nan
     return clock
@@ -51,7 +47,7 @@ def new_clock(unit_s: float, modulus: int) -> Any:
 
 @kernel
 def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool) -> float:
-    """Device seconds of a counter value; NaN when it cannot be true (a jump, counted). `restarted`: it is the device's first word."""
+    """Device seconds of a counter value; NaN for an impossible one (a jump, counted). `restarted`: in the first message after a start."""
     if not clock.started:
         return _begin(clock, value, t_arrival_ns, value * clock.unit_s)
     delta, possible = _delta(clock, value, t_arrival_ns)
@@ -73,7 +69,7 @@ def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool) -> 
 
 @kernel
 def _delta(clock: DeviceClock, value: int, t_arrival_ns: int) -> tuple[int, bool]:
-    """Counts since the newest value, and whether a true count can explain the value."""
+    """Counts from the newest value to this one, whole wraps by arrival times included, and whether the value is possible."""
     back = min(int(BEHIND_S / clock.unit_s), clock.modulus // 2)
     delta = (value - clock.newest + back) % clock.modulus - back
     elapsed_s = (t_arrival_ns - clock.newest_arrival_ns) * 1e-9
@@ -84,10 +80,11 @@ def _delta(clock: DeviceClock, value: int, t_arrival_ns: int) -> tuple[int, bool
 
 @kernel
 def _begin(clock: DeviceClock, value: int, t_arrival_ns: int, seconds: float) -> float:
+    """Begin a new epoch: `value` is at device time `seconds`."""
     clock.started = 1
     clock.newest, clock.newest_arrival_ns, clock.jumped = value, t_arrival_ns, 0
     clock.epoch_s = seconds - value * clock.unit_s
-    arrival.begin(clock)
+    arrival.reset(clock)
     arrival.update(clock, seconds, t_arrival_ns)
     return seconds
 

@@ -1,11 +1,11 @@
-"""SyncOut edges and which sample belongs to which.
+"""SyncOut edges: which edge belongs to which MTx sample, and so the time of each sample.
 
-In: edges that the board saw, and sample counters with their time by arrival. Out: the samples' times. Owns nothing: the state is a `SyncEdges`
-that the caller keeps.
+In: edges that the board has timed; sample counters with their time by arrival. Out: times of samples. Owns nothing: the caller keeps the
+`SyncEdges`.
 
-Edges and samples come in equal steps; only the number between them is unknown. Every sample votes for the edge nearest to its time by
-arrival, and the vote of the last `VOTES` samples decides. From there on a sample's time is its edge's, or follows from the newest edge and the
-measured period when that edge has not been seen.
+The MTx gives one edge per sample, so counter - edge count is a constant offset (mod 65536), which is unknown at first. Each sample votes for the
+offset of the edge nearest to its time by arrival. An offset with more than half of the last `VOTES` votes is locked. Then the time of a sample is
+the time of its edge; if the board has not reported that edge, it is extrapolated from the newest edge by the measured period.
 """
 
 from __future__ import annotations
@@ -14,54 +14,53 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Floats, Ints, record_dtype
 from echostep.jit import kernel
 
-VOTES = 50
-KEPT = 256
+VOTES = 50  # samples; by reason: half a second at 100 Hz
+KEPT = 256  # edges in the ring; by reason: more than two seconds at 100 Hz
+OUTDATED_PERIODS = 1e3  # farther from the newest edge than this, a sample has no time by edges; by reason
+MATCH_PERIODS = 100  # largest distance of a matching edge from the time by arrival; by reason
 
 
 class SyncEdges(Protocol):
-    """The last edges in a ring (`edge` u16 count, `t_s`; `seen` so far) and votes; `newest` and `first` are unwrapped counts."""
+    """The newest edges and votes, each in a ring."""
 
-    nominal_s: float
-    period_s: float
-    edge: Ints
-    t_s: Floats
-    seen: int
-    newest: int
+    nominal_s: float  # period by the settings
+    period_s: float  # period as measured, the nominal one before VOTES edges
+    edge: Ints  # (KEPT,) u16 count of each edge
+    t_s: Floats  # (KEPT,) its time
+    seen: int  # edges since the reset
+    newest: int  # count of the newest edge, unwrapped
     newest_s: float
-    first: int
+    first: int  # count of the first edge since the reset
     first_s: float
-    vote: Ints
-    voted: int
+    vote: Ints  # (VOTES,) offsets voted for
+    voted: int  # votes since the reset
     locked: int
-    offset: int  # counter minus edge, once locked
+    offset: int  # counter minus edge count (mod 65536), once locked
 
 
-EDGES = np.dtype([
-    ("nominal_s", "f8"), ("period_s", "f8"), ("edge", "i8", KEPT), ("t_s", "f8", KEPT), ("seen", "i8"), ("newest", "i8"),
-    ("newest_s", "f8"), ("first", "i8"), ("first_s", "f8"), ("vote", "i8", VOTES), ("voted", "i8"), ("locked", "i8"), ("offset", "i8"),
-])  # fmt: skip
+EDGES = record_dtype(SyncEdges, edge=KEPT, t_s=KEPT, vote=VOTES)
 
 
 def new_edges(period_s: float) -> Any:
-    """No edge seen so far; `period_s` between them by the settings."""
+    """State without any edge; `period_s`: time between two edges by the settings."""
     edges = np.zeros(1, EDGES)[0]
     edges["nominal_s"] = edges["period_s"] = period_s
     return edges
 
 
 @kernel
-def forget(s: SyncEdges) -> None:
-    """Start anew after a restart of either side."""
+def reset(s: SyncEdges) -> None:
+    """Discard all edges and votes, after a restart of the board or the MTx."""
     s.period_s = s.nominal_s
     s.seen = s.voted = s.locked = 0
 
 
 @kernel
 def add(s: SyncEdges, edge: int, t_s: float) -> None:
-    """Keep an edge (u16 count) and its time."""
+    """Add an edge (u16 count) and its time, and measure the period."""
     if s.seen == 0:
         s.newest = s.first = edge
         s.first_s = t_s
@@ -78,18 +77,18 @@ def add(s: SyncEdges, edge: int, t_s: float) -> None:
 
 @kernel
 def time_of(s: SyncEdges, counter: int, by_arrival_s: float) -> float:
-    """Time of the sample with this u16 counter; NaN until the vote is decided or when edges are long gone."""
-    if s.seen == 0 or not abs(by_arrival_s - s.newest_s) <= 1e3 * s.nominal_s:
+    """Time of the sample with this u16 counter; NaN until an offset is locked, or long after the last edge."""
+    if s.seen == 0 or not abs(by_arrival_s - s.newest_s) <= OUTDATED_PERIODS * s.nominal_s:
         return np.nan
     _vote(s, counter, by_arrival_s)
     if not s.locked:
         return np.nan
     edge = (counter - s.offset) & 0xFFFF
     for back in range(1, min(s.seen, KEPT) + 1):
-        at = (s.seen - back) % KEPT
-        if s.edge[at] == edge:
-            if abs(s.t_s[at] - by_arrival_s) < 100 * s.nominal_s:
-                return s.t_s[at]
+        slot = (s.seen - back) % KEPT
+        if s.edge[slot] == edge:
+            if abs(s.t_s[slot] - by_arrival_s) < MATCH_PERIODS * s.nominal_s:
+                return s.t_s[slot]
             break
     ahead = ((edge - s.newest + 0x8000) & 0xFFFF) - 0x8000
     return s.newest_s + ahead * s.period_s
@@ -97,13 +96,15 @@ def time_of(s: SyncEdges, counter: int, by_arrival_s: float) -> float:
 
 @kernel
 def _vote(s: SyncEdges, counter: int, by_arrival_s: float) -> None:
+    """Add the vote of one sample, and lock the offset that has the majority of the last votes."""
     ahead = round((by_arrival_s - s.newest_s) / s.period_s)
     vote = (counter - s.newest - ahead) & 0xFFFF
     s.vote[s.voted % VOTES] = vote
     s.voted += 1
     if (s.locked and vote == s.offset) or s.voted < VOTES:
         return
-    leader, support = s.vote[0], 0  # whoever has more than half of the votes leads in the end [Boyer, Moore 1981]
+    # Majority: a value with more than half of the votes is the leader at the end [Boyer, Moore 1981].
+    leader, support = s.vote[0], 0
     for v in s.vote:
         if support == 0:
             leader = v

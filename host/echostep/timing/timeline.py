@@ -135,7 +135,7 @@ def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: 
     restarts = board.restarts
     t_s = clocks.read(board, ticks, t_arrival_ns, kind == FIRST_MESSAGE)
     if board.restarts != restarts:
-        sync.forget(edges)
+        sync.reset(edges)
     if kind >= 0 and not np.isnan(t_s):
         sync.add(edges, kind, t_s)
     return t_s
@@ -151,7 +151,7 @@ def _mtx_time(
     if np.isnan(device_s):
         return np.nan
     if mtx.restarts != restarts:
-        sync.forget(edges)
+        sync.reset(edges)
     t_s = device_s
     if board.started:
         sampled_s = arrival.to_arrival_s(mtx, device_s) - latency_s

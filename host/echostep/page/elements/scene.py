@@ -16,7 +16,7 @@ from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
 from echostep.page.elements.stream_rates import StreamRates
-from echostep.tracker_state import Particles
+from echostep.tracker import Particles
 
 KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
 MOST_SHOWN = 10_000  # particles in a frame
