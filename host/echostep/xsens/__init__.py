@@ -1,11 +1,12 @@
 """Xsens MT protocol, sans-I/O: frames, both measurement messages, configuration, and the axes of the MT world.
 
-In: bytes from an MT's port. Out: batches of measurements that have passed every gate, and the bytes that
-configure the device. Opens nothing, waits for nothing.
-Sources, cited by their names below:
+In: bytes from an MT's port. Out: batches of measurements that have passed every gate, and the bytes that configure the device.
+Owns the unfinished frame and the counts. No module here opens a port or waits.
+
+Sources, cited by these names:
 LLCP: Xsens, "MT Low-Level Communication Protocol Documentation", MT0101P (legacy messages: revisions up to U).
 Manual: Xsens, "MTi and MTx User Manual and Technical Documentation", MT0100P.N.
-CMT: the constants of Xsens' public C++ SDK (cmtdef.h), where both are silent.
+CMT: the constants of Xsens' public C++ SDK (cmtdef.h), for what both documents omit.
 """
 
 from echostep.xsens.frames import MTDATA, MTDATA2, Frame, FrameReader, encode_frame

@@ -1,6 +1,6 @@
-"""Orientations as an MT gives them -> one quaternion, and the MT world -> the project's map frame. Nothing else turns MT axes.
+"""Orientations of an MT -> quaternions, and the MT's world frame -> the map frame. No other module converts MT axes.
 
-In: Euler angles, matrices or quaternions in one of the MT's worlds. Out: quaternions w x y z, sensor -> MT world or sensor -> map.
+In: Euler angles, matrices or quaternions in one of the MT's worlds. Out: quaternions w x y z, sensor -> MT world or sensor -> map. Owns nothing.
 MT world: x magnetic north, y west, z up [Manual 2.2, the default of the MTx]. Map: x east, y north, z up.
 """
 
@@ -13,12 +13,12 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 
 ENU, NED, NWU = 0x0, 0x4, 0x8  # coordinate bits of an MTData2 identifier [LLCP, MTData2]
-EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees, and some rounding
-ROTATION_ERROR = 0.02
+EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees of roll, pitch, yaw; by reason: the range and some rounding
+ROTATION_ERROR = 0.02  # largest error of an element of R R^T and of the right-handed frame; by reason
 IDENTITY = np.eye(3).ravel()
 _HALF = math.sqrt(0.5)
 TO_MAP = np.array([_HALF, 0.0, 0.0, _HALF])  # north, west, up -> east, north, up: a quarter turn about up
-FROM_WORLD = {  # some world -> north, west, up
+FROM_WORLD = {  # ENU, NED or NWU -> north, west, up
     ENU: np.array([_HALF, 0.0, 0.0, -_HALF]),
     NED: np.array([0.0, 1.0, 0.0, 0.0]),
     NWU: np.array([1.0, 0.0, 0.0, 0.0]),
@@ -36,7 +36,7 @@ def to_mt_world(q: Floats, world: int) -> Floats:
 
 
 def product(p: Floats, q: Floats) -> Floats:
-    """Hamilton product p q of one quaternion (4,) with many (n, 4): first q's rotation, then p's."""
+    """Hamilton products p q (n, 4) of one quaternion p (4,) with many q (n, 4): the rotation of q first, then that of p."""
     w, x, y, z = p
     a, b, c, d = q[:, 0], q[:, 1], q[:, 2], q[:, 3]
     return np.stack(
@@ -53,7 +53,7 @@ def product(p: Floats, q: Floats) -> Floats:
 def from_euler(degrees: Floats) -> Floats:
     """Quaternions of roll, pitch, yaw (n, 3) in degrees, R = Rz(yaw) Ry(pitch) Rx(roll) [Manual 2.3, aerospace sequence].
 
-    Angles that are none give 0, which no gate takes for a quaternion.
+    Impossible angles give 0, which fails the gate on |q| = 1.
     """
     possible = np.all(np.abs(degrees) <= EULER_LIMITS, axis=1)
     half = np.radians(np.where(possible[:, None], degrees, 0.0)) * 0.5
@@ -71,29 +71,29 @@ def from_euler(degrees: Floats) -> Floats:
 
 
 def from_matrix(columns: Floats) -> Floats:
-    """Quaternions of rotation matrices sent column by column (n, 9) [Manual, definition of a to i]; what is no rotation gives 0.
+    """Quaternions of rotation matrices sent column by column (n, 9) [Manual, definition of a to i]; a matrix that is no rotation gives 0.
 
-    The branch with the largest component, so that nothing small is divided by [Shepperd 1978].
+    The branch of the largest component is used, so that no divisor is small [Shepperd 1978].
     """
     rotation = _are_rotations(columns)
     columns = np.where(rotation[:, None], columns, IDENTITY)
     a, b, c, d, e, f, g, h, i = columns.T
     squares = np.stack([1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i], axis=1)
-    best = np.argmax(squares, axis=1)
+    largest = np.argmax(squares, axis=1)
     rows = np.empty((4, len(columns), 4))
     rows[0] = np.stack([squares[:, 0], f - h, g - c, b - d], axis=1)
     rows[1] = np.stack([f - h, squares[:, 1], b + d, c + g], axis=1)
     rows[2] = np.stack([g - c, b + d, squares[:, 2], f + h], axis=1)
     rows[3] = np.stack([b - d, c + g, f + h, squares[:, 3]], axis=1)
     index = np.arange(len(columns))
-    return rotation[:, None] * rows[best, index] / (2.0 * np.sqrt(squares[index, best]))[:, None]
+    return rotation[:, None] * rows[largest, index] / (2.0 * np.sqrt(squares[index, largest]))[:, None]
 
 
 def _are_rotations(columns: Floats) -> Bools:
     """Whether the columns (n, 9) are orthonormal and right-handed."""
     with np.errstate(all="ignore"):
         first, second, third = columns[:, 0:3], columns[:, 3:6], columns[:, 6:9]
-        off = np.abs(np.cross(first, second) - third).max(axis=1)
-        off = np.maximum(off, np.abs(np.einsum("ni,ni->n", first, second)))
-        off = np.maximum(off, np.abs(np.einsum("ni,ni->n", first, first) - 1.0))
-        return off <= ROTATION_ERROR
+        error = np.abs(np.cross(first, second) - third).max(axis=1)
+        error = np.maximum(error, np.abs(np.einsum("ni,ni->n", first, second)))
+        error = np.maximum(error, np.abs(np.einsum("ni,ni->n", first, first) - 1.0))
+        return error <= ROTATION_ERROR

@@ -1,8 +1,12 @@
 """Xsens frames: bytes -> message identifier and payload, in any split of the bytes.
 
-In: bytes as they came. Out: where each complete frame lies. Owns the unfinished frame (at most 2054 bytes) and the counts of what it rejected.
-FA, bus, message, length, payload, checksum; length FF announces two more bytes of length; all bytes after FA sum to 0 mod 256
-[Manual 5.3.1; LLCP, message structure and extended length].
+In: bytes of the port, in order. Out: position and length of each complete frame. Owns the unfinished frame (at most 2054 bytes) and the counts of
+rejected bytes.
+
+    FA | bus FF | message | length        | payload | checksum      length < FF
+    FA | bus FF | message | FF | length, 2 | payload | checksum      extended
+
+All bytes after FA sum to 0 mod 256 [Manual 5.3.1; LLCP, message structure and extended length].
 """
 
 from __future__ import annotations
@@ -15,18 +19,16 @@ import numpy as np
 from echostep.arrays import Ints, Octets
 from echostep.jit import kernel
 
-PREAMBLE = 0xFA
+PREAMBLE = 0xFA  # this and the next two [Manual 5.3.1]
 BUS_ID = 0xFF
 EXTENDED = 0xFF
-MTDATA = 0x32
-MTDATA2 = 0x36
-WAKE_UP = 0x3E
-ERROR = 0x42
-MAX_LENGTH = 2048  # longest payload that an MT sends
-SHORTEST = 5  # bytes in a frame without payload
+MTDATA, MTDATA2, WAKE_UP, ERROR = 0x32, 0x36, 0x3E, 0x42  # message identifiers [LLCP]
+MAX_LENGTH = 2048  # bytes, longest payload that an MT sends [LLCP, extended length]
+SHORTEST = 5  # bytes of a frame without payload
 
-
-SKIPPED, BAD_CHECKSUM = 0, 1  # what `_scan` counts
+SKIPPED, BAD_CHECKSUM, _TALLY = range(3)  # entries of a tally, and its length
+_MID, _BODY, _LENGTH, _CERTAIN, _COLUMNS = range(5)  # columns of a row of `_find_frames`, and their number
+_NO_HEADER, _UNFINISHED = -1, 0  # results of `_header`; else the header's size in bytes
 
 
 class Frame(NamedTuple):
@@ -37,8 +39,10 @@ class Frame(NamedTuple):
 
 
 class MtFrames(NamedTuple):
-    """Complete frames: `stream` holds them; `mid`, `body` and `length` of each payload (n,); `end` (n,): after which of
-    the bytes just fed it was clear that it is a frame: its last one, or that of a false frame which began before it.
+    """Complete frames: identifier `mid` (n,), and first byte `body` (n,) and `length` (n,) of the payload in `stream`.
+
+    `end` (n,): index, in the bytes just fed, behind the byte that completed the frame. That is the frame's last byte, or the last byte of a false
+    frame that began before it and had to be rejected first.
     """
 
     stream: Octets
@@ -50,7 +54,7 @@ class MtFrames(NamedTuple):
 
 @dataclass(slots=True)
 class MtFrameCounts:
-    """Octets that belong to no frame, and frames with a wrong checksum."""
+    """Bytes that belong to no frame, and frames with a wrong checksum."""
 
     skipped_bytes: int = 0
     bad_checksum: int = 0
@@ -67,39 +71,39 @@ def encode_frame(mid: int, payload: bytes = b"", bus_id: int = BUS_ID) -> bytes:
 
 @dataclass(slots=True)
 class FrameReader:
-    """Frames out of a byte stream; after damage it looks for the next preamble inside what it rejected."""
+    """Frames of a byte stream. After a rejected frame, the next preamble is searched inside it."""
 
     counts: MtFrameCounts = field(default_factory=MtFrameCounts)
     _rest: bytes = b""
 
     @property
     def pending(self) -> int:
-        """Octets of the unfinished frame."""
+        """Bytes of the unfinished frame."""
         return len(self._rest)
 
     def scan(self, received: bytes) -> MtFrames:
         """Frames completed by these bytes."""
         stream = np.frombuffer(self._rest + received, np.uint8)
-        found = np.empty((len(stream) // SHORTEST, 4), np.int64)
-        counted = np.zeros(2, np.int64)
-        count, resume = _scan(stream, found, counted)
-        self.counts.skipped_bytes += int(counted[SKIPPED])
-        self.counts.bad_checksum += int(counted[BAD_CHECKSUM])
+        rows = np.empty((len(stream) // SHORTEST, _COLUMNS), np.int64)
+        tally = np.zeros(_TALLY, np.int64)
+        count, resume = _find_frames(stream, rows, tally)
+        self.counts.skipped_bytes += int(tally[SKIPPED])
+        self.counts.bad_checksum += int(tally[BAD_CHECKSUM])
         before = len(self._rest)
         self._rest = stream[resume:].tobytes()
-        mid, body, length, end = found[:count].T
-        return MtFrames(stream, mid, body, length, end - before)
+        mid, body, length, certain = rows[:count].T
+        return MtFrames(stream, mid, body, length, certain - before)
 
     def feed(self, received: bytes) -> list[Frame]:
         """Frames completed by these bytes, one by one."""
-        found = self.scan(received)
-        rows = zip(found.mid.tolist(), found.body.tolist(), found.length.tolist(), strict=True)
-        return [Frame(mid, found.stream[body : body + length].tobytes()) for mid, body, length in rows]
+        frames = self.scan(received)
+        rows = zip(frames.mid.tolist(), frames.body.tolist(), frames.length.tolist(), strict=True)
+        return [Frame(mid, frames.stream[body : body + length].tobytes()) for mid, body, length in rows]
 
 
 @kernel
-def payloads_at(stream: Octets, begin: Ints, length: int) -> Octets:
-    """Rows of `length` bytes (n, length) that begin at `begin` (n,)."""
+def copy_payloads(stream: Octets, begin: Ints, length: int) -> Octets:
+    """Copy of the `length` bytes that follow each index of `begin` (n,), as rows (n, length)."""
     rows = np.empty((len(begin), length), np.uint8)
     for k in range(len(begin)):
         rows[k] = stream[begin[k] : begin[k] + length]
@@ -107,49 +111,66 @@ def payloads_at(stream: Octets, begin: Ints, length: int) -> Octets:
 
 
 @kernel
-def _scan(stream: Octets, found: Ints, counted: Ints) -> tuple[int, int]:
-    """Fill rows (message, body, length, known) of `found`; returns their number, and where the unfinished frame begins.
+def _find_frames(stream: Octets, rows: Ints, tally: Ints) -> tuple[int, int]:
+    """Fill `rows` (n, 4) with the columns `_MID` to `_CERTAIN`; returns the number of frames, and where the unfinished frame begins.
 
-    `known` is the byte after which it is clear that the frame is one: its end, or the end of a false frame that began before it.
-    Running sums make every checksum two look-ups: noise full of preambles costs no more than frames.
+    After a rejected frame the search goes on one byte later. Running sums make each checksum two look-ups, so noise full of preambles costs no
+    more than frames.
     """
-    size = len(stream)
-    sums = np.empty(size + 1, np.uint8)
+    size, sums = len(stream), _running_sums(stream)
+    count, begin, certain = 0, 0, 0
+    while begin < size:
+        head, length = _header(stream, begin)
+        if head == _NO_HEADER:
+            certain = max(certain, begin + length)
+            tally[SKIPPED] += 1
+            begin += 1
+            continue
+        end = begin + head + length + 1
+        if head == _UNFINISHED or end > size:
+            break
+        certain = max(certain, end)
+        if sums[end] != sums[begin + 1]:
+            tally[BAD_CHECKSUM] += 1
+            tally[SKIPPED] += 1
+            begin += 1
+            continue
+        rows[count, _MID], rows[count, _BODY] = stream[begin + 2], begin + head
+        rows[count, _LENGTH], rows[count, _CERTAIN] = length, certain
+        count += 1
+        begin = end
+    return count, begin
+
+
+@kernel
+def _running_sums(stream: Octets) -> Octets:
+    """Sums mod 256 (n + 1,) of the first k bytes."""
+    sums = np.empty(len(stream) + 1, np.uint8)
     running = 0
-    for k in range(size):
+    for k in range(len(stream)):
         sums[k] = running
         running = (running + stream[k]) & 0xFF
-    sums[size] = running
-    count, at, known = 0, 0, 0
-    while at < size:
-        have = size - at
-        if stream[at] != PREAMBLE or (have > 1 and stream[at + 1] != BUS_ID):
-            known = max(known, at + 1 + (stream[at] == PREAMBLE))
-            counted[SKIPPED] += 1
-            at += 1
-            continue
-        if have < 4:
-            break
-        length, head = int(stream[at + 3]), 4
-        if length == EXTENDED:
-            if have < 6:
-                break
-            length, head = (int(stream[at + 4]) << 8) | int(stream[at + 5]), 6
-            if length < EXTENDED or length > MAX_LENGTH:
-                known = max(known, at + 6)
-                counted[SKIPPED] += 1
-                at += 1
-                continue
-        end = at + head + length + 1
-        if end > size:
-            break
-        known = max(known, end)
-        if sums[end] != sums[at + 1]:
-            counted[BAD_CHECKSUM] += 1
-            counted[SKIPPED] += 1
-            at += 1
-            continue
-        found[count, 0], found[count, 1], found[count, 2], found[count, 3] = stream[at + 2], at + head, length, known
-        count += 1
-        at = end
-    return count, at
+    sums[len(stream)] = running
+    return sums
+
+
+@kernel
+def _header(stream: Octets, begin: int) -> tuple[int, int]:
+    """Size of the header at `begin` and length of the payload; `_UNFINISHED` when bytes are missing.
+
+    `_NO_HEADER` with the number of bytes that show it: no preamble, another bus, or an impossible extended length.
+    """
+    have = len(stream) - begin
+    if stream[begin] != PREAMBLE:
+        return _NO_HEADER, 1
+    if have > 1 and stream[begin + 1] != BUS_ID:
+        return _NO_HEADER, 2
+    if have < 4:
+        return _UNFINISHED, 0
+    length = int(np.int64(stream[begin + 3]))
+    if length != EXTENDED:
+        return 4, length
+    if have < 6:
+        return _UNFINISHED, 0
+    length = int(np.int64(stream[begin + 4]) << 8 | np.int64(stream[begin + 5]))
+    return (_NO_HEADER, 6) if length < EXTENDED or length > MAX_LENGTH else (6, length)

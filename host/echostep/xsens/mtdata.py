@@ -1,7 +1,7 @@
 """MTData (0x32), the measurement message of the MTi and the MTx, in every output mode and setting of an MTx.
 
-In: payloads and the output format that the device was set to; the message does not say it. Out: values in SI units. Owns nothing.
-Order: temperature, calibrated (accel, gyro, mag), orientation, auxiliary, status, sample counter [Manual 5.3.3, MTData].
+In: payloads, and the output format that was set on the device, as the message does not contain it. Out: values in SI units. Owns nothing.
+Order of a payload: temperature, calibrated (accel, gyro, mag), orientation, auxiliary, status, sample counter [Manual 5.3.3, MTData].
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ _UNIT_12_20 = 2.0**-20
 _ORIENTATION_VALUES = {QUATERNION: 4, EULER: 3, MATRIX: 9}
 RAW_BYTES = 20  # accel, gyro, mag and temperature as u16, not calibrated
 
-# Columns of decoded values, common to both measurement messages; a quantity that was not sent is NaN.
+# Columns of decoded values, the same for both measurement messages; NaN for a quantity that was not sent.
 ACCEL, GYRO, MAG, ATTITUDE, CELSIUS, COLUMNS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13), 13, 14
 
 
 class Decoded(NamedTuple):
-    """`values` (n, 14): accel m/s2, gyro rad/s, mag, quaternion (sensor -> MT world), temperature degC; `counter` (n,), -1 without one;
-    `sent` (n, 4): whether the message has accel, gyro, mag, orientation.
+    """`values` (n, 14): accel m/s2, gyro rad/s, mag, quaternion (sensor -> MT world), temperature degC.
+
+    `counter` (n,): -1 where not sent. `sent` (n, 4): whether the message has accel, gyro, mag, orientation.
     """
 
     values: Floats
@@ -48,13 +49,13 @@ class Decoded(NamedTuple):
 
 @dataclass(frozen=True)
 class OutputFormat:
-    """Output mode and settings as set by SetOutputMode and SetOutputSettings; raises ValueError for what no MTx has."""
+    """Output mode and settings as set by SetOutputMode and SetOutputSettings; raises ValueError for a format that no MTx has."""
 
     mode: int
     settings: int
 
     def __post_init__(self) -> None:
-        """Refuse reserved bits, and raw data together with anything else."""
+        """Raise ValueError for reserved bits, and for raw data together with any other."""
         if self.mode & ~_MODES:
             raise ValueError(f"output mode 0x{self.mode:04X} is not a mode of an MTx")
         if self.settings & ~_SETTINGS or self.settings & 0x0003 > SAMPLE_COUNTER:
@@ -79,17 +80,17 @@ class OutputFormat:
 
     @cached_property
     def orientation_values(self) -> int:
-        """How many values the orientation has: 0, 3, 4 or 9."""
+        """Number of values of the orientation: 0, 3, 4 or 9."""
         return _ORIENTATION_VALUES[self.settings & ORIENTATION_MASK] if self.mode & ORIENTATION else 0
 
     @cached_property
     def numbers(self) -> int:
-        """How many 4-byte values come first."""
+        """Number of 4-byte values at the begin of a payload."""
         return (self.mode & TEMPERATURE > 0) + 3 * len(self.calibrated) + self.orientation_values
 
     @cached_property
     def length(self) -> int:
-        """Octets of a payload."""
+        """Bytes of a payload."""
         counter = 2 * (self.settings & SAMPLE_COUNTER)
         if self.mode & RAW:
             return RAW_BYTES + counter
@@ -98,10 +99,11 @@ class OutputFormat:
 
 
 PROJECT = OutputFormat(CALIBRATED | ORIENTATION, SAMPLE_COUNTER | QUATERNION | FLOAT)  # 54 bytes
+_PROJECT = struct.Struct(">13fH")
 
 
 def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
-    """Values of payloads (n, `output.length`); raw data are not calibrated and give NaN."""
+    """Values of payloads (n, `output.length`); NaN for raw data, which are not calibrated."""
     count = len(rows)
     values = np.full((count, COLUMNS), np.nan)
     counter = np.full(count, -1, np.int64)
@@ -112,31 +114,29 @@ def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
         return Decoded(values, counter, sent)
     fixed = bool(output.settings & FIXED_12_20)
     bytewise = np.ascontiguousarray(rows[:, : 4 * output.numbers]).view(">i4" if fixed else ">f4")
-    with np.errstate(invalid="ignore"):  # a damaged float may be a signalling NaN
+    with np.errstate(invalid="ignore"):  # a damaged float can be a signalling NaN
         numbers: Floats = bytewise.astype(np.float64)
     if fixed:
         numbers *= _UNIT_12_20
-    at = 0
+    first = 0  # column of the next quantity
     if output.mode & TEMPERATURE:
         values[:, CELSIUS] = numbers[:, 0]
-        at = 1
+        first = 1
     for columns in output.calibrated:
-        values[:, columns] = numbers[:, at : at + 3]
-        at += 3
+        values[:, columns] = numbers[:, first : first + 3]
+        first += 3
     if output.orientation_values:
-        values[:, ATTITUDE] = _quaternions(numbers[:, at:])
+        values[:, ATTITUDE] = _quaternions(numbers[:, first:])
     return Decoded(values, counter, sent)
 
 
 def _quaternions(orientation: Floats) -> Floats:
+    """Quaternions (n, 4) of orientations (n, 4), (n, 3) or (n, 9)."""
     if orientation.shape[1] == 4:
         return orientation
     return from_euler(orientation) if orientation.shape[1] == 3 else from_matrix(orientation)
 
 
 def pack_mtdata(sample: MtSample) -> bytes:
-    """MTData payload in the project's format: calibrated values, quaternion and sample counter as floats (54 bytes)."""
+    """MTData payload in the format `PROJECT`: calibrated values, quaternion and sample counter as floats (54 bytes)."""
     return _PROJECT.pack(*sample.accel, *sample.gyro, *sample.mag, *sample.quaternion, sample.counter & 0xFFFF)
-
-
-_PROJECT = struct.Struct(">13fH")

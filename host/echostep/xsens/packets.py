@@ -1,6 +1,6 @@
-"""Every packet of an MTData2 message, by name, for captures and for people.
+"""All packets of an MTData2 message, by name, to inspect captures.
 
-In: the payload of an MTData2 message. Out: packets with their names and values. Owns nothing; raises ValueError for a payload that does not add up.
+In: the payload of an MTData2 message. Out: packets with their names and values. Owns nothing; raises ValueError for a payload whose lengths disagree.
 [LLCP, MTData2: data identifiers and their fields].
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.xsens.mtdata2 import FORMAT_MASK, TYPE_MASK, WIDTHS, WORLD_MASK, read_numbers
 
-NUMBERS = {  # in one of the four number formats: name, fields
+NUMBERS = {  # packets in one of the four number formats: name, fields
     0x0810: ("Temperature", ("",)),
     0x2010: ("Quaternion", ("Q0", "Q1", "Q2", "Q3")),
     0x2020: ("RotationMatrix", tuple("ABCDEFGHI")),
@@ -35,7 +35,7 @@ _PVT = (
     "ITOW Year Month Day Hour Min Sec Valid TAcc Nano FixType Flags NumSV Reserved1 Lon Lat Height HMSL HAcc VAcc "
     "VelN VelE VelD GSpeed HeadMot SAcc HeadAcc HeadVeh GDOP PDOP TDOP VDOP HDOP NDOP EDOP"
 )
-INTEGERS = {  # always integers: name, layout, fields
+INTEGERS = {  # packets of integers: name, layout, fields
     0x1010: ("UTCTime", ">IHBBBBBB", ("Ns", "Year", "Month", "Day", "Hour", "Minute", "Second", "Flags")),
     0x1020: ("PacketCounter", ">H", ("",)),
     0x1030: ("ITOW", ">I", ("",)),
@@ -47,10 +47,15 @@ INTEGERS = {  # always integers: name, layout, fields
     0xE020: ("StatusWord", ">I", ("",)),
 }
 SATELLITES = 0x7020
+HEAD = 3  # bytes before a packet's content: identifier (2), length (1)
+SATELLITE_HEAD, SATELLITE = 8, 4  # bytes of GNSSSatInfo before the satellites, and of each satellite
 
 
 class Packet(NamedTuple):
-    """One packet: identifier, name ("" if unknown), number format and world (bits of the identifier), values by field ("" for the only one)."""
+    """One packet; `form` (number format) and `world` are bits of the identifier.
+
+    `name`: "" if unknown. `fields`: values by the field's name, "" if there is only one.
+    """
 
     identifier: int
     name: str
@@ -60,27 +65,29 @@ class Packet(NamedTuple):
 
 
 def read_packets(payload: bytes) -> list[Packet]:
-    """All packets of a payload; raises ValueError when their lengths do not fit."""
-    packets, at = [], 0
-    while at < len(payload):
-        if at + 3 > len(payload) or at + 3 + payload[at + 2] > len(payload):
-            raise ValueError(f"MTData2: a packet at byte {at} ends outside its message")
-        identifier, size = struct.unpack_from(">HB", payload, at)
-        packets.append(_read(identifier, payload[at + 3 : at + 3 + size]))
-        at += 3 + size
+    """All packets of a payload; raises ValueError when their lengths do not fill it."""
+    packets, begin = [], 0
+    while begin < len(payload):
+        content = begin + HEAD
+        if content > len(payload) or content + payload[content - 1] > len(payload):
+            raise ValueError(f"MTData2: a packet at byte {begin} ends outside its message")
+        identifier, size = struct.unpack_from(">HB", payload, begin)
+        packets.append(_decode(identifier, payload[content : content + size]))
+        begin = content + size
     return packets
 
 
-def _read(identifier: int, content: bytes) -> Packet:
+def _decode(identifier: int, content: bytes) -> Packet:
+    """The packet with this identifier; raises ValueError for content of a wrong size."""
     kind, form, world = identifier & TYPE_MASK, identifier & FORMAT_MASK, identifier & WORLD_MASK
     if kind in NUMBERS:
         name, fields = NUMBERS[kind]
-        _expect(name, content, len(fields) * WIDTHS[form])
+        _check_size(name, content, len(fields) * WIDTHS[form])
         numbers = read_numbers(np.frombuffer(content, np.uint8)[None, :], form)[0]
         return Packet(identifier, name, form, world, dict(zip(fields, numbers.tolist(), strict=True)))
     if kind in INTEGERS:
         name, layout, fields = INTEGERS[kind]
-        _expect(name, content, struct.calcsize(layout))
+        _check_size(name, content, struct.calcsize(layout))
         return Packet(identifier, name, form, world, dict(zip(fields, struct.unpack(layout, content), strict=True)))
     if kind == SATELLITES:
         return Packet(identifier, "GNSSSatInfo", form, world, _satellites(content))
@@ -88,18 +95,20 @@ def _read(identifier: int, content: bytes) -> Packet:
 
 
 def _satellites(content: bytes) -> dict[str, float]:
-    """Time of week and number of satellites; of each: system, number, carrier to noise (dBHz), flags."""
-    if len(content) < 8 or len(content) != 8 + 4 * content[4]:
+    """Fields of GNSSSatInfo: time of week, number of satellites; of each: system, number, carrier to noise (dBHz), flags."""
+    if len(content) < SATELLITE_HEAD or len(content) != SATELLITE_HEAD + SATELLITE * content[4]:
         raise ValueError(f"MTData2: GNSSSatInfo of {len(content)} bytes does not fit its number of satellites")
-    found: dict[str, float] = dict(
+    fields: dict[str, float] = dict(
         zip(("ITOW", "NumSVS", "Res1", "Res2", "Res3"), struct.unpack_from(">IBBBB", content), strict=True)
     )
     for k in range(content[4]):
-        for field, value in zip(("GnssId", "SvId", "Cno", "Flags"), content[8 + 4 * k : 12 + 4 * k], strict=True):
-            found[f"{field}{k}"] = value
-    return found
+        begin = SATELLITE_HEAD + SATELLITE * k
+        for name, value in zip(("GnssId", "SvId", "Cno", "Flags"), content[begin : begin + SATELLITE], strict=True):
+            fields[f"{name}{k}"] = value
+    return fields
 
 
-def _expect(name: str, content: bytes, size: int) -> None:
+def _check_size(name: str, content: bytes, size: int) -> None:
+    """Raise ValueError unless the content has this size in bytes."""
     if len(content) != size:
         raise ValueError(f"MTData2: {name} has {len(content)} bytes, not {size}")

@@ -1,4 +1,4 @@
-"""One measurement of an MT.
+"""One measurement of an MT as plain Python numbers.
 
 In: nothing. Out: `MtSample`. Owns nothing.
 """
@@ -12,7 +12,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class MtSample(NamedTuple):
-    """One measurement: accel m/s2, gyro rad/s, mag in units of the earth's field, quaternion w x y z (sensor -> MT world), u16 counter."""
+    """Counter (u16), accel m/s2, gyro rad/s, mag in units of the earth's field (sensor frame); quaternion w x y z (sensor -> MT world)."""
 
     counter: int
     accel: Vector

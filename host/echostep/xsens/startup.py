@@ -15,7 +15,7 @@ from echostep.xsens.setup import MtxSetup, State
 
 
 class MtxStart:
-    """Passes the MTx's bytes to its setup and sends the requests; raises EchostepError when the MTx sends an unusable format and cannot be set up."""
+    """Passes the MTx's bytes to `MtxSetup` and sends its requests; raises EchostepError for an unusable format that cannot be changed."""
 
     def __init__(self, rate_hz: float, send: Callable[[bytes], None], say: Callable[[str], None]) -> None:
         """`send` writes to the MTx's port, `say` prints a message."""
@@ -25,7 +25,7 @@ class MtxStart:
             raise EchostepError(str(error)) from error
         self._setup = MtxSetup(requests, rate_hz)
         self._send, self._say = send, say
-        self._usable = False  # whether the MTx has ever sent what is wanted
+        self._usable = False  # whether the MTx was once in the wanted format
 
     def advance(self, chunk: Chunk | None) -> None:
         """Process the next chunk of any port; None when nothing came, so that timeouts are checked."""
