@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.board.frames import encode
-from echostep.board.gateway import MOST_BEACONS, SETTLED, Gateway
+from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity
 from echostep.errors import EchostepError
 from echostep.localization.beacon_initialisation import locate_beacon
@@ -65,7 +65,7 @@ def test_second_unit_under_a_number_is_refused_and_named() -> None:
     assert len(said(gateway, GOOD)) == 1
     assert said(gateway, GOOD._replace(unit=1), now_s=10.2) == []
     assert gateway.duplicates == {7}
-    assert "two beacons call themselves 7" in gateway.describe()
+    assert "two beacons have the number 7" in gateway.describe()
 
 
 def test_a_beacon_that_speaks_too_often_is_a_flood_and_others_are_still_heard() -> None:
@@ -86,9 +86,9 @@ def test_clock_that_jumps_is_doubted_until_it_is_steady() -> None:
     gateway = Gateway()
     assert len(said(gateway, GOOD)) == 1
     accepted = [len(said(gateway, message(7, 3.0, 0.0, 500.0 + 0.2 * k), now_s=10.2 + 0.2 * k)) for k in range(15)]
-    assert accepted == [0] * (SETTLED - 1) + [1] * (15 - SETTLED + 1)
+    assert accepted == [0] * (NEW_CLOCK_MESSAGES - 1) + [1] * (15 - NEW_CLOCK_MESSAGES + 1)
     assert gateway.counts.clock_jumps == 1
-    assert gateway.counts.late == SETTLED - 1
+    assert gateway.counts.late == NEW_CLOCK_MESSAGES - 1
 
 
 def test_frames_of_a_board_at_the_gateways_port_are_foreign() -> None:

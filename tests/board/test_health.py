@@ -55,10 +55,10 @@ def test_one_cause_for_many_is_said_once() -> None:
     nobody = {"errors_ranger_left": 1, "errors_ranger_right": 1, "errors_compass": 1}
     nobody |= {"fault_ranger_left": 1, "fault_ranger_right": 1, "fault_compass": 1}
     (text,) = texts(words(status(healthy=0x78, **nobody)))
-    assert text.startswith("I2C bus: nobody answers")
+    assert text.startswith("I2C bus: no device answers")
     (text,) = texts(words(status(healthy=0x7F & ~0x38, errors_thigh=1, errors_calf=1, errors_belt=1,
                                  fault_thigh=1, fault_calf=1, fault_belt=1)))  # fmt: skip
-    assert text.startswith("SPI bus: nobody answers")
+    assert text.startswith("SPI bus: no device answers")
 
 
 def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
@@ -68,7 +68,7 @@ def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
     heard.add(status(**old | {"ticks": 4_000_000, "errors_compass": 12, "dropped_ping": 4}))
     assert [text.split(";")[0] for text in texts(heard)] == [
         "compass: failed 3 times in the last 1 s (no answer), and answers again",
-        "board: left out 10 messages in the last 1 s",
+        "board: dropped 10 messages in the last 1 s",
     ]
     heard.add(status(ticks=5))  # it has restarted
     assert texts(heard) == []
@@ -78,10 +78,10 @@ def test_old_failures_are_forgotten_and_new_ones_are_not() -> None:
     ("said", "part", "severity"),
     [
         (m.GyroHealth(0, 1, 0, m.SelfTest.FAILED, -20, 20), "calf gyro: failed its self-test (responses -20 and 20", 2),
-        (m.GyroHealth(0, 1, 0, m.SelfTest.MOVED, -221, 0), "calf gyro: was turning", 0),
+        (m.GyroHealth(0, 1, 0, m.SelfTest.MOVED, -221, 0), "calf gyro: turned", 0),
         (m.GyroHealth(0, 1, 0, m.SelfTest.NOT_RUN, -32768, -32768), "calf gyro: was not tested", 0),
         (m.GyroHealth(0, 1, -32768, m.SelfTest.PASSED, -221, 221), "calf gyro: answers, but not with its temp", 2),
-        (m.GyroHealth(0, 1, 600, m.SelfTest.PASSED, -221, 221), "calf gyro: says it has 112 degrees", 1),
+        (m.GyroHealth(0, 1, 600, m.SelfTest.PASSED, -221, 221), "calf gyro: reports 112 degrees", 1),
     ],
 )
 def test_what_a_gyro_says_of_itself(said: m.GyroHealth, part: str, severity: int) -> None:

@@ -1,5 +1,5 @@
-"""The wire of the sensor board and of a beacon gateway.
+"""Protocol of the sensor board and of a beacon gateway.
 
-In: bytes. Out: messages (named tuples and numpy rows), counts converted to SI, and what is wrong with the board in words. Owns unfinished frames.
+In: bytes. Out: messages (named tuples and numpy rows), samples in SI units, and findings on the board's health as text. Owns unfinished frames.
 `messages` is generated from protocol/messages.toml.
 """

@@ -1,6 +1,6 @@
-"""Counts -> SI, in the body frame.
+"""Raw counts of the board's sensors -> SI units.
 
-In: messages and MTx samples with their time. Out: samples in SI units. Owns nothing but the mounting.
+In: rows of messages, by the dtypes of the schema. Out: ranges, rates, headings and heights. Owns nothing.
 """
 
 from __future__ import annotations
@@ -16,11 +16,17 @@ from echostep.arrays import Floats
 from echostep.board.messages import GYROS_INVALID, PING_TIME_OF_FLIGHT_US_INVALID, Outcome
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
-ADIS16100_RAD_S = math.radians(0.2439)  # per count [ADIS16100 datasheet, sensitivity]
+ADIS16100_RAD_S = math.radians(0.2439)  # rad/s per count [ADIS16100 datasheet, sensitivity]
+BEARINGS = 3600  # counts of 0.1 degrees in a turn of the compass
+PRESSURE_PA = 0.25  # Pa per count of the barometer
+STANDARD_PA = 101_325.0  # pressure at height 0 [ISO 2533]
+HEIGHT_SCALE_M, HEIGHT_EXPONENT = 44_330.77, 0.190263  # of the height by pressure in the troposphere [ISO 2533]
+GYROS = ("thigh", "calf", "belt")  # fields of a gyro sample, columns of `gyro_rates`
+BELT = GYROS.index("belt")
 
 
 class Echo(NamedTuple):
-    """One ping in SI units: `ranger` 0 looks left, 1 right; `range_m` is None when nothing was heard."""
+    """One ping in SI units: `ranger` 0 looks left, 1 right; `range_m` is None without an echo."""
 
     t_s: float
     ranger: int
@@ -29,18 +35,15 @@ class Echo(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
-    """What is known of the rangers: `speed_of_sound_m_s`, and `delay_s` between trigger stamp and burst."""
+    """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst."""
 
     speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
     delay_s: float = 0.0
 
 
-GYROS = ("thigh", "calf", "belt")
-
-
 @dataclass(frozen=True, slots=True)
 class GyroSettings:
-    """Biases of the board's gyros, and whether the belt's is worn upside down; found by `echostep calibrate`."""
+    """Biases of the board's gyros, and whether the belt gyro is mounted upside down; measured by `echostep calibrate`."""
 
     thigh_bias_rad_s: float = 0.0
     calf_bias_rad_s: float = 0.0
@@ -49,7 +52,7 @@ class GyroSettings:
 
 
 def ranges(pings: NDArray[np.void], settings: RangerSettings) -> Floats:
-    """Ranges (n,) of pings (n,) by the schema's dtype: half the way of the sound; NaN when nothing was heard."""
+    """Ranges (n,) in m of pings (n,): half the path of the sound; NaN without an echo."""
     range_m = 0.5e-6 * pings["time_of_flight_us"] * settings.speed_of_sound_m_s
     unmeasured = pings["time_of_flight_us"] == PING_TIME_OF_FLIGHT_US_INVALID
     range_m[(pings["outcome"] != Outcome.ECHO) | unmeasured] = np.nan
@@ -57,31 +60,28 @@ def ranges(pings: NDArray[np.void], settings: RangerSettings) -> Floats:
 
 
 def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> Floats:
-    """Rates (n, 3) of thigh, calf and belt in rad/s of gyro samples (n,) by the schema's dtype; NaN where a gyro is absent or tests itself."""
+    """Rates (n, 3) in rad/s of thigh, calf and belt, of gyro samples (n,); NaN where a gyro is absent or in its self-test."""
     counts = np.column_stack([samples[name] for name in GYROS]).astype(np.float64)
     counts[counts == GYROS_INVALID] = np.nan
-    found: Floats = counts * ADIS16100_RAD_S - [
+    rates: Floats = counts * ADIS16100_RAD_S - [
         settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s
     ]  # fmt: skip
-    found[:, 2] *= -1.0 if settings.belt_reversed else 1.0
-    return found
+    rates[:, BELT] *= -1.0 if settings.belt_reversed else 1.0
+    return rates
 
 
 def compass_headings(samples: NDArray[np.void]) -> Floats:
-    """Headings (n,) in radians, counter-clockwise from east, of compass samples (n,) by the schema's dtype; NaN when nothing was read."""
-    bearing = np.where(samples["bearing"] < 3600, samples["bearing"], np.nan)
-    found: Floats = 0.5 * math.pi - np.radians(0.1 * bearing)
-    return found
-
-
-STANDARD_PA = 101_325.0
+    """Headings (n,) in radians, counter-clockwise from east, of compass samples (n,); NaN for an invalid bearing."""
+    bearing = np.where(samples["bearing"] < BEARINGS, samples["bearing"], np.nan)
+    headings: Floats = 0.5 * math.pi - np.radians(0.1 * bearing)
+    return headings
 
 
 def heights(samples: NDArray[np.void]) -> Floats:
-    """Heights (n,) in the standard atmosphere [ISO 2533] of barometer samples (n,) by the schema's dtype; NaN when nothing was measured.
+    """Heights (n,) in m in the standard atmosphere [ISO 2533] of barometer samples (n,); NaN for an invalid pressure.
 
-    Differences count, over a building; the weather moves all of them.
+    Only differences over a short time are meaningful, as the weather shifts all heights.
     """
-    pressure_pa = np.where(samples["pressure"] == 0, np.nan, 0.25 * samples["pressure"])
-    found: Floats = 44_330.77 * (1.0 - (pressure_pa / STANDARD_PA) ** 0.190263)
-    return found
+    pressure_pa = np.where(samples["pressure"] == 0, np.nan, PRESSURE_PA * samples["pressure"])
+    heights_m: Floats = HEIGHT_SCALE_M * (1.0 - (pressure_pa / STANDARD_PA) ** HEIGHT_EXPONENT)
+    return heights_m

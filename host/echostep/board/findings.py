@@ -1,6 +1,6 @@
-"""The words of a finding, and what the board has said about itself.
+"""Findings on the board's health, and the board's reports about itself from which they are made.
 
-In: the board's messages. Out: `BoardReports`, `Finding`s that others fill. Owns the newest words and the status before.
+In: the board's messages. Out: `BoardReports`; the types and names of findings. Owns the newest reports and the previous status.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from enum import IntEnum
 
 from echostep.board.messages import Configuration, GyroHealth, Healthy, Identity, Message, Sensors, Status
 
+TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
+
 
 class Severity(IntEnum):
-    """How bad: a note needs nothing done, a warning costs accuracy, a fault costs a sensor."""
+    """Severity: a note needs no action, a warning costs accuracy, a fault costs a sensor."""
 
     NOTE = 0
     WARNING = 1
@@ -21,7 +23,7 @@ class Severity(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is not as it should be: of what, what it is, what to do."""
+    """One problem: the part that has it, what is wrong, and the remedy."""
 
     severity: Severity
     subject: str
@@ -41,24 +43,33 @@ NAMES = {
     Healthy.BELT: "belt gyro",
     Healthy.PRESSURE: "barometer",
 }
+DEVICES = 0x7F  # mask of all devices in `Healthy` and `Sensors`
 ON_I2C = Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT | Healthy.COMPASS
 GYROS = Healthy.THIGH | Healthy.CALF | Healthy.BELT
-ADDRESSES = {Healthy.RANGER_LEFT: 0x70, Healthy.RANGER_RIGHT: 0x71, Healthy.COMPASS: 0x60}
-SELECTS = {Healthy.THIGH: "D8", Healthy.CALF: "D9", Healthy.BELT: "D10"}
+ADDRESSES = {  # on I2C, 7 bits
+    Healthy.RANGER_LEFT: 0x70,
+    Healthy.RANGER_RIGHT: 0x71,
+    Healthy.COMPASS: 0x60,
+}
+SELECTS = {
+    Healthy.THIGH: "D8",
+    Healthy.CALF: "D9",
+    Healthy.BELT: "D10",
+}  # pins of the chip selects [firmware/README.md]
 
 
 @dataclass(slots=True)
 class BoardReports:
-    """The board's newest words about itself, and the status before: what has grown since is news."""
+    """The board's newest reports about itself, and the previous status: a counter that has increased since then is a new problem."""
 
     identity: Identity | None = None
     configuration: Configuration | None = None
     status: Status | None = None
-    earlier: Status | None = None
+    previous_status: Status | None = None
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
 
     def add(self, message: Message) -> None:
-        """Keep a message when it says something about the board; a restart forgets the status before."""
+        """Keep a message if it is a report; after a restart of the board there is no previous status."""
         if isinstance(message, Identity):
             self.identity = message
         elif isinstance(message, Configuration):
@@ -67,34 +78,34 @@ class BoardReports:
             self.gyros[message.gyro] = message
         elif isinstance(message, Status):
             restarted = self.status is not None and message.ticks < self.status.ticks  # or the ticks have wrapped
-            self.earlier, self.status = None if restarted else self.status, message
+            self.previous_status, self.status = None if restarted else self.status, message
 
     @property
     def sensors(self) -> Sensors:
-        """Which sensors are switched on; all of them, as long as nobody said otherwise."""
+        """The sensors that are switched on; all of them before the first `Configuration`."""
         return Sensors(0xFF if self.configuration is None else self.configuration.sensors)
 
 
-def suffix(device: Healthy) -> str:
+def field_suffix(device: Healthy) -> str:
     """A device's name in the fields of `Status`."""
     return (device.name or "").lower()
 
 
-def of(status: Status, what: str, device: Healthy) -> int:
-    """`errors_...` or `fault_...` of a device."""
-    return int(getattr(status, f"{what}_{suffix(device)}"))
+def status_field(status: Status, prefix: str, device: Healthy) -> int:
+    """The field `errors_...` or `fault_...` of a device."""
+    return int(getattr(status, f"{prefix}_{field_suffix(device)}"))
 
 
 def has_failed(status: Status, device: Healthy) -> bool:
-    """Whether a device ever failed; one that was not asked yet did not."""
-    return bool(of(status, "errors", device) or of(status, "fault", device))
+    """Whether an access to the device ever failed; false before the first access."""
+    return bool(status_field(status, "errors", device) or status_field(status, "fault", device))
 
 
-def grown(status: Status, earlier: Status, name: str) -> int:
-    """What a counter has grown by; it wraps."""
-    return int((getattr(status, name) - getattr(earlier, name)) & 0xFFFF)
+def increase(status: Status, previous: Status, name: str) -> int:
+    """Increase of a u16 counter, which may wrap."""
+    return int((getattr(status, name) - getattr(previous, name)) & 0xFFFF)
 
 
-def span_s(status: Status, earlier: Status) -> float:
-    """Time between two statuses."""
-    return ((status.ticks - earlier.ticks) & 0xFFFFFFFF) * 0.5e-6
+def span_s(status: Status, previous: Status) -> float:
+    """Time between two statuses, in seconds."""
+    return ((status.ticks - previous.ticks) & 0xFFFFFFFF) * TICK_S

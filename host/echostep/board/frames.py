@@ -1,7 +1,9 @@
 """Board frames, sans-I/O: bytes in any split -> messages, and messages -> bytes.
 
-In: bytes from the board's USB port. Out: frames as columns (`Frames`), and the same as messages (`echostep.messages`). Owns the unfinished frame
-and the counters. The frame is described in protocol/README.md.
+In: bytes from the board's USB port. Out: frames as columns (`Frames`), and as messages (`echostep.messages`). Owns the unfinished frame and the
+counters.
+
+    payload = id (1) | sequence (2) | body | checksum (2)      frame = COBS of the payload | 00      [protocol/README.md]
 """
 
 from __future__ import annotations
@@ -20,50 +22,52 @@ from echostep.board.messages import BY_ID, GREATEST, ROWS, SCHEMA_HASH, SCHEMA_S
 from echostep.errors import EchostepError
 from echostep.jit import kernel, lean_kernel
 
-MAX_ENCODED = 65  # payloads are at most 64 bytes; COBS adds one
-SHORTEST = 7  # an empty body: id, sequence, checksum, one byte of COBS, the closing zero
+MAX_ENCODED = 65  # bytes; payloads are at most 64 bytes [protocol/README.md], COBS adds one
+HEAD = 3  # bytes before the body: id, sequence
+CHECKSUM = 2  # bytes
+SHORTEST = HEAD + CHECKSUM + 2  # bytes of a frame with an empty body: one byte of COBS, the closing zero
 MAX_BODY = max(kind.itemsize for kind in ROWS.values())
-_HEAD = struct.Struct("<BH")
+_HEAD_FORMAT = struct.Struct("<BH")
 _IDENTITY, _IDENTIFY, _BEACON = 0x01, 0x81, 0x20
-_FIXED_SEED = 0xFFFF  # never changes [protocol/README.md]
+_FIXED_SEED = 0xFFFF  # the same in every schema [protocol/README.md]
 _FIXED_SEED_IDS = (_IDENTITY, _IDENTIFY, _BEACON)
-_GOOD, _BAD_COBS, _BAD_LENGTH, _BAD_CRC, _BAD_MESSAGE, _LOST, _SEQUENCE, _TALLY = range(
-    8
-)  # the first as in `FrameCounts`
+# Entries of a tally: the counters in the order of `FrameCounts`, the last sequence number (-1: none), and the length of a tally.
+_GOOD, _BAD_COBS, _BAD_LENGTH, _BAD_CRC, _BAD_MESSAGE, _LOST, _SEQUENCE, _TALLY = range(8)
 
 
 class _Schema(NamedTuple):
-    """What the kernel needs to know of the schema; an argument, as numba's cache would keep the values of globals from another file."""
+    """The schema as arrays. It is an argument of the kernels, because numba's cache would keep the old values of globals of another file."""
 
-    size: Ints  # of each id's body, -1: no such message
-    greatest: Octets  # (256, MAX_BODY) value of each byte
-    crc: Ints  # (256,) of one byte
+    size: Ints  # (256,) bytes of the body by id, -1: no such message
+    greatest: Octets  # (256, MAX_BODY) greatest value of each byte of a body
+    crc: Ints  # (256,) CRC of one byte
     seed: int
     hash: int
-    hash_at: int
+    hash_offset: int  # of the schema's hash in the body of an `Identity`
 
 
 def _schema() -> _Schema:
+    """The generated tables of `messages` as arrays."""
     sizes, greatest = np.full(256, -1, np.int64), np.full((256, MAX_BODY), 255, np.uint8)
     for identifier, kind in ROWS.items():
         sizes[identifier] = kind.itemsize
     for identifier, offset, value in GREATEST:
         greatest[identifier, offset] = value
-    hash_at = int(ROWS[_IDENTITY].fields["schema_hash"][1])  # type: ignore[index]
+    hash_offset = int(ROWS[_IDENTITY].fields["schema_hash"][1])  # type: ignore[index]
     crcs = np.array([binascii.crc_hqx(bytes([k]), 0) for k in range(256)], np.int64)
-    return _Schema(sizes, greatest, crcs, SCHEMA_SEED, SCHEMA_HASH, hash_at)
+    return _Schema(sizes, greatest, crcs, SCHEMA_SEED, SCHEMA_HASH, hash_offset)
 
 
 _SCHEMA = _schema()
 
 
 class StaleFirmwareError(EchostepError):
-    """The board speaks another schema than this host."""
+    """The board uses another schema than this host."""
 
 
 @dataclass(slots=True)
 class FrameCounts:
-    """What a `BoardReader` has seen; `lost` counts sequence numbers that never came."""
+    """Frames that a `BoardReader` has counted; `lost`: sequence numbers that never came."""
 
     good: int = 0
     bad_cobs: int = 0
@@ -74,24 +78,25 @@ class FrameCounts:
 
     @property
     def rejected(self) -> int:
+        """Frames that failed a check."""
         return self.bad_cobs + self.bad_length + self.bad_crc + self.bad_message
 
 
 def crc(identifier: int, plain: bytes) -> int:
-    """CRC-16 of id, sequence and body, seeded by the schema [protocol/README.md]."""
+    """CRC-16 of `plain` (id, sequence and body), with the schema's seed [protocol/README.md]."""
     return binascii.crc_hqx(plain, _FIXED_SEED if identifier in _FIXED_SEED_IDS else SCHEMA_SEED)
 
 
 def encode(message: Message, sequence: int) -> bytes:
     """One frame with its closing zero; the sequence wraps at 65536."""
-    plain = _HEAD.pack(message.id, sequence & 0xFFFF) + message.pack()
+    plain = _HEAD_FORMAT.pack(message.id, sequence & 0xFFFF) + message.pack()
     payload = plain + crc(message.id, plain).to_bytes(2, "little")
     return bytes(cobs.encode(payload)) + b"\0"
 
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Frames that passed every check, as columns: `id`, `sequence`, `end` = index after the closing zero in the bytes fed, `body` (n, MAX_BODY)."""
+    """Frames that passed every check, as columns: `id`, `sequence`, `end` = index behind the closing zero in the bytes fed, `body` (n, MAX_BODY)."""
 
     id: Octets
     sequence: NDArray[np.uint16]
@@ -99,13 +104,13 @@ class Frames:
     body: Octets
 
     def rows(self, identifier: int) -> tuple[Ints, NDArray[np.void]]:
-        """Which frames (k,) carry this id, and their bodies (k,) by the schema's dtype."""
-        at = (self.id == identifier).nonzero()[0]
+        """Indices (k,) of the frames with this id, and their bodies (k,) by the schema's dtype."""
+        frame_index = (self.id == identifier).nonzero()[0]
         kind = ROWS[identifier]
-        return at, np.ascontiguousarray(self.body[at, : kind.itemsize]).view(kind)[:, 0]
+        return frame_index, np.ascontiguousarray(self.body[frame_index, : kind.itemsize]).view(kind)[:, 0]
 
     def messages(self) -> list[Message]:
-        """The same as named tuples."""
+        """The frames as named tuples."""
         bodies = self.body.tobytes()
         return [
             BY_ID[i].unpack(bodies[k * MAX_BODY : k * MAX_BODY + ROWS[i].itemsize])
@@ -114,7 +119,7 @@ class Frames:
 
 
 class BoardReader:
-    """Frames out of a byte stream; every malformed frame is counted, none raises."""
+    """Frames of a byte stream; malformed frames are counted and raise no error."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -123,7 +128,7 @@ class BoardReader:
 
     @property
     def counts(self) -> FrameCounts:
-        """What was seen so far."""
+        """Counts since the start."""
         return FrameCounts(*self._tally[:_SEQUENCE].tolist())
 
     def feed(self, received: bytes) -> list[Message]:
@@ -140,59 +145,62 @@ class BoardReader:
             np.empty(most, np.int64),
             np.zeros((most, MAX_BODY), np.uint8),
         )
-        found, done, stale = _read(
+        count, resume, stale = _find_frames(
             np.frombuffer(stream, np.uint8), _SCHEMA, self._tally, frames.id, frames.sequence, frames.end, frames.body
         )
         if stale >= 0:
             raise StaleFirmwareError(
-                f"the board's firmware speaks schema 0x{stale:08X}, this host 0x{SCHEMA_HASH:08X}: "
+                f"the board's firmware has schema 0x{stale:08X}, this host 0x{SCHEMA_HASH:08X}: "
                 "flash the firmware that belongs to this host (make flash)"
             )
-        ends = frames.end[:found] - len(self._rest)
-        self._rest = stream[done : done + MAX_ENCODED + 1]
-        return Frames(frames.id[:found], frames.sequence[:found], ends, frames.body[:found])
+        ends = frames.end[:count] - len(self._rest)
+        self._rest = stream[resume : resume + MAX_ENCODED + 1]
+        return Frames(frames.id[:count], frames.sequence[:count], ends, frames.body[:count])
 
 
 @kernel
-def _read(
+def _find_frames(
     stream: Octets, schema: _Schema, tally: Ints, ids: Octets, sequences: NDArray[np.uint16], ends: Ints, bodies: Octets
 ) -> tuple[int, int, int]:
-    """Fill the columns; returns how many frames were found, where the unfinished one begins, and a foreign schema hash or -1."""
+    """Fill the columns; returns the number of frames, the begin of the unfinished one, and the hash of another schema or -1.
+
+    Another schema ends the search only before the first good frame; after it, such an identity is a bad message.
+    """
     payload = np.empty(MAX_ENCODED, np.uint8)
-    found, start = 0, 0
+    count, start = 0, 0
     for end in range(len(stream)):
         if stream[end] != 0:
             continue
         length = end - start
-        if length > 0 and _open(stream, start, end, payload, schema, tally):
-            identifier, size = payload[0], length - 6
+        if length > 0 and _decode_frame(stream, start, end, payload, schema, tally):
+            identifier, size = payload[0], length - 1 - HEAD - CHECKSUM
             if identifier == _IDENTITY and _schema_hash(payload, schema) != schema.hash and tally[_GOOD] == 0:
-                return found, start, _schema_hash(payload, schema)
-            if _known(payload, size, schema):
-                ids[found] = identifier
-                sequences[found] = payload[1] | payload[2] << 8
-                ends[found] = end + 1
-                bodies[found, :size] = payload[3 : 3 + size]
+                return count, start, _schema_hash(payload, schema)
+            if _is_valid(payload, size, schema):
+                ids[count] = identifier
+                sequences[count] = payload[1] | payload[2] << 8
+                ends[count] = end + 1
+                bodies[count, :size] = payload[HEAD : HEAD + size]
                 _count_sequence(payload[1] | payload[2] << 8, identifier, tally)
-                found += 1
+                count += 1
             else:
                 tally[_BAD_MESSAGE] += 1
         start = end + 1
-    return found, start, -1
+    return count, start, -1
 
 
 @lean_kernel
-def _open(stream: Octets, start: int, end: int, payload: Octets, schema: _Schema, tally: Ints) -> bool:
-    """Whether stream[start:end] is a frame with a right checksum; then `payload` holds its id, sequence, body and checksum."""
+def _decode_frame(stream: Octets, start: int, end: int, payload: Octets, schema: _Schema, tally: Ints) -> bool:
+    """Decode stream[start:end] into `payload` (id, sequence, body, checksum); false, and counted, if COBS, length or checksum is wrong."""
     if not SHORTEST - 1 <= end - start <= MAX_ENCODED:
         tally[_BAD_LENGTH] += 1
         return False
-    if not _unstuff(stream, start, end, payload):
+    if not _decode_cobs(stream, start, end, payload):
         tally[_BAD_COBS] += 1
         return False
     length = end - start - 1
     crc = _FIXED_SEED if payload[0] in _FIXED_SEED_IDS else schema.seed
-    for k in range(length - 2):
+    for k in range(length - CHECKSUM):
         crc = (crc << 8 & 0xFF00) ^ schema.crc[crc >> 8 ^ payload[k]]
     if crc != payload[length - 2] | payload[length - 1] << 8:
         tally[_BAD_CRC] += 1
@@ -201,47 +209,49 @@ def _open(stream: Octets, start: int, end: int, payload: Octets, schema: _Schema
 
 
 @lean_kernel
-def _unstuff(stream: Octets, at: int, end: int, payload: Octets) -> bool:
-    """Undo COBS for one frame of at most MAX_ENCODED bytes; false when a block reaches beyond its end [Cheshire, Baker 1999]."""
+def _decode_cobs(stream: Octets, begin: int, end: int, payload: Octets) -> bool:
+    """Decode COBS of one frame of at most MAX_ENCODED bytes; false when a block ends behind the frame [Cheshire, Baker 1999]."""
     n = 0
-    while at < end:
-        code = stream[at] & 0xFF
-        if at + code > end:
+    while begin < end:
+        code = stream[begin] & 0xFF
+        if begin + code > end:
             return False
-        for k in range(at + 1, at + code):
+        for k in range(begin + 1, begin + code):
             payload[n] = stream[k]
             n += 1
-        at += code
-        payload[n] = 0  # a zero after each block; the last one lies behind the payload
+        begin += code
+        payload[n] = 0  # a zero after each block; that of the last block is behind the payload
         n += 1
     return True
 
 
 @lean_kernel
-def _known(payload: Octets, size: int, schema: _Schema) -> bool:
-    """Whether there is such a message, of this size, without unknown enumeration values, and from our own schema if it names one."""
+def _is_valid(payload: Octets, size: int, schema: _Schema) -> bool:
+    """Whether the schema has this message, with this size and these enumeration values; an identity must have this host's schema."""
     identifier = payload[0]
     if schema.size[identifier] != size:
         return False
     for k in range(size):
-        if payload[3 + k] > schema.greatest[identifier, k]:
+        if payload[HEAD + k] > schema.greatest[identifier, k]:
             return False
     return identifier != _IDENTITY or _schema_hash(payload, schema) == schema.hash
 
 
 @lean_kernel
 def _schema_hash(payload: Octets, schema: _Schema) -> int:
+    """The schema's hash in the payload of an identity."""
     value = 0
     for k in range(4):
-        value |= (payload[3 + schema.hash_at + k] & 0xFF) << 8 * k
+        value |= (payload[HEAD + schema.hash_offset + k] & 0xFF) << 8 * k
     return value
 
 
 @lean_kernel
 def _count_sequence(sequence: int, identifier: int, tally: Ints) -> None:
+    """Count a good frame, and the frames lost before it."""
     tally[_GOOD] += 1
     if tally[_SEQUENCE] >= 0 and identifier != _IDENTIFY:
         gap = (sequence - tally[_SEQUENCE] - 1) & 0xFFFF
-        if gap < 0x8000:  # a step back is a board that restarted
+        if gap < 0x8000:  # a step back is a restart of the board
             tally[_LOST] += gap
     tally[_SEQUENCE] = sequence

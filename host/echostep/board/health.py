@@ -1,7 +1,7 @@
-"""What is wrong with the board, in words: what it is and what to do about it.
+"""Findings on the board's health, each with a remedy.
 
-In: the board's words about itself, and what was counted while listening. Out: `Finding`s, the worst first. Owns nothing; the texts for single
-devices are `device_findings`'.
+In: the board's reports about itself, and the measured rates of its streams. Out: `Finding`s, the most severe first. Owns nothing; the texts for
+single devices are in `device_faults`.
 """
 
 from __future__ import annotations
@@ -9,81 +9,109 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from echostep.board.device_faults import device_findings, gyro_celsius, gyro_findings
-from echostep.board.findings import NAMES, SELECTS, BoardReports, Finding, Severity, grown, of, span_s, suffix
+from echostep.board.findings import (
+    DEVICES,
+    NAMES,
+    SELECTS,
+    BoardReports,
+    Finding,
+    Severity,
+    field_suffix,
+    increase,
+    span_s,
+    status_field,
+)
 from echostep.board.messages import Fault, Healthy, PressureMode, ResetCause, Schedule, Sensors, Status
 
 __all__ = [
     "NAMES", "SELECTS", "BoardReports", "Finding", "Severity", "board_findings", "expected_rates", "gyro_celsius", "rate_findings",
 ]  # fmt: skip
 
-MEMORY_MAX_BYTES = 2200  # of 2560 [firmware/README.md, budgets]
-RATE_LEAST = 0.9  # of what is expected; below half of it the stream is as good as gone
+MEMORY_BYTES = 2560  # of the processor
+MEMORY_MAX_BYTES = 2200  # [firmware/README.md, budgets]
+RATE_LEAST = 0.9  # of the expected rate; by reason
+RATE_FAULT = 0.5  # of the expected rate, below it the finding is a fault; by reason
 PINGS_HZ = {Schedule.CONCURRENT: 28.0, Schedule.SEQUENTIAL: 13.5}  # both rangers [firmware/README.md]
 PRESSURE_HZ = {PressureMode.HIGH_SPEED: 9.0, PressureMode.HIGH_RESOLUTION: 1.8}
+DEFAULT_GYROS_HZ, DEFAULT_COMPASS_HZ = 200.0, 10.0  # [protocol/README.md]
+_STREAMS = {  # by message: subject and unit of a finding, devices
+    "Ping": ("rangers", "pings", Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT),
+    "Gyros": ("gyros", "samples", Healthy(0)),
+    "Compass": ("compass", "bearings", Healthy.COMPASS),
+    "Pressure": ("barometer", "samples", Healthy.PRESSURE),
+}
 
 
-def board_findings(words: BoardReports) -> list[Finding]:
-    """What the board says is wrong, the worst first; empty when all is well or it has not spoken yet."""
-    found = _start(words) + gyro_findings(words)
-    if words.status is not None:
-        found += device_findings(words, words.status) + _sometimes(words) + _losses(words.status, words.earlier)
-    return sorted(found, key=lambda finding: -finding.severity)
+def board_findings(reports: BoardReports) -> list[Finding]:
+    """Findings by the board's reports, the most severe first; empty without problems or before the first report."""
+    findings = _restart_findings(reports) + gyro_findings(reports)
+    if reports.status is not None:
+        findings += (
+            device_findings(reports, reports.status)
+            + _intermittent_findings(reports)
+            + _loss_findings(reports.status, reports.previous_status)
+        )
+    return sorted(findings, key=lambda finding: -finding.severity)
 
 
-def _start(words: BoardReports) -> list[Finding]:
-    cause = ResetCause(0 if words.identity is None else words.identity.reset_cause)
+def _restart_findings(reports: BoardReports) -> list[Finding]:
+    """Finding on an unwanted cause of the last restart."""
+    cause = ResetCause(0 if reports.identity is None else reports.identity.reset_cause)
     if cause & ResetCause.WATCHDOG:
-        what, remedy = "its watchdog has restarted it", "if it happens again, write down what was done and report it"
+        what, remedy = "was restarted by its watchdog", "if it happens again, write down what was done and report it"
     elif cause & ResetCause.BROWN_OUT:
-        what, remedy = "its supply was too low and it restarted", "use a shorter USB cable or a powered hub"
+        what, remedy = "restarted because its supply was too low", "use a shorter USB cable or a powered hub"
     else:
         return []
     return [Finding(Severity.WARNING, "board", what, remedy)]
 
 
-def _sometimes(words: BoardReports) -> list[Finding]:
-    """Devices that answer now and failed since the status before."""
-    status, earlier = words.status, words.earlier
-    if status is None or earlier is None:
+def _intermittent_findings(reports: BoardReports) -> list[Finding]:
+    """Findings on devices that answer now and failed since the previous status."""
+    status, previous = reports.status, reports.previous_status
+    if status is None or previous is None:
         return []
-    answering = words.sensors & status.healthy & 0x7F
-    found = []
+    answering = reports.sensors & status.healthy & DEVICES
+    findings = []
     for device in (d for d in Healthy if d & answering):
-        if count := grown(status, earlier, f"errors_{suffix(device)}"):
-            fault = Fault(of(status, "fault", device)).name.lower().replace("_", " ")
-            what = f"failed {count} times in the last {span_s(status, earlier):.0f} s ({fault}), and answers again"
-            found.append(Finding(Severity.WARNING, NAMES[device], what, "a loose plug? move the cable and watch"))
-    return found
+        if count := increase(status, previous, f"errors_{field_suffix(device)}"):
+            fault = Fault(status_field(status, "fault", device)).name.lower().replace("_", " ")
+            what = f"failed {count} times in the last {span_s(status, previous):.0f} s ({fault}), and answers again"
+            findings.append(
+                Finding(Severity.WARNING, NAMES[device], what, "a loose plug is likely: move the cable and watch")
+            )
+    return findings
 
 
-def _losses(status: Status, earlier: Status | None) -> list[Finding]:
-    if earlier is None:
+def _loss_findings(status: Status, previous: Status | None) -> list[Finding]:
+    """Findings on counters of lost data that have increased, and on memory."""
+    if previous is None:
         return []
-    found = []
-    span = f"in the last {span_s(status, earlier):.0f} s"
-    if dropped := sum(grown(status, earlier, n) for n in Status._fields if n.startswith("dropped_")):
+    findings = []
+    span = f"in the last {span_s(status, previous):.0f} s"
+    if dropped := sum(increase(status, previous, n) for n in Status._fields if n.startswith("dropped_")):
         what, remedy = (
-            f"left out {dropped} messages {span}",
+            f"dropped {dropped} messages {span}",
             "the host reads too slowly: close other programs, avoid a USB hub",
         )
-        found.append(Finding(Severity.WARNING, "board", what, remedy))
-    if recovered := grown(status, earlier, "bus_recoveries"):
-        what = f"was stuck and clocked free {recovered} times {span}"
-        found.append(
+        findings.append(Finding(Severity.WARNING, "board", what, remedy))
+    if recovered := increase(status, previous, "bus_recoveries"):
+        what = f"was stuck and recovered {recovered} times {span}"
+        findings.append(
             Finding(Severity.WARNING, "I2C bus", what, "check the pull-ups (2.2 kohm) and keep the cables short")
         )
-    if bad := grown(status, earlier, "bad_frames"):
+    if bad := increase(status, previous, "bad_frames"):
         what = f"got {bad} damaged commands {span}"
-        found.append(Finding(Severity.WARNING, "board", what, "does another program write to its port?"))
+        findings.append(Finding(Severity.WARNING, "board", what, "close other programs that write to its port"))
     if status.memory_used > MEMORY_MAX_BYTES:
-        what = f"has used {status.memory_used} of 2560 bytes of memory"
-        found.append(Finding(Severity.WARNING, "board", what, "report it, with the recording"))
-    return found
+        what = f"used {status.memory_used} of {MEMORY_BYTES} bytes of memory"
+        findings.append(Finding(Severity.WARNING, "board", what, "report it, with the recording"))
+    return findings
 
 
-def expected_rates(words: BoardReports) -> dict[str, float]:
-    """Messages per second of each stream that is switched on, as the board is configured, by the message's name."""
-    c, on = words.configuration, words.sensors
+def expected_rates(reports: BoardReports) -> dict[str, float]:
+    """Messages per second of each stream that is switched on, by the message's name; the board's defaults before its `Configuration`."""
+    c, on = reports.configuration, reports.sensors
     schedule = Schedule.CONCURRENT if c is None else Schedule(c.schedule)
     mode = PressureMode.HIGH_SPEED if c is None else PressureMode(c.pressure_mode)
     rangers = (on & (Sensors.RANGER_LEFT | Sensors.RANGER_RIGHT)).bit_count()
@@ -93,34 +121,26 @@ def expected_rates(words: BoardReports) -> dict[str, float]:
             ("Ping", PINGS_HZ[schedule] * rangers / 2, rangers),
             (
                 "Gyros",
-                200.0 if c is None else float(c.gyro_rate_hz),
+                DEFAULT_GYROS_HZ if c is None else float(c.gyro_rate_hz),
                 on & (Sensors.THIGH | Sensors.CALF | Sensors.BELT),
             ),
-            ("Compass", 10.0 if c is None else float(c.compass_rate_hz), on & Sensors.COMPASS),
+            ("Compass", DEFAULT_COMPASS_HZ if c is None else float(c.compass_rate_hz), on & Sensors.COMPASS),
             ("Pressure", PRESSURE_HZ[mode], on & Sensors.PRESSURE),
         )
         if there
     }
 
 
-_STREAMS = {
-    "Ping": ("rangers", "pings", Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT),
-    "Gyros": ("gyros", "samples", Healthy(0)),
-    "Compass": ("compass", "bearings", Healthy.COMPASS),
-    "Pressure": ("barometer", "samples", Healthy.PRESSURE),
-}
-
-
-def rate_findings(words: BoardReports, rates_hz: Mapping[str, float]) -> list[Finding]:
-    """Streams that come more slowly than configured, unless the status already says why."""
-    found = []
-    healthy = 0x7F if words.status is None else words.status.healthy
-    for name, expected in expected_rates(words).items():
+def rate_findings(reports: BoardReports, rates_hz: Mapping[str, float]) -> list[Finding]:
+    """Findings on streams that are slower than configured, unless the status explains it."""
+    findings = []
+    healthy = DEVICES if reports.status is None else reports.status.healthy
+    for name, expected in expected_rates(reports).items():
         subject, unit, devices = _STREAMS[name]
-        got = rates_hz.get(name, 0.0)
-        if got >= RATE_LEAST * expected or (devices and not healthy & devices):
+        measured = rates_hz.get(name, 0.0)
+        if measured >= RATE_LEAST * expected or (devices and not healthy & devices):
             continue
-        severity = Severity.FAULT if got < 0.5 * expected else Severity.WARNING
-        what = f"{got:.1f} {unit}/s, expected are {expected:.1f}"
-        found.append(Finding(severity, subject, what, "unplug the board and plug it in again; avoid a USB hub"))
-    return found
+        severity = Severity.FAULT if measured < RATE_FAULT * expected else Severity.WARNING
+        what = f"{measured:.1f} {unit}/s, expected are {expected:.1f}"
+        findings.append(Finding(severity, subject, what, "unplug the board and plug it in again; avoid a USB hub"))
+    return findings
