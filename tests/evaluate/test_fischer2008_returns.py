@@ -1,4 +1,4 @@
-"""The guided returns of [Fischer 2008, 4]: magnetic sources, measurements, the paper's fusion, intervals, and that ours gets people out."""
+"""The guided returns of [Fischer 2008, 4]: magnetic sources, measurements, the paper's fusion, intervals, the success of each system."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from command_line import echostep
-from echostep.evaluate.fischer2008.simulator import _WALKER, OURS, PAPER, PDR, fuse, guided_return
+from echostep.evaluate.fischer2008.paper_fusion import FUSION, fuse
+from echostep.evaluate.fischer2008.simulator import OURS, PAPER, PDR, guided_return
 from echostep.evaluate.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95
 from echostep.simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
 
@@ -21,7 +22,7 @@ def test_source_turns_the_heading_once_by_the_side_of_approach() -> None:
     sources, inside = np.array([[5.0, 1.0, 2.0, 0.5]]), np.zeros(1, bool)
     east = [disturbance(sources, inside, x, 0.0, 0.0) for x in np.arange(0.0, 10.0, 0.1)]
     west = [disturbance(sources, inside, x, 0.0, math.pi) for x in np.arange(10.0, 0.0, -0.1)]
-    assert [v for v in east if v] == [0.5]  # on his left
+    assert [v for v in east if v] == [0.5]  # on the left
     assert [v for v in west if v] == [-0.5]
 
 
@@ -39,15 +40,15 @@ def test_measurements_have_the_papers_spread() -> None:
 
 
 def test_fusion_leaves_small_discrepancies_alone_and_turns_about_the_last_reliable_place() -> None:
-    w = np.zeros(1, _WALKER)[0]
-    w["believed_x"] = 10.0
+    w = np.zeros(1, FUSION)[0]
+    w["x"] = 10.0
     beacon = np.array([10.0, 1.0, -0.5 * math.pi])
     fuse(w, beacon, 1.5, 0.0, 1.0)  # says (10, -0.5)
-    assert (w["believed_x"], w["believed_y"], w["offset"]) == (10.0, 0.0, 0.0)
+    assert (w["x"], w["y"], w["offset"]) == (10.0, 0.0, 0.0)
     beacon = np.array([0.0, 11.0, -0.5 * math.pi])
     fuse(w, beacon, 1.0, 0.0, 1.0)  # says (0, 10): a quarter to the left, seen from (0, 0)
-    assert w["believed_x"] == pytest.approx(0.0)
-    assert w["believed_y"] == pytest.approx(10.0)
+    assert w["x"] == pytest.approx(0.0)
+    assert w["y"] == pytest.approx(10.0)
     assert w["offset"] == pytest.approx(0.5 * math.pi)
 
 
@@ -64,19 +65,19 @@ def test_dead_reckoning_without_iron_is_exact_and_with_iron_fails() -> None:
     assert sum(one_return(Case("", PDR), seed) for seed in range(40)) < 10
 
 
-def test_ours_gets_people_out_where_the_paper_does_not_always() -> None:
+def test_the_particle_filter_reaches_the_exit_where_the_paper_does_not_always() -> None:
     assert all(one_return(Case("", OURS), seed) for seed in range(20))
     assert sum(one_return(Case("", OURS, UNCERTAIN), seed) for seed in range(20)) >= 19
     paper = sum(one_return(Case("", PAPER, UNCERTAIN), seed) for seed in range(60))
     assert 30 < paper < 60
 
 
-def test_nearly_all_come_out_of_a_map_that_was_made_on_the_way_in() -> None:
+def test_nearly_all_return_by_a_map_that_was_learnt_on_the_way_in() -> None:
     assert sum(one_return(Case("", OURS, deployed=True), seed) for seed in range(12)) >= 11
 
 
 def test_three_dead_beacons_in_a_row_are_a_gap_that_is_crossed() -> None:
-    """20 m without a beacon leave 4 m in which nobody is_in_reach him; who was sent back once goes on."""
+    """20 m without a beacon leave 4 m out of reach; after each return the allowed time without a measurement doubles."""
     for seed in range(3):
         world = ground(replace(NOMINAL, sources=0), np.random.default_rng(seed))
         world.works[5:8] = False

@@ -18,33 +18,33 @@ from echostep.simulation.world.beacon_ground import BeaconGround
 TITLES = {
     "pdr": "dead reckoning alone (Figure 9)",
     "fischer2008": "the paper's fusion (Figure 10)",
-    "default": "ours, beacons in the particle filter",
+    "default": "particle filter with beacons",
 }
 LABELS = {
-    "place_sd_m": "uncertainty of beacons' places (m)",
-    "axis_sd_deg": "uncertainty of beacons' orientations (degrees)",
+    "place_sd_m": "standard deviation of the beacons' places (m)",
+    "axis_sd_deg": "standard deviation of the beacons' orientations (degrees)",
     "reach_m": "beacons' range (m)",
     "spacing_m": "distance between beacons (m)",
-    "outliers": "share of ranges with 3 m too much",
+    "outliers": "share of ranges with 3 m added",
     "period_s": "time between measurements (s)",
 }
 
 
-def draw_returns(path: Path, world: BeaconGround, seen: Mapping[str, Return]) -> None:
-    """One map a system: the trail, the beacons, the magnetic sources, where he walked and where the system believed him."""
+def draw_returns(path: Path, world: BeaconGround, returns: Mapping[str, Return]) -> None:
+    """One map per system: trail, beacons, magnetic sources, true and estimated path."""
     from matplotlib.patches import Circle
 
-    figure, axes = axes_of(len(seen), 1, (9.0, 4.2 * len(seen)))
-    for (ax,), (name, walk) in zip(axes, seen.items(), strict=True):
+    figure, axes = axes_of(len(returns), 1, (9.0, 4.2 * len(returns)))
+    for (ax,), (name, walk) in zip(axes, returns.items(), strict=True):
         for x, y, radius, _ in world.sources:
             ax.add_patch(Circle((float(x), float(y)), float(radius), color=RED, alpha=0.15, lw=0))
         ax.plot(*world.trail.T, color="0.7", lw=5, solid_capstyle="round", label="trail")
         ax.plot(*world.beacons[:, :2].T, "^", color=GREEN, ms=6, label="beacons")
-        ax.plot(*walk.truth.T, color=BLACK, lw=1.4, label="walked")
-        ax.plot(*walk.believed.T, color=BLUE, lw=1.0, ls="--", marker=".", ms=4, label="believed")
+        ax.plot(*walk.truth.T, color=BLACK, lw=1.4, label="true path")
+        ax.plot(*walk.believed.T, color=BLUE, lw=1.0, ls="--", marker=".", ms=4, label="estimated path")
         ax.plot(*world.trail[-1], "s", color=ORANGE, ms=9, label="exit")
-        words = "came out" if walk.arrived else f"did not come out: ended {walk.end_m:.0f} m from the exit"
-        ax.set_title(f"{TITLES[name]}: {words}", fontsize=10)
+        result = "exit reached" if walk.arrived else f"exit not reached: ended {walk.end_m:.0f} m from it"
+        ax.set_title(f"{TITLES[name]}: {result}", fontsize=10)
         ax.set_aspect("equal")
         ax.tick_params(labelsize=7)
     axes[0][0].legend(loc="upper left", fontsize=8)
@@ -58,7 +58,7 @@ def draw_sweeps(
     nominal: Mapping[str, float],
     rows: Mapping[str, Mapping[str, Any]],
 ) -> None:
-    """Success with its 95 % interval over each parameter, for the paper's fusion and ours."""
+    """Success with its 95 % interval over each parameter, for the paper's fusion and the particle filter."""
     columns = 3
     figure, axes = axes_of(-(-len(sweeps) // columns), columns, (4.2 * columns, 3.2 * -(-len(sweeps) // columns)))
     flat = [ax for line in axes for ax in line]
@@ -74,7 +74,7 @@ def draw_sweeps(
         ax.set_xlabel(LABELS[parameter], fontsize=8)
         ax.set_ylim(-3.0, 103.0)
         ax.tick_params(labelsize=7)
-    flat[0].set_ylabel("people who came out (%)", fontsize=8)
+    flat[0].set_ylabel("exit reached (%)", fontsize=8)
     flat[0].legend(fontsize=8)
     figure.suptitle("Simulated: guided returns as beacons get worse, 95 % intervals")
     save(figure, path)

@@ -1,6 +1,7 @@
-"""The guided returns of [Fischer 2008, 4]: dead reckoning alone, the paper's fusion and ours, and what happens as beacons get worse (simulated).
+"""The guided returns of [Fischer 2008, 4]: success of dead reckoning alone, the paper's fusion and the particle filter, also with worse beacons.
 
-In: how many returns, a seed. Out: rows `{name, success, low95, high95, runs}`, the paper's Figures 9 and 10, a picture of the sweeps. Return k of
+Simulated. The particle filter has the tracker's kernels, but some rules of its own: see `beacon_cloud` and `guidance`.
+In: number of returns, seed. Out: rows `{name, success, low95, high95, runs}`, the paper's Figures 9 and 10, a picture of the sweeps. Return k of
 every row is on the same ground: trail, beacons and sources of seed + k.
 """
 
@@ -15,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from echostep.evaluate.fischer2008.simulator import OBEDIENT, OURS, PAPER, PDR, ObedientPerson, guided_return
+from echostep.evaluate.fischer2008.simulator import OURS, PAPER, PDR, Knowledge, guided_return
+from echostep.evaluate.fischer2008.walker import EXACT, Obedience
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.simulation.world.beacon_ground import GroundSettings, ground
 
 BATCH = 50  # returns a task
-PEOPLE = ObedientPerson(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)
+INEXACT = Obedience(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)  # by reason
 SYSTEMS = {"pdr": PDR, "fischer2008": PAPER, "default": OURS}
 NOMINAL = GroundSettings()
 UNCERTAIN = replace(NOMINAL, place_sd_m=1.0, axis_sd_deg=15.0, outliers=0.2)
@@ -33,23 +35,23 @@ SWEEPS: dict[str, tuple[float, ...]] = {
     "outliers": (0.0, 0.2, 0.4),
     "period_s": (1.0, 2.0, 5.0),
 }
-SAMPLE = 20  # a sweep has one return for so many of the main rows
-CLOSER = 4  # and the rows of one condition one for so many
+SAMPLE = 20  # rows of the sweeps and of rare conditions have one return for so many of the main rows
+CLOSER = 4  # rows of the conditions that matter most likewise
 COLUMNS = {"name": "", "percent": "% out", "low_percent": "from", "high_percent": "to (95 %)", "runs": "runs"}
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A row: who estimates, on what ground, how often heard, who walks.
+    """A row: the system, the ground, the time between measurements, the person's obedience.
 
-    `deployed`: beacons are known from the way in alone. `every`: one of so many returns.
+    `deployed`: the beacons' places are known from the way in alone. `every`: the row has one of so many returns.
     """
 
     name: str
     system: int
     settings: GroundSettings = NOMINAL
     period_s: float = 0.2
-    person: ObedientPerson = OBEDIENT
+    obedience: Obedience = EXACT
     deployed: bool = False
     every: int = 1
 
@@ -61,7 +63,7 @@ def cases() -> Iterator[Case]:
     for name, system in list(SYSTEMS.items())[1:]:
         yield Case(f"{name}/known-to-1m", system, replace(UNCERTAIN, axis_sd_deg=0.0), every=CLOSER)
         yield Case(f"{name}/uncertain", system, UNCERTAIN, every=CLOSER)
-        yield Case(f"{name}/people", system, person=PEOPLE, every=CLOSER)
+        yield Case(f"{name}/people", system, obedience=INEXACT, every=CLOSER)
         yield Case(f"{name}/moved", system, replace(NOMINAL, moved=0.1), every=SAMPLE)
         yield Case(f"{name}/dead", system, replace(NOMINAL, dead=0.2), every=SAMPLE)
     yield Case("default/deployed", OURS, deployed=True, every=SAMPLE)
@@ -77,6 +79,7 @@ def cases() -> Iterator[Case]:
 
 
 def _with(parameter: str, value: float) -> GroundSettings:
+    """The nominal ground with one parameter changed."""
     changed: dict[str, Any] = {parameter: value}
     return replace(NOMINAL, **changed)
 
@@ -104,28 +107,27 @@ def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
 
 
 def one_batch(batch: int, first: int, runs: int) -> list[Row]:
-    """The returns [batch * BATCH, ...) of all rows: how many there were and how many came out."""
+    """The returns [batch * BATCH, ...) of all rows: their number, and the number of those that reached the exit."""
     returns = range(batch * BATCH, min((batch + 1) * BATCH, runs))
-    found = []
+    rows = []
     for case in cases():
         chosen = [k for k in returns if k % case.every == 0]
         if chosen:
-            found.append(
+            rows.append(
                 {"name": case.name, "runs": len(chosen), "out": sum(one_return(case, first + k) for k in chosen)}
             )
-    return found
+    return rows
 
 
 def one_return(case: Case, seed: int) -> bool:
-    """Whether one person gets out."""
+    """Whether one person reaches the exit in time."""
     world = ground(case.settings, np.random.default_rng([seed, 1]))
-    return guided_return(
-        world, case.system, seed, case.period_s, case.person, deployed=case.deployed,
-        place_sd_m=case.settings.place_sd_m, axis_sd_rad=math.radians(case.settings.axis_sd_deg),
-    ).arrived  # fmt: skip
+    knowledge = Knowledge(case.settings.place_sd_m, math.radians(case.settings.axis_sd_deg), case.deployed)
+    return guided_return(world, case.system, seed, case.period_s, case.obedience, knowledge).arrived
 
 
 def _summary(batches: list[Row]) -> Row:
+    """The batches of one row added up: the success rate and its 95 % interval."""
     runs, out = sum(b["runs"] for b in batches), sum(b["out"] for b in batches)
     low, high = wilson95(out, runs)
     return {"name": batches[0]["name"], "success": out / runs, "low95": low, "high95": high, "runs": runs}
@@ -141,13 +143,13 @@ def wilson95(successes: int, runs: int) -> tuple[float, float]:
 
 
 def draw(out: Path, _seed: int, rows: list[Row]) -> None:
-    """The paper's Figures 9 and 10 and ours on the same ground, and the sweeps."""
+    """The paper's Figures 9 and 10, the same return by the particle filter, and the sweeps."""
     from echostep.evaluate.fischer2008.pictures import draw_returns, draw_sweeps
 
     trail = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [45.0, 15.0], [45.0, -5.0], [70.0, -5.0]])
     world = ground(NOMINAL, np.random.default_rng(9), trail)
-    seen = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
-    draw_returns(out / "figures9-10.png", world, seen)
-    base = {r["name"]: r for r in rows}
+    returns = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
+    draw_returns(out / "figures9-10.png", world, returns)
+    by_name = {r["name"]: r for r in rows}
     nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
-    draw_sweeps(out / "sweeps.png", SWEEPS, nominal, base)
+    draw_sweeps(out / "sweeps.png", SWEEPS, nominal, by_name)
