@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.evaluate.fischer2008.walker import Walker
+from echostep.evaluate.fischer2008.walker import GuidedWalker
 from echostep.jit import kernel
 from echostep.localization.beacon_beliefs import (
     BeaconBeliefs,
@@ -87,7 +87,7 @@ def set_beacons(cloud: BeaconCloud, beacons: Floats, place_sd_m: float, axis_sd_
 
 @kernel
 def update_by_ultrasound(
-    world: BeaconGround, cloud: BeaconCloud, walker: Walker, tick: int, order: Ints, rng: np.random.Generator
+    world: BeaconGround, cloud: BeaconCloud, walker: GuidedWalker, tick: int, order: Ints, rng: np.random.Generator
 ) -> bool:
     """One ultrasound event: propagate by the dead reckoning since the last one, then reweight by each beacon in reach.
 

@@ -4,7 +4,7 @@ In: an estimate, the trail. Out: `Advice`. Owns the fields of a `Contact` record
 
 One rule differs from the tracker's, going back when no beacon measures: here the walker is sent back after SILENCE_S, to the dead-reckoned place of
 the last measurement; the tracker's guide warns then, sends back after twice this time to the last estimated place, and says "stop" there and where
-the heading is uncertain. Both double the allowed time after each return. The tracker's rule lost more returns here: numbers in `beacon_cloud`.
+the heading is uncertain. Both double the allowed time after each return. The tracker's rules lost more returns: see `beacon_cloud`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from echostep.arrays import Floats
 from echostep.evaluate.fischer2008.beacon_cloud import BeaconCloud, mean_place
 from echostep.evaluate.fischer2008.learnt_trail import believed_trail, span_near_heard
 from echostep.evaluate.fischer2008.paper_fusion import Fusion, note_reliable
-from echostep.evaluate.fischer2008.walker import TICK_S, Walker
+from echostep.evaluate.fischer2008.walker import TICK_S, GuidedWalker
 from echostep.jit import kernel
 from echostep.plan.polyline import along, nearest
 
@@ -52,7 +52,7 @@ CONTACT = np.dtype([(name, "f8") for name in Contact.__annotations__])
 
 
 @kernel
-def update_contact(contact: Contact, walker: Walker, heard: bool, tick: int, silence_s: float) -> None:
+def update_contact(contact: Contact, walker: GuidedWalker, heard: bool, tick: int, silence_s: float) -> None:
     """One ultrasound event; `heard`: a beacon measured. The allowed silence doubles after each return, and is `silence_s` again after SAFE_S."""
     if not heard:
         contact.silent_tick = tick
@@ -65,7 +65,7 @@ def update_contact(contact: Contact, walker: Walker, heard: bool, tick: int, sil
 
 
 @kernel
-def advise_by_fusion(fusion: Fusion, trail: Floats, walker: Walker) -> Advice:
+def advise_by_fusion(fusion: Fusion, trail: Floats, walker: GuidedWalker) -> Advice:
     """One guidance event by the paper's fusion."""
     note_reliable(fusion)
     direction, rest_m = _target(trail, fusion.x, fusion.y, 0.0, np.inf)
@@ -75,8 +75,9 @@ def advise_by_fusion(fusion: Fusion, trail: Floats, walker: Walker) -> Advice:
 
 @kernel
 def advise_by_cloud(
-    cloud: BeaconCloud, contact: Contact, trail: Floats, deployed: bool, walker: Walker, tick: int, silence_s: float
-) -> Advice:
+    cloud: BeaconCloud, contact: Contact, trail: Floats, deployed: bool, walker: GuidedWalker, tick: int,
+    silence_s: float,
+) -> Advice:  # fmt: skip
     """One guidance event by the cloud; `deployed`: each particle goes by the map that it learnt on the way in, else by the trail."""
     x, y = mean_place(cloud.particles)
     measured = walker.heading + walker.error

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.evaluate.fischer2008.beacon_cloud import BeaconCloud, update_by_ultrasound
-from echostep.evaluate.fischer2008.walker import STEP_M, WALKER, Walker, dead_reckon
+from echostep.evaluate.fischer2008.walker import STEP_M, WALKER, GuidedWalker, dead_reckon
 from echostep.jit import kernel
 from echostep.localization.beacon_beliefs import X, Y
 from echostep.plan.polyline import along, way_m
@@ -35,7 +35,7 @@ def walk_in(world: BeaconGround, cloud: BeaconCloud, ultrasound_ticks: int, rng:
 
 @kernel
 def _walk_in(
-    world: BeaconGround, length_m: float, cloud: BeaconCloud, walker: Walker, ultrasound_ticks: int,
+    world: BeaconGround, length_m: float, cloud: BeaconCloud, walker: GuidedWalker, ultrasound_ticks: int,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """Walk along the trail, whose first point is now the exit, and drop the beacons, the last one first; `world.works`: those that lie already."""

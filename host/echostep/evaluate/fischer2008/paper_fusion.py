@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.evaluate.fischer2008.walker import Walker
+from echostep.evaluate.fischer2008.walker import GuidedWalker
 from echostep.jit import kernel
 from echostep.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 
@@ -46,7 +46,7 @@ def add_step(fusion: Fusion, dx: float, dy: float) -> None:
 
 
 @kernel
-def fuse_nearest(world: BeaconGround, walker: Walker, fusion: Fusion, rng: np.random.Generator) -> None:
+def fuse_nearest(world: BeaconGround, walker: GuidedWalker, fusion: Fusion, rng: np.random.Generator) -> None:
     """One ultrasound event: all beacons in reach measure, and the measurement with the shortest range is fused."""
     closest, shortest_m, its_bearing = -1, np.inf, 0.0
     for k in range(len(world.beacons)):

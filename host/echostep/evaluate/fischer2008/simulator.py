@@ -25,7 +25,7 @@ from echostep.evaluate.fischer2008.guidance import (
 )
 from echostep.evaluate.fischer2008.learnt_trail import walk_in
 from echostep.evaluate.fischer2008.paper_fusion import FUSION, Fusion, add_step, fuse_nearest, start_fusion
-from echostep.evaluate.fischer2008.walker import EXACT, SPEED_M_S, TICK_S, WALKER, Obedience, Walker, obey, walk
+from echostep.evaluate.fischer2008.walker import EXACT, SPEED_M_S, TICK_S, WALKER, GuidedWalker, Obedience, obey, walk
 from echostep.jit import kernel
 from echostep.localization.beacon_model import BeaconSettings
 from echostep.plan.polyline import along, way_m
@@ -76,10 +76,10 @@ class _Rules(NamedTuple):
     obedience: Obedience
 
 
-class _State(NamedTuple):
+class _ReturnState(NamedTuple):
     """What changes during a return. Each system uses its part: the paper's `fusion`, the particle filter's `contact` and `cloud`."""
 
-    walker: Walker
+    walker: GuidedWalker
     fusion: Fusion
     contact: Contact
     cloud: BeaconCloud
@@ -99,7 +99,7 @@ def guided_return(
         walker["error"] = walk_in(world, cloud, ticks, rng)
     longest = int(TIME_FACTOR * way_m(world.trail) / SPEED_M_S / (GUIDANCE_TICKS * TICK_S)) + 2
     truth, believed = np.zeros((longest, 2)), np.zeros((longest, 2))
-    state = _State(walker[0], fusion[0], contact[0], cloud)
+    state = _ReturnState(walker[0], fusion[0], contact[0], cloud)
     n, end_m, arrived = _walk_back(world, rules, state, rng, truth, believed)
     return Return(truth[:n], believed[:n], end_m, arrived)
 
@@ -119,7 +119,7 @@ def _first_cloud(
 
 @kernel
 def _walk_back(
-    world: BeaconGround, rules: _Rules, state: _State, rng: np.random.Generator, truth: Floats, believed: Floats
+    world: BeaconGround, rules: _Rules, state: _ReturnState, rng: np.random.Generator, truth: Floats, believed: Floats
 ) -> tuple[int, float, bool]:
     """The loop of events. Writes the true and the estimated place at each guidance; returns their number, `end_m` and `arrived` of a `Return`."""
     walker, fusion, trail = state.walker, state.fusion, world.trail
@@ -151,7 +151,7 @@ def _walk_back(
 
 @kernel
 def _measure(
-    world: BeaconGround, rules: _Rules, state: _State, tick: int, order: Ints, rng: np.random.Generator
+    world: BeaconGround, rules: _Rules, state: _ReturnState, tick: int, order: Ints, rng: np.random.Generator
 ) -> None:
     """One ultrasound event."""
     if rules.system == OURS:
@@ -162,7 +162,7 @@ def _measure(
 
 
 @kernel
-def _advise(trail: Floats, rules: _Rules, state: _State, tick: int) -> Advice:
+def _advise(trail: Floats, rules: _Rules, state: _ReturnState, tick: int) -> Advice:
     """One guidance event."""
     if rules.system == OURS:
         return advise_by_cloud(state.cloud, state.contact, trail, rules.deployed, state.walker, tick, rules.silence_s)

@@ -1,6 +1,6 @@
 """The simulated person: walks in the direction of the last cue, with dead reckoning whose heading magnetic sources disturb [Fischer 2008, 4.1.2].
 
-In: a `BeaconGround`, turns to be made. Out: the true position and the dead-reckoned path. Owns the fields of a `Walker` record.
+In: a `BeaconGround`, turns to be made. Out: the true position and the dead-reckoned path. Owns the fields of a `GuidedWalker` record.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Obedience(NamedTuple):
 EXACT = Obedience()
 
 
-class Walker(Protocol):
+class GuidedWalker(Protocol):
     """A record of floats. Headings are counter-clockwise from x (rad); places in metres."""
 
     x: float  # true place
@@ -46,11 +46,11 @@ class Walker(Protocol):
     turn_tick: float  # at which it is made
 
 
-WALKER = np.dtype([(name, "f8") for name in Walker.__annotations__])
+WALKER = np.dtype([(name, "f8") for name in GuidedWalker.__annotations__])
 
 
 @kernel
-def walk(world: BeaconGround, inside: Bools, walker: Walker) -> tuple[float, float]:
+def walk(world: BeaconGround, inside: Bools, walker: GuidedWalker) -> tuple[float, float]:
     """One inertial event: a step in the true heading, and its dead reckoning."""
     walker.x += STEP_M * math.cos(walker.heading)
     walker.y += STEP_M * math.sin(walker.heading)
@@ -58,7 +58,7 @@ def walk(world: BeaconGround, inside: Bools, walker: Walker) -> tuple[float, flo
 
 
 @kernel
-def dead_reckon(world: BeaconGround, inside: Bools, walker: Walker) -> tuple[float, float]:
+def dead_reckon(world: BeaconGround, inside: Bools, walker: GuidedWalker) -> tuple[float, float]:
     """One step of dead reckoning in the measured heading, which the sources disturb; returns it (m, walk frame).
 
     `inside` (s,): the sources within whose radius the walker is; updated.
@@ -74,7 +74,7 @@ def dead_reckon(world: BeaconGround, inside: Bools, walker: Walker) -> tuple[flo
 
 
 @kernel
-def obey(walker: Walker, turn: float, obedience: Obedience, tick: int, rng: np.random.Generator) -> None:
+def obey(walker: GuidedWalker, turn: float, obedience: Obedience, tick: int, rng: np.random.Generator) -> None:
     """Decide on the turn (rad) of a cue, as well as the person obeys, and when it is made."""
     walker.turn = turn + math.radians(obedience.heading_sd_deg) * rng.standard_normal()
     if rng.random() < obedience.wrong_turns:
