@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.foot import ins, stance, zupt_ins
+from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
-from echostep.foot.zupt_ins import (
+from echostep.foot.zupt_state import (
     COVARIANCE,
     END_S,
     HEADING,
@@ -120,7 +120,7 @@ class Foot:
     """Live processing; equal samples give the same events, bit for bit, in blocks of any size."""
 
     def __init__(self, settings: FootSettings | None = None, noise: ins.Noise | None = None) -> None:
-        self._zupt = np.zeros(1, zupt_ins.ZUPT_STATE)
+        self._zupt = np.zeros(1, zupt_state.ZUPT_STATE)
         self._zupt["height_m"] = (settings or FootSettings()).height_m
         self._nav = ins.new_nav(noise or ins.Noise())
         self._window = stance.new_window()
@@ -175,9 +175,9 @@ class Foot:
             raise ValueError(
                 f"samples of shapes {t_s.shape}, {accel.shape}, {gyro.shape}; expected (n,), (n, 3), (n, 3), mag as gyro"
             )
-        events = np.zeros((zupt_ins.EVENTS_PER_SAMPLE * len(t_s), zupt_ins.EVENT_SIZE))
-        state = zupt_ins.FootState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
-        count = zupt_ins.process(state, zupt_ins.Samples(t_s, accel, gyro, mag), zupt_ins.Output(events, rows))
+        events = np.zeros((zupt_state.EVENTS_PER_SAMPLE * len(t_s), zupt_state.EVENT_SIZE))
+        state = zupt_state.FootState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
+        count = zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), zupt_state.Output(events, rows))
         return [_event(row) for row in events[:count]]
 
 
@@ -207,7 +207,7 @@ def walk_track(
 def _event(row: Floats) -> Step | Stance:
     """The event of a row (EVENT_SIZE,)."""
     start_s, end_s, heading, toe = row[[START_S, END_S, HEADING, TOE]].tolist()
-    if row[KIND] == zupt_ins.STANCE:
+    if row[KIND] == zupt_state.STANCE:
         return Stance(start_s, end_s, heading)
     dx, dy, dz = row[MOVE : MOVE + 3].tolist()
     covariance = row[COVARIANCE : COVARIANCE + 9].reshape(3, 3).copy()

@@ -9,14 +9,34 @@ Position and yaw errors count from the last stance, so every step has its own co
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
 
-from echostep.arrays import Floats, record_dtype
+from echostep.arrays import Floats
 from echostep.foot import ins, mounting, stance
 from echostep.foot import magnetometer as magnetic
 from echostep.foot.ins import POS, TILT, VEL, YAW, Nav
 from echostep.foot.magnetometer import Magnetometer
 from echostep.foot.stance import SampleWindow, ZaruSums
+from echostep.foot.zupt_state import (
+    COVARIANCE,
+    END_S,
+    HEADING,
+    HEADING_SD,
+    KIND,
+    MOVE,
+    ROW_EVENT_COUNT,
+    ROW_HEADING,
+    ROW_IN_STANCE,
+    ROW_POSITION,
+    STANCE,
+    START_S,
+    STEP,
+    TOE,
+    FootState,
+    Output,
+    Sample,
+    Samples,
+    ZuptState,
+)
 from echostep.jit import lean_kernel
 
 CONFIRM_S = 0.03  # a stance is reported after so much rest
@@ -36,101 +56,6 @@ UNSURE_YAW_RAD2_S = 1.0
 DOUBT_S = 0.1  # of stances against the innovation gate: the level is wrong
 ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
 FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, kerb or ramp
-
-STEP, STANCE = 0.0, 1.0  # kinds of event
-KIND, START_S, END_S, MOVE, COVARIANCE, HEADING, HEADING_SD, TOE = (
-    0,
-    1,
-    2,
-    3,
-    6,
-    15,
-    16,
-    17,
-)  # columns of an event: MOVE has 3, COVARIANCE 9
-EVENT_SIZE = 18
-EVENTS_PER_SAMPLE = 2
-ROW_POSITION, ROW_HEADING, ROW_IN_STANCE, ROW_EVENT_COUNT = 0, 3, 4, 5  # columns of a row: ROW_POSITION has 3
-ROW_SIZE = 6
-
-
-class ZuptState(Protocol):
-    """State of the foot besides its navigation: last sample, levelling, present rest, last step, counts. A numpy record in the kernel."""
-
-    t_s: float
-    period_s: float  # running median of the time between samples
-    force: Floats
-    rate: Floats
-    levelled: int
-    yaw_rad: float  # given to the attitude at levelling
-    waited_s: float  # for levelling
-    still_s: float
-    lasting_s: float
-    doubt_s: float  # of rest against the innovation gate
-    force_sum: Floats
-    force_count: int
-    lost_s: float  # of missing samples, not yet in the covariance
-    force_limit_s: Floats  # duration of each axis at its limit
-    rate_limit_s: Floats
-    rest_s: float
-    rest_end_s: float
-    rest_yaw_rad: float
-    in_stance: int
-    settled: int
-    stance_tilt: Floats  # tilt of the foot in the last stance
-    tilt_square: Floats  # of the swings, see `mounting`
-    tilt_cube: Floats
-    stance_begin_s: float
-    stance_end_s: float  # of the stance before
-    walking: int  # whether there was a stance before
-    origin: Floats  # position at the last reported step
-    yaw_variance: float  # at the last reported step
-    stray: int
-    samples: int
-    impossible: int
-    not_later: int
-    saturated: int
-    gaps: int
-    forced: int
-    height_m: float  # of the sensor above the sole's contact with the floor
-
-
-class FootState(NamedTuple):
-    """All state of one foot."""
-
-    zupt: ZuptState
-    nav: Nav
-    window: SampleWindow
-    sums: ZaruSums
-    compass: Magnetometer
-
-
-class Samples(NamedTuple):
-    """Samples t_s (n,), accel m/s2 and gyro rad/s (n, 3), mag (n, 3) or (0, 3), body frame."""
-
-    t_s: Floats
-    accel: Floats
-    gyro: Floats
-    mag: Floats
-
-
-class Sample(NamedTuple):
-    """One sample, `dt` s after the one before: accel m/s2 and gyro rad/s (3,)."""
-
-    dt: float
-    t_s: float
-    accel: Floats
-    gyro: Floats
-
-
-class Output(NamedTuple):
-    """`events` (2n, EVENT_SIZE); `rows` (n, ROW_SIZE) of the foot after each sample, or (0, ROW_SIZE) where not wanted."""
-
-    events: Floats
-    rows: Floats
-
-
-ZUPT_STATE = record_dtype(ZuptState, array_size=3)
 
 
 @lean_kernel

@@ -13,6 +13,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.foot.steps import Track
+from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
 from echostep.offline.csv_table import rate_complaint
 
 TIME = 0  # columns of the table
@@ -31,7 +32,7 @@ REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other wit
 BACK_SHARE = 0.02  # largest share of rows whose time goes back
 REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
 MISSING_SHARE = 0.02  # share of missing samples that is reported
-STEEP = (15.0, 4.0)  # m/s2, rad/s: equal readings beyond these are a sensor at its limit; as in `foot.zupt_ins`
+STEEP = (STEEP_M_S2, STEEP_RAD_S)  # equal readings beyond these are a sensor at its limit
 CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
 FEWEST_REPEATS = 3  # of equal neighbours at the limit
 FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
