@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.arrays import Floats, record_dtype
 from echostep.evaluate.fischer2008.beacon_cloud import BeaconCloud, mean_place
 from echostep.evaluate.fischer2008.learnt_trail import believed_trail, span_near_heard
 from echostep.evaluate.fischer2008.paper_fusion import Fusion, note_reliable
@@ -48,7 +48,7 @@ class Contact(Protocol):
     sent_back: float  # 1: has been sent back since the last measurement
 
 
-CONTACT = np.dtype([(name, "f8") for name in Contact.__annotations__])
+CONTACT = record_dtype(Contact)
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.arrays import Floats, record_dtype
 from echostep.evaluate.fischer2008.walker import GuidedWalker
 from echostep.jit import kernel
 from echostep.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
@@ -29,7 +29,7 @@ class Fusion(Protocol):
     confirmed: float  # 1: ultrasound has confirmed or corrected the place since the last guidance
 
 
-FUSION = np.dtype([(name, "f8") for name in Fusion.__annotations__])
+FUSION = record_dtype(Fusion)
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from echostep.arrays import Bools
+from echostep.arrays import Bools, record_dtype
 from echostep.jit import kernel
 from echostep.simulation.world.beacon_ground import BeaconGround, disturbance
 
@@ -46,7 +46,7 @@ class GuidedWalker(Protocol):
     turn_tick: float  # at which it is made
 
 
-WALKER = np.dtype([(name, "f8") for name in GuidedWalker.__annotations__])
+WALKER = record_dtype(GuidedWalker)
 
 
 @kernel
