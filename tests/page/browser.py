@@ -16,6 +16,7 @@ from typing import Any
 from board_runs import ROOT
 from echostep.foot.steps import Step
 from echostep.guidance.guided_run import GuidedRun
+from echostep.localization.estimate import Estimate
 from echostep.page.live import LivePage
 from echostep.page.server import Address
 from echostep.path import PathSegment
@@ -59,7 +60,7 @@ class Walk:
         self.page = LivePage(self._tracker, "A simulated walk", LOCAL, guided)
         self._begin = sum(chunk.t_arrival_ns - self._first_ns < begin_s * 1e9 for chunk in self._chunks)
         self._thread = threading.Thread(target=self._run, daemon=True)
-        self.taken = 0
+        self.checked_in: list[Estimate] = []  # the estimate that each check-in gave
         self.told_s: list[float] = []  # for each step, how long after the landing its bytes had come
         told = self._tracker.front_end.path.add_step
 
@@ -88,16 +89,16 @@ class Walk:
             if self._stop.wait(max(ahead_s, 0.0)):
                 return
             for said in self.page.pop_check_ins():
-                self.taken += 1
-                self._take(Chunk("person", chunk.t_arrival_ns, said))
+                self.checked_in += self._take(Chunk("person", chunk.t_arrival_ns, said))
             self._take(chunk)
 
-    def _take(self, chunk: Chunk) -> None:
+    def _take(self, chunk: Chunk) -> list[Estimate]:
         self._now_s = (chunk.t_arrival_ns - START_NS) * 1e-9
         portion = portion_of([chunk])
         self.page.note_arrival()
-        self._tracker.take(portion)
+        estimates = self._tracker.take(portion)
         self.page.publish(portion)
+        return estimates
 
 
 def looking(browser: Any, url: str, look: str) -> Any:
