@@ -63,12 +63,13 @@ def test_no_wall_runs_through_a_door_or_a_staircase(westport: Plan) -> None:
                 assert not len(walls.query(inside, "intersects")), (level.name, connector.name)
 
 
-def test_the_readme_counts_right(westport: Plan) -> None:
+def test_the_manual_counts_right(westport: Plan) -> None:
     walls, windows, doors = (
         sum(len(getattr(level, kind)) for level in westport.levels) for kind in ("walls", "windows", "doors")
     )
     said = f"{walls} walls, {windows} windows, {doors} doors and {len(westport.connectors)} stairs and lifts"
-    assert said in (Path(__file__).parents[2] / "host/docs/plan.md").read_text()
+    page = (Path(__file__).parents[2] / "host/docs/plan.md").read_text()
+    assert said in " ".join(page.split())
 
 
 def test_what_is_saved_has_the_digest(westport: Plan, tmp_path: Path) -> None:
