@@ -31,7 +31,7 @@ AIR_J_KG_K, GRAVITY_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C, COLDEST_C, WARMEST_C = 20.0, -30.0, 45.0
 SCALE_SD = 0.015  # of a rise, by the air's temperature
 RESOLUTION_M = 0.1
-HIGH_SPEED_PA, HIGH_RESOLUTION_PA = 3.0, 1.5  # noise of the SCP1000's modes [SCP1000 data sheet]
+HIGH_SPEED_PA = 3.0  # noise of the SCP1000's high-speed mode [SCP1000 data sheet]
 QUIETEST_PA = 0.2
 LOWEST_PA, HIGHEST_PA = 20_000.0, 120_000.0
 

@@ -45,7 +45,6 @@ class LivePage:
         self, tracker: Tracker, title: str, address: Address, guided: GuidedRun | None = None, *, replay: bool = False
     ) -> None:
         """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate."""
-        self.wanted = True  # false from Ctrl-C on
         self._tracker = tracker
         self._guided = guided
         self._replay = replay
