@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The functions that the portable firmware needs from the board. `avr/` implements them for the ATmega32U4; a test may implement them in
  * memory. The prefix of a name is its file in `avr/`. None blocks longer than its comment says. All are called from the main loop,
  * never from an interrupt. */
@@ -59,16 +60,31 @@ void spi_excite_gyros(enum excitation excitation);
 #define USB_ROOM 1023u /* size of the send buffer, bytes */
 
 void usb_run(void);                                   /* moves bytes and answers the host's requests */
-bool usb_is_open(void);                               /* whether a host program has the port open (DTR) */
+bool usb_is_open(void);                               /* whether a host program has the port open (DTR), and the bus is not suspended */
 bool usb_take_opening(void);                          /* true once after each opening, which empties the buffers */
 bool usb_write(const uint8_t *bytes, uint8_t length); /* all bytes; false: no room, none was taken */
 int16_t usb_read(void);                               /* one byte, or -1 */
 bool usb_bootloader_wanted(void);                     /* whether the port was closed at 1200 Bd */
+uint8_t usb_suspends(void);                           /* how often the host has suspended the bus since the start; wraps */
+
+/* Supply voltage. */
+bool adc_take(uint16_t *reading); /* 1024 * 1.1 V / supply, and starts the next measurement (0.1 ms); false: not finished */
+
+/* What survives a reset of the processor, but not a loss of power. */
+struct restart {
+	uint8_t cause;          /* of this start, RESET_CAUSE_* flags */
+	uint8_t starts;         /* since power was applied; at most 255 */
+	uint8_t crashes;        /* restarts by the watchdog among them */
+	uint8_t crash_place;    /* of the last crash, CRASH_PLACE_* */
+	uint16_t crash_address; /* of the last crash, in words; 0: unknown */
+};
+const struct restart *restart_known(void);
+void restart_enter(uint8_t place);   /* the main loop begins a part, CRASH_PLACE_* */
+void restart_note_sag(bool sagging); /* whether the supply is far below its usual voltage: explains the next reset */
 
 /* Power and start. */
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
 void board_sleep(uint32_t wake_ticks); /* until then, or until an interrupt needs the main loop; restarts the watchdog */
-uint8_t board_reset_cause(void);       /* RESET_CAUSE_* flags */
 uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack since the start */
 void board_bootloader(void);           /* resets the processor into the bootloader; does not return */
 

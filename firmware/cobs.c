@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "cobs.h"
 
 #define FULL_BLOCK 0xFFu /* code of a block of 254 bytes that no zero follows */

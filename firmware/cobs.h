@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Consistent Overhead Byte Stuffing [Cheshire and Baker 1999], without the closing zero. Pure functions. */
 #ifndef ECHOSTEP_COBS_H
 #define ECHOSTEP_COBS_H

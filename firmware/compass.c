@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "compass.h"
 #include "board.h"         /* twi_* */
 #include "configuration.h" /* rate, whether it is enabled */

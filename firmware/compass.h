@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Devantech CMPS10 (CMPS03 class): the compass. `compass` messages at the configured rate. */
 #ifndef ECHOSTEP_COMPASS_H
 #define ECHOSTEP_COMPASS_H

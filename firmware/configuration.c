@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "configuration.h"
 #include "compass.h" /* limits of its rate */
 #include "gyros.h"   /* limits of their rate */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The settings in force: the defaults after a reset, then what the host's last `configure` set. */
 #ifndef ECHOSTEP_CONFIGURATION_H
 #define ECHOSTEP_CONFIGURATION_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "frame.h"
 
 /* Adds one byte to a CRC-16/XMODEM, without a table and without a loop over its bits. */

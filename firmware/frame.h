@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames: the payload is id u8, sequence u16, body, crc u16, little-endian; on the wire it is COBS(payload) and a zero
  * (protocol/README.md). Pure functions. */
 #ifndef ECHOSTEP_FRAME_H

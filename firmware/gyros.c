@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "gyros.h"
 #include "board.h"         /* clock_now, spi_* */
 #include "configuration.h" /* rate, enabled gyros */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Analog Devices ADIS16100: the three rate gyros of thigh, calf and belt. One `gyros` message per sample instant, one `gyro_health`
  * message per gyro and second. */
 #ifndef ECHOSTEP_GYROS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "link.h"
 #include "board.h"  /* usb_* */
 #include "status.h" /* drop counters */

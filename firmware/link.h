@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames to and from the host: packed messages -> USB bytes, USB bytes -> commands. Owns the sequence number and the unfinished frame from
  * the host. */
 #ifndef ECHOSTEP_LINK_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Main loop of the sensor board: moves USB bytes, carries out the host's commands, runs each sensor, then sleeps until the earliest time
  * that a sensor returned, or until an interrupt. Interrupts only latch; everything that takes time happens here. */
 #include "board.h"         /* start, clock, USB, sleep */
@@ -9,17 +10,20 @@
 #include "ranger.h"        /* sensor */
 #include "selftest.h"      /* carries out `check_gyros` */
 #include "status.h"        /* sent once a second */
+#include "supply.h"        /* voltage */
 
 #define VERSION_MAJOR 1
-#define VERSION_MINOR 1
+#define VERSION_MINOR 2
 #define VERSION_PATCH 0
+
+static uint8_t subscribed; /* REPORTS_*, the optional messages that the host wants */
 
 #define SLEEP_MAX_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed within this time */
 
 static void send_identity(void)
 {
 	struct msg_identity m = {
-		clock_now(), SCHEMA_HASH, VERSION_MAJOR, VERSION_MINOR, VERSION_PATCH, board_reset_cause(),
+		clock_now(), SCHEMA_HASH, VERSION_MAJOR, VERSION_MINOR, VERSION_PATCH, restart_known()->cause,
 	};
 	link_send(MSG_IDENTITY, msg_pack_identity(link_body(), &m));
 }
@@ -48,6 +52,21 @@ static void send_status(void)
 	status.ticks = clock_now();
 	status.memory_used = board_memory_used();
 	link_send(MSG_STATUS, msg_pack_status(link_body(), &status));
+}
+
+static void send_board_health(void)
+{
+	const struct restart *r = restart_known();
+	struct msg_board_health m = {
+		.ticks = clock_now(),
+		.starts = r->starts,
+		.crashes = r->crashes,
+		.crash_place = r->crash_place,
+		.crash_address = r->crash_address,
+		.suspends = usb_suspends(),
+	};
+	supply_take(&m.supply_mv, &m.supply_least_mv);
+	link_send(MSG_BOARD_HEALTH, msg_pack_board_health(link_body(), &m));
 }
 
 static void send_identity_and_configuration(void)
@@ -102,6 +121,17 @@ static bool handle_check_gyros(const struct link_command *command)
 	return true;
 }
 
+static bool handle_subscribe(const struct link_command *command)
+{
+	struct msg_subscribe m;
+	if (!msg_unpack_subscribe(&m, command->body, command->length))
+		return false;
+	subscribed = m.reports;
+	if (subscribed & REPORTS_BOARD_HEALTH)
+		send_board_health();
+	return true;
+}
+
 /* Carries out a command; false: unknown id or wrong length. */
 static bool handle_command(const struct link_command *command)
 {
@@ -114,6 +144,8 @@ static bool handle_command(const struct link_command *command)
 		return handle_configure(command);
 	case MSG_CHECK_GYROS:
 		return handle_check_gyros(command);
+	case MSG_SUBSCRIBE:
+		return handle_subscribe(command);
 	default:
 		return false;
 	}
@@ -124,6 +156,7 @@ static void handle_port_opening(void)
 	if (!usb_take_opening())
 		return;
 	link_open();
+	subscribed = 0;
 	send_identity_and_configuration();
 }
 
@@ -146,7 +179,7 @@ static void send_edge(void)
 	link_send(MSG_SYNC, msg_pack_sync(link_body(), &m));
 }
 
-/* Sends identity and status when due; returns the time of the next call. */
+/* Sends the reports of each second when due; returns the time of the next call. */
 static uint32_t send_each_second(uint32_t now)
 {
 	static uint32_t due;
@@ -154,6 +187,8 @@ static uint32_t send_each_second(uint32_t now)
 		return due;
 	send_identity();
 	send_status();
+	if (subscribed & REPORTS_BOARD_HEALTH)
+		send_board_health();
 	due += TICKS_PER_S;
 	return due;
 }
@@ -169,28 +204,46 @@ static uint32_t run_sensors(void)
 {
 	uint32_t now = clock_now();
 	uint32_t wake = now + SLEEP_MAX_TICKS;
+	restart_enter(CRASH_PLACE_BUS);
 	if (twi_watch(now))
 		status.bus_recoveries++;
+	restart_enter(CRASH_PLACE_RANGER);
 	wake = earlier(wake, ranger_run(now));
+	restart_enter(CRASH_PLACE_GYROS);
 	wake = earlier(wake, gyros_run(now));
+	restart_enter(CRASH_PLACE_COMPASS);
 	wake = earlier(wake, compass_run(now));
+	restart_enter(CRASH_PLACE_PRESSURE);
 	wake = earlier(wake, pressure_run(now));
+	restart_enter(CRASH_PLACE_SUPPLY);
+	supply_run();
+	restart_enter(CRASH_PLACE_REPORTS);
 	return earlier(wake, send_each_second(now));
+}
+
+/* A restart that was not wanted happens during a walk: no self-test then. */
+static bool was_started_on_purpose(void)
+{
+	return !(restart_known()->cause & (RESET_CAUSE_WATCHDOG | RESET_CAUSE_BROWN_OUT));
 }
 
 int main(void)
 {
 	board_start();
 	start_sensors();
-	if (!(board_reset_cause() & RESET_CAUSE_WATCHDOG)) /* a watchdog reset happens during a walk: no test then */
+	if (was_started_on_purpose())
 		selftest_begin();
 	for (;;) {
+		restart_enter(CRASH_PLACE_USB);
 		usb_run(); /* received bytes */
+		restart_enter(CRASH_PLACE_COMMANDS);
 		handle_port_opening();
 		receive_commands();
 		send_edge();
 		uint32_t wake = run_sensors();
+		restart_enter(CRASH_PLACE_USB);
 		usb_run(); /* the messages just made */
+		restart_enter(CRASH_PLACE_SLEEP);
 		board_sleep(wake);
 	}
 }

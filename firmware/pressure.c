@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "pressure.h"
 #include "board.h"         /* spi_* */
 #include "configuration.h" /* mode, whether it is enabled */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* VTI SCP1000-D01: the barometer. Starts it, restarts it after a failure, one `pressure` message per sample. */
 #ifndef ECHOSTEP_PRESSURE_H
 #define ECHOSTEP_PRESSURE_H

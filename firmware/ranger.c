@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "ranger.h"
 #include "board.h"         /* twi_* */
 #include "configuration.h" /* schedule, enabled rangers */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Devantech SRF02: the two ultrasonic rangers. Triggers them, reads them, one `ping` message per ranging cycle.
  * Owns the ping schedule. Both schedules share one grid: each ranger has one slot per period, the right ranger half a period after
  * the left one.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "selftest.h"
 #include "board.h"    /* spi_excite_gyros */
 #include "messages.h" /* SELF_TEST_* */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Self-test of the three gyros: inputs ST1 and ST2 deflect the vibrating mass, first one way, then the other; the rate must follow. */
 #ifndef ECHOSTEP_SELFTEST_H
 #define ECHOSTEP_SELFTEST_H

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Flash, static RAM and an upper bound of the stack of the firmware, each against its limit.
 
+Also where the memory lies that survives a reset (.noinit): the bootloader must not write there.
 In: the ELF, and the compiler's stack usage files (-fstack-usage) in the same folder. Out: a table; exit status 1 when a
 limit is exceeded. The bound comes from the call graph of the disassembly: the deepest chain of calls from main plus the
 deepest interrupt (interrupts do not nest). Owns nothing.
@@ -19,6 +21,8 @@ ABSOLUTE_CALL = re.compile(r"\s(?:call|jmp)\s+0x([0-9a-f]+)")
 INDIRECT = re.compile(r"\s(?:icall|eicall|ijmp|eijmp)\b")
 INTERRUPT = re.compile(r"__vector_\d+$")
 RETURN_ADDRESS = 2  # bytes on the stack
+BOOTLOADER_WRITES = (0x0300, 0x0800)  # Caterina's variables end below the first address, its key is at the second
+DATA_SPACE = 0x800000  # of the ELF
 
 
 def output_of(*command: str) -> str:
@@ -72,6 +76,13 @@ def deepest(elf: Path) -> int:
     return depth(main, ()) + max(interrupts, default=0)
 
 
+def kept_memory(elf: Path) -> tuple[int, int]:
+    """First address of .noinit, and the address behind it."""
+    fields = next(f for f in map(str.split, output_of("avr-size", "-A", str(elf)).splitlines()) if f[:1] == [".noinit"])
+    begin = int(fields[2]) - DATA_SPACE
+    return begin, begin + int(fields[1])
+
+
 def main() -> int:
     elf = Path(sys.argv[1])
     flash_max, ram_max, memory_max = map(int, sys.argv[2:5])
@@ -85,7 +96,13 @@ def main() -> int:
     ):
         passed &= value <= limit
         print(f"{what:20}{value:7} B  limit {limit:6} B  {'ok' if value <= limit else 'TOO MUCH'}")
-    return 0 if passed else 1
+    begin, end = kept_memory(elf)
+    safe = BOOTLOADER_WRITES[0] <= begin and end <= BOOTLOADER_WRITES[1]
+    low, high = BOOTLOADER_WRITES
+    print(
+        f"{'kept over a reset':20} 0x{begin:04X}-0x{end - 1:04X}  within 0x{low:04X}-0x{high - 1:04X}  {'ok' if safe else 'OVERWRITTEN'}"
+    )
+    return 0 if passed and safe else 1
 
 
 if __name__ == "__main__":

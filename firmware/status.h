@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Counters of lost frames, failures and causes: each is counted where it happens; all are sent once a second as `status`. */
 #ifndef ECHOSTEP_STATUS_H
 #define ECHOSTEP_STATUS_H

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Make the C and Python codecs, the byte tables and the golden vectors from messages.toml.
 
 In: protocol/messages.toml. Out: the five files named in `outputs()`. `--check` writes nothing and exits 1 when one of them is stale.

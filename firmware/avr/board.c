@@ -1,4 +1,5 @@
-/* Start, sleep and watchdog of the processor; its reset cause and memory use. */
+/* SPDX-License-Identifier: MIT */
+/* Start and sleep of the processor; its memory use; its bootloader. */
 #include <avr/interrupt.h> /* cli, sei */
 #include <avr/io.h>        /* registers */
 #include <avr/power.h>     /* switching off unused parts */
@@ -17,7 +18,6 @@
 
 volatile bool board_awake;
 
-static uint8_t reset_cause;
 extern uint8_t _end; /* linker: first byte after the static variables */
 
 static void paint_free_memory(void)
@@ -28,11 +28,9 @@ static void paint_free_memory(void)
 
 void board_start(void)
 {
-	reset_cause = MCUSR;
+	restart_begin(MCUSR, USBCON & BIT(USBE));
 	MCUSR = 0;
-	wdt_disable(); /* after a watchdog reset it still runs, with its shortest period */
 	paint_free_memory();
-	power_adc_disable();
 	power_timer0_disable();
 	power_timer3_disable();
 	power_usart1_disable();
@@ -42,7 +40,7 @@ void board_start(void)
 	spi_start();
 	twi_start();
 	usb_start();
-	wdt_enable(WDTO_250MS);
+	adc_start();
 	sei();
 }
 
@@ -62,11 +60,6 @@ void board_sleep(uint32_t wake_ticks)
 	sei();
 }
 
-uint8_t board_reset_cause(void)
-{
-	return reset_cause;
-}
-
 /* Searches downwards from the deepest byte known so far, until UNTOUCHED_MAX painted bytes follow each other. A search of the whole memory
  * would take 0.7 ms. */
 uint16_t board_memory_used(void)
@@ -84,6 +77,7 @@ uint16_t board_memory_used(void)
 void board_bootloader(void)
 {
 	cli();
+	restart_forget();
 	*BOOTLOADER_KEY_OLD = BOOTLOADER_KEY;
 	*BOOTLOADER_KEY_NEW = BOOTLOADER_KEY;
 	wdt_enable(WDTO_120MS);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The 32-bit clock: Timer1 at 2 MHz extended by an overflow count; SyncOut edges on its input capture (PD4); and the alarm that ends a
  * sleep. */
 #include <avr/interrupt.h> /* ISR */

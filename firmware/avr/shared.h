@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Shared by the files of avr/: the start function of each part, and the flag by which an interrupt ends the main loop's sleep. */
 #ifndef ECHOSTEP_AVR_SHARED_H
 #define ECHOSTEP_AVR_SHARED_H
@@ -15,5 +16,8 @@ void clock_alarm(uint32_t ticks); /* an interrupt at that time, which must be le
 void twi_start(void);
 void spi_start(void);
 void usb_start(void);
+void adc_start(void);
+void restart_begin(uint8_t flags, bool bootloader_waited); /* with the flags of MCUSR, which a bootloader may have cleared */
+void restart_forget(void);                                 /* the next start counts as one after a loss of power */
 
 #endif

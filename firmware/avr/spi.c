@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SPI master: polled bytes to one of four chips, each with its own mode and rate; and the other pins of these chips. SCK PB1, MOSI PB2,
  * MISO PB3; chip selects PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7,
  * ST2 on PF6. */

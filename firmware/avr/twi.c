@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* I2C master: interrupts carry out one transfer at a time; the main loop frees a stuck bus. SCL is PD0, SDA is PD1. */
 #include <avr/interrupt.h> /* ISR */
 #include <avr/io.h>        /* registers */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* USB device controller of the ATmega32U4 [datasheet, chapters 21 and 22]: attach, bus reset, and the port's two bulk endpoints.
  * An interrupt only disables itself and wakes the main loop; usb_run does the work and enables it again. */
 #include <avr/interrupt.h> /* ISR */
@@ -23,7 +24,8 @@
 
 #define RING_SIZE (USB_ROOM + 1u)
 
-static volatile bool bus_was_reset;
+static volatile bool bus_was_reset, suspended;
+static uint8_t suspends;
 static uint8_t ring[RING_SIZE]; /* send buffer; empty when head == tail */
 static uint16_t head, tail;     /* indices of the next byte to write and to send */
 
@@ -36,14 +38,16 @@ void usb_start(void)
 	for (uint16_t n = 0; n < PLL_TRIES && !(PLLCSR & BIT(PLOCK)); n++)
 		;
 	USBCON = BIT(USBE) | BIT(OTGPADE);
-	UDIEN = BIT(EORSTE);
+	UDIEN = BIT(EORSTE) | BIT(SUSPE);
 	UDCON = 0; /* full speed, attached */
 }
 
+/* A bus without traffic for 3 ms is suspended. The controller's clock stays on, so that it answers at once when the bus resumes. */
 ISR(USB_GEN_vect)
 {
 	if (UDINT & BIT(EORSTI))
 		bus_was_reset = true;
+	suspended = !(UDINT & BIT(EORSTI));
 	UDINT = 0;
 	board_awake = true;
 }
@@ -65,7 +69,7 @@ ISR(USB_COM_vect)
 void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory)
 {
 	UENUM = endpoint;
-	UECONX = BIT(EPEN);
+	UECONX = BIT(RSTDT) | BIT(EPEN); /* RSTDT: the first packet is DATA0, as the host expects after it has set a configuration */
 	UECFG0X = type;
 	UECFG1X = memory;
 }
@@ -149,7 +153,23 @@ int16_t usb_read(void)
 
 bool usb_is_open(void)
 {
-	return usb_control_is_configured() && usb_control_port_is_open();
+	return usb_control_is_configured() && usb_control_port_is_open() && !suspended;
+}
+
+/* A start of frame ends a suspension. A port that is not configured yet is suspended until the host resets the bus: this does not count. */
+static void follow_suspend(void)
+{
+	static bool counted;
+	if (UDINT & BIT(SOFI))
+		suspended = false;
+	if (suspended && !counted && usb_control_is_configured())
+		suspends++;
+	counted = suspended;
+}
+
+uint8_t usb_suspends(void)
+{
+	return suspends;
 }
 
 static bool cable_pulled(void)
@@ -163,6 +183,7 @@ void usb_run(void)
 		bus_was_reset = false;
 		usb_control_start();
 	}
+	follow_suspend();
 	usb_control_run();
 	if (!usb_control_is_configured())
 		return;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Shared by the parts of the USB driver: usb.c moves the bytes of the port, usb_control.c answers the host's requests, usb_descriptors.c
  * holds the descriptors. */
 #ifndef ECHOSTEP_AVR_USB_H
@@ -17,7 +18,8 @@ void usb_start_port(void);                                       /* enables the 
 void usb_empty_port(void);                                       /* drops the bytes that wait for the host */
 
 /* usb_descriptors.c */
-const uint8_t *usb_descriptor(uint16_t value, uint8_t *length); /* by the request's wValue; in flash; 0: there is none */
+uint8_t usb_descriptor_length(uint16_t value);               /* by the request's wValue; 0: there is none */
+uint8_t usb_descriptor_byte(uint16_t value, uint8_t index); /* below that length */
 
 /* usb_control.c */
 void usb_control_start(void); /* after a bus reset and while unplugged: no configuration, port closed */

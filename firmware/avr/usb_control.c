@@ -1,7 +1,7 @@
+/* SPDX-License-Identifier: MIT */
 /* USB control endpoint: standard requests [USB 2.0, chapter 9] and those of the CDC-ACM class [PSTN120, 6.3]. Never waits: each call of
  * usb_control_run does what the controller is ready for, and enables the interrupt of the next step. */
-#include <avr/io.h>       /* registers */
-#include <avr/pgmspace.h> /* descriptors in flash */
+#include <avr/io.h> /* registers */
 #include "shared.h"
 #include "usb.h"
 
@@ -41,20 +41,22 @@ struct setup {
 	uint16_t value, index, length;
 };
 
-/* Of the request under way. ACKNOWLEDGING: the empty packet of the status stage. ADDRESSING: after it, the new address takes effect. */
-enum stage { IDLE, REPLYING, RECEIVING_LINE_CODING, ACKNOWLEDGING, ADDRESSING };
+/* Of the request under way. REPLYING and DESCRIBING: data for the host. ACKNOWLEDGING: the empty packet of the status stage. ADDRESSING:
+ * after it, the new address takes effect. */
+enum stage { IDLE, REPLYING, DESCRIBING, RECEIVING_LINE_CODING, ACKNOWLEDGING, ADDRESSING };
 
 static enum stage stage;
 static uint8_t configured; /* bConfigurationValue */
-static uint8_t address;
+static bool addressing; /* the request under way sets the address */
 static bool dtr;
 static uint8_t line_coding[LINE_CODING_SIZE] = { 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }; /* 115200 8N1; has no effect */
-static bool opened; /* since the last call of usb_take_opening */
+static bool opened;       /* since the last call of usb_take_opening */
+static bool reconfigured; /* since the host last set the line state */
 static bool bootloader_wanted;
 static struct {
-	const uint8_t *next;
-	uint8_t left;
-	bool in_flash;
+	const uint8_t *bytes; /* when REPLYING */
+	uint16_t descriptor;  /* when DESCRIBING: wValue of the request */
+	uint8_t index, length;
 } reply;
 static uint8_t answer[2];
 
@@ -62,7 +64,7 @@ void usb_control_start(void)
 {
 	stage = IDLE;
 	configured = 0;
-	dtr = false;
+	dtr = addressing = false;
 	usb_enable(EP_CONTROL, 0, MEMORY_64);
 }
 
@@ -88,20 +90,25 @@ bool usb_bootloader_wanted(void)
 	return bootloader_wanted && stage == IDLE; /* only after the host has its acknowledge */
 }
 
-static bool send(const uint8_t *bytes, uint8_t length, uint16_t wanted, bool in_flash)
+static bool send(enum stage how, uint8_t length, uint16_t wanted)
 {
-	reply.next = bytes;
-	reply.left = (uint8_t)(wanted < length ? wanted : length);
-	reply.in_flash = in_flash;
-	stage = REPLYING;
+	reply.index = 0;
+	reply.length = (uint8_t)(wanted < length ? wanted : length);
+	stage = how;
 	return true;
+}
+
+static bool send_bytes(const uint8_t *bytes, uint8_t length, uint16_t wanted)
+{
+	reply.bytes = bytes;
+	return send(REPLYING, length, wanted);
 }
 
 static bool send_answer(uint8_t low, uint8_t length, uint16_t wanted)
 {
 	answer[0] = low;
 	answer[1] = 0;
-	return send(answer, length, wanted, false);
+	return send_bytes(answer, length, wanted);
 }
 
 static bool acknowledge(void)
@@ -112,19 +119,29 @@ static bool acknowledge(void)
 
 static bool send_descriptor(const struct setup *s)
 {
-	uint8_t length;
-	const uint8_t *descriptor = usb_descriptor(s->value, &length);
-	return descriptor && send(descriptor, length, s->length, true);
+	uint8_t length = usb_descriptor_length(s->value);
+	reply.descriptor = s->value;
+	return length && send(DESCRIBING, length, s->length);
 }
 
+/* A host may set the same configuration again: the endpoints start anew, and an open port stays open. */
 static bool set_configuration(uint8_t value)
 {
 	if (value > 1)
 		return false;
 	configured = value;
-	dtr = false;
+	reconfigured = true;
+	dtr = dtr && configured;
 	if (configured)
 		usb_start_port();
+	return acknowledge();
+}
+
+/* The address and its bit ADDEN must not be written at once [data sheet, 22.7]; ADDEN follows after the status stage. */
+static bool set_address(uint8_t address)
+{
+	UDADDR = address;
+	addressing = true;
 	return acknowledge();
 }
 
@@ -136,11 +153,12 @@ static void check_for_1200_baud(void)
 
 static bool set_line_state(bool new_dtr)
 {
-	if (new_dtr && !dtr) {
+	if (new_dtr && (!dtr || reconfigured)) {
 		usb_empty_port();
 		opened = true;
 	}
 	dtr = new_dtr;
+	reconfigured = false;
 	check_for_1200_baud();
 	return acknowledge();
 }
@@ -176,8 +194,7 @@ static bool handle_request(const struct setup *s)
 	case REQUEST(FROM_DEVICE, GET_DESCRIPTOR):
 		return send_descriptor(s);
 	case REQUEST(TO_DEVICE, SET_ADDRESS):
-		address = s->value & 0x7Fu;
-		return acknowledge();
+		return set_address(s->value & 0x7Fu);
 	case REQUEST(TO_DEVICE, SET_CONFIGURATION):
 		return set_configuration((uint8_t)s->value);
 	case REQUEST(FROM_DEVICE, GET_CONFIGURATION):
@@ -196,7 +213,7 @@ static bool handle_request(const struct setup *s)
 	case REQUEST(TO_INTERFACE, SET_INTERFACE):
 		return s->value == 0 && acknowledge();
 	case REQUEST(FROM_PORT, GET_LINE_CODING):
-		return send(line_coding, LINE_CODING_SIZE, s->length, false);
+		return send_bytes(line_coding, LINE_CODING_SIZE, s->length);
 	case REQUEST(TO_PORT, SET_LINE_CODING):
 		stage = RECEIVING_LINE_CODING;
 		return s->length == LINE_CODING_SIZE;
@@ -223,7 +240,7 @@ static void receive_setup(void)
 	s.length = read16();
 	UEINTX = (uint8_t)~(BIT(RXSTPI) | BIT(RXOUTI));
 	stage = IDLE;
-	address = UDADDR & 0x7Fu;
+	addressing = false;
 	if (handle_request(&s))
 		return;
 	stage = IDLE;
@@ -247,11 +264,9 @@ static void receive_packet(void)
 
 static void send_part(void)
 {
-	for (uint8_t n = 0; n < EP_SIZE && reply.left; n++, reply.left--) {
-		UEDATX = reply.in_flash ? pgm_read_byte(reply.next) : *reply.next;
-		reply.next++;
-	}
-	if (!reply.left) /* no descriptor's length is a multiple of EP_SIZE: the last packet is short, or has the last byte wanted */
+	for (uint8_t n = 0; n < EP_SIZE && reply.index < reply.length; n++, reply.index++)
+		UEDATX = stage == DESCRIBING ? usb_descriptor_byte(reply.descriptor, reply.index) : reply.bytes[reply.index];
+	if (reply.index == reply.length) /* no descriptor's length is a multiple of EP_SIZE: the last packet is short, or has the last byte wanted */
 		stage = IDLE;
 	UEINTX = (uint8_t)~BIT(TXINI);
 }
@@ -261,14 +276,16 @@ static void send_next(void)
 {
 	switch (stage) {
 	case REPLYING:
+	case DESCRIBING:
 		send_part();
 		break;
 	case ACKNOWLEDGING:
-		stage = address == (UDADDR & 0x7Fu) ? IDLE : ADDRESSING;
+		stage = addressing ? ADDRESSING : IDLE;
+		addressing = false;
 		UEINTX = (uint8_t)~BIT(TXINI);
 		break;
 	case ADDRESSING:
-		UDADDR = (uint8_t)(address | BIT(ADDEN));
+		UDADDR |= BIT(ADDEN);
 		stage = IDLE;
 		break;
 	default:
@@ -286,6 +303,6 @@ void usb_control_run(void)
 		receive_packet();
 	if (UEINTX & BIT(TXINI))
 		send_next();
-	bool sending = stage == REPLYING || stage == ACKNOWLEDGING || stage == ADDRESSING;
+	bool sending = stage == REPLYING || stage == DESCRIBING || stage == ACKNOWLEDGING || stage == ADDRESSING;
 	UEIENX = (uint8_t)(BIT(RXSTPE) | BIT(RXOUTE) | (sending ? BIT(TXINE) : 0u));
 }

@@ -1,10 +1,17 @@
-/* USB descriptors: one CDC-ACM port [USB 2.0, chapter 9; CDC120; PSTN120]. All in flash. */
+/* SPDX-License-Identifier: MIT */
+/* USB descriptors: one CDC-ACM port [USB 2.0, chapter 9; CDC120; PSTN120]. All in flash, except the serial number, which is made of the
+ * chip's own number. */
+#include <avr/boot.h>     /* signature row */
 #include <avr/pgmspace.h> /* PROGMEM */
+#include <util/atomic.h>  /* ATOMIC_BLOCK */
 #include "usb.h"
 
 /* pid.codes reserves 0x1209:0x0001 for tests. */
 static const uint8_t device_descriptor[] PROGMEM = {
-	18, 1, 0x00, 0x02, 0x02, 0, 0, EP_SIZE, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 0, 1,
+	18, 1, 0x00, 0x02,      /* USB 2.0 */
+	2, 2, 0, EP_SIZE,       /* class and subclass by which Windows 10 and later load their driver, usbser.sys */
+	0x09, 0x12, 0x01, 0x00, /* vendor, product */
+	0x20, 0x01, 1, 2, 3, 1, /* release 1.2; strings of maker, product and serial number; one configuration */
 };
 
 #define CONFIGURATION_SIZE 67
@@ -28,8 +35,34 @@ static const uint8_t product[] PROGMEM = {
 	26, 3, 's', 0, 'e', 0, 'n', 0, 's', 0, 'o', 0, 'r', 0, ' ', 0, 'b', 0, 'o', 0, 'a', 0, 'r', 0, 'd', 0,
 };
 
+/* The chip's lot, wafer and place on it: ten bytes of the signature row, of which the data sheet is silent and which LUFA reads too. */
+#define CHIP_NUMBER 0x0Eu
+#define SERIAL_DIGITS 20u
+#define SERIAL_SIZE (2u + 2u * SERIAL_DIGITS)
+#define STRING 3u
+
+static uint8_t hex_digit(uint8_t nibble)
+{
+	return (uint8_t)(nibble < 10u ? '0' + nibble : 'A' - 10 + nibble);
+}
+
+/* A byte of the string descriptor: length, type, then two bytes a digit. */
+static uint8_t serial_byte(uint8_t index)
+{
+	if (index < 2u)
+		return index ? STRING : SERIAL_SIZE;
+	if (index & 1u)
+		return 0;
+	uint8_t digit = (uint8_t)(index / 2u - 1u), byte = 0;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		byte = boot_signature_byte_get(CHIP_NUMBER + digit / 2u);
+	}
+	return hex_digit(digit & 1u ? byte & 0x0Fu : byte >> 4);
+}
+
 struct descriptor {
-	const uint8_t *bytes;
+	const uint8_t *bytes; /* 0: made by serial_byte */
 	uint8_t length;
 };
 
@@ -46,14 +79,20 @@ static struct descriptor find(uint16_t value)
 		return (struct descriptor){ maker, sizeof maker };
 	case 0x0302:
 		return (struct descriptor){ product, sizeof product };
+	case 0x0303:
+		return (struct descriptor){ 0, SERIAL_SIZE };
 	default:
 		return (struct descriptor){ 0, 0 };
 	}
 }
 
-const uint8_t *usb_descriptor(uint16_t value, uint8_t *length)
+uint8_t usb_descriptor_length(uint16_t value)
 {
-	struct descriptor d = find(value);
-	*length = d.length;
-	return d.bytes;
+	return find(value).length;
+}
+
+uint8_t usb_descriptor_byte(uint16_t value, uint8_t index)
+{
+	const uint8_t *bytes = find(value).bytes;
+	return bytes ? pgm_read_byte(bytes + index) : serial_byte(index);
 }

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A minimal SVG writer: boxes, discs, wires, paths and lines of text.
 
 In: coordinates in pixels, x to the right, y down. Out: the text of an SVG file. Owns the elements drawn so far.

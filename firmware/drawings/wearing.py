@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Drawing of where each device is worn: python firmware/drawings/wearing.py > firmware/drawings/wearing.svg
 
 In: nothing. Out: SVG on standard output. Owns the places and the notes.

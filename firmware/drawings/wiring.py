@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Drawing of the sensor board's wiring: python firmware/drawings/wiring.py > firmware/drawings/wiring.svg
 
 In: nothing; the pins are those of the table in firmware/README.md. Out: SVG on standard output. Owns the layout.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """protocol/README.md: one byte table per message, between the page's two marks.
 
 In: the messages, and the page as it is. Out: the page with fresh tables. Owns the words for sender and "not measured".

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """firmware/messages.h and messages.c: structs, packers of the board's messages, unpackers of the host's.
 
 In: the messages between board and host. Out: C11 source. Owns nothing.
@@ -7,7 +8,7 @@ from __future__ import annotations
 
 import textwrap
 
-from generator.schema import FIXED_SEED, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
+from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
 COMMENT_WIDTH = 130  # as in the hand-written C
 
@@ -28,6 +29,7 @@ def _constants(messages: list[Message]) -> list[str]:
     value = schema_hash(messages)
     markers = {name: marker for m in messages for name, marker in m.invalid_markers.items()}
     return [
+        f"/* {LICENCE} */",
         f"/* Messages of the board link: structs, packers, unpackers. {NOTICE} */",
         "#ifndef ECHOSTEP_MESSAGES_H",
         "#define ECHOSTEP_MESSAGES_H",
@@ -94,7 +96,7 @@ static uint16_t get16(const uint8_t *in)
 def c_code(messages: list[Message]) -> str:
     """firmware/messages.c."""
     reads_16_bits = any(f.size == 2 for m in messages if m.direction == "host" for f in m.fields)
-    text = f'/* {NOTICE} */\n#include "messages.h"\n' + PUT + (GET16 if reads_16_bits else "")
+    text = f'/* {LICENCE} */\n/* {NOTICE} */\n#include "messages.h"\n' + PUT + (GET16 if reads_16_bits else "")
     for message in (m for m in messages if m.fields):
         body = _pack(message) if message.direction == "board" else _unpack(message)
         text += "\n".join(["", _signature(message), "{", *body, "}"]) + "\n"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/echostep/board/messages.py: one named tuple per message, its codec, and the bodies as numpy dtypes.
 
 In: the messages. Out: Python source, formatted as ruff does it. Owns nothing.
@@ -5,7 +6,7 @@ In: the messages. Out: Python source, formatted as ruff does it. Owns nothing.
 
 from __future__ import annotations
 
-from generator.schema import FIXED_SEED, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
+from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
 
 def python_code(messages: list[Message]) -> str:
@@ -18,6 +19,7 @@ def python_code(messages: list[Message]) -> str:
 
 def _head(value: int) -> list[str]:
     return [
+        f"# {LICENCE}",
         f'"""Messages of the board link. {NOTICE}',
         "",
         "In: the body of a frame. Out: named tuples of raw integers; units stand beside each field. `..._INVALID` is what a field holds",

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """protocol/vectors.jsonl: golden frames of every message, and COBS cases around its block length.
 
 In: the messages. Out: JSON lines; encoding is done here without the host's or the firmware's code. Owns the choice of cases.
