@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Install Debian packages that are missing; exit 1 without a word of error when this user may not.
 missing=""
 for package in "$@"; do

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The pages of host/docs that are made from the code, written or compared (`make docs`, `make check`).
 
 In: the installed package. Out: host/docs/*.md and report.schema.json. `--check` writes nothing and exits 1 when one is stale. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Fuzzes the MTx decoder with mutated frames: no exception, bounded memory, and only samples within the limits pass.
 
 In: a number of frames and a seed. Out: frames per second and counts of the reader; exit status 1 on a failure.

@@ -1,7 +1,10 @@
+# SPDX-License-Identifier: MIT
 """Kills a recording process with SIGKILL at random moments, and measures what is missing from its file.
 
-In: options. Out: how many milliseconds before each kill are missing; exit status 1 when it is more than a second, or when a file does not
-open. Owns the processes that it starts.
+In: options. Out: how many milliseconds before each kill are missing; exit status 1 when it is more than a second, when a file does not open, or
+when a recording of an earlier run is not the same bytes as before. Owns the processes that it starts.
+
+All runs record under one name in one folder, as `echostep live` does.
 
 The killed process records 850 chunks a second, as the ports deliver them, and holds the interpreter lock for long moments, as the filter's
 kernels do. It writes number and time of each recorded chunk to a pipe, which outlives it. A chunk that is in the pipe but not in the file
@@ -11,6 +14,7 @@ is lost.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import random
 import signal
@@ -26,7 +30,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.recording.edit import repair
 from echostep.recording.mcap_records import MCAP_MAGIC
-from echostep.recording.recorder import open_recording
+from echostep.recording.reading import open_recording
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
 ROW = struct.Struct("<Qq")
@@ -34,12 +38,14 @@ LIMIT_S = 1.0
 
 WRITER = """
 import os, struct, sys, time
-from echostep.recording.recorder import DerivedMessage, Recorder
+from pathlib import Path
+from echostep.recording.recorder import DerivedMessage
 from echostep.ports.chunks import Chunk
+from echostep.session.recording import start_recording
 from echostep.output.foxglove import pose
 path, pipe = sys.argv[1], int(sys.argv[2])
 number, busy = 0, [(k * 7919) % 100_003 for k in range(100_003)]
-with Recorder(path, {"note": "to be killed"}) as recorder:
+with start_recording(Path(path), {"note": "to be killed"}) as recorder:
     os.write(pipe, struct.pack("<Qq", 0, time.monotonic_ns()))
     while True:
         now = time.monotonic_ns()
@@ -56,18 +62,28 @@ with Recorder(path, {"note": "to be killed"}) as recorder:
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """Loss of one kill: chunks given to the recorder, chunks missing, and the time before the kill that they span."""
+    """Loss of one kill: chunks given to the recorder, chunks missing, the time before the kill that they span; earlier recordings that changed."""
 
     given: int
     missing: int
     missing_s: float
     opens: bool
+    changed: int
 
 
-def kill_once(path: Path, after_s: float) -> Kill:
-    """Record, kill `after_s` seconds after the first chunk, read the file; raises AssertionError when a chunk in the middle is missing."""
+def recordings(wanted: Path) -> dict[str, str]:
+    """Recordings under a name: name and digest of each."""
+    pattern = f"{wanted.stem}-*{wanted.suffix}"
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in wanted.parent.glob(pattern)}
+
+
+def kill_once(wanted: Path, after_s: float) -> Kill:
+    """Record under a name, kill `after_s` seconds after the first chunk, read the file; AssertionError when a chunk in the middle is missing."""
+    before = recordings(wanted)
     read_end, write_end = os.pipe()
-    run = subprocess.Popen([sys.executable, "-c", WRITER, str(path), str(write_end)], pass_fds=[write_end])
+    run = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(wanted), str(write_end)], pass_fds=[write_end], stdout=subprocess.DEVNULL
+    )
     os.close(write_end)
     try:
         given = [ROW.unpack(_read_row(read_end))]
@@ -80,7 +96,10 @@ def kill_once(path: Path, after_s: float) -> Kill:
     while row := os.read(read_end, ROW.size):
         given.append(ROW.unpack(row))
     os.close(read_end)
-    return _loss(path, given)
+    after = recordings(wanted)
+    changed = sum(after.get(name) != digest for name, digest in before.items())
+    (new,) = after.keys() - before.keys()
+    return _loss(wanted.with_name(new), given, changed)
 
 
 def _read_row(pipe: int) -> bytes:
@@ -90,17 +109,18 @@ def _read_row(pipe: int) -> bytes:
     return row
 
 
-def _loss(path: Path, given: Sequence[tuple[int, int]]) -> Kill:
+def _loss(path: Path, given: Sequence[tuple[int, int]], changed: int) -> Kill:
     try:
         numbers = [int.from_bytes(chunk.data[:8], "little") for chunk in open_recording(path).chunks()]
-        repair(path, path.with_suffix(".repaired.mcap"))
-        opens = path.with_suffix(".repaired.mcap").read_bytes().endswith(MCAP_MAGIC)
+        whole = path.with_name(f"repaired-{path.name}")
+        repair(path, whole)
+        opens = whole.read_bytes().endswith(MCAP_MAGIC)
     except EchostepError:
         numbers, opens = [], len(given) == 1  # killed before the first chunk was written
     assert numbers == list(range(1, len(numbers) + 1)), "chunks are missing in the middle"
     lost = [t_ns for number, t_ns in given if number > len(numbers)]
     missing_s = (given[-1][1] - lost[0]) * 1e-9 + CHUNK_NS * 1e-9 if lost else 0.0
-    return Kill(len(given) - 1, len(lost), missing_s, opens)
+    return Kill(len(given) - 1, len(lost), missing_s, opens, changed)
 
 
 def main() -> int:
@@ -113,17 +133,18 @@ def main() -> int:
     rng, kills = random.Random(options.seed), []
     with tempfile.TemporaryDirectory() as folder:
         for k in range(options.kills):
-            kills.append(kill_once(Path(folder) / f"{k}.mcap", rng.uniform(0.05, options.longest)))
+            kills.append(kill_once(Path(folder) / "walk.mcap", rng.uniform(0.05, options.longest)))
             if not (k + 1) % 20:
                 print(f"{k + 1} kills, worst {max(kill.missing_s for kill in kills) * 1e3:.0f} ms missing", flush=True)
     worst = max(kill.missing_s for kill in kills)
     typical = sorted(kill.missing_s for kill in kills)[len(kills) // 2]
-    closed = sum(not kill.opens for kill in kills)
+    closed, changed = sum(not kill.opens for kill in kills), sum(kill.changed for kill in kills)
     print(
         f"{len(kills)} kills: the last {typical * 1e3:.0f} ms missing (median), {worst * 1e3:.0f} ms at worst; "
-        f"{sum(kill.given for kill in kills)} chunks recorded, {sum(kill.missing for kill in kills)} missing; {closed} files do not open"
+        f"{sum(kill.given for kill in kills)} chunks recorded, {sum(kill.missing for kill in kills)} missing; {closed} files do not open, "
+        f"{changed} earlier recordings changed"
     )
-    return int(worst > LIMIT_S or closed > 0)
+    return int(worst > LIMIT_S or closed > 0 or changed > 0)
 
 
 if __name__ == "__main__":

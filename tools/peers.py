@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What others offer for the same work, for `bench.py`: rays of embreex and shapely, plain rays, and updates without a map.
 
 In: walls (n, 4), poses (n,). Out: functions to be timed. Owns nothing. Peers that are not installed are missing from the dictionaries;

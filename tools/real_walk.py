@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tracks a real recorded foot on a plan drawn around its path, and prints the error (`make real`).
 
 Real: the foot's inertial samples (walk GX5 33, 200 Hz), and every footprint, surveyed with a ruler. Simulated: the plan, a corridor 2 m wide along
@@ -12,7 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,13 +32,15 @@ from echostep.localization.metrics import load_truth
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.recording.recorder import Recorder, open_recording
+from echostep.recording.reading import open_recording
+from echostep.session.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import RATE_HZ, Walk
 from echostep.simulation.stimulus import BoardSensors
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+from recordings import DATA
 
 NAME = "GX5 33"
 NOTE = "foot real (GX5 33, surveyed footprints); plan drawn around the surveyed path, echoes simulated from it at the true positions"
@@ -62,11 +64,6 @@ class Recorded:
     gyro: Floats
     print_t_s: Floats
     print_m: Floats
-
-
-def data_folder() -> Path:
-    """Folder of the recordings."""
-    return Path(os.environ.get("ECHOSTEP_DATA", Path(__file__).resolve().parent.parent.parent / "shared" / "data"))
 
 
 def read_walk(folder: Path) -> Recorded:
@@ -163,7 +160,7 @@ def write_files(out: Path, walk: Recorded, seed: int) -> None:
         "settings_toml": SETTINGS,
         "plan_sha256": loaded.digest,
     }
-    with Recorder(out / "walk.mcap", about) as recorder:
+    with start_recording(out / "walk.mcap", about) as recorder:
         for chunk in chunks(walk, loaded, seed):
             recorder.write(chunk)
 
@@ -199,10 +196,10 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/real"), metavar="DIR")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    if not (data_folder() / "gx5_gcp").is_dir():
-        console.print(f"skipped: no recordings in {data_folder()} (set ECHOSTEP_DATA)")
+    if not (DATA / "gx5_gcp").is_dir():
+        console.print(f"skipped: no recordings in {DATA} (set ECHOSTEP_DATA)")
         return 0
-    walk = read_walk(data_folder())
+    walk = read_walk(DATA)
     write_files(options.out, walk, options.seed)
     plan = load_plan(options.out / "plan.json")
     assert plan.start is not None

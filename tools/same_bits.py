@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Digests of everything that a refactoring must not change, to be compared between two checkouts.
 
 In: the recordings' folder ($ECHOSTEP_DATA or ../shared/data), the twin when it is built. Out: one line `name sha256` per result on stdout:
@@ -11,7 +12,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import os
 import re
 import subprocess
 import sys
@@ -19,8 +19,9 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from recordings import DATA
+
 ROOT = Path(__file__).resolve().parent.parent
-DATA = Path(os.environ.get("ECHOSTEP_DATA", ROOT.parent / "shared" / "data"))
 TWIN = ROOT / "tools/twin/build/echostep-twin"
 ELF = ROOT / "firmware/build/echostep.elf"
 STUDIES = ("girard2011", "echoes", "trails", "lee2010", "floors", "legs", "storeys", "fischer2008", "feet")
@@ -78,12 +79,8 @@ def captures() -> Iterator[tuple[str, str]]:
 FOOT = """
 import hashlib, sys
 from pathlib import Path
-try:
-    from echostep.evaluate.feet.datasets import read_recordings
-    from echostep.foot.steps import walk_track
-except ImportError:
-    from echostep.evaluate.recordings import read_recordings
-    from echostep.foot import walk_track
+from echostep.evaluate.feet.datasets import read_recordings
+from echostep.foot.steps import walk_track
 for r in read_recordings(Path(sys.argv[1]))[0]:
     track = walk_track(r.t_s, r.accel, r.gyro, mag=r.mag)
     print(r.group, r.name, hashlib.sha256(track.position_m.tobytes()).hexdigest(), sep="\\t")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """CPU time of each stage of a replay: the smallest of several rounds.
 
 In: a recording and its plan. Out: a table on the terminal. Kernels are compiled before the measurement.
@@ -15,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from echostep.plan.model import load_plan
-from echostep.recording.recorder import open_recording
+from echostep.recording.reading import open_recording
 from echostep.tracker import Tracker
 
 Spent = dict[str, float]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """CPU load of a team: trackers that publish over MQTT, and two commanders that receive their reports.
 
 In: number of trackers, rate, duration. Out: figures on the terminal. Owns a Mosquitto broker on a free loopback port. The trackers are threads that

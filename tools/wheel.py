@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Builds the wheel, installs it in a fresh environment and runs a demo there, without clone, compiler or apt.
 
 In: the host package. Out: one line per stage with its time; exit status 1 when a stage fails. Owns a temporary folder.

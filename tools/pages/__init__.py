@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The pages of host/docs that are made from the code: one module a page.
 
 In: the installed package. Out: the text of each page. Owns nothing: `tools/docs.py` writes and compares.

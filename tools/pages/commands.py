@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/docs/commands.md: every command with its arguments and options, from typer.
 
 In: `echostep.cli`. Out: the page. Owns nothing.

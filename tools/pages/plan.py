@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/docs/plan.md: its table of every field of plan.json, from the schema.
 
 In: host/echostep/plans/plan.schema.json. Out: the page with its tables made anew. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/docs/python.md: the public Python API, from its docstrings.
 
 In: `echostep.__all__`, and `__all__` of the packages in it. Out: the page. Owns nothing.
@@ -9,11 +10,12 @@ import importlib
 import inspect
 from collections.abc import Iterator
 from enum import Enum
-from typing import Any
+from typing import Any, ForwardRef, Literal, get_origin
 
 import echostep
 from pages import MADE
 
+LINE = 100  # characters; by reason: the width of the page
 HEAD = """# Python
 {made}
 What is listed here keeps its names; everything else may move between versions. All of it is typed.
@@ -44,12 +46,13 @@ def page() -> str:
 
 def _entry(name: str, value: Any) -> str:
     """One name: heading, docstring, public methods."""
-    text = inspect.cleandoc(value.__doc__ or "") if callable(value) else f"`{value!r}`"
-    if callable(value) and text.startswith(f"{name}("):
+    described = callable(value) and get_origin(value) is not Literal
+    text = inspect.cleandoc(value.__doc__ or "") if described else f"`{value!r}`".replace("typing.", "")
+    if described and text.startswith(f"{name}("):
         text = ""  # a dataclass or tuple without a docstring of its own
     methods = "".join(_methods(value)) if inspect.isclass(value) else ""
-    heading = f"### {name}{_signature(value)}" if callable(value) else f"### {name}"
-    return f"{heading}\n\n{text}\n{methods}"
+    call = f"```python\n{signature}\n```\n\n" if (signature := _signature(name, value)) else ""
+    return f"### {name}\n\n{call}{text}\n{methods}"
 
 
 def _methods(value: type) -> Iterator[str]:
@@ -61,18 +64,41 @@ def _methods(value: type) -> Iterator[str]:
             continue
         text = inspect.cleandoc(member.__doc__ or "").split("\n\n")[0].replace("\n", " ")
         if text:
-            yield f"\n- `{name}{'' if isinstance(member, property) else _signature(member)}`: {text}"
+            yield f"\n- `{name if isinstance(member, property) else ' '.join(_signature(name, member).split())}`: {text}"
     yield "\n"
 
 
-def _signature(value: Any) -> str:
-    """Parameters and result as they are written in the source."""
-    if inspect.isclass(value) and issubclass(value, Enum):
+def _signature(name: str, value: Any) -> str:
+    """The call as it is written in the source, one parameter a line where it does not fit into LINE characters; empty for what is not called."""
+    if not callable(value) or get_origin(value) is Literal or (inspect.isclass(value) and issubclass(value, Enum)):
         return ""
-    try:
-        return str(inspect.signature(value)).replace("self, ", "").replace("(self)", "()").replace("'", "")
-    except (TypeError, ValueError):
-        return ""
+    signature = inspect.signature(value)
+    parts: list[str] = []
+    for parameter in signature.parameters.values():
+        if parameter.kind is parameter.KEYWORD_ONLY and "*" not in parts:
+            parts.append("*")
+        if not parameter.name.startswith("_") and parameter.name != "self":
+            parts.append(_parameter(parameter))
+    returns = "" if inspect.isclass(value) else f" -> {_annotation(signature.return_annotation)}"
+    if len(line := f"{name}({', '.join(parts)}){returns}") <= LINE:
+        return line
+    return f"{name}(\n" + "".join(f"    {part},\n" for part in parts) + f"){returns}"
+
+
+def _parameter(parameter: inspect.Parameter) -> str:
+    """`name: type = default`; a default that is made anew for each call is `...`."""
+    text = f"{parameter.name}: {_annotation(parameter.annotation)}"
+    if parameter.default is parameter.empty:
+        return text
+    default = str(parameter.default) if isinstance(parameter.default, Enum) else repr(parameter.default)
+    return f"{text} = {'...' if default == '<factory>' else default}"
+
+
+def _annotation(value: Any) -> str:
+    """A type as it is written in the source."""
+    if isinstance(value, ForwardRef):
+        return value.__forward_arg__
+    return value if isinstance(value, str) else inspect.formatannotation(value)
 
 
 def public_names() -> list[str]:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/docs/recordings.md: its table of derived messages, from their schemas.
 
 In: `echostep.output`. Out: the page with its table made anew. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/docs/settings.md: every section and field of the settings, from their dataclasses.
 
 In: `echostep.settings`. Out: the page. Owns nothing.

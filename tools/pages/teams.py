@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """host/docs/teams.md: its tables of every field of a report, and the report's JSON Schema, from the dataclasses that the host checks with.
 
 In: `echostep.team.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.

@@ -16,6 +16,8 @@
 
 struct row row;
 
+static enum pair { NONE, RANGERS, THIGH_CALF, THIGH_BELT, CALF_BELT, PAIRS } swapped;
+
 static uint8_t out_buffer[1 << 16];
 static unsigned out_length;
 static int out_fd;
@@ -129,14 +131,25 @@ static avr_cycle_count_t sync_rise(avr_t *a, avr_cycle_count_t when, void *param
 	return 0;
 }
 
+/* A sleeping processor passes time up to the next timer: none may lie beyond the end of the millisecond. */
+static avr_cycle_count_t millisecond_ended(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	(void)a;
+	(void)when;
+	(void)param;
+	return 0;
+}
+
 static void run_millisecond(avr_cycle_count_t end)
 {
-	if (!board_has_power()) {
+	if (!board_runs()) {
 		avr->cycle = end;
 		return;
 	}
 	if (row.sync_us != NO_SYNC)
-		avr_cycle_timer_register(avr, US(row.sync_us) + 1, sync_rise, NULL);
+		avr_cycle_timer_register(avr, clock_cycles(row.sync_us) + 1, sync_rise, NULL);
+	if (avr->cycle < end)
+		avr_cycle_timer_register(avr, end - avr->cycle, millisecond_ended, NULL);
 	while (avr->cycle < end) {
 		int state = avr_run(avr);
 
@@ -145,66 +158,56 @@ static void run_millisecond(avr_cycle_count_t end)
 	}
 }
 
+static void swap16(void *a, void *b)
+{
+	uint16_t kept;
+
+	memcpy(&kept, a, 2);
+	memcpy(a, b, 2);
+	memcpy(b, &kept, 2);
+}
+
+/* The plugs of two sensors are exchanged. */
+static void swap_sensors(void)
+{
+	switch (swapped) {
+	case RANGERS:
+		swap16(&row.own_us[0], &row.own_us[1]);
+		swap16(&row.cross_us[0], &row.cross_us[1]);
+		break;
+	case THIGH_CALF: swap16(&row.rate[0], &row.rate[1]); break;
+	case THIGH_BELT: swap16(&row.rate[0], &row.rate[2]); break;
+	case CALF_BELT: swap16(&row.rate[1], &row.rate[2]); break;
+	default: break;
+	}
+}
+
+bool bench_swap(const char *value)
+{
+	static const char *const names[PAIRS] = { "none", "rangers", "thigh_calf", "thigh_belt", "calf_belt" };
+
+	for (int k = 0; k < PAIRS; k++)
+		if (!strcmp(value, names[k])) {
+			swapped = (enum pair)k;
+			return true;
+		}
+	return false;
+}
+
 /* Runs one millisecond per row. */
 static void advance(const uint8_t *rows, uint32_t length)
 {
-	static avr_cycle_count_t end;
-
 	if (length % ROW_SIZE)
 		fail("a record of rows has %u bytes, not a multiple of %zu", length, ROW_SIZE);
 	for (uint32_t offset = 0; offset < length; offset += ROW_SIZE) {
 		memcpy(&row, rows + offset, ROW_SIZE);
-		end += CYCLES_PER_MS;
-		run_millisecond(end);
+		swap_sensors();
+		run_millisecond(clock_next_millisecond());
 		if (pty_wanted())
 			pty_poll();
 	}
 	put_record('A', NULL, 0);
 	flush();
-}
-
-/* Switches that are no device's; false: no such switch. */
-static bool board_fault(const char *name, const char *value)
-{
-	if (!strcmp(name, "usb")) {
-		if (!strcmp(value, "unplug"))
-			board_power(false);
-		else if (!strcmp(value, "plug"))
-			board_power(true);
-		else if (!strcmp(value, "reset"))
-			usb_host_reset();
-		else
-			return false;
-	} else if (!strcmp(name, "host")) {
-		usb_host_stall(!strcmp(value, "stall"));
-		return !strcmp(value, "stall") || !strcmp(value, "read");
-	} else if (!strcmp(name, "sda")) {
-		bool forever = !strcmp(value, "stuck_forever");
-
-		twi_fault(forever ? TWI_STUCK_FOREVER : !strcmp(value, "stuck") ? TWI_STUCK : TWI_GOOD);
-		return forever || !strcmp(value, "stuck") || !strcmp(value, "ok");
-	} else if (!strcmp(name, "reset")) {
-		uint8_t cause = !strcmp(value, "power") ? 1 : !strcmp(value, "external") ? 2 : !strcmp(value, "watchdog") ? 8 : 0;
-
-		if (cause)
-			board_reset(cause);
-		return cause != 0;
-	} else {
-		return false;
-	}
-	return true;
-}
-
-static void switch_fault(char *text)
-{
-	char *value = strchr(text, '=');
-
-	if (!value)
-		fail("fault '%s' is not name=value", text);
-	*value++ = 0;
-	if (!board_fault(text, value) && !srf02_fault(text, value) && !adis16100_fault(text, value) && !scp1000_fault(text, value) &&
-	    !compass_fault(text, value))
-		fail("there is no fault %s=%s; see tools/twin/README.md", text, value);
 }
 
 void bench_run(int in, int out)

@@ -18,17 +18,12 @@
 
 #define MCU "atmega32u4"
 #define FREQUENCY 16000000u
-#define MCUSR 0x54
 #define EXTERNAL_INTERRUPTS 7
-enum { POWER_ON = 1, WATCHDOG = 8 };
 
 avr_t *avr;
 uint64_t random_state = 1;
 
 static elf_firmware_t firmware;
-static uint8_t next_cause = POWER_ON;
-static bool with_pty;
-static bool powered = true;
 
 void fail(const char *format, ...)
 {
@@ -50,11 +45,6 @@ uint32_t random_below(uint32_t limit)
 	z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
 	z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
 	return (uint32_t)((z ^ (z >> 31)) % limit);
-}
-
-uint64_t time_ns(void)
-{
-	return avr->cycle * 125u / 2u;
 }
 
 avr_int_vector_t *vector(int number)
@@ -90,63 +80,6 @@ void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t wri
 		avr->io[io].w.c = write;
 		avr->io[io].w.param = NULL;
 	}
-}
-
-static void power_devices(void)
-{
-	srf02_power();
-	adis16100_power();
-	scp1000_power();
-	compass_power();
-}
-
-/* The content of RAM after power-up is undefined. */
-static void scramble_memory(void)
-{
-	memset(avr->data + avr->ioend + 1, 0xA5, (size_t)(avr->ramend - avr->ioend));
-}
-
-/* Called by simavr after every reset, whatever its cause; simavr has lost all timers. */
-static void after_reset(avr_t *a)
-{
-	a->data[MCUSR] = next_cause;
-	bench_trace("reset %s", next_cause == POWER_ON ? "power" : next_cause == WATCHDOG ? "watchdog" : "external");
-	bench_reset();
-	usb_device_reset();
-	twi_reset();
-	spi_reset();
-	if (next_cause == POWER_ON)
-		power_devices();
-	else
-		scp1000_resume();
-	adis16100_resume();
-	next_cause = WATCHDOG; /* every other cause is set before its reset */
-	usb_host_start();
-}
-
-void board_reset(uint8_t cause)
-{
-	next_cause = cause;
-	avr_reset(avr);
-}
-
-void board_power(bool on)
-{
-	if (on == powered)
-		return;
-	powered = on;
-	usb_host_unplug();
-	if (with_pty)
-		(on ? pty_open : pty_close)();
-	if (on) {
-		scramble_memory();
-		board_reset(POWER_ON);
-	}
-}
-
-bool board_has_power(void)
-{
-	return powered;
 }
 
 /* simavr's messages are not printed; errors are reported by `fail`. */
@@ -202,17 +135,16 @@ static void make_board(const char *path)
 	if (firmware.flashsize > avr->flashend + 1)
 		fail("%s: %u bytes do not fit into the flash", path, firmware.flashsize);
 	avr_load_firmware(avr, &firmware);
-	scramble_memory();
 	avr->sleep = no_sleep;
 	usb_device_init();
 	twi_init();
 	spi_init();
+	watchdog_init();
 	for (int i = 0; i < avr->interrupts.vector_count; i++)
 		avr_irq_register_notify(avr->interrupts.vector[i]->irq + AVR_INT_IRQ_RUNNING, add_entry_cycles, NULL);
 	for (uint8_t i = 0; i < EXTERNAL_INTERRUPTS; i++)
 		avr_extint_set_strict_lvl_trig(avr, i, 0); /* otherwise simavr polls low pins on every cycle */
-	avr->reset = after_reset;
-	after_reset(avr);
+	board_init();
 }
 
 static uint64_t seed_of(const char *text)
@@ -235,6 +167,7 @@ int main(int argc, char **argv)
 		{ NULL, 0, NULL, 0 },
 	};
 	const char *elf = NULL;
+	bool with_pty = false;
 	int option;
 
 	while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Figures of the real firmware in the twin: rates, errors of time stamps, losses, memory, speed; each with its limit and PASS or FAIL.
 
 In: the ELF and the twin (`make measure` builds both). Out: a table; exit status 1 when a limit is missed. Owns the limits.

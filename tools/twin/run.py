@@ -1,8 +1,10 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """The twin in real time: a simulated walk in the demo building, the board and the MTx on two pseudo terminals (`make twin`).
 
 In: the ELF and the twin; the MTx begins with its factory settings and accepts its configuration. Out: two ports for `echostep live`, and the
 true path in out/twin/truth.csv. The walk begins when the board's port is opened, and is repeated until Ctrl-C. With
-`--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. Owns both pseudo terminals.
+`--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. With `--still`
+the wearer acts what `echostep calibrate` asks for. Owns both pseudo terminals.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from echostep.plan.model import load_plan
 from echostep.simulation.devices.beacon_gateway import SPACING_M
 from echostep.simulation.devices.board import Sent
 from echostep.simulation.devices.mtx_setup import MtxDevice
+from echostep.simulation.rehearsal import Act, Rehearsal
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.simulation.stimulus import NO_SYNC, ROW
 from echostep.xsens import MtxReader
@@ -151,12 +154,32 @@ def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
             began = time.monotonic() - now_s
 
 
+def rehearse(rehearsal: Rehearsal, board: PtyBoard, mtx: PtyMtx) -> None:
+    """Act what `echostep calibrate` asks for, the next act at each opening of the board's port, in real time, until Ctrl-C."""
+    act, at_ms, was_open = Act.WALK, 0, False
+    due_s = time.monotonic()
+    while True:
+        if board.is_open and not was_open:
+            act, at_ms = Act((act + 1) % len(Act)), 0
+            print(f"the wearer: {act.name.lower()}", flush=True)
+        was_open = board.is_open
+        rows = rehearsal.rows(act if was_open else Act.STAND, at_ms, BLOCK_MS)
+        if not mtx.device.pulses:
+            rows["sync_us"] = NO_SYNC
+        board.advance(rows)
+        mtx.answer_requests()
+        at_ms += BLOCK_MS
+        due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
+        time.sleep(max(0.0, due_s - time.monotonic()))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--once", action="store_true", help="end after one walk")
     parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
     parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
+    parser.add_argument("--still", action="store_true", help="a wearer who does what echostep calibrate asks")
     options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
@@ -166,9 +189,14 @@ def main() -> int:
         mtx = PtyMtx()
         options.out.mkdir(parents=True, exist_ok=True)
         more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
+        command = f"live --plan {path} --board {board.port} --mtx {mtx.port}{more}"
+        if options.still:
+            command = f"calibrate --board {board.port} --out out/twin/calibration.toml"
         print(f"board {board.port}\nmtx   {mtx.port}\n\nIn another terminal:\n"
-              f"  .venv/bin/echostep live --plan {path} --board {board.port} --mtx {mtx.port}{more}\n\nCtrl-C ends.", flush=True)  # fmt: skip
+              f"  .venv/bin/echostep {command}\n\nCtrl-C ends.", flush=True)  # fmt: skip
     try:
+        if options.still:
+            rehearse(Rehearsal(plan, options.seed, board), board, mtx)
         while True:
             scenario = demo_scenario(plan, options.seed, board)
             wait_for_opening(board, mtx)

@@ -66,6 +66,8 @@ static void select_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 	if (d->selected != !level) {
 		d->selected = !level;
 		d->select(d, d->selected);
+		if (d->selected)
+			hang_spi_selected();
 	}
 }
 

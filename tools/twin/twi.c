@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Two-wire interface, master mode [ATmega32U4 data sheet, chapter 20]: bit timing of TWBR and TWSR, devices on the bus, clock
- * stretching, and an SDA line that a device may hold low until it has received nine clocks. */
+ * stretching, an SDA line that a device may hold low until it has received nine clocks, and an SCL line that one may hold low. */
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>
@@ -89,6 +89,8 @@ static void operate(unsigned bits, uint8_t result)
 	uint32_t stretch = active ? active->stretch : 0;
 
 	status = result;
+	if (line == TWI_CLOCK_STUCK)
+		return; /* it never ends */
 	avr_cycle_timer_register(avr, bits * bit_cycles() + stretch, done, NULL);
 }
 
@@ -149,7 +151,7 @@ static void transfer(uint8_t control)
 {
 	uint8_t byte = avr->data[TWDR];
 
-	if (line != TWI_GOOD && phase != READING && byte) {
+	if ((line == TWI_STUCK || line == TWI_STUCK_FOREVER) && phase != READING && byte) {
 		lose_arbitration(byte);
 		return;
 	}

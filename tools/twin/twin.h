@@ -34,7 +34,6 @@ extern struct row row;       /* the millisecond under way */
 extern uint64_t random_state; /* for everything that varies from part to part */
 
 uint32_t random_below(uint32_t limit);
-uint64_t time_ns(void); /* simulated */
 void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2))); /* one line on stderr, exit status 2 */
 avr_int_vector_t *vector(int number);
 
@@ -44,28 +43,48 @@ void drive_pin(char port, uint8_t pin, bool level);
 /* Replaces the functions that the program's reads and writes of a register call. */
 void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t write);
 
+/* clock.c: true time; the processor's crystal may be off. */
+uint64_t time_ns(void);                          /* simulated */
+avr_cycle_count_t clock_next_millisecond(void);  /* begins one; returns its end */
+avr_cycle_count_t clock_cycles(unsigned us);     /* of true time */
+bool clock_fault(const char *value);
+
 /* bench.c: the bytes that the board sends, and traces of its buses for tests. */
 void bench_sent(const uint8_t *bytes, unsigned length);
 bool bench_has_room(void); /* false: the program on the host does not read */
 void bench_trace(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void bench_reset(void);
+bool bench_swap(const char *value); /* false: there are no such sensors */
 void bench_run(int in, int out);
 
 /* usb_device.c: the device controller, from the cable's side. */
-enum usb_answer { USB_ACK = 0, USB_NAK = -1, USB_STALL = -2, USB_SILENCE = -3 };
+enum usb_answer { USB_ACK = 0, USB_NAK = -1, USB_STALL = -2, USB_SILENCE = -3, USB_REPEATED = -4 };
 void usb_device_init(void);
 void usb_device_reset(void);
 bool usb_device_attached(void);
 void usb_bus_reset(void);
+void usb_bus_suspend(void); /* 3 ms without traffic */
+void usb_bus_resume(void);
+void usb_target(uint8_t address); /* of the transactions that follow */
 void usb_frame(uint16_t number);
 int usb_setup(const uint8_t *request);
-int usb_in(uint8_t endpoint, uint8_t *bytes); /* returns the length, or a usb_answer */
-int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length);
+int usb_in(uint8_t endpoint, uint8_t *bytes, bool *toggle); /* returns the length, or a usb_answer; the packet stays until acknowledged */
+void usb_in_acknowledged(uint8_t endpoint);
+int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length, bool toggle);
+
+/* usb_cable.c: the same transactions as the host sees them. */
+void usb_cable_reset_toggles(void); /* of the host, when it sets a configuration */
+int usb_cable_setup(const uint8_t *request);
+int usb_cable_in(uint8_t endpoint, uint8_t *bytes);
+int usb_cable_out(uint8_t endpoint, const uint8_t *bytes, unsigned length);
+bool usb_cable_errors(const char *value);
 
 /* usb_host.c: enumerates the device, opens the port, moves bytes. */
 void usb_host_start(void);   /* after power-up: registers its timer */
 void usb_host_unplug(void);
 void usb_host_reset(void);   /* a bus reset: the device is enumerated again */
+void usb_host_suspend(bool on);
+void usb_host_configure(void); /* sets the configuration that is in force again */
 void usb_host_stall(bool on); /* the program on the host does not read */
 void usb_host_open(bool on);  /* a program has the port open (DTR) */
 void usb_host_send(const uint8_t *bytes, unsigned length);
@@ -80,7 +99,7 @@ struct twi_device {
 	uint32_t stretch; /* cycles for which the device holds the clock low after each byte */
 	struct twi_device *next;
 };
-enum twi_fault { TWI_GOOD, TWI_STUCK, TWI_STUCK_FOREVER };
+enum twi_fault { TWI_GOOD, TWI_STUCK, TWI_STUCK_FOREVER, TWI_CLOCK_STUCK };
 void twi_init(void);
 void twi_reset(void);
 void twi_add(struct twi_device *device);
@@ -121,9 +140,38 @@ bool pty_has_room(void);
 void pty_write(const uint8_t *bytes, unsigned length);
 void pty_poll(void);
 
-/* main.c */
+/* board.c */
+void board_init(void); /* the first power-up */
 void board_power(bool on);
 void board_reset(uint8_t cause); /* MCUSR bits */
-bool board_has_power(void);
+bool board_runs(void);           /* once a millisecond: whether the program runs; without power, and in the bootloader, it does not */
+void board_watchdog(void);
+bool board_fault(const char *name, const char *value);
+
+/* supply.c */
+void supply_init(void);
+bool supply_in_brown_out(void);
+bool supply_is_unreliable(void);
+bool supply_took_memory(void); /* since the last call */
+bool supply_took_chips(void);  /* since the last call: the sensors lost their power */
+bool supply_fault(const char *value);
+bool supply_fuse(const char *value);
+
+/* hang.c: a processor that hangs. */
+void hang_now(void);
+void hang_soon(void); /* at the next millisecond */
+void hang_millisecond(void);
+void hang_spi_selected(void);
+void hang_end(void);
+bool hang_fault(const char *value);
+
+/* signature.c */
+void signature_init(void);
+
+/* watchdog.c */
+void watchdog_init(void);
+
+/* faults.c */
+void switch_fault(char *text);
 
 #endif

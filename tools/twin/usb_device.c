@@ -13,7 +13,7 @@ enum {
 	UEINTX = 0xE8, UENUM, UERST, UECONX, UECFG0X, UECFG1X, UESTA0X, UESTA1X, UEIENX, UEDATX, UEBCLX, UEBCHX, UEINT,
 };
 enum { TXINI = 1, STALLEDI = 2, RXOUTI = 4, RXSTPI = 8, NAKOUTI = 16, RWAL = 32, NAKINI = 64, FIFOCON = 128 };
-enum { USBE = 0x80, FRZCLK = 0x20, OTGPADE = 0x10, VBUS = 1, VBUSTI = 1, VBUSTE = 1, DETACH = 1, SOFI = 4, EORSTI = 8 };
+enum { USBE = 0x80, FRZCLK = 0x20, OTGPADE = 0x10, VBUS = 1, VBUSTI = 1, VBUSTE = 1, DETACH = 1, SUSPI = 1, SOFI = 4, EORSTI = 8, WAKEUPI = 16 };
 enum { PLLCSR = 0x49, PLOCK = 1, UVREGE = 1 };
 enum { EPEN = 1, RSTDT = 8, STALLRQC = 16, STALLRQ = 32, ALLOC = 2, ADDEN = 0x80 };
 #define ENDPOINTS 7
@@ -30,9 +30,12 @@ struct bank {
 static struct endpoint {
 	uint8_t conx, cfg0, cfg1, enabled, flags;
 	bool stalled;
+	bool toggle; /* of the next packet, sent or expected; a control endpoint: of IN */
 	struct bank bank[2]; /* of a control endpoint: 0 is OUT and SETUP, 1 is IN */
 	int cpu, cable;      /* bank on which each side works */
 } endpoints[ENDPOINTS];
+static bool control_out_toggle;
+static uint8_t target; /* address of the transactions on the cable */
 
 static bool is_in(const struct endpoint *e) { return e->cfg0 & 1; }
 static bool is_control(const struct endpoint *e) { return (e->cfg0 >> 6) == 0; }
@@ -204,6 +207,13 @@ static void write_device_register(avr_io_addr_t address, uint8_t value)
 	case UEINT:
 	case UDFNUML:
 	case UDFNUMH: break; /* read only */
+	case UDADDR:
+		if ((value & ADDEN) && !(old & ADDEN) && ((value ^ old) & 0x7F)) {
+			bench_trace("usb: address and its enable bit written at once");
+			value &= 0x7F;
+		}
+		avr->data[address] = value;
+		break;
 	default: avr->data[address] = value;
 	}
 }
@@ -222,6 +232,8 @@ static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void 
 			e->stalled = true;
 		if (value & STALLRQC)
 			e->stalled = false;
+		if (value & RSTDT)
+			e->toggle = false;
 		break;
 	case UECFG0X: e->cfg0 = value; break;
 	case UECFG1X:
@@ -283,6 +295,23 @@ void usb_bus_reset(void)
 	refresh();
 }
 
+void usb_bus_suspend(void)
+{
+	avr->data[UDINT] |= SUSPI;
+	refresh();
+}
+
+void usb_bus_resume(void)
+{
+	avr->data[UDINT] |= WAKEUPI;
+	refresh();
+}
+
+void usb_target(uint8_t address)
+{
+	target = address;
+}
+
 void usb_frame(uint16_t number)
 {
 	avr->data[UDFNUML] = (uint8_t)number;
@@ -291,9 +320,13 @@ void usb_frame(uint16_t number)
 	refresh();
 }
 
-/* The endpoint with this number; NULL: not enabled. */
+/* The endpoint with this number; NULL: not enabled, or the device has another address. */
 static struct endpoint *enabled_endpoint(uint8_t number)
 {
+	uint8_t own = avr->data[UDADDR] & ADDEN ? avr->data[UDADDR] & 0x7F : 0;
+
+	if (own != target)
+		return NULL;
 	if (!usb_device_attached() || number >= ENDPOINTS || !(endpoints[number].conx & EPEN) || !(endpoints[number].cfg1 & ALLOC))
 		return NULL;
 	return &endpoints[number];
@@ -306,6 +339,7 @@ int usb_setup(const uint8_t *request)
 	if (!e)
 		return USB_SILENCE;
 	e->stalled = false; /* a SETUP is always accepted */
+	e->toggle = control_out_toggle = true;
 	memcpy(e->bank[0].bytes, request, 8);
 	e->bank[0].length = 8;
 	e->bank[0].read = 0;
@@ -314,15 +348,19 @@ int usb_setup(const uint8_t *request)
 	return USB_ACK;
 }
 
-int usb_in(uint8_t endpoint, uint8_t *bytes)
+static struct bank *bank_for_host(struct endpoint *e)
+{
+	return &e->bank[is_control(e) ? 1 : e->cable];
+}
+
+int usb_in(uint8_t endpoint, uint8_t *bytes, bool *toggle)
 {
 	struct endpoint *e = enabled_endpoint(endpoint);
 
 	if (!e)
 		return USB_SILENCE;
 
-	struct bank *b = &e->bank[is_control(e) ? 1 : e->cable];
-	int length = b->length;
+	struct bank *b = bank_for_host(e);
 
 	if (e->stalled) {
 		e->flags |= STALLEDI;
@@ -334,9 +372,20 @@ int usb_in(uint8_t endpoint, uint8_t *bytes)
 		refresh();
 		return USB_NAK;
 	}
-	memcpy(bytes, b->bytes, (size_t)length);
+	memcpy(bytes, b->bytes, (size_t)b->length);
+	*toggle = e->toggle;
+	return b->length;
+}
+
+/* The host has the packet: its bank is free. */
+void usb_in_acknowledged(uint8_t endpoint)
+{
+	struct endpoint *e = &endpoints[endpoint];
+	struct bank *b = bank_for_host(e);
+
 	b->length = b->read = 0;
 	b->full = false;
+	e->toggle = !e->toggle;
 	if (is_control(e)) {
 		e->flags |= TXINI;
 	} else {
@@ -344,10 +393,9 @@ int usb_in(uint8_t endpoint, uint8_t *bytes)
 		offer_bank(e);
 	}
 	refresh();
-	return length;
 }
 
-int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length)
+int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length, bool toggle)
 {
 	struct endpoint *e = enabled_endpoint(endpoint);
 
@@ -366,6 +414,13 @@ int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length)
 		refresh();
 		return USB_NAK;
 	}
+	bool *expected = is_control(e) ? &control_out_toggle : &e->toggle;
+
+	if (toggle != *expected) {
+		bench_trace("usb: the device drops a repeated packet of %u bytes", length);
+		return USB_ACK;
+	}
+	*expected = !toggle;
 	if (length)
 		memcpy(b->bytes, bytes, length);
 	b->length = (int)length;

@@ -10,6 +10,8 @@
 #define CONTROL_POLL US(100)
 #define FRAME US(1000)
 #define DEBOUNCE_MS 20
+#define IDLE_MS 3    /* without traffic, then a device is suspended */
+#define RESUME_MS 30 /* resume signal and recovery */
 #define STAGE_LIMIT_MS 500   /* for each stage of a request */
 #define PACKETS_PER_FRAME 19 /* maximum of full speed */
 #define DTR_RTS 3
@@ -23,6 +25,7 @@ static const uint8_t script[][16] = {
 	{ 0x80, 6, 0, 2, 0, 0, 255, 0 },      /* configuration descriptor */
 	{ 0x80, 6, 0, 3, 0, 0, 255, 0 },      /* languages */
 	{ 0x80, 6, 2, 3, 9, 4, 255, 0 },      /* product */
+	{ 0x80, 6, 3, 3, 9, 4, 255, 0 },      /* serial number */
 	{ 0x80, 6, 0, 6, 0, 0, 10, 0 },       /* device qualifier: a full-speed device stalls */
 	{ 0x00, 9, 1, 0, 0, 0, 0, 0 },        /* configuration 1 */
 	{ 0x21, 0x20, 0, 0, 0, 0, 7, 0, 0x00, 0xC2, 0x01, 0x00, 0, 0, 8 }, /* 115200 8N1 */
@@ -31,7 +34,7 @@ static const uint8_t script[][16] = {
 
 enum stage { SETUP, DATA_IN, DATA_OUT, STATUS_IN, STATUS_OUT };
 
-static enum { DETACHED, DEBOUNCING, ENUMERATING, RUNNING } state;
+static enum { DETACHED, DEBOUNCING, ENUMERATING, RUNNING, SUSPENDED, RESUMING } state;
 static unsigned step;
 static enum stage stage;
 static uint8_t request[16]; /* under way */
@@ -75,9 +78,35 @@ static void set_line_state(bool open)
 	begin_request(bytes);
 }
 
+/* What a host shows of a device: its class, by which Windows chooses a driver, and its serial number. */
+static void trace_descriptor(void)
+{
+	char text[64] = "";
+
+	if (request[3] == 1 && received >= 18)
+		bench_trace("usb class %02x subclass %02x serial string %u", descriptor[4], descriptor[5], descriptor[16]);
+	if (request[3] != 3 || request[2] != 3)
+		return;
+	for (unsigned k = 2; k + 1 < received && k / 2 < sizeof text; k += 2)
+		text[k / 2 - 1] = (char)descriptor[k];
+	bench_trace("usb serial number %s", text);
+}
+
+/* Requests that change the address or the data toggles take effect on both ends. */
+static void apply_request(void)
+{
+	if (request[0] == 0 && request[1] == 5)
+		usb_target(request[2]);
+	if (request[0] == 0 && request[1] == 9)
+		usb_cable_reset_toggles();
+}
+
 static void finish_request(void)
 {
 	requesting = false;
+	apply_request();
+	if (request[0] == 0x80 && request[1] == 6)
+		trace_descriptor();
 	if (request[0] == 0x80 && request[1] == 6 && request[3] == 1 && received >= 8)
 		control_size = descriptor[7];
 	if (request[0] == 0x80 && request[1] == 6 && request[3] == 2)
@@ -103,12 +132,12 @@ static bool advance_request(void)
 
 	switch (stage) {
 	case SETUP:
-		if (usb_setup(request) != USB_ACK)
+		if (usb_cable_setup(request) != USB_ACK)
 			return false;
 		next_stage(!length ? STATUS_IN : request[0] & 0x80 ? DATA_IN : DATA_OUT);
 		return true;
 	case DATA_IN:
-		answer = usb_in(0, bytes);
+		answer = usb_cable_in(0, bytes);
 		if (answer == USB_STALL) {
 			finish_request();
 			return true;
@@ -121,20 +150,20 @@ static bool advance_request(void)
 			next_stage(STATUS_OUT);
 		return true;
 	case DATA_OUT:
-		answer = usb_out(0, request + 8, length);
+		answer = usb_cable_out(0, request + 8, length);
 		if (answer == USB_ACK)
 			next_stage(STATUS_IN);
 		else if (answer == USB_STALL)
 			finish_request();
 		return answer == USB_ACK || answer == USB_STALL;
 	case STATUS_IN:
-		answer = usb_in(0, bytes);
-		if (answer == USB_NAK || answer == USB_SILENCE)
+		answer = usb_cable_in(0, bytes);
+		if (answer < 0 && answer != USB_STALL)
 			return false;
 		finish_request();
 		return true;
 	case STATUS_OUT:
-		if (usb_out(0, NULL, 0) != USB_ACK)
+		if (usb_cable_out(0, NULL, 0) != USB_ACK)
 			return false;
 		finish_request();
 		return true;
@@ -149,7 +178,7 @@ static void move_bulk(void)
 	while (outbox_length) {
 		unsigned part = outbox_length < 64 ? outbox_length : 64;
 
-		if (usb_out(out_endpoint, outbox, part) != USB_ACK)
+		if (usb_cable_out(out_endpoint, outbox, part) != USB_ACK)
 			break;
 		outbox_length -= part;
 		memmove(outbox, outbox + part, outbox_length);
@@ -157,8 +186,10 @@ static void move_bulk(void)
 	if (!is_open || stalled)
 		return;
 	for (int k = 0; k < PACKETS_PER_FRAME && bench_has_room(); k++) {
-		int length = usb_in(in_endpoint, bytes);
+		int length = usb_cable_in(in_endpoint, bytes);
 
+		if (length == USB_REPEATED || length == USB_SILENCE)
+			continue;
 		if (length < 0)
 			break;
 		bench_sent(bytes, (unsigned)length);
@@ -176,12 +207,20 @@ static void watch(void)
 		waited_ms = 0;
 	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS) {
 		usb_bus_reset();
+		usb_target(0);
+		usb_cable_reset_toggles();
 		state = ENUMERATING;
 		step = 0;
 		control_size = 8;
 		requesting = is_open = false;
 		waited_ms = 0;
 	}
+	if (waited_ms == IDLE_MS && (state == DEBOUNCING || state == SUSPENDED))
+		usb_bus_suspend();
+	if (state == SUSPENDED && waited_ms <= IDLE_MS)
+		waited_ms++;
+	if (state == RESUMING && ++waited_ms > RESUME_MS)
+		state = RUNNING;
 	if (requesting && ++stage_ms > STAGE_LIMIT_MS) {
 		bench_trace("usb: no answer to request %02x %02x", request[0], request[1]);
 		state = DEBOUNCING;
@@ -194,7 +233,7 @@ static avr_cycle_count_t poll(avr_t *a, avr_cycle_count_t when, void *param)
 	(void)param;
 	if (a->cycle % FRAME < CONTROL_POLL || !requesting) {
 		watch();
-		if (state != DETACHED)
+		if (state == ENUMERATING || state == RUNNING)
 			usb_frame(frame_number++);
 		if (state == RUNNING && !requesting) {
 			if (wanted_open != is_open)
@@ -233,6 +272,26 @@ void usb_host_reset(void)
 		state = DEBOUNCING;
 	waited_ms = 0;
 	requesting = is_open = false;
+}
+
+void usb_host_suspend(bool on)
+{
+	if (on && state == RUNNING && !requesting) {
+		state = SUSPENDED;
+		waited_ms = 0;
+	} else if (!on && state == SUSPENDED) {
+		usb_bus_resume();
+		state = RESUMING;
+		waited_ms = 0;
+	}
+}
+
+void usb_host_configure(void)
+{
+	static const uint8_t again[16] = { 0x00, 9, 1, 0, 0, 0, 0, 0 };
+
+	if (state == RUNNING && !requesting)
+		begin_request(again);
 }
 
 void usb_host_stall(bool on)
