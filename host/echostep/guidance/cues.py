@@ -1,7 +1,8 @@
+# SPDX-License-Identifier: MIT
 """Cues for a wearer on a route: where to go next, as words, as an arrow, and as a sentence to speak.
 
 In: a `Route`, estimates, and when a beacon was last heard. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
-last known place. An estimate that is too uncertain gives no direction: the cue is then "stop", or the direction back to the last known place.
+`Contact`: the last known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
 """
 
 from __future__ import annotations
@@ -11,8 +12,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+import numpy as np
+
 from echostep.angles import wrap
 from echostep.errors import EchostepError
+from echostep.guidance.contact import CONTACT, allowed_silence, start_contact, update_contact
+from echostep.guidance.target import turn_ahead
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.polyline import along, nearest, way_m
 from echostep.plan.routing import Route, RoutePlace, Stretch
@@ -30,7 +35,9 @@ class CueKind(StrEnum):
     AHEAD = "ahead"
 
 
+Choice = tuple[CueKind, str, float | None]  # kind, words, direction from straight ahead (rad)
 NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
+NEVER_KNOWN = "Your place is not known yet: walk slowly along the walls"
 # Direction beyond which the target is behind, by reason.
 AROUND_RAD = math.radians(135.0)
 RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, by reason
@@ -60,18 +67,15 @@ class GuidanceSettings:
     """Limits of guidance.
 
     `ahead_m`: the target's distance along the route [Fischer 2008, 4.2]. `arrived_m`: distance from the end at which the wearer has arrived.
-    `off_m`: distance from the route, beyond the 95 % radius, that counts as off it. `deaf_s`, `return_s`: time without beacon contact before the
-    warning, and before the wearer is sent back. The second doubles after each return (the next beacons may be dead), and is reset after `safe_s` of
-    contact. `heading_sd_deg`: greatest standard deviation of a usable heading. `turn_deg`: least angle of a cue to turn. `arrow_s`: time constant of
-    the arrow, `arrow_deg_s` its greatest rate. `say_again_s`: least time before a sentence is repeated.
+    `off_m`: distance from the route, beyond the 95 % radius, that counts as off it. `silence_s`: time without beacon contact before the wearer is
+    sent back. `heading_sd_deg`: greatest standard deviation of a usable heading. `turn_deg`: least angle of a cue to turn. `arrow_s`: time constant
+    of the arrow, `arrow_deg_s` its greatest rate. `say_again_s`: least time before a sentence is repeated.
     """
 
     ahead_m: float = 3.0
     arrived_m: float = 1.0
     off_m: float = 2.0
-    deaf_s: float = 3.0
-    return_s: float = 6.0
-    safe_s: float = 15.0
+    silence_s: float = 3.0
     heading_sd_deg: float = 45.0
     turn_deg: float = 30.0
     arrow_s: float = 0.5
@@ -102,41 +106,49 @@ class Guide:
         self._progress_m = 0.0
         self._arrow: float | None = None
         self._arrow_s = -math.inf
-        self._known_place: RoutePlace | None = None
-        self._silence_limit_s = self._settings.return_s
-        self._sent_back = False
-        self._contact_since_s = -math.inf
+        self._contact = np.zeros(1, CONTACT)[0]
+        self._was_lost = False
+        self._known_level: int | None = None  # of the last known place; None: there is none yet
         self._last_text = ""
         self._spoken_s = -math.inf
         self.replanned = 0
 
     def cue(self, e: Estimate, heard_s: float | None = None) -> Cue:
         """The cue at this estimate; `heard_s`: when a beacon last measured, None where there are none."""
-        silent_s = 0.0 if heard_s is None else e.t_s - heard_s
-        self._update_silence_limit(e.t_s, silent_s)
-        if e.status is not TrackStatus.LOST and silent_s < self._settings.deaf_s:
-            self._known_place = RoutePlace(e.x_m, e.y_m, e.level)
-        if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
-            return self._make_cue(e, CueKind.STOP, NO_HEADING, None)
-        if e.status is TrackStatus.LOST or silent_s >= self._silence_limit_s:
-            return self._cue_back(e, silent_s)
-        self._update_progress(e)
-        cue = self._cue_along(e)
-        if silent_s >= self._settings.deaf_s and cue.kind is not CueKind.ARRIVED:
-            return self._make_cue(e, CueKind.OFF, "You leave the beacons' range", cue.arrow_rad)
-        return cue
+        return self._make_cue(e, *self._choose(e, heard_s))
 
-    def _update_silence_limit(self, t_s: float, silent_s: float) -> None:
-        """Double the allowed time without beacon contact after each return; reset it after `safe_s` of contact."""
-        if silent_s >= self._settings.deaf_s:
-            self._contact_since_s = math.inf
-            self._sent_back = self._sent_back or silent_s >= self._silence_limit_s
-            return
-        self._contact_since_s = min(self._contact_since_s, t_s)
-        if self._sent_back:
-            self._silence_limit_s, self._sent_back = 2.0 * self._silence_limit_s, False
-        elif t_s - self._contact_since_s > self._settings.safe_s:
-            self._silence_limit_s = self._settings.return_s
+    def _choose(self, e: Estimate, heard_s: float | None) -> Choice:
+        """What to do at this estimate. An end that is reached is reached, whether beacons measure there or not."""
+        lost = e.status is TrackStatus.LOST
+        back, silent = self._update_contact(e, heard_s, lost)
+        if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
+            return CueKind.STOP, NO_HEADING, None
+        if self._known_level is None:
+            return CueKind.STOP, NEVER_KNOWN, None
+        self._update_progress(e)
+        if not lost and self._has_arrived(e):
+            return CueKind.ARRIVED, "You have arrived", None
+        why = "Your place is not known" if lost else "No beacon hears you"
+        if back and self._known_level == e.level:
+            x, y = self._contact["known_x"], self._contact["known_y"]
+            arrow = math.atan2(y - e.y_m, x - e.x_m) - e.heading_rad
+            return CueKind.RETURN, f"{why}. Go back to the last known place", arrow
+        kind, text, ahead = self._choose_along(e)
+        if (lost or silent) and kind not in (CueKind.STOP, CueKind.ARRIVED):
+            return CueKind.OFF, f"{why}. Go on", ahead
+        return kind, text, ahead
+
+    def _update_contact(self, e: Estimate, heard_s: float | None, lost: bool) -> tuple[bool, bool]:
+        """Update the contact; whether the wearer is to go back, and whether no beacon measures. An estimate that is not lost any more is known."""
+        contact, silence_s = self._contact, self._settings.silence_s
+        known_s = e.t_s if heard_s is None or self._was_lost else heard_s
+        if not lost and self._known_level is None:
+            start_contact(contact, known_s, e.x_m, e.y_m)
+        if not lost and (self._known_level is None or known_s > contact["known_s"]):
+            self._known_level = e.level
+        self._was_lost = lost
+        back = update_contact(contact, e.t_s, known_s, e.x_m, e.y_m, lost, silence_s)
+        return back, bool(e.t_s - contact["known_s"] > allowed_silence(contact, silence_s))
 
     @property
     def left_m(self) -> float:
@@ -166,68 +178,61 @@ class Guide:
             progress, off = nearest(self._here.line_m, e.x_m, e.y_m, 0.0, math.inf)
         self._progress_m = progress
 
-    def _cue_along(self, e: Estimate) -> Cue:
-        """The cue on the route: arrived, change of level, turn, or straight ahead."""
+    def _choose_along(self, e: Estimate) -> Choice:
+        """What to do on the route: arrived, change of level, turn, or straight ahead."""
         s, line = self._settings, self._here.line_m
-        x, y, _ = along(line, self._progress_m)
-        off = math.hypot(x - e.x_m, y - e.y_m)
-        if self._here.level != e.level or off > s.off_m + e.ellipse95.major_m:
-            return self._cue_off_route(e, off)
-        if self.left_m < s.arrived_m or (
-            self._last and math.hypot(e.x_m - line[-1, 0], e.y_m - line[-1, 1]) < s.arrived_m
-        ):
-            return self._make_cue(e, CueKind.ARRIVED, "You have arrived", None)
-        to_x, to_y, _ = along(line, self._progress_m + s.ahead_m)
-        arrow = math.atan2(to_y - e.y_m, to_x - e.x_m) - e.heading_rad
+        off_m = self._off_m(e)
+        if off_m > s.off_m + e.ellipse95.major_m:
+            return self._choose_off_route(e, off_m)
+        if self._has_arrived(e):
+            return CueKind.ARRIVED, "You have arrived", None
+        arrow = turn_ahead(line, self._progress_m + s.ahead_m, e.x_m, e.y_m, e.heading_rad)
         rest = way_m(line) - self._progress_m
         if not self._last and rest < s.ahead_m:
             after = self.route.stretches[self._stretch + 1].level
             step = "up" if after > e.level else "down"
-            return self._make_cue(e, CueKind.CHANGE, f"Take the {self._here.by} {step}", arrow)
+            return CueKind.CHANGE, f"Take the {self._here.by} {step}", arrow
         side = wrap(arrow)
         if abs(side) > AROUND_RAD:
-            return self._make_cue(e, CueKind.TURN, "Turn around", arrow)
+            return CueKind.TURN, "Turn around", arrow
         if abs(side) > math.radians(s.turn_deg):
-            return self._make_cue(e, CueKind.TURN, "Turn left" if side > 0.0 else "Turn right", arrow)
-        return self._make_cue(e, CueKind.AHEAD, "Straight ahead", arrow)
+            return CueKind.TURN, "Turn left" if side > 0.0 else "Turn right", arrow
+        return CueKind.AHEAD, "Straight ahead", arrow
+
+    def _off_m(self, e: Estimate) -> float:
+        """Distance (m) from the route; infinite on another level."""
+        x, y, _ = along(self._here.line_m, self._progress_m)
+        return math.hypot(x - e.x_m, y - e.y_m) if self._here.level == e.level else math.inf
+
+    def _has_arrived(self, e: Estimate) -> bool:
+        """Whether the end of the route is reached."""
+        s, end = self._settings, self._here.line_m[-1]
+        if self._off_m(e) > s.off_m + e.ellipse95.major_m:
+            return False
+        return self.left_m < s.arrived_m or (self._last and math.hypot(e.x_m - end[0], e.y_m - end[1]) < s.arrived_m)
 
     @property
     def _last(self) -> bool:
         """Whether the present stretch is the last one."""
         return self._stretch == len(self.route.stretches) - 1
 
-    def _cue_off_route(self, e: Estimate, off_m: float) -> Cue:
-        """The cue off the route: a new route with a planner, else the direction back to it."""
+    def _choose_off_route(self, e: Estimate, off_m: float) -> Choice:
+        """What to do off the route: a new route with a planner, else the direction back to it."""
         if self._planner is not None:
             end = self.route.stretches[-1]
             goal = RoutePlace(float(end.line_m[-1, 0]), float(end.line_m[-1, 1]), end.level)
             try:
                 self.route = self._planner.way(RoutePlace(e.x_m, e.y_m, e.level), goal)
             except EchostepError:
-                return self._make_cue(e, CueKind.STOP, "Stop. No way leads on from here", None)
+                return CueKind.STOP, "Stop. No way leads on from here", None
             self._stretch, self._progress_m = 0, 0.0
             self.replanned += 1
-            x, y, _ = along(self._here.line_m, self._settings.ahead_m)
-            return self._make_cue(
-                e, CueKind.OFF, "You left the way. Here is another", math.atan2(y - e.y_m, x - e.x_m) - e.heading_rad
-            )
+            arrow = turn_ahead(self._here.line_m, self._settings.ahead_m, e.x_m, e.y_m, e.heading_rad)
+            return CueKind.OFF, "You left the way. Here is another", arrow
         if self._here.level != e.level:
-            return self._make_cue(e, CueKind.STOP, "Stop. You are on the wrong level", None)
-        x, y, _ = along(self._here.line_m, self._progress_m + RETURN_AHEAD_M)
-        arrow = math.atan2(y - e.y_m, x - e.x_m) - e.heading_rad
-        return self._make_cue(e, CueKind.OFF, f"You left the way: it is {off_m:.0f} metres off", arrow)
-
-    def _cue_back(self, e: Estimate, silent_s: float) -> Cue:
-        """The cue where the position is not known: back to the last known place, by the steps since, while it is on this level."""
-        why = "No beacon hears you" if silent_s >= self._silence_limit_s else "Your place is not known"
-        if self._known_place is None or self._known_place.level != e.level:
-            return self._make_cue(e, CueKind.STOP, f"Stop. {why}", None)
-        dx, dy = self._known_place.x_m - e.x_m, self._known_place.y_m - e.y_m
-        if math.hypot(dx, dy) < self._settings.arrived_m:
-            return self._make_cue(e, CueKind.STOP, f"Stop. {why}, and this is the last known place", None)
-        return self._make_cue(
-            e, CueKind.RETURN, f"{why}. Go back to the last known place", math.atan2(dy, dx) - e.heading_rad
-        )
+            return CueKind.STOP, "Stop. You are on the wrong level", None
+        arrow = turn_ahead(self._here.line_m, self._progress_m + RETURN_AHEAD_M, e.x_m, e.y_m, e.heading_rad)
+        return CueKind.OFF, f"You left the way: it is {off_m:.0f} metres off", arrow
 
     def _make_cue(self, e: Estimate, kind: CueKind, text: str, arrow_rad: float | None) -> Cue:
         """A cue with its smoothed arrow, and its sentence unless that was just spoken."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A guided run: estimates of a tracker in, cues out, to show, to speak and to keep.
 
 In: a tracker, a destination. Out: a `Cue` for each estimate, when the tracker publishes it; cues.csv. Owns the guide. The time of the last beacon
@@ -19,6 +20,7 @@ from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.tracker import Tracker
 
 NO_WAY = "Stop. No way leads there from here"
+FAR_M = 9.0  # from a route: the first cue is to lead back to it, which compiles all kernels
 CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
 
 
@@ -52,7 +54,7 @@ class GuidedRun:
         self._routes = Routes(tracker.plan)
         first = Guide(self._routes.way(to, to))
         first.cue(
-            Estimate(0.0, to.x_m, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, to.level)
+            Estimate(0.0, to.x_m + FAR_M, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, to.level)
         )  # compiles the kernels now, not during the run
         self._guide: Guide | None = None
         self._returned = 0

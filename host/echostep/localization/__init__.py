@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The particle filter on the plan: path and pings -> position.
 
 In: `MeasuredSegment`s and beacon readings. Out: `Estimate`s: position, covariance, heading, status. Owns the particles and the beacon map.

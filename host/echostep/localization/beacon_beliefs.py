@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What each particle believes of each beacon: a small Kalman filter of three states per particle and beacon [Montemerlo 2002, FastSLAM].
 
 In: innovations of one measurement. Out: means, covariances, and their moments over all particles. Owns `BeaconBeliefs`. Given a particle's path,
@@ -13,23 +14,16 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, lean_kernel
-from echostep.localization.beacon_model import BeaconModel
 
 TWO_PI = 2.0 * math.pi
 X, Y, AXIS = 0, 1, 2  # states: place on the sheet (m), direction of the beacon's axis (rad)
 XX, XY, X_AXIS, YY, Y_AXIS, AXIS_AXIS = 0, 1, 2, 3, 4, 5  # stored terms of the symmetric covariance
-DROPPED_SHARE = 0.7  # of beacons heard for the first time: just dropped, at whatever range; by reason: most are
-FAR_SD_M, FAR_SD_PER_M = (
-    0.3,
-    0.1,
-)  # of one particle's guess of a far beacon's place, by reason: a guess in each direction
-FAR_AXIS_VAR_RAD2 = 0.01  # added to the bearing's variance then: (6 deg)^2, by reason
 
 
 class BeaconBeliefs(NamedTuple):
     """Of n particles about b beacons.
 
-    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): log-odds that the beacon was moved, above those of one that has
+    `mean` (n, b, 3): X, Y, AXIS. `cov` (n, b, 6): XX to AXIS_AXIS. `doubt` (n, b): odds that the beacon was moved, divided by those of one that has
     just been placed.
     """
 
@@ -49,7 +43,7 @@ class BeaconMeasurement(NamedTuple):
 def empty_beliefs(particles: int, beacons: int) -> BeaconBeliefs:
     """Room for beacons of which nothing is known yet."""
     return BeaconBeliefs(
-        np.zeros((particles, beacons, 3)), np.zeros((particles, beacons, 6)), np.zeros((particles, beacons))
+        np.zeros((particles, beacons, 3)), np.zeros((particles, beacons, 6)), np.ones((particles, beacons))
     )
 
 
@@ -61,39 +55,16 @@ def set_beliefs(
     for i in range(len(beliefs.mean)):
         beliefs.mean[i, slot] = x, y, axis
         beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, axis_var
-        beliefs.doubt[i, slot] = 0.0
+        beliefs.doubt[i, slot] = 1.0
 
 
 @kernel
-def initialise_beliefs(
-    beliefs: BeaconBeliefs, x: Floats, y: Floats, measurement: BeaconMeasurement, model: BeaconModel,
-    rng: np.random.Generator,
-) -> None:  # fmt: skip
-    """Beliefs of a beacon after its first measurement, for particles at (x, y), each (n,).
-
-    A near beacon was just dropped: it lies about the particle. Of a far one each particle guesses a direction, and the next measurements judge it.
-    """
-    k, range_m = measurement.slot, measurement.range_m
-    near = range_m * range_m < 4.0 * model.drop_var_m2
+def place_dropped(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_var: float) -> None:
+    """Beliefs of a beacon that was just dropped: it lies about each particle (x, y), each (n,), within this variance (m2); its axis is unknown."""
     for i in range(len(beliefs.mean)):
-        mean, cov = beliefs.mean[i, k], beliefs.cov[i, k]
-        beliefs.doubt[i, k] = 0.0
-        if near or rng.random() < DROPPED_SHARE:
-            mean[X], mean[Y], mean[AXIS] = x[i], y[i], 0.0
-            _set_variances(cov, model.drop_var_m2, math.pi * math.pi)
-            continue
-        direction = TWO_PI * rng.random()
-        mean[X] = x[i] + range_m * math.cos(direction)
-        mean[Y] = y[i] + range_m * math.sin(direction)
-        mean[AXIS] = direction + math.pi - measurement.bearing_rad
-        sd = FAR_SD_M + FAR_SD_PER_M * range_m
-        _set_variances(cov, sd * sd, model.bearing_sd_rad**2 + FAR_AXIS_VAR_RAD2)
-
-
-@kernel
-def _set_variances(cov: Floats, place_var: float, axis_var: float) -> None:
-    """A diagonal covariance."""
-    cov[XX], cov[XY], cov[X_AXIS], cov[YY], cov[Y_AXIS], cov[AXIS_AXIS] = place_var, 0.0, 0.0, place_var, 0.0, axis_var
+        beliefs.mean[i, slot] = x[i], y[i], 0.0
+        beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, math.pi * math.pi
+        beliefs.doubt[i, slot] = 1.0
 
 
 @kernel
@@ -113,12 +84,17 @@ def _gather_rows(rows: Floats, chosen: Ints) -> None:
     """
     for i in range(len(chosen)):
         if chosen[i] > i:
-            for k in range(rows.shape[1]):
-                rows[i, k] = rows[chosen[i], k]
+            _copy_row(rows[chosen[i]], rows[i])
     for i in range(len(chosen) - 1, -1, -1):
         if chosen[i] < i:
-            for k in range(rows.shape[1]):
-                rows[i, k] = rows[chosen[i], k]
+            _copy_row(rows[chosen[i]], rows[i])
+
+
+@lean_kernel
+def _copy_row(source: Floats, target: Floats) -> None:
+    """Set target[k] = source[k]. Slices of their own let the compiler copy several values at once."""
+    for k in range(len(target)):
+        target[k] = source[k]
 
 
 @lean_kernel
@@ -135,8 +111,8 @@ def correct(
     px = cov[XX] * hx + cov[XY] * hy + cov[X_AXIS] * h_axis
     py = cov[XY] * hx + cov[YY] * hy + cov[Y_AXIS] * h_axis
     p_axis = cov[X_AXIS] * hx + cov[Y_AXIS] * hy + cov[AXIS_AXIS] * h_axis
-    variance = hx * px + hy * py + h_axis * p_axis + noise_var
-    gx, gy, g_axis = px / variance, py / variance, p_axis / variance
+    inverse = 1.0 / (hx * px + hy * py + h_axis * p_axis + noise_var)
+    gx, gy, g_axis = inverse * px, inverse * py, inverse * p_axis
     mean[X] += gx * innovation
     mean[Y] += gy * innovation
     mean[AXIS] = wrap_angle(mean[AXIS] + g_axis * innovation)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The beacons of one walk: the cloud is reweighted by their readings, and their places follow from the cloud.
 
 In: a cloud, its last path segment, the beacons' readings on it. Out: log-weights, and `BeaconPlace`s. Owns each beacon's health, when it was
@@ -7,7 +8,6 @@ last heard, and the readings of beacons whose place is not known yet.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,26 +16,16 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_beliefs import BeaconBeliefs, BeaconMeasurement, moments, set_beliefs
-from echostep.localization.beacon_initialisation import locate_beacon
+from echostep.localization.beacon_beliefs import BeaconBeliefs, BeaconMeasurement, moments
 from echostep.localization.beacon_model import BeaconSettings, beacon_model
-from echostep.localization.beacon_slam import (
-    IN_PLACE,
-    TIMES_MOVED,
-    BeaconHealth,
-    initial_health,
-    propose_heading_jumps,
-    update_by_measurement,
-)
+from echostep.localization.beacon_slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
+from echostep.localization.beacon_step import Beacons, Waiting, no_waiting, update_by_reading
 from echostep.localization.particles import Cloud
 from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall
 
 # All constants here are by reason.
-MOST_UNPLACED = 60  # readings kept of a beacon without a place
-LOCATE_EVERY = 4  # readings of a beacon without a place
-LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`
 SILENT_S = 8.0  # without a reading, while it is expected to be heard and others are: the beacon is silent
 EXPECTED_SHARE = 0.6  # of the greatest range at which a beacon was heard: within it, and without a wall between, it is expected to be heard
 
@@ -67,18 +57,22 @@ class BeaconMap:
 
     def __init__(self, walls: Walls, settings: BeaconSettings, rng: np.random.Generator) -> None:
         self._walls = walls
-        self._settings = settings
         self._model = beacon_model(settings)
         self._rng = rng
         self._health = initial_health(0)
-        self._unplaced: dict[int, deque[tuple[float, float, float, float]]] = {}  # by slot: rows for `locate_beacon`
+        self._waiting = no_waiting(0)
         self._heard_s: list[float] = []
         self._reach_m: list[float] = []  # greatest range at which each was heard
         self._unexpected_s: list[float] = []  # when each was last too far away or behind a wall
         self.heard_s: float | None = None  # when any beacon was last heard
 
-    def update(self, cloud: Cloud, segment: PathSegment, readings: Sequence[BeaconReading]) -> None:
-        """Reweight the cloud, which is at the end of a segment, by the readings on this segment."""
+    def update(
+        self, cloud: Cloud, segment: PathSegment, readings: Sequence[BeaconReading], plan_supports: bool = False
+    ) -> None:
+        """Reweight the cloud, which is at the end of a segment, by the readings on this segment.
+
+        `plan_supports`: whether echoes confirm the cloud by the plan.
+        """
         length = math.hypot(segment.dx_m, segment.dy_m)
         if length > 0.0 and readings:
             propose_heading_jumps(cloud.turn_rad, cloud.log_weight, length, self._model, self._rng)
@@ -87,18 +81,16 @@ class BeaconMap:
             self._heard_s[reading.slot] = reading.t_s
             self._reach_m[reading.slot] = max(self._reach_m[reading.slot], reading.range_m)
             self.heard_s = reading.t_s
-            x, y = _places_at(cloud, segment, reading.t_s)
-            if self._has_place(cloud, x, y, reading):
-                self._reweight(cloud, x, y, reading)
-                cloud.resample_if_needed()
+            self._reweight(cloud, segment, reading, plan_supports)
+            cloud.resample_if_needed()
         if self._health.known.any():
             self._note_unexpected(cloud, segment.t1_s)
 
     def places(self, cloud: Cloud, t_s: float) -> list[BeaconPlace]:
-        """Every beacon with a place, by slot."""
+        """Every beacon with a place, by slot. One that was moved has none until it is located anew."""
         beacons = moments(cloud.beliefs, cloud.weight)
-        known = np.flatnonzero(self._health.known).tolist()
-        return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in known]
+        placed = np.flatnonzero(self._health.known & (self._health.each[:, SUSPECT] == 0.0)).tolist()
+        return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in placed]
 
     def _place(self, cloud: Cloud, slot: int, moments_of_it: list[float], t_s: float) -> BeaconPlace:
         x, y, sd, axis = moments_of_it
@@ -121,39 +113,16 @@ class BeaconMap:
             if far or (len(index.walls) and crosses_wall(bx, by, x, y, index)):
                 self._unexpected_s[slot] = t_s
 
-    def _has_place(self, cloud: Cloud, x: Floats, y: Floats, reading: BeaconReading) -> bool:
-        """Whether this reading can reweight the particles at (x, y).
-
-        A near beacon is placed by its first reading. One that is first heard from afar is located from several readings, this one included.
-        """
-        slot = reading.slot
-        near = reading.range_m < 2.0 * self._settings.drop_sd_m
-        if self._health.known[slot] or (near and slot not in self._unplaced):
-            return True
-        weight = cloud.weight
-        rows = self._unplaced.setdefault(slot, deque(maxlen=MOST_UNPLACED))
-        rows.append((float(weight @ x), float(weight @ y), reading.range_m, reading.bearing_rad))
-        if len(rows) % LOCATE_EVERY:
-            return False
-        if (place := locate_beacon(np.array(rows))) is not None:
-            set_beliefs(cloud.beliefs, slot, *place, 0.0, LOCATED_SD_M**2, math.pi**2)
-            self._health.known[slot] = True
-            self._health.each[slot, IN_PLACE] = 1.0
-            del self._unplaced[slot]
-        return False
-
-    def _reweight(self, cloud: Cloud, x: Floats, y: Floats, reading: BeaconReading) -> None:
-        """Update the cloud by one reading at places (x, y); particles that the update moves keep their path since then."""
-        slot, before = reading.slot, self._health.each[reading.slot, TIMES_MOVED]
+    def _reweight(self, cloud: Cloud, segment: PathSegment, reading: BeaconReading, plan_supports: bool) -> None:
+        """Update the cloud by one reading on the segment; particles that the update moves keep their path since then."""
+        x, y = _places_at(cloud, segment, reading.t_s)
         since_x, since_y = cloud.x_m - x, cloud.y_m - y
         index = self._walls.near(cloud.x_m, cloud.y_m, reading.range_m)
-        measurement = BeaconMeasurement(slot, reading.range_m, reading.bearing_rad)
+        measurement = BeaconMeasurement(reading.slot, reading.range_m, reading.bearing_rad)
+        beacons = Beacons(cloud.beliefs, self._health, self._waiting)
         particles = cloud.arrays._replace(x_m=x, y_m=y)
-        update_by_measurement(particles, cloud.beliefs, self._health, measurement, self._model, index, self._rng)
+        update_by_reading(particles, beacons, measurement, self._model, index, plan_supports, self._rng)
         cloud.x_m, cloud.y_m = x + since_x, y + since_y
-        if self._health.each[slot, TIMES_MOVED] > before:  # found moved: it is located anew
-            self._health.known[slot] = False
-            self._unplaced[slot] = deque(maxlen=MOST_UNPLACED)
 
     def _make_room(self, cloud: Cloud, slot: int) -> None:
         """Extend the cloud's beliefs and the lists here, so that they hold this slot."""
@@ -165,9 +134,10 @@ class BeaconMap:
         cloud.beliefs = BeaconBeliefs(
             np.concatenate([mean, np.zeros((n, more, 3))], axis=1),
             np.concatenate([cov, np.zeros((n, more, 6))], axis=1),
-            np.concatenate([doubt, np.zeros((n, more))], axis=1),
+            np.concatenate([doubt, np.ones((n, more))], axis=1),
         )
         fresh, health = initial_health(more), self._health
+        self._waiting = Waiting(*(np.concatenate(both) for both in zip(self._waiting, no_waiting(more), strict=True)))
         self._health = BeaconHealth(
             np.concatenate([health.each, fresh.each]), health.all, np.concatenate([health.known, fresh.known])
         )

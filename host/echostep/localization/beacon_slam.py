@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beacons in the particle filter: reweight the particles by a measurement, and let each correct its belief of the beacon [Montemerlo 2002].
 
 In: particles, and what a beacon measured to the boot. Out: log-weights, corrected `BeaconBeliefs`. Owns `BeaconHealth`: how well measurements fit,
@@ -27,7 +28,6 @@ from echostep.localization.beacon_beliefs import (
     X,
     Y,
     correct,
-    initialise_beliefs,
     wrap_angle,
 )
 from echostep.localization.beacon_model import BeaconModel
@@ -35,7 +35,8 @@ from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.index import WallIndex, crosses_wall
 
 # All constants here are by reason.
-DOUBT_LIMIT = 3.0  # log-odds that a particle's doubt of a beacon reaches at most, to either side of even odds
+GREATEST_ODDS = math.exp(3.0)  # of a particle, that a beacon was moved
+LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, in terms of a beacon that has just been placed
 CLOSE_BEARING_M2 = 0.25  # squared distance below which a bearing carries no information: half a metre
 UNKNOWN_AXIS_RAD2 = 3.0  # variance above which an axis is unknown: that of a uniform one is pi^2 / 3
 KNOWN_AXIS_RAD2 = 1.0  # variance below which an axis tells on which side of the beacon the boot is
@@ -46,15 +47,17 @@ LOST_FIT = 0.4  # the same of all beacons together: below it the cloud is wrong
 RECOVERED_FIT = 0.7  # of all beacons together after a recovery
 RECOVERED_SHARE = 0.25  # of a lost cloud: particles put where the newest measurement allows
 RECOVERY_WIDTH = 1.5  # standard deviations of the direction are widened by this in a recovery
-IN_PLACE, MEASUREMENTS, TIMES_MOVED = 0, 1, 2  # columns of `BeaconHealth.each`
+ACQUITTED_FIT = 0.75  # running probability above which a beacon that was found moved is where it was believed after all
+IN_PLACE, MEASUREMENTS, TIMES_MOVED, SUSPECT = 0, 1, 2, 3  # columns of `BeaconHealth.each`
 CLOUD_FIT, RECOVERIES = 0, 1  # entries of `BeaconHealth.all`
 
 
 class BeaconHealth(NamedTuple):
     """How well the measurements of b beacons fit.
 
-    `each` (b, 3): IN_PLACE, running probability that the beacon was not moved; MEASUREMENTS; TIMES_MOVED, how often it was found moved. `all` (2,):
-    CLOUD_FIT, the same probability over all beacons; RECOVERIES. `known` (b,): whether the beacon has beliefs.
+    `each` (b, 4): IN_PLACE, running probability that the beacon was not moved; MEASUREMENTS; TIMES_MOVED, how often it was found moved; SUSPECT, 1
+    from then on until it has a new place or fits the old one again. `all` (2,): CLOUD_FIT, the same probability over all beacons; RECOVERIES. `known`
+    (b,): whether the beacon has beliefs.
     """
 
     each: Floats
@@ -64,7 +67,7 @@ class BeaconHealth(NamedTuple):
 
 def initial_health(beacons: int) -> BeaconHealth:
     """Health of beacons without measurements."""
-    each = np.zeros((beacons, 3))
+    each = np.zeros((beacons, 4))
     each[:, IN_PLACE] = 1.0
     return BeaconHealth(each, np.array([1.0, 0.0]), np.zeros(beacons, np.bool_))
 
@@ -74,23 +77,20 @@ def update_by_measurement(
     particles: ParticleArrays, beliefs: BeaconBeliefs, health: BeaconHealth, measurement: BeaconMeasurement,
     model: BeaconModel, walls: WallIndex, rng: np.random.Generator,
 ) -> float:  # fmt: skip
-    """Update particles, beliefs and health by one measurement; the first one of a beacon initialises its beliefs.
+    """Update particles, beliefs and health by one measurement of a known beacon.
 
     Notices a beacon that was moved, and a cloud that is wrong. Returns the effective size after it.
     """
-    k = measurement.slot
-    if not health.known[k]:
-        health.known[k] = True
-        health.each[k, IN_PLACE] = 1.0
-        initialise_beliefs(beliefs, particles.x_m, particles.y_m, measurement, model, rng)
-        return float(len(particles.x_m))
     fit, size = reweight(particles, beliefs, measurement, model, walls)
-    each, together = health.each[k], health.all
+    each, together = health.each[measurement.slot], health.all
     each[MEASUREMENTS] += 1.0
     each[IN_PLACE] += FIT_SHARE * (fit - each[IN_PLACE])
-    if each[IN_PLACE] < MISFIT and together[CLOUD_FIT] > LOST_FIT:
+    if each[SUSPECT]:
+        if each[IN_PLACE] > ACQUITTED_FIT:
+            each[SUSPECT] = 0.0
+    elif each[IN_PLACE] < MISFIT and together[CLOUD_FIT] > LOST_FIT:
         each[TIMES_MOVED] += 1.0
-        each[IN_PLACE] = 1.0
+        each[SUSPECT] = 1.0
     together[CLOUD_FIT] += 0.5 * FIT_SHARE * (fit - together[CLOUD_FIT])
     if together[CLOUD_FIT] < LOST_FIT:
         together[CLOUD_FIT] = RECOVERED_FIT
@@ -106,12 +106,12 @@ def reweight(
     """Reweight the particles by one measurement, correct their beliefs of the beacon, and bring the greatest log-weight to 0.
 
     The likelihood mixes two hypotheses: the beacon is where the particle believes it, or it was moved and any measurement is equally likely. The
-    particle's `doubt` is the log-odds of the second; a particle that holds it for more likely does not correct its belief.
+    particle's `doubt` gives the odds of the second; a particle that holds it for more likely does not correct its belief.
     Returns the cloud's mean probability of the first hypothesis, and the effective size after.
     """
     k, log_weight = measurement.slot, particles.log_weight
-    top, in_place, total = -np.inf, 0.0, 0.0
-    prior = math.log(model.moved / (1.0 - model.moved))
+    top, in_place, total, after, squares = -np.inf, 0.0, 0.0, 0.0, 0.0
+    prior = model.moved / (1.0 - model.moved)
     has_bearing = not math.isnan(measurement.bearing_rad)
     if_moved = 1.0 / (
         model.span_m * (TWO_PI if has_bearing else 1.0)
@@ -119,7 +119,8 @@ def reweight(
     for i in range(len(log_weight)):
         w = math.exp(log_weight[i])
         x, y, mean, cov = particles.x_m[i], particles.y_m[i], beliefs.mean[i, k], beliefs.cov[i, k]
-        moved = 1.0 / (1.0 + math.exp(-prior - beliefs.doubt[i, k]))
+        odds = prior * beliefs.doubt[i, k]
+        moved = odds / (1.0 + odds)
         outliers = model.range_outliers
         if len(walls.walls) and crosses_wall(x, y, mean[X], mean[Y], walls):
             outliers = 1.0 - model.hidden * (1.0 - outliers)
@@ -129,26 +130,18 @@ def reweight(
         there = (1.0 - moved) * density
         either = there + moved * if_moved
         log_weight[i] += math.log(either)
-        doubt = beliefs.doubt[i, k] + math.log(if_moved / density)
-        beliefs.doubt[i, k] = min(max(doubt, -DOUBT_LIMIT), DOUBT_LIMIT - prior)
         top = max(top, log_weight[i])
+        beliefs.doubt[i, k] = min(max(beliefs.doubt[i, k] * if_moved / density, LEAST_DOUBT), GREATEST_ODDS / prior)
         in_place += w * there / either
         total += w
+        w *= either
+        after += w
+        squares += w * w
         cov[XX] += model.drift_m**2
         cov[YY] += model.drift_m**2
-    return in_place / total, _normalise(log_weight, top)
-
-
-@lean_kernel
-def _normalise(log_weight: Floats, top: float) -> float:
-    """Subtract the greatest log-weight; returns the effective size."""
-    weights, squares = 0.0, 0.0
     for i in range(len(log_weight)):
         log_weight[i] -= top
-        w = math.exp(log_weight[i])
-        weights += w
-        squares += w * w
-    return weights * weights / squares
+    return in_place / total, after * after / squares
 
 
 @lean_kernel
@@ -162,18 +155,18 @@ def _range_density(
     """
     dx, dy = x - mean[X], y - mean[Y]
     square = dx * dx + dy * dy + 1e-6
-    distance = math.sqrt(square)
-    ux, uy = dx / distance, dy / distance
+    inverse = 1.0 / math.sqrt(square)
+    ux, uy = inverse * dx, inverse * dy
     along = ux * ux * cov[XX] + 2.0 * ux * uy * cov[XY] + uy * uy * cov[YY]
     across = max(cov[XX] + cov[YY] - along, 0.0)
     expected = math.sqrt(square + across)
-    variance = (along * square + 0.5 * across * across) / (square + across) + model.range_sd_m**2
+    longer_var, inverse = 0.5 * across * across, 1.0 / (square + across)
+    variance = (along * square + longer_var) * inverse + model.range_sd_m**2
     innovation = range_m - expected
     inlier = (1.0 - outliers) * (math.exp(-0.5 * innovation * innovation / variance) / math.sqrt(TWO_PI * variance))
     density = inlier + outliers / model.span_m
-    inlier /= density
-    if in_place * inlier > 0.5:
-        noise_var = model.range_sd_m**2 + 0.5 * across * across / (square + across)
+    if in_place * inlier > 0.5 * density:
+        noise_var = model.range_sd_m**2 + longer_var * inverse
         correct(mean, cov, -ux, -uy, 0.0, innovation, noise_var)
     return density
 
@@ -191,7 +184,8 @@ def _bearing_density(
     if square < CLOSE_BEARING_M2 or square < cov[XX] + cov[YY]:
         return 1.0 / TWO_PI
     direction = math.atan2(dy, dx)
-    hx, hy = dy / square, -dx / square
+    inverse = 1.0 / square
+    hx, hy = inverse * dy, -inverse * dx
     if cov[AXIS_AXIS] > UNKNOWN_AXIS_RAD2:
         if learn:
             mean[AXIS] = wrap_angle(direction - bearing)
@@ -239,4 +233,4 @@ def _recover(
         particles.y_m[i] = mean[Y] + range_m * math.sin(direction)
         particles.turn_rad[i] = TWO_PI * rng.random()
         particles.log_weight[i] = 0.0
-        beliefs.doubt[i] = 0.0
+        beliefs.doubt[i] = 1.0

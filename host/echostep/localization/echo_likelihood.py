@@ -1,9 +1,12 @@
+# SPDX-License-Identifier: MIT
 """p(echo | pose): density of the range that a ranger reports, given the echo sources within its cone.
 
 In: a range and the plan's echo sources, nearest first. Out: a likelihood. Owns nothing.
 
-An SRF02 reports the first echo that it detects. So a source answers if it is detected and no nearer one is; an object that is not on the plan may
-answer before all of them, and a second reflection after them. The mixture is the beam model's, in that order [Thrun et al. 2005, 6.3].
+An SRF02 reports the first echo that it detects. So a source answers if it is detected and no nearer one is, and a second reflection after them all.
+Where the plan is not what stands there (furniture, people, a door that is shut, a wall that is gone), the view of a ranger is hidden, and its echo
+says nothing about the pose. A hidden view lasts: furniture has a length. So each particle carries the probability that its view is hidden, a Markov
+chain of two states over the path [Thrun et al. 2005, 6.3: the mixture of the beam model; here with a memory].
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a di
 NEGLIGIBLE = (
     1e-4  # probability that no source so far was detected below which sources further away are left out, by reason
 )
-SILENT = 0.2  # share of outliers that are "no echo", by reason
+SILENT = 0.2  # share of outliers and of hidden views that are "no echo", by reason
+HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source, by reason: more is added to a room than removed
 LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
 GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
 
@@ -34,8 +38,10 @@ class EchoSettings:
     A wall is detected with probability 1/2 when its level equals that of a wall straight ahead at `maximum_m`, given spreading and absorption there
     and back and a beam that is `rim_db` down at 27.5 degrees each way [Girard 2011, 2.6.2, 2.6.3]; `soft_db`: decibels per unit of logit.
     The inside of a corner answers `corner_db` more weakly, any other wall end `edge_db`, and more so with distance.
-    `short`: an object before all sources, not on the plan; `stray`: a second reflection when no source was detected; `outlier`: anything else.
-    `correlation_m`: length of the path over which errors of successive echoes become independent.
+    `hidden`: share of views in which the plan is not what stands there, `hidden_m`: length of the path over which a view stays hidden (a cupboard).
+    `stray`: a second reflection when no source was detected; `outlier`: anything else, from ping to ping.
+    `correlation_m`: length of the path over which errors of successive echoes become independent: those of the plan, of a ranger's bias, and of the
+    trunk's sway, which lasts half a stride.
     """
 
     sd_m: float = 0.036
@@ -46,17 +52,18 @@ class EchoSettings:
     soft_db: float = 2.0
     edge_db: float = 20.0
     corner_db: float = 3.0
-    short: float = 0.15
+    hidden: float = 0.15
+    hidden_m: float = 0.6
     stray: float = 0.3
     outlier: float = 0.05
-    correlation_m: float = 0.06
+    correlation_m: float = 0.25
 
     def __post_init__(self) -> None:
         """Raise ValueError for lengths of zero and for numbers that are not probabilities."""
-        for name in ("sd_m", "soft_db", "correlation_m", "outlier"):
+        for name in ("sd_m", "soft_db", "correlation_m", "outlier", "hidden", "hidden_m"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"[echo] {name}: must be greater than 0")
-        for name in ("short", "stray", "outlier"):
+        for name in ("hidden", "stray", "outlier"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(f"[echo] {name}: must be a probability below 1")
         if not 0.0 < self.minimum_m < 0.5 * self.maximum_m:
@@ -75,8 +82,17 @@ class EchoModel(NamedTuple):
     corner: float
     maximum_m: float
     minimum_m: float
-    short: float
+    hidden: float
+    hidden_m: float
     stray: float
+    outlier: float
+
+
+class EchoDensities(NamedTuple):
+    """Density per metre of a range (or probability of no echo): if the view is as planned, if it is hidden, and of an outlier."""
+
+    planned: float
+    hidden: float
     outlier: float
 
 
@@ -87,16 +103,15 @@ def echo_model(s: EchoSettings) -> EchoModel:
     reach = per_db * (20.0 * math.log10(s.maximum_m) + ABSORPTION_DB_M * s.maximum_m)
     return EchoModel(
         s.sd_m, s.slant_m, reach, per_db, per_db * beam, per_db * s.edge_db, per_db * s.corner_db,
-        s.maximum_m, s.minimum_m, s.short, s.stray, s.outlier,
+        s.maximum_m, s.minimum_m, s.hidden, s.hidden_m, s.stray, s.outlier,
     )  # fmt: skip
 
 
 @lean_kernel
-def echo_density(
+def echo_densities(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
-) -> float:
-    """Density per metre of a range given `count` sources, nearest first; range 0: the probability of no echo."""
-    first = distance_m[0] if count else m.maximum_m
+) -> EchoDensities:
+    """Densities of a range given `count` sources, nearest first; range 0: probabilities of no echo."""
     unheard, hit = 1.0, 0.0
     for k in range(count):
         heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
@@ -106,13 +121,23 @@ def echo_density(
             hit += heard * normal(range_m - distance_m[k], sd)
         if unheard < NEGLIGIBLE:
             break
-    span = m.maximum_m - m.minimum_m
     if range_m <= 0.0:
-        return (1.0 - m.outlier) * (1.0 - m.short) * (1.0 - m.stray) * unheard + m.outlier * SILENT
+        return EchoDensities((1.0 - m.stray) * unheard, SILENT, SILENT)
+    span = m.maximum_m - m.minimum_m
+    first = distance_m[0] if count else m.maximum_m
     before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
-    short = 1.0 / before if range_m < m.minimum_m + before else 0.0
-    density = (1.0 - m.short) * (hit + unheard * m.stray / span) + m.short * short
-    return (1.0 - m.outlier) * density + m.outlier * (1.0 - SILENT) / span
+    nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
+    hidden = (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) / span)
+    return EchoDensities(hit + unheard * m.stray / span, hidden, (1.0 - SILENT) / span)
+
+
+@lean_kernel
+def echo_density(
+    range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
+) -> float:
+    """Density per metre of a range whose view has no history: hidden with probability `hidden`; range 0: the probability of no echo."""
+    d = echo_densities(range_m, count, distance_m, off_axis_rad, kind, m)
+    return (1.0 - m.outlier) * ((1.0 - m.hidden) * d.planned + m.hidden * d.hidden) + m.outlier * d.outlier
 
 
 @lean_kernel

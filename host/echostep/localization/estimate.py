@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The estimate: moments of the cloud.
 
 In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that says how far to trust it. Owns nothing.
@@ -16,19 +17,25 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.localization.hypotheses import Hypothesis, hypotheses
 from echostep.localization.particles import Cloud
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
-TRACKING_M, LOST_M = (
-    1.0,
-    5.0,
-)  # 95 % radius up to which the status is tracking, beyond which it is lost; by reason: a door, a room
+TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter, by reason: a door, a room
+SURE = 0.95  # probability of an error below TRACKING_M while tracking, by reason
+UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, by reason
+RISK = 1e-3  # probability of an error beyond the protection radius
+TAIL = (
+    1.5  # of the protection radius of a normal distribution, by reason: errors of echoes and steps have heavier tails
+)
+SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, by reason
+UNFIT = 0.5  # probability of the plan below which it is said not to fit, by reason
 SURE_OF_LEVEL = 0.9  # least probability of the likeliest level while tracking, by reason
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
 
 
 class TrackStatus(StrEnum):
-    """How far to trust a position: `uncertain` beyond 1 m of 95 % radius, `lost` beyond 5 m."""
+    """How far to trust a position: `tracking` where the error is below 1 m with probability 0.95, `lost` where it is above 5 m with 0.5."""
 
     TRACKING = "tracking"
     UNCERTAIN = "uncertain"
@@ -40,6 +47,9 @@ class Estimate:
     """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`.
 
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
+    `protection_m`: radius beyond which the error is with probability RISK, infinite where no radius within the building is that safe. `right`:
+    probability that the wearer is in this cloud at all; `plan_fits`: that the plan is the building's.
+    `hypotheses`: the places of a cloud that has not gathered, the likeliest first.
     """
 
     t_s: float
@@ -56,6 +66,10 @@ class Estimate:
     levels: tuple[float, ...] = (1.0,)
     z_m: float = 0.0
     z_sd_m: float = 0.0
+    protection_m: float = math.inf
+    right: float = 1.0
+    hypotheses: tuple[Hypothesis, ...] = ()
+    plan_fits: float = 1.0
 
     @property
     def ellipse95(self) -> Ellipse:
@@ -87,24 +101,82 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     return Ellipse(major, minor, 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2))
 
 
-def estimate(cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, doubt_m: float = 0.0) -> Estimate:
-    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean]; `doubt_m`: standard deviation per axis to be added."""
+class Right(NamedTuple):
+    """Probability that the wearer is `here`, in the cloud, and at least `about`, within LOST_M of it, by a search of the building."""
+
+    here: float
+    about: float = 0.0
+
+
+SURELY = Right(1.0)
+
+
+def estimate(
+    cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
+    elsewhere: Elsewhere | None = None,
+) -> Estimate:  # fmt: skip
+    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
+
+    `sd_m`: standard deviation per axis to be added; `right`: probability that the wearer is in the cloud, otherwise `elsewhere`. While tracking, the
+    covariance is the cloud's; otherwise that of the mixture of both about the cloud's mean.
+    """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
     map_x = cloud.map_x_m
     x, y = float(weight @ map_x), float(weight @ cloud.y_m)
     dx, dy = map_x - x, cloud.y_m - y
     xx, xy, yy = float(weight @ (dx * dx)), float(weight @ (dx * dy)), float(weight @ (dy * dy))
-    east = float(weight @ np.cos(cloud.turn_rad + walk_heading_rad))
-    north = float(weight @ np.sin(cloud.turn_rad + walk_heading_rad))
+    heading = cloud.turn_rad + walk_heading_rad
+    east, north = float(weight @ np.cos(heading)), float(weight @ np.sin(heading))
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    xx, yy = xx + doubt_m**2, yy + doubt_m**2
-    status = trust(ellipse95(xx, xy, yy).major_m)
-    if status is TrackStatus.TRACKING and max(levels) < SURE_OF_LEVEL:
-        status = TrackStatus.UNCERTAIN
+    places: tuple[Hypothesis, ...] = ()
+    if xx + yy > SPREAD_M**2:
+        places = hypotheses(map_x, cloud.y_m, cloud.level, heading, weight)
+    status = _status(np.hypot(dx, dy), weight, right, max(levels))
+    xx, yy = xx + sd_m**2, yy + sd_m**2
+    protection_m = _protection_m(xx, xy, yy, right.here)
+    if status is not TrackStatus.TRACKING and elsewhere is not None:
+        xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), right.here)
     return Estimate(
-        t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd
-    )
+        t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
+        protection_m, right.here, places,
+    )  # fmt: skip
+
+
+def _status(error_m: Floats, weight: Floats, right: Right, level: float) -> TrackStatus:
+    """Status from the distances (n,) of the particles from the estimate, and the probabilities of the cloud and of the likeliest level."""
+    near, about = (right.here * float(weight @ (error_m < limit)) for limit in (TRACKING_M, LOST_M))
+    about = max(about, right.about)
+    if near >= SURE and level >= SURE_OF_LEVEL:
+        return TrackStatus.TRACKING
+    return TrackStatus.UNCERTAIN if about >= UNSURE else TrackStatus.LOST
+
+
+def _protection_m(xx_m2: float, xy_m2: float, yy_m2: float, right: float) -> float:
+    """Radius beyond which the error is with probability RISK: of a normal distribution along its longer axis; being wrong takes part of the risk."""
+    rest = RISK - (1.0 - right)
+    if rest <= 0.0:
+        return math.inf
+    return TAIL * ellipse95(xx_m2, xy_m2, yy_m2).major_m * math.sqrt(-2.0 * math.log(rest) / CHI2_95)
+
+
+class Elsewhere(NamedTuple):
+    """Mean (m) and covariance (m2) of the places in a building where a wearer may be who is not in the cloud."""
+
+    x_m: float
+    y_m: float
+    xx_m2: float
+    xy_m2: float
+    yy_m2: float
+
+    def mixed(
+        self, at_m: tuple[float, float], covariance_m2: tuple[float, float, float], right: float
+    ) -> tuple[float, float, float]:
+        """Second moments xx, xy, yy (m2) about `at_m` of the mixture of a cloud there and of these places."""
+        dx, dy = self.x_m - at_m[0], self.y_m - at_m[1]
+        away = (self.xx_m2 + dx * dx, self.xy_m2 + dx * dy, self.yy_m2 + dy * dy)
+        xx, xy, yy = (right * c + (1.0 - right) * a for c, a in zip(covariance_m2, away, strict=True))
+        return xx, xy, yy
 
 
 def _heights(cloud: Cloud, weight: Floats) -> tuple[tuple[float, ...], float, float]:

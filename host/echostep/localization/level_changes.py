@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Height and level of each particle, from the rise that the foot measured and the height by air pressure.
 
 In: particles after a move, and the `HeightChange` over it. Out: heights, log-weights, and levels (the level shows in x on the sheet). Owns nothing.

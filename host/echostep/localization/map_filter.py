@@ -1,54 +1,56 @@
+# SPDX-License-Identifier: MIT
 """The map filter: measured path segments and beacon readings in, estimates out.
 
 In: `MeasuredSegment`s, each with the pings triggered on it, in order of time; the beacons' readings. Out: an `Estimate` at the end of each segment.
-Owns the cloud, the beacon map, and how far the plan explains the echoes.
+Owns the clouds, the beacon map, and the probability that each cloud is right.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import median
 
 import numpy as np
 
-from echostep.angles import wrap
-from echostep.arrays import Floats, Ints
 from echostep.board.gateway import BeaconReading
+from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.beacon_model import BeaconSettings
+from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.estimate import Estimate, estimate
+from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate
+from echostep.localization.hypotheses import Hypothesis, hypotheses
 from echostep.localization.level_changes import ClimbSettings, HeightChange
 from echostep.localization.particle_kernels import Move, PingBatch
-from echostep.localization.particles import Cloud, CloudSettings
+from echostep.localization.particles import Cloud, CloudSettings, Evidence
+from echostep.localization.plausibility import LEAST, STATED, Plausibility, log_odds, probability
+from echostep.localization.start import Start
+from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
-from echostep.walls.echo_sources import Walls
-from echostep.walls.level_sheet import LevelSheet
 
-RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
-LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
-EXPLAINED_SHARE = 0.1  # of one independent ping in the running mean `explained`, by reason: ten pings
-# Values of `explained` (log of a density in 1/m): a tracked walk has +1, an echo that fits nowhere -5.
-FULL_TRUST, NO_TRUST = 1.2, -1.0  # the trust in echoes is 1 from the first on, and falls to LEAST_TRUST at the second
-UNEXPLAINED = -1.5  # below it the plan does not explain the echoes, and the estimate is lost
-LEAST_TRUST = 0.1  # by reason: with none the trust could not rise again
-LOST_SD_M = 3.0  # standard deviation added to a lost estimate, by reason: its status is then "lost"
-REGAIN_M = 10.0  # path at full trust over which that standard deviation falls to 1 / e, by reason
-# Turn on a segment at which its pings count half, by reason: headings between its ends are interpolated
-TURNING_RAD = math.radians(15.0)
+SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, by reason
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
-PLAN_SD_M = (
-    0.15  # standard deviation per axis at zero trust, by reason: a plan that explains few echoes may be so far off
-)
-UNTRUSTED_FACTOR = 3.0  # extra cloud-size factor at zero trust, by reason
+HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
+HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
 COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
 COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
 HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
 AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce, by reason: draughts
+# Probabilities that a cloud is right, by reason:
+DOUBTED = 0.5  # of the tracked one, below which a search begins
+AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
+BELIEVED = 0.99  # of the tracked one, above which the plan supports it
+GATHERED = 0.3  # of a search's that has just gathered: what it found by the table has yet to foretell echoes
+FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
+REJECTED = 0.05  # of the search's, once it has gathered, below which it begins anew
+FOUND_WITHIN_M = 60.0  # path after which a search that has found nothing begins anew
+PLAN_FITS = 0.99  # prior probability that the plan is that of the building
+FAILS = 0.1  # probability that a search fails although the plan fits
+UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,35 +61,55 @@ class FilterSettings:
     echo: EchoSettings = field(default_factory=EchoSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     beacons: BeaconSettings = field(default_factory=BeaconSettings)
+    plan_sd_m: float = 0.0  # of the walls' positions, per axis
+
+
+@dataclass(slots=True)
+class Hypothetical:
+    """A cloud, the probability that it is right, and whether it has contracted once: before that, echoes tell little of it.
+
+    `is_stated`: it began where it was said to begin, so it should explain the echoes from the first on.
+    """
+
+    cloud: Cloud
+    plausibility: Plausibility
+    is_stated: bool = False
+    has_contracted: bool = False
 
 
 class MapFilter:
-    """A cloud on a plan, from a start on.
-
-    `explained`: running mean of log p(ping) under the cloud, log of a density in 1/m: how well the plan explains the echoes.
-    """
+    """The cloud of a start, and a second one that searches the building while the first is doubted."""
 
     def __init__(
-        self, walls: Walls, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
-        settings: FilterSettings | None = None, sheet: LevelSheet | None = None,
+        self, building: Building, start: Start, walk_heading_rad: float, rng: np.random.Generator,
+        settings: FilterSettings | None = None,
     ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; `sheet`: how levels lie on the walls' sheet."""
-        settings = settings or FilterSettings()
-        self.cloud = Cloud(settings.cloud, start, walk_heading_rad, rng, sheet, settings.climb)
-        self.beacon_map = BeaconMap(walls, settings.beacons, rng)
-        self.explained = 1.0
-        self._walls = walls
-        self._echo = settings.echo
-        self._model = echo_model(settings.echo)
-        self._doubt_m = 0.0  # standard deviation per axis that the cloud's own spread does not show
-        self._path_m = 0.0  # length of the path so far
+        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at the start."""
+        self._settings = settings or FilterSettings()
+        self._building = building
+        self._rng = rng
+        sd_m, cloud_settings = math.hypot(self._settings.echo.sd_m, self._settings.plan_sd_m), self._settings.cloud
+        self._model = echo_model(replace(self._settings.echo, sd_m=sd_m))
+        self._blurred = echo_model(replace(self._settings.echo, sd_m=math.hypot(sd_m, cloud_settings.rough_m)))
+        self._pings = UsablePings(building.background(self._model), self._settings.echo.correlation_m)
+        cloud = self._new_cloud(start, walk_heading_rad)
+        stated = not cloud.is_coarse
+        self.tracked = Hypothetical(cloud, Plausibility(STATED if stated else GATHERED), stated)
+        self.search: Hypothetical | None = None
+        self._search_m = 0.0  # length of the path at which the search began
+        self._plan_log_odds = log_odds(PLAN_FITS)
+        self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
-        self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
     @property
-    def trust(self) -> float:
-        """Trust in the echoes, LEAST_TRUST to 1: as far as the plan explained the last ones. Echoes that it does not explain repeat themselves."""
-        return min(max((self.explained - NO_TRUST) / (FULL_TRUST - NO_TRUST), LEAST_TRUST), 1.0)
+    def cloud(self) -> Cloud:
+        """The cloud that is tracked."""
+        return self.tracked.cloud
+
+    @property
+    def right(self) -> float:
+        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it."""
+        return min(self.tracked.plausibility.probability, self._search_within(TRACKING_M))
 
     def update(self, measured: MeasuredSegment, readings: Sequence[BeaconReading] = ()) -> Estimate:
         """Propagate along a segment, reweight by its pings, height change and beacon readings, and resample; returns the estimate at its end."""
@@ -96,63 +118,141 @@ class MapFilter:
             self._scatter(measured)
         else:
             self._follow(measured)
-        self.beacon_map.update(self.cloud, segment, readings)
-        doubt_m = math.hypot(self._doubt_m, segment.anchor_sd_m, PLAN_SD_M * (1.0 - self.trust), EXACT_SD_M)
-        return estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, doubt_m)
+        self.beacon_map.update(self.cloud, segment, readings, self._plan_supports)
+        self._choose(segment.heading1_rad)
+        return self._estimate(segment)
+
+    def turn_walk_frame(self, by_rad: float) -> None:
+        """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
+        for each in self._clouds():
+            each.cloud.turn_rad = each.cloud.turn_rad + by_rad
+
+    def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
+        s, b = self._settings, self._building
+        return Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
+
+    @property
+    def _plan_supports(self) -> bool:
+        """Whether the last metres of echoes confirm the cloud by the plan."""
+        return self.right > BELIEVED and self._pings.silent_m < SUPPORTED_M
 
     def _scatter(self, measured: MeasuredSegment) -> None:
         """Spread the cloud over an unobserved segment."""
-        self.cloud.scatter(_move(measured.segment), _height_change(measured))
-        self._doubt_m = math.hypot(self._doubt_m, measured.segment.sd_m)
+        for each in self._clouds():
+            each.cloud.scatter(_move(measured.segment), _height_change(measured))
+            each.plausibility.doubt(UNOBSERVED_DOUBT)
 
     def _follow(self, measured: MeasuredSegment) -> None:
-        """Propagate along an observed segment; the cloud resamples itself after each reweighting that needs it."""
+        """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
-        pings = self._usable_pings(measured)
+        pings, unplanned = self._pings.take(measured)
         if segment.scale_sd > 0.0:
-            self._coarse_until_m = self._path_m + COARSE_PATH_M
-        coarse = COARSE_FACTOR if self._path_m < self._coarse_until_m else 0.0
-        self.cloud.set_minimum_size(1.0 + coarse + UNTRUSTED_FACTOR * (1.0 - self.trust))
-        log_evidence = self.cloud.propagate_and_reweight(_move(segment), pings, self._model, self._walls)
-        self._judge(log_evidence, pings.power)
-        self.cloud.change_levels(_move(segment), _height_change(measured))
-        self._doubt_m *= math.exp(-math.hypot(segment.dx_m, segment.dy_m) * self.trust / REGAIN_M)
+            self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
+        for each in self._clouds():
+            self._follow_with(each, measured, pings, unplanned)
 
-    def _usable_pings(self, measured: MeasuredSegment) -> PingBatch:
-        """The pings that bring information, with their share of the segment and their axis in the walk frame; extends the path by the segment."""
-        segment = measured.segment
-        length, span_s = math.hypot(segment.dx_m, segment.dy_m), segment.t1_s - segment.t0_s
-        turn = wrap(segment.heading1_rad - segment.heading0_rad)
-        share = np.ones(len(measured.t_s))
-        if span_s > 0.0:
-            share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
-        axis = segment.heading0_rad + share * turn + RANGER_AXES_RAD[measured.ranger]
-        range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
-        power = self._independent_share(measured.ranger, self._path_m + share * length) * self.trust
-        power /= 1.0 + (turn / TURNING_RAD) ** 2
-        self._path_m += length
-        used = power > LEAST_POWER
-        return PingBatch(share[used], axis[used], range_m[used], power[used])
+    def _follow_with(
+        self, each: Hypothetical, measured: MeasuredSegment, pings: PingBatch, unplanned: UnplannedDensities
+    ) -> None:
+        """Propagate and reweight one cloud, and judge it by how well it foretold the pings."""
+        cloud, move = each.cloud, _move(measured.segment)
+        legs = COARSE_FACTOR if self._pings.path_m < self._coarse_until_m else 0.0
+        cloud.set_minimum_size(1.0 + legs + HIDDEN_FACTOR * cloud.hidden_share)
+        if cloud.is_coarse:
+            field = self._building.field(self._model)
+            cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)
+        else:
+            # A scattered cloud's particles stand for the places between them.
+            model = self._blurred if cloud.is_scattered else self._model
+            evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
+            self._judge(each, evidence, unplanned, math.hypot(move.dx_m, move.dy_m))
+        cloud.change_levels(move, _height_change(measured))
 
-    def _independent_share(self, ranger: Ints, path_m: Floats) -> Floats:
-        """Share of independent information in each ping (k,): errors of one ranger's echoes are correlated over `correlation_m` of the path."""
-        power = np.zeros(len(path_m))
-        for which in (0, 1):
-            own = np.flatnonzero(ranger == which)
-            if len(own):
-                travel = path_m[own]
-                last_m, self._last_ping_m[which] = self._last_ping_m[which], float(travel[-1])
-                travel[1:] -= travel[:-1].copy()
-                travel[0] -= last_m
-                power[own] = np.minimum(travel / self._echo.correlation_m, 1.0)
-        return power
+    def _judge(self, each: Hypothetical, evidence: Evidence, unplanned: UnplannedDensities, path_m: float) -> None:
+        """Update the probability that a cloud is right; one that has not contracted gains nothing, and a search's is judged against chance alone."""
+        cloud, most = each.cloud, each.plausibility.probability
+        judged = each.has_contracted and not cloud.is_scattered
+        each.has_contracted = each.has_contracted or cloud.is_small  # what contracts it, it has not foretold
+        rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
+        each.plausibility.update(evidence.log_pings - rival, evidence.log_path, path_m)
+        if not judged:
+            each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))
 
-    def _judge(self, log_evidence: Floats, power: Floats) -> None:
-        """Update `explained` by the pings' log-evidence; below UNEXPLAINED the cloud's spread is not believed."""
-        for value, share in zip(log_evidence.tolist(), power.tolist(), strict=True):
-            self.explained += share * EXPLAINED_SHARE * (value - self.explained)
-            if self.explained < UNEXPLAINED:
-                self._doubt_m = max(self._doubt_m, LOST_SD_M)
+    def _clouds(self) -> list[Hypothetical]:
+        return [self.tracked] if self.search is None else [self.tracked, self.search]
+
+    def _choose(self, walk_heading_rad: float) -> None:
+        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found."""
+        tracked, search = self.tracked, self.search
+        if tracked.cloud.is_coarse and self._pings.path_m - self._search_m > FOUND_WITHIN_M:
+            self._doubt_plan()
+            self.tracked = Hypothetical(self._new_cloud(Start(), walk_heading_rad), Plausibility(GATHERED))
+        elif search is None:
+            least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else REJECTED
+            doubted = tracked.plausibility.probability < least and not tracked.cloud.is_coarse
+            if tracked.has_contracted and tracked.plausibility.probability > BELIEVED:
+                self._plan_log_odds = log_odds(PLAN_FITS)
+            if doubted and len(self._building.floor.x_m):
+                self._begin_search(walk_heading_rad)
+        elif self.right > AGREED:
+            self.search, self._plan_log_odds = None, log_odds(PLAN_FITS)
+        elif search.plausibility.probability > FOUND and search.cloud.is_gathered and self.right < DOUBTED:
+            self.tracked, self.search = search, None
+        elif self._has_failed(search):
+            self._doubt_plan()
+            self._begin_search(walk_heading_rad)
+
+    def _search_within(self, distance_m: float) -> float:
+        """The search's weight so near to the tracked cloud's mean, on its level; 1 without a search."""
+        if self.search is None:
+            return 1.0
+        cloud, mean = self.search.cloud, self._believed(0.0)
+        near = np.hypot(cloud.map_x_m - mean.x_m, cloud.y_m - mean.y_m) < distance_m
+        return float(cloud.weight @ (near & (cloud.level == mean.level)))
+
+    def _doubt_plan(self) -> None:
+        """A search of the whole building has failed."""
+        self._plan_log_odds = max(self._plan_log_odds + math.log(FAILS), LEAST)
+        self._search_m = self._pings.path_m
+
+    def _begin_search(self, walk_heading_rad: float) -> None:
+        start = Start(near=self._believed(walk_heading_rad))
+        self.search = Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
+        self._search_m = self._pings.path_m
+
+    def _believed(self, walk_heading_rad: float) -> Pose:
+        """The mean pose of the tracked cloud, on its likeliest level."""
+        cloud, weight = self.cloud, self.cloud.weight
+        level = int(np.bincount(cloud.level, weight).argmax())
+        on = cloud.level == level
+        x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
+        turn = math.atan2(float(weight @ np.sin(cloud.turn_rad)), float(weight @ np.cos(cloud.turn_rad)))
+        return Pose(x, y, turn + walk_heading_rad, level)
+
+    def _has_failed(self, search: Hypothetical) -> bool:
+        """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing for long."""
+        if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
+            return True
+        return self._pings.path_m - self._search_m > FOUND_WITHIN_M
+
+    def _estimate(self, segment: PathSegment) -> Estimate:
+        """The estimate at the end of a segment."""
+        hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
+        sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
+        right = Right(self.right, self._search_within(LOST_M) if self.search else 0.0)
+        new = estimate(
+            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere
+        )
+        return replace(
+            new, plan_fits=probability(self._plan_log_odds), hypotheses=self._hypotheses(new, segment.heading1_rad)
+        )
+
+    def _hypotheses(self, new: Estimate, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
+        """The places of the search while there is one, otherwise those of the estimate."""
+        if self.search is None:
+            return new.hypotheses
+        cloud = self.search.cloud
+        return hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, cloud.weight)
 
 
 def _move(segment: PathSegment) -> Move:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Errors of estimates against the truth, where it is known.
 
 In: truth.csv (`t_s,x,y,heading_rad`, the trunk, map frame) and estimates. Out: `Errors`. Owns nothing.

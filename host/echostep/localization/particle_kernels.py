@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The steps of the particle filter on plain arrays: propagate, reweight by a ping, normalise, choose whom to keep.
 
 In: `ParticleArrays`, a `Move` in the walk frame, a `PingBatch`, the walls. Out: the same arrays, changed in place. Owns nothing.
@@ -12,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, lean_kernel
-from echostep.localization.echo_likelihood import EchoModel, echo_density
+from echostep.localization.echo_likelihood import EchoModel, echo_densities
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex, crosses_wall
 
@@ -43,13 +44,34 @@ class Move(NamedTuple):
 class PingBatch(NamedTuple):
     """k pings on a move: share of the move at the trigger (ascending), axis of the ranger in the walk frame, range (0: none), power.
 
-    `power`: share of independent information in the ping; its log-likelihood is multiplied by it.
+    `power`: share of independent information in the ping, the power of its densities. `ranger`: 0 left, 1 right. `travel_m`: length of
+    the path since this ranger's ping before. `alike`: density of an echo that is like the one before (`background`).
     """
 
     share: Floats
     axis_rad: Floats
     range_m: Floats
     power: Floats
+    ranger: Ints
+    travel_m: Floats
+    alike: Floats
+
+
+class Ping(NamedTuple):
+    """One ping of a `PingBatch`."""
+
+    axis_rad: float
+    range_m: float
+    power: float
+    travel_m: float
+    alike: float
+
+
+class EchoMemory(NamedTuple):
+    """`hidden` (2, n): probability by ranger and particle that its view is hidden. `log_evidence` (k,): output, see `propagate_and_reweight`."""
+
+    hidden: Floats
+    log_evidence: Floats
 
 
 class CloudModel(NamedTuple):
@@ -70,57 +92,65 @@ class MoveProgress(NamedTuple):
 @kernel
 def propagate_and_reweight(
     particles: ParticleArrays, move: Move, noise: Floats, progress: MoveProgress, pings: PingBatch,
-    model: CloudModel, walls: WallIndex, log_evidence: Floats,
-) -> tuple[MoveProgress, float]:  # fmt: skip
+    model: CloudModel, walls: WallIndex, memory: EchoMemory,
+) -> tuple[MoveProgress, float, float]:  # fmt: skip
     """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (4, n) is for the rest of the move.
 
-    Writes to `log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, and the lowest best
-    log-weight before renormalising.
+    Writes to `memory.log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, the lowest
+    best log-weight before renormalising, and the log of the weight that the walls left.
     """
     done, k = progress.share, progress.ping
-    rest, lowest = 1.0 - done, 0.0
+    rest, lowest, passed = 1.0 - done, 0.0, 0.0
     while done < 1.0 or k < len(pings.share):
         until = max(pings.share[k], done) if k < len(pings.share) else 1.0
         if until > done:
             part = until - done
-            best = propagate(
+            best, left = propagate(
                 particles, part * move.dx_m, part * move.dy_m, part / rest, noise, model.wall_cost, walls
-            )  # fmt: skip
+            )
             lowest = min(lowest, best)
+            passed += left
             done = until
         if k < len(pings.share):
-            log_evidence[k], size = reweight_by_ping(
-                particles, pings.axis_rad[k], pings.range_m[k], pings.power[k], model.echo, walls
+            ping = Ping(pings.axis_rad[k], pings.range_m[k], pings.power[k], pings.travel_m[k], pings.alike[k])
+            memory.log_evidence[k], size = reweight_by_ping(
+                particles, memory.hidden[pings.ranger[k]], ping, model.echo, walls
             )
             k += 1
         else:
             size = effective_size(particles.log_weight)
         if size < model.resample_below * len(particles.x_m):
             break
-    return MoveProgress(done, k), lowest
+    return MoveProgress(done, k), lowest, passed
 
 
 @lean_kernel
 def propagate(
     particles: ParticleArrays, dx: float, dy: float, share: float, noise: Floats, wall_cost: float, walls: WallIndex
-) -> float:
-    """Move every particle by (dx, dy) in the walk frame, with this share of its noise; returns the greatest log-weight and makes it 0 again."""
+) -> tuple[float, float]:
+    """Move every particle by (dx, dy) in the walk frame, with this share of its noise, and make the greatest log-weight 0 again.
+
+    Returns what that was, and the log of the share of the weight that crossed no wall.
+    """
     x, y, turn, scale, log_weight = particles
-    top = -np.inf
+    top, total, crossed = -np.inf, 0.0, 0.0
     for i in range(len(x)):
         turn[i] += share * noise[NOISE_TURN, i]
         scale[i] += share * noise[NOISE_SCALE, i]
         c, s = math.cos(turn[i]), math.sin(turn[i])
         to_x = x[i] + scale[i] * (c * dx - s * dy) + share * noise[0, i]
         to_y = y[i] + scale[i] * (s * dx + c * dy) + share * noise[1, i]
+        weight = math.exp(log_weight[i])
+        total += weight
         if crosses_wall(x[i], y[i], to_x, to_y, walls):
+            crossed += weight
             log_weight[i] -= wall_cost
         top = max(top, log_weight[i])
         x[i], y[i] = to_x, to_y
     if top != 0.0:
         for i in range(len(x)):
             log_weight[i] -= top
-    return top
+    return top, math.log(max(1.0 - crossed / total, math.exp(-wall_cost)))
 
 
 @kernel
@@ -137,28 +167,36 @@ def propagate_without_walls(particles: ParticleArrays, move: Move, rng: np.rando
 
 @kernel
 def reweight_by_ping(
-    particles: ParticleArrays, axis: float, range_m: float, power: float, model: EchoModel, walls: WallIndex
+    particles: ParticleArrays, hidden: Floats, ping: Ping, model: EchoModel, walls: WallIndex
 ) -> tuple[float, float]:
-    """Add each particle's log-likelihood, times `power`, and make the greatest log-weight 0.
+    """Add each particle's log-likelihood, and make the greatest log-weight 0.
 
-    Returns the log of the mean likelihood before, and the effective size after.
+    `hidden` (n,): of this ranger, the probability that the particle's view is hidden. Along the path it returns to `model.hidden` within
+    `model.hidden_m`; the ping corrects it. The densities are raised to the ping's power, the probabilities of the view are not: a view that stays
+    hidden for long is unlikely, however often it is measured. Returns the log of the mean likelihood before, and the effective size after.
     """
     x, y, turn, _, log_weight = particles
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    kept, inlier = math.exp(-ping.travel_m / model.hidden_m), 1.0 - model.outlier
     top = -np.inf
     weight, evidence, total, squares = 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         w = math.exp(log_weight[i])
         if w < NEGLIGIBLE:
             continue
-        count = echo_sources(x[i], y[i], axis + turn[i], walls, distance_m, off_axis_rad, kind)
-        likelihood = echo_density(range_m, count, distance_m, off_axis_rad, kind, model)
+        count = echo_sources(x[i], y[i], ping.axis_rad + turn[i], walls, distance_m, off_axis_rad, kind)
+        density = echo_densities(ping.range_m, count, distance_m, off_axis_rad, kind, model)
+        before = model.hidden + kept * (hidden[i] - model.hidden)
+        outlier = model.outlier * density.outlier
+        hidden_density = 0.5 * (density.hidden + ping.alike)  # anything, or what hides the view goes on
+        by_hidden = before * math.exp(ping.power * math.log(inlier * hidden_density + outlier))
+        likelihood = by_hidden + (1.0 - before) * math.exp(ping.power * math.log(inlier * density.planned + outlier))
+        hidden[i] = by_hidden / likelihood
         weight += w
-        evidence += w * likelihood
-        log_likelihood = power * math.log(likelihood)
-        log_weight[i] += log_likelihood
+        w *= likelihood
+        evidence += w
+        log_weight[i] += math.log(likelihood)
         top = max(top, log_weight[i])
-        w *= math.exp(log_likelihood)
         total += w
         squares += w * w
     for i in range(len(x)):
@@ -190,3 +228,11 @@ def systematic(weight: Floats, draw: float, count: int) -> Ints:
             reach += weight[k]
         chosen[i] = k
     return chosen
+
+
+@kernel
+def keep_chosen(particles: ParticleArrays, chosen: Ints) -> None:
+    """Replace the particles by the chosen ones (n,) in place, with equal weights; their number stays."""
+    x, y, turn, scale, log_weight = particles
+    x[:], y[:], turn[:], scale[:] = x[chosen], y[chosen], turn[chosen], scale[chosen]
+    log_weight[:] = 0.0

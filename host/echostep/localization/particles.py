@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The cloud: the trunk's position as weighted particles on the plan.
 
 In: moves of the trunk in the walk frame, with the pings on them. Out: a `Cloud` whose moments are the estimate. Owns the particles; draws from the
@@ -11,11 +12,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.beacon_beliefs import BeaconBeliefs, empty_beliefs
+from echostep.localization.coarse_field import CoarseField, CoarsePing, reweight_coarsely
 from echostep.localization.echo_likelihood import EchoModel
 from echostep.localization.level_changes import (
     ClimbSettings,
@@ -27,39 +30,59 @@ from echostep.localization.level_changes import (
 )
 from echostep.localization.particle_kernels import (
     CloudModel,
+    EchoMemory,
     Move,
     MoveProgress,
     ParticleArrays,
     PingBatch,
     effective_size,
+    propagate,
     propagate_and_reweight,
     systematic,
 )
-from echostep.plan.model import Pose
+from echostep.localization.start import Start, draw_poses
 from echostep.walls.echo_sources import Walls
+from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-ANY_LEVEL = -1  # level of a start that is not known
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
-ROUGHENED = (
-    10  # a cloud of more than so many times the usual size is roughened, by reason: only a scattered one is so large
+# A cloud of more than so many times the usual size is roughened, by reason: only a scattered one is so large
+ROUGHENED = 10
+SMALL = 2  # times the least size, by reason: a cloud has contracted
+COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
+COARSE_POWER = 0.3  # share of information in such a ping, by reason: walls go on
+START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
+WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
+COARSE_WALL_COST = (
+    5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
 )
+COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
+# Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
+MODE_M, MODE_RAD = 2.0, math.radians(45.0)
+LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, by reason
+MOST_MODES = 1_000_000  # cells beyond which no modes are told apart: memory
+GATHERED_M, GATHERED_REST = (
+    2.5,
+    1e-4,
+)  # a cloud has gathered when no more than this weight is further from its mean, by reason
 KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 
 
 @dataclass(frozen=True, slots=True)
 class CloudSettings:
-    """Size of the cloud, spread at the start, and noise that the path's own covariance leaves out.
+    """Size of the cloud, spread of a start about whose errors nothing is said, and noise that the path's own covariance leaves out.
 
     `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation and of the lengths,
     likewise. `resample_below`: effective share of the cloud at which it is resampled (systematic). The size follows the spread [Fox 2003,
     KLD-sampling]: enough particles that the distribution over cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at
-    most `largest`. A scattered cloud is roughened by `rough_m` and `rough_deg` until it has contracted. `wall_cost`: log-weight that crossing a
-    wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
+    most `largest`. A cloud that would need more is coarse: it has `searching` particles, and echoes are looked up in a table. A scattered cloud is
+    roughened by `rough_m` and `rough_deg` until it has contracted. `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a
+    cloud that crossed a wall as a whole.
     """
 
     size: int = 220
     largest: int = 20_000
+    searching: int = 300_000
     kld: float = 0.15
     cell_m: float = 0.1
     cell_deg: float = 5.0
@@ -84,37 +107,52 @@ class CloudSettings:
                 raise ValueError(f"[cloud] {name}: must be greater than 0")
 
 
+class Evidence(NamedTuple):
+    """How well a cloud foretold a segment: of each ping (k,) the log of its mean likelihood before it, and the log of the weight that walls left."""
+
+    log_pings: Floats
+    log_path: float
+
+
 class Cloud:
     """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0."""
 
     def __init__(
-        self, settings: CloudSettings, start: Pose, walk_heading_rad: float, rng: np.random.Generator,
-        sheet: LevelSheet | None = None, climbing: ClimbSettings | None = None,
+        self, settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator,
+        sheet: LevelSheet | None = None, climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR,
     ) -> None:  # fmt: skip
-        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; without `sheet` there is one level."""
+        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; without `sheet` there is one level.
+
+        `floor`: for a start that is anywhere.
+        """
         self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
         self._climbing = climbing or ClimbSettings()
         self._level_changes = level_change_model(self._climbing)
         self._lag_variance = UNKNOWN_LAG_M2
-        n = settings.size
         self._settings = settings
         self._rng = rng
-        self.x_m: Floats = start.x_m + settings.start_sd_m * rng.standard_normal(n)
-        self.y_m: Floats = start.y_m + settings.start_sd_m * rng.standard_normal(n)
-        spread = math.radians(settings.start_turn_sd_deg)
-        self.turn_rad: Floats = start.heading_rad - walk_heading_rad + spread * rng.standard_normal(n)
-        self.scale: Floats = 1.0 + settings.start_scale_sd * rng.standard_normal(n)
-        self.z_m: Floats = np.zeros(n)
-        self.lag_m: Floats = np.zeros(n)
-        self.log_weight: Floats = np.zeros(n)
-        self.beliefs = empty_beliefs(n, 0)
-        if self.sheet:
-            levels = len(self.sheet.height_m)
-            level = np.arange(n) % levels if start.level == ANY_LEVEL else np.full(n, start.level)
-            self.x_m += level * self.sheet.pitch_m
-            self.z_m = self.sheet.height_m[level]
+        self._minimum_size = settings.size
+        self._last_used_m = np.full(2, -math.inf)  # path at the last ping of each ranger that a coarse cloud used
+        self._path_m = 0.0
         self.rescues = 0
-        self._minimum_size = n
+        self.is_gathered = False
+        self.is_coarse = start.pose is None or start.sd_m > WIDE_M
+        self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
+        wanted = max(self._size_by_spread(), START_SIZE)
+        if wanted < settings.largest:
+            self.is_coarse = False
+            self._keep(np.arange(min(wanted, len(self.x_m))))
+
+    def _draw(self, start: Start, count: int, walk_heading_rad: float, floor: Floor) -> None:
+        """Draw so many particles from the start."""
+        self.x_m, self.y_m, heading = draw_poses(start, count, floor, self.sheet, self._rng)
+        self.turn_rad: Floats = heading - walk_heading_rad
+        self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
+        self.lag_m: Floats = np.zeros(count)
+        self.log_weight: Floats = np.zeros(count)
+        self.hidden: Floats = np.zeros((2, count))
+        self.beliefs = empty_beliefs(count, 0)
+        self.z_m: Floats = self.sheet.height_m[self.level] if self.sheet else np.zeros(count)
 
     @property
     def level(self) -> Ints:
@@ -143,30 +181,69 @@ class Cloud:
         weight /= weight.sum()
         return weight
 
+    @property
+    def is_scattered(self) -> bool:
+        """Whether the cloud is so large that it has not gathered yet."""
+        return len(self.x_m) > ROUGHENED * self._settings.size
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the cloud has contracted to about its least size."""
+        return len(self.x_m) <= SMALL * self._minimum_size
+
+    @property
+    def hidden_share(self) -> float:
+        """Probability that a view is hidden, mean of both rangers."""
+        return float((self.hidden @ self.weight).mean())
+
     def level_at(self, x_m: float) -> int:
         """Level of an x on the sheet."""
         return int(level_of(np.array([x_m]), self.sheet)[0]) if self.sheet else 0
 
-    def propagate_and_reweight(self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls) -> Floats:
+    def propagate_and_reweight(self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls) -> Evidence:
         """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
 
         A particle that crosses a wall loses its weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns
-        for each ping the log of its mean likelihood under the cloud before it: how well the plan explains the ping.
+        how well the cloud foretold the pings and the path.
         """
-        log_evidence = np.zeros(len(pings.share))
+        log_evidence, log_passed = np.zeros(len(pings.share)), 0.0
         progress, settings = MoveProgress(0.0, 0), self._settings
         cloud_model = CloudModel(settings.wall_cost, settings.resample_below, model)
         while progress.share < 1.0 or progress.ping < len(log_evidence):
             rest = 1.0 - progress.share
             noise = self._noise(move, rest)
             index = walls.near(self.x_m, self.y_m, rest * math.hypot(move.dx_m, move.dy_m))
-            progress, lowest = propagate_and_reweight(
-                self.arrays, move, noise, progress, pings, cloud_model, index, log_evidence
+            progress, lowest, passed = propagate_and_reweight(
+                self.arrays, move, noise, progress, pings, cloud_model, index, EchoMemory(self.hidden, log_evidence)
             )
+            log_passed += passed
             if lowest < -0.5 * settings.wall_cost:
                 self._widen()
             self.resample_if_needed()
-        return log_evidence
+        return Evidence(log_evidence, log_passed)
+
+    def propagate_and_reweight_coarsely(
+        self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
+    ) -> None:
+        """The same for a coarse cloud: one ping of each ranger on COARSE_M of the path, looked up in the table."""
+        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(257), 0.0
+        for k, share in enumerate([*pings.share.tolist(), 1.0]):
+            is_ping = k < len(pings.share)
+            if is_ping and self._path_m + share * length < self._last_used_m[pings.ranger[k]] + COARSE_M:
+                continue
+            if share > done:
+                self._propagate_coarsely(move, share - done, walls)
+                done = share
+            if is_ping:
+                self._last_used_m[pings.ranger[k]] = self._path_m + share * length
+                ping = CoarsePing(float(pings.axis_rad[k]), float(pings.range_m[k]), COARSE_POWER)
+                reweight_coarsely(self.arrays, ping, field, model, table)
+            self.resample_if_needed()
+        self._path_m += length
+
+    def _propagate_coarsely(self, move: Move, share: float, walls: Walls) -> None:
+        noise = self._noise(move, share)
+        propagate(self.arrays, share * move.dx_m, share * move.dy_m, 1.0, noise, COARSE_WALL_COST, walls.index)
 
     def change_levels(self, move: Move, change: HeightChange) -> None:
         """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
@@ -184,6 +261,7 @@ class Cloud:
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
         """Spread by an unobserved move: no wall is asked, the path to its end is not known. The level is that of the height by pressure, if any."""
         self._keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
+        self.is_gathered = False
         noise = self._rng.standard_normal((3, len(self.x_m)))
         self.turn_rad += move.turn_sd_rad * noise[2]
         c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
@@ -197,15 +275,51 @@ class Cloud:
         self._minimum_size = int(factor * self._settings.size)
 
     def resample_if_needed(self) -> None:
-        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight."""
-        if effective_size(self.log_weight) >= self._settings.resample_below * len(self.x_m):
+        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.
+
+        Until the cloud has gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
+        alone would lose the lighter of two modes by chance.
+        """
+        weight_after = np.zeros(len(self.x_m)) if self.is_gathered else 0.5 * self._log_mode_weight()
+        wanted_weight = self.log_weight - weight_after
+        if effective_size(wanted_weight) >= self._settings.resample_below * len(self.x_m):
             return
-        self._keep(systematic(np.exp(self.log_weight), float(self._rng.random()), len(self.x_m)))
-        count = self._size_by_spread()
+        self._resample(wanted_weight, weight_after, len(self.x_m))
+        wanted = self._size_by_spread()
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest
+        count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
-            self._keep(systematic(np.ones(len(self.x_m)), float(self._rng.random()), count))
-        if count > ROUGHENED * self._settings.size:
-            self._roughen()
+            self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
+        self.is_gathered = self.is_gathered or self._has_gathered()
+        if self.is_coarse:
+            self._roughen(*COARSE_ROUGH)
+        elif self.is_scattered:
+            self._roughen(self._settings.rough_m, math.radians(self._settings.rough_deg))
+
+    def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
+        """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
+        chosen = systematic(np.exp(log_wanted - log_wanted.max()), float(self._rng.random()), count)
+        kept = log_weight[chosen]
+        self._keep(chosen)
+        self.log_weight = kept - kept.max()
+
+    def _log_mode_weight(self) -> Floats:
+        """Log of the weight (n,) of all particles in the same cell of MODE_M, MODE_M and MODE_RAD; at least LEAST_MODE."""
+        east, north = np.floor((self.x_m - self.x_m.min()) / MODE_M), np.floor((self.y_m - self.y_m.min()) / MODE_M)
+        sectors = round(2.0 * math.pi / MODE_RAD)
+        sector = np.floor(self.turn_rad / MODE_RAD).astype(np.int64) % sectors
+        columns, rows = int(east.max()) + 1, int(north.max()) + 1
+        if columns * rows > MOST_MODES:
+            return np.zeros(len(self.x_m))
+        cell = (east.astype(np.int64) * rows + north.astype(np.int64)) * sectors + sector
+        mass = np.bincount(cell, self.weight)
+        return np.log(np.maximum(mass, LEAST_MODE))[cell]
+
+    def _has_gathered(self) -> bool:
+        """Whether nearly all of the weight lies about its mean."""
+        weight = self.weight
+        far = np.hypot(self.x_m - weight @ self.x_m, self.y_m - weight @ self.y_m) > GATHERED_M
+        return bool(weight @ far < GATHERED_REST)
 
     def _noise(self, move: Move, share: float) -> Floats:
         """Noise of this share of a move in x, y, turn and scale of each particle, (4, n)."""
@@ -223,12 +337,12 @@ class Cloud:
         self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
         self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
 
-    def _roughen(self) -> None:
+    def _roughen(self, rough_m: float, rough_rad: float) -> None:
         """Add noise to a scattered cloud, so that copies of one particle try places between the few that fit [Gordon et al. 1993]."""
         noise = self._rng.standard_normal((3, len(self.x_m)))
-        self.x_m += self._settings.rough_m * noise[0]
-        self.y_m += self._settings.rough_m * noise[1]
-        self.turn_rad += math.radians(self._settings.rough_deg) * noise[2]
+        self.x_m += rough_m * noise[0]
+        self.y_m += rough_m * noise[1]
+        self.turn_rad += rough_rad * noise[2]
 
     def _keep(self, chosen: Ints) -> None:
         """Replace the particles by the chosen ones (m,), with equal weights."""
@@ -236,10 +350,11 @@ class Cloud:
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
         self.z_m, self.lag_m = self.z_m[chosen], self.lag_m[chosen]
         self.beliefs = BeaconBeliefs(*(part[chosen] for part in self.beliefs))
+        self.hidden = np.ascontiguousarray(self.hidden[:, chosen])
         self.log_weight = np.zeros(len(chosen))
 
     def _size_by_spread(self) -> int:
-        """Size for the present spread, from the number of cells that hold particles [Fox 2003, eq. 7]."""
+        """Size for the present spread, from the number of cells that hold particles [Fox 2003, eq. 7]; more than `largest` for a coarse cloud."""
         s = self._settings
         cells = np.floor(self.x_m / s.cell_m)
         cells += 1e6 * np.floor(self.y_m / s.cell_m)
@@ -250,4 +365,4 @@ class Cloud:
             return self._minimum_size
         part = 2.0 / (9.0 * k)
         wanted = k / (2.0 * s.kld) * (1.0 - part + math.sqrt(part) * KLD_QUANTILE) ** 3
-        return int(min(max(wanted, self._minimum_size), s.largest))
+        return int(max(wanted, self._minimum_size))

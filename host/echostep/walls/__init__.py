@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What kernels look up about a plan: which walls a move crosses, and the echo sources within a ranger's cone.
 
 In: a `Plan`. Out: `Walls` on a `LevelSheet` (all levels side by side). Owns the tables of tiles, filled when a cloud first comes near.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Echo sources of the plan: where a ranger's ping is reflected back to it.
 
 In: walls (n, 4) and places. Out: `Walls.near` gives the `WallIndex` for kernels; `echo_sources` is such a kernel.

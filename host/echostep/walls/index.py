@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The walls of a plan on a grid of square tiles: which of them a move crosses.
 
 In: wall segments (n, 4) in map metres. Out: `WallIndex`, plain arrays for kernels, and `crosses_wall`. Owns nothing.

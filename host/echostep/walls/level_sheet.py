@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """All levels of a plan laid side by side on one sheet, and the connectors between them.
 
 In: a plan. Out: `LaidOutPlan`: walls for the cloud, and `LevelSheet`, plain arrays for kernels. Owns nothing.

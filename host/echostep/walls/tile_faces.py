@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Faces of a tile: the walls that can reflect sound straight back to it.
 
 In: a tile's corners and the walls near it. Out: a `SourceTable` of faces with their screens. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Points of a tile: the places where walls end or meet, corners and edges, that can be heard from it.
 
 In: a tile's corners and the walls near it. Out: a `SourceTable` of points with their screens. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Echo sources that can be heard from somewhere in one tile, and the walls (screens) that may hide each from there.
 
 In: the walls of a `WallIndex` and a tile. Out: its faces and points as two `SourceTable`s. Owns nothing.

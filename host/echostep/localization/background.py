@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""The echoes' density if nothing is known of the pose: what a wearer anywhere in the building receives, or what the last echo foretells.
+
+In: walls, their floor, pings. Out: `Background`: log-density by range; `RangeMemory`: log-density of a ping after those before. Owns the last ranges.
+A cloud that explains the echoes no better than this is wrong, or the plan is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.jit import kernel
+from echostep.localization.echo_likelihood import EchoModel, echo_density
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.floor import Floor
+from echostep.walls.index import WallIndex
+
+ALIKE = 0.5  # share of echoes that are like the one before, by reason
+ALIKE_M = 0.07  # mean difference of such, by reason: the error of two ranges, and the sway between them
+STAYS = 0.9  # probability that such a view still has an echo, or still none, by reason
+POSES = 400  # drawn on the floor, by reason: their mean is then good to 5 %
+BIN_M = 0.05  # width of a bin of ranges
+
+
+class Background(NamedTuple):
+    """`log_density` (bins + 1,): log of the density (1/m) in each bin of BIN_M; the last entry: log-probability of no echo."""
+
+    log_density: Floats
+
+    def of(self, range_m: Floats) -> Floats:
+        """Log-densities of ranges (k,); 0: no echo."""
+        last = len(self.log_density) - 1
+        k = np.minimum((range_m / BIN_M).astype(np.int64), last - 1)
+        return self.log_density[np.where(range_m > 0.0, k, last)]
+
+
+def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
+    """The mean of the echo density over poses evenly on the floor; of a plan without a floor: even over all ranges."""
+    bins = math.ceil(model.maximum_m / BIN_M) + 1
+    if not len(floor.x_m):
+        return Background(np.full(bins + 1, -math.log(model.maximum_m)))
+    rng = np.random.default_rng(0)
+    x, y = floor.draw(POSES, rng)
+    density = _mean_density(x, y, 2.0 * math.pi * rng.random(POSES), walls.near(x, y), model, bins)
+    return Background(np.log(density))
+
+
+class UnplannedDensities(NamedTuple):
+    """Of pings (k,): `alike`, the density if like the one before. Logs, to the pings' power: `anywhere` in the building, `either`."""
+
+    alike: Floats
+    anywhere: Floats
+    either: Floats
+
+
+class RangeMemory:
+    """The density of echoes without any plan: like the last echo of the same ranger, or as anywhere in the building."""
+
+    def __init__(self, background: Background) -> None:
+        self._background = background
+        self._last_m = [math.nan, math.nan]  # range of each ranger's last ping; 0: no echo, NaN: no ping yet
+
+    def densities(self, ranger: Ints, range_m: Floats, power: Floats) -> UnplannedDensities:
+        """For pings (k,) in order of time; range 0: no echo."""
+        log_anywhere = self._background.of(range_m)
+        anywhere = np.exp(log_anywhere)
+        alike = np.empty(len(range_m))
+        for k, (which, value_m) in enumerate(zip(ranger.tolist(), range_m.tolist(), strict=True)):
+            alike[k] = _alike(value_m, self._last_m[which], float(anywhere[k]))
+            self._last_m[which] = value_m
+        either = power * np.log((1.0 - ALIKE) * anywhere + ALIKE * alike)
+        return UnplannedDensities(alike, power * log_anywhere, either)
+
+
+def _alike(range_m: float, last_m: float, anywhere: float) -> float:
+    """Density of a range after one that it is like: Laplace about it. After no echo, no echo is likely."""
+    if math.isnan(last_m):
+        return anywhere
+    if range_m <= 0.0 or last_m <= 0.0:
+        if last_m > 0.0:
+            return 1.0 - STAYS
+        return STAYS if range_m <= 0.0 else (1.0 - STAYS) * anywhere
+    return STAYS * math.exp(-abs(range_m - last_m) / ALIKE_M) / (2.0 * ALIKE_M)
+
+
+@kernel
+def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: EchoModel, bins: int) -> Floats:
+    """Mean over the poses of the density in the middle of each bin, and of the probability of no echo."""
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    mean = np.zeros(bins + 1)
+    for i in range(len(x)):
+        count = echo_sources(x[i], y[i], axis[i], walls, distance_m, off_axis_rad, kind)
+        for k in range(bins):
+            mean[k] += echo_density((k + 0.5) * BIN_M, count, distance_m, off_axis_rad, kind, model)
+        mean[bins] += echo_density(0.0, count, distance_m, off_axis_rad, kind, model)
+    return mean / len(x)

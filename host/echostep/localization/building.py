@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""What the filters of one plan share.
+
+In: walls, sheet of levels. Out: `Building`. Owns the walkable floor, and the tables of echoes, made when a cloud first needs them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echostep.localization.background import Background, background
+from echostep.localization.coarse_field import CoarseField, coarse_field
+from echostep.localization.echo_likelihood import EchoModel
+from echostep.localization.estimate import Elsewhere
+from echostep.walls.echo_sources import Walls
+from echostep.walls.floor import Floor, walkable_floor
+from echostep.walls.level_sheet import LevelSheet, level_of
+
+
+class Building:
+    """What the filters of one plan share: walls, sheet of levels, floor; the tables are made when a cloud first needs them."""
+
+    def __init__(self, walls: Walls, sheet: LevelSheet | None = None) -> None:
+        self.walls = walls
+        self.sheet = sheet
+        self.floor = walkable_floor(walls.index.walls)
+        self.elsewhere = _elsewhere(self.floor, sheet)
+        self._backgrounds: dict[EchoModel, Background] = {}
+        self._fields: dict[EchoModel, CoarseField] = {}
+
+    def background(self, model: EchoModel) -> Background:
+        """Density of the echoes of a wearer anywhere on the floor."""
+        if model not in self._backgrounds:
+            self._backgrounds[model] = background(self.walls, self.floor, model)
+        return self._backgrounds[model]
+
+    def field(self, model: EchoModel) -> CoarseField:
+        """Table of the ranges to expect, for a coarse cloud."""
+        if model not in self._fields:
+            self._fields[model] = coarse_field(self.walls, self.floor, model)
+        return self._fields[model]
+
+
+def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Elsewhere | None:
+    """Moments of the floor, all levels above one another; None for a plan without a floor."""
+    if not len(floor.x_m):
+        return None
+    x = floor.x_m if sheet is None else floor.x_m - level_of(floor.x_m, sheet) * sheet.pitch_m
+    (xx, xy), (_, yy) = np.cov(x, floor.y_m, bias=True).tolist()
+    return Elsewhere(float(x.mean()), float(floor.y_m.mean()), xx, xy, yy)

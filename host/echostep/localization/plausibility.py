@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""The probability that the wearer is where a cloud says, from how well the cloud foretells the echoes.
+
+In: of each ping the log of its density under the cloud and without it (`background`). Out: a probability. Owns the log-odds.
+
+A hidden Markov model of two states, right and wrong [Rabiner 1989, forward algorithm]. If the cloud is right, echoes have the density that it
+foretells. If it is wrong, the wearer is anywhere: then an echo is like the one before, or as anywhere in the building (`unplanned`). So a cloud gains
+nothing by foretelling that a corridor goes on, but by foretelling where it ends. On every metre a right cloud may become wrong (carried, a wall that
+is not on the plan, a door that is a wall): WRONG_PER_M.
+"""
+
+from __future__ import annotations
+
+import math
+
+from echostep.arrays import Floats
+
+# All by reason.
+WRONG_PER_M = 2e-5  # probability that a right cloud becomes wrong on a metre of the path: once in 50 km
+UNPLANNED_DOOR = math.log(1 / 400)  # log-probability that a way leads through a wall of the plan all the same
+STATED = 0.99  # prior probability of a stated start
+LEAST, MOST = (
+    -6.0,
+    12.0,
+)  # log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
+
+
+def log_odds(probability: float) -> float:
+    """Of a probability below 1."""
+    return math.log(probability / (1.0 - probability))
+
+
+def probability(log_odds: float) -> float:
+    """Of log-odds."""
+    return 1.0 / (1.0 + math.exp(-log_odds))
+
+
+class Plausibility:
+    """Log-odds of right against wrong of one cloud."""
+
+    def __init__(self, prior: float) -> None:
+        self.log_odds = log_odds(prior)
+
+    @property
+    def probability(self) -> float:
+        """That the cloud is right."""
+        return probability(self.log_odds)
+
+    def update(self, log_ratio: Floats, log_passed: float, path_m: float) -> None:
+        """Pings on a path of this length, each with the log of its density under the cloud over its density without it, both to its power.
+
+        `log_passed`: log of the share of the cloud that crossed no wall on it.
+        """
+        for value in [max(log_passed, UNPLANNED_DOOR), *log_ratio.tolist()]:
+            self.log_odds = min(max(self.log_odds + value, LEAST), MOST)
+        self._forget(WRONG_PER_M * path_m)
+
+    def limit(self, most: float) -> None:
+        """Let the probability be at most `most`."""
+        self.log_odds = min(self.log_odds, log_odds(most))
+
+    def doubt(self, share: float) -> None:
+        """Move this share of the probability of right to wrong."""
+        self._forget(share)
+
+    def _forget(self, share: float) -> None:
+        right = self.probability * (1.0 - share)
+        self.log_odds = log_odds(right)

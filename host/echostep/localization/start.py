@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""The start as a distribution: about a pose, in a room, or anywhere on the walkable floor.
+
+In: a `Start`. Out: poses drawn from it. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.plan.model import Pose
+from echostep.walls.floor import Floor
+from echostep.walls.level_sheet import LevelSheet, level_of
+
+ANY_LEVEL = -1  # level of a start that is not known
+# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. By reason:
+WIDE_SHARE = 0.07  # of the particles have these standard deviations beside those stated:
+WIDE_M, WIDE_RAD = 0.9, math.radians(30.0)  # a stride, a foot that is set down turned
+# Of a search, this share is drawn about where the wearer was believed: errors are mostly small. By reason:
+NEAR_SHARE, NEAR_M, NEAR_RAD = 0.6, 2.0, math.radians(20.0)
+TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where the trunk may be at the beginning.
+
+    `pose`: its mean, with a standard deviation `sd_m` per axis and `heading_sd_rad`; a pose with level ANY_LEVEL may be on any. Without a pose:
+    evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if there is one; a share of them
+    `near` a pose, if there is one.
+    """
+
+    pose: Pose | None = None
+    sd_m: float = 0.15
+    heading_sd_rad: float = math.radians(5.0)
+    room_m: Floats | None = None
+    level: int = ANY_LEVEL
+    near: Pose | None = None
+
+    @property
+    def is_anywhere(self) -> bool:
+        """Whether nothing is known but the building."""
+        return self.pose is None and self.room_m is None
+
+
+def draw_poses(
+    start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """x, y on the sheet (m) and heading (rad), each (count,)."""
+    if start.pose is None:
+        x, y, heading = _on_floor(_within(floor, start, sheet), count, rng)
+        return (x, y, heading) if start.near is None else _drawn_near(start.near, x, y, heading, sheet, rng)
+    is_wide = rng.random(count) < WIDE_SHARE
+    sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_M), start.sd_m)
+    sd_rad = np.where(is_wide, math.hypot(start.heading_sd_rad, WIDE_RAD), start.heading_sd_rad)
+    pose, noise = start.pose, rng.standard_normal((3, count))
+    x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
+    heading = pose.heading_rad + sd_rad * noise[2]
+    if start.heading_sd_rad > TURN_AROUND_RAD:
+        heading = 2.0 * math.pi * rng.random(count)
+    if sheet is not None:
+        x = x + _levels(pose.level, count, sheet) * sheet.pitch_m
+    return x, y, heading
+
+
+def _drawn_near(
+    near: Pose, x: Floats, y: Floats, heading: Floats, sheet: LevelSheet | None, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """The same poses, the first NEAR_SHARE of them about a pose instead."""
+    count = round(NEAR_SHARE * len(x))
+    noise = rng.standard_normal((3, count))
+    east = near.x_m if sheet is None else near.x_m + near.level * sheet.pitch_m
+    x[:count], y[:count] = east + NEAR_M * noise[0], near.y_m + NEAR_M * noise[1]
+    heading[:count] = near.heading_rad + NEAR_RAD * noise[2]
+    return x, y, heading
+
+
+def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:
+    """The level of each of so many particles: the given one, or all in turn."""
+    return np.arange(count) % len(sheet.height_m) if level == ANY_LEVEL else np.full(count, level)
+
+
+def _within(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
+    """The cells of the floor that a start without a pose allows; all of them where a room has none."""
+    level = np.zeros(len(floor.x_m), np.int64) if sheet is None else level_of(floor.x_m, sheet)
+    kept = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level
+    if start.room_m is not None:
+        import shapely
+
+        map_x = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
+        kept &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
+    return Floor(floor.x_m[kept], floor.y_m[kept]) if kept.any() else floor
+
+
+def _on_floor(floor: Floor, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """Poses drawn evenly over the floor, with any heading; at the origin for a plan without a floor."""
+    heading = 2.0 * math.pi * rng.random(count)
+    if not len(floor.x_m):
+        return np.zeros(count), np.zeros(count), heading
+    return *floor.draw(count, rng), heading

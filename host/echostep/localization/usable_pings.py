@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Which pings of a segment bring information, and how much.
+
+In: `MeasuredSegment`s in order of time. Out: a `PingBatch` and the pings' densities without a plan. Owns the length of the path, and each ranger's
+last ping.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.angles import wrap
+from echostep.arrays import Floats, Ints
+from echostep.localization.background import Background, RangeMemory, UnplannedDensities
+from echostep.localization.particle_kernels import PingBatch
+from echostep.path import MeasuredSegment
+
+RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
+LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
+# Turn on a segment at which its pings count half, by reason: headings between its ends are interpolated
+TURNING_RAD = math.radians(15.0)
+
+
+class UsablePings:
+    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `correlation_m`."""
+
+    def __init__(self, background: Background, correlation_m: float) -> None:
+        self.path_m = 0.0  # length of the path so far
+        self._correlation_m = correlation_m
+        self._ranges = RangeMemory(background)
+        self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
+
+    @property
+    def silent_m(self) -> float:
+        """Length of the path since the last ping."""
+        return self.path_m - max(self._last_ping_m)
+
+    def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
+        """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
+        segment = measured.segment
+        length, span_s = math.hypot(segment.dx_m, segment.dy_m), segment.t1_s - segment.t0_s
+        turn = wrap(segment.heading1_rad - segment.heading0_rad)
+        share = np.ones(len(measured.t_s))
+        if span_s > 0.0:
+            share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
+        axis = segment.heading0_rad + share * turn + RANGER_AXES_RAD[measured.ranger]
+        range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
+        travel_m = self._travels(measured.ranger, self.path_m + share * length)
+        power = np.minimum(travel_m / self._correlation_m, 1.0) / (1.0 + (turn / TURNING_RAD) ** 2)
+        self.path_m += length
+        used = power > LEAST_POWER
+        ranger, range_m = measured.ranger[used], range_m[used]
+        unplanned = self._ranges.densities(ranger, range_m, power[used])
+        return PingBatch(
+            share[used], axis[used], range_m, power[used], ranger, travel_m[used], unplanned.alike
+        ), unplanned
+
+    def _travels(self, ranger: Ints, path_m: Floats) -> Floats:
+        """Length of the path (k,) between each ping and the one before it of the same ranger."""
+        travel_m = np.zeros(len(path_m))
+        for which in (0, 1):
+            own = np.flatnonzero(ranger == which)
+            if len(own):
+                travel = path_m[own]
+                last_m, self._last_ping_m[which] = self._last_ping_m[which], float(travel[-1])
+                travel[1:] -= travel[:-1].copy()
+                travel[0] -= last_m
+                travel_m[own] = travel
+        return travel_m

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""The walkable floor of a plan, on its sheet of levels: where a wearer can be who may be anywhere in the building.
+
+In: walls (n, 4) on the sheet. Out: `Floor`: cells that no wall is too near to, inside the building. Owns nothing.
+
+A place is inside if walls are in sight in at least half of all directions: a yard that is open on one side is, a lawn before a facade is not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.jit import kernel
+from echostep.plan.routing import mark_near_walls
+
+# All by reason.
+CELL_M = 0.25  # side of a cell
+BODY_M = 0.25  # half a person's width
+DIRECTIONS = 32  # in which walls are looked for
+SIGHT_M = 40.0  # how far
+EDGE_M = 2.0  # of the grid around the walls
+HALL_M = 3.0  # distance from a wall up to which floor counts where no wall encloses any
+MOST_CELLS = 40_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """Free cells inside the building: their centres `x_m`, `y_m` (n,) on the sheet; empty for a plan without walls."""
+
+    x_m: Floats
+    y_m: Floats
+
+    @property
+    def area_m2(self) -> float:
+        """Area of all cells."""
+        return len(self.x_m) * CELL_M**2
+
+    def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Places (count,), evenly over the floor; one in each cell before any cell has two."""
+        order = rng.permutation(len(self.x_m))
+        cell = order[np.arange(count) % len(order)]
+        within = CELL_M * (rng.random((2, count)) - 0.5)
+        return self.x_m[cell] + within[0], self.y_m[cell] + within[1]
+
+
+NO_FLOOR = Floor(np.zeros(0), np.zeros(0))
+
+
+def walkable_floor(walls: Floats) -> Floor:
+    """The floor inside these walls (n, 4); where they enclose none, the floor within HALL_M of them."""
+    ends = walls.reshape(-1, 2)
+    if not len(ends):
+        return NO_FLOOR
+    low = ends.min(0) - EDGE_M
+    columns, rows = (int(n) for n in np.ceil((ends.max(0) + EDGE_M - low) / CELL_M))
+    if columns * rows > MOST_CELLS:
+        return NO_FLOOR
+    cells = (walls - np.tile(low, 2)) / CELL_M
+    blocked, hall = np.zeros((2, rows, columns), np.bool_)
+    mark_near_walls(cells, BODY_M / CELL_M, blocked)
+    mark_near_walls(cells, HALL_M / CELL_M, hall)
+    inside = _enclosed(blocked, int(SIGHT_M / CELL_M))
+    if not inside.any():
+        inside = hall & ~blocked
+    row, column = np.nonzero(inside)
+    return Floor(low[0] + (column + 0.5) * CELL_M, low[1] + (row + 0.5) * CELL_M)
+
+
+@kernel
+def _enclosed(blocked: Bools, sight: int) -> Bools:
+    """Free cells from which at least half of the directions meet a blocked cell within so many cells."""
+    rows, columns = blocked.shape
+    enclosed = np.zeros((rows, columns), np.bool_)
+    aside = np.full(
+        columns, sight, np.int64
+    )  # columns to the nearest one with a wall: others are between two levels of the sheet
+    for c in range(columns):
+        if blocked[:, c].any():
+            for k in range(max(c - sight, 0), min(c + sight, columns)):
+                aside[k] = min(aside[k], abs(k - c))
+    for r in range(rows):
+        for c in range(columns):
+            if not blocked[r, c] and aside[c] < sight // 4:
+                enclosed[r, c] = 2 * _walls_in_sight(r, c, blocked, sight) >= DIRECTIONS
+    return enclosed
+
+
+@kernel
+def _walls_in_sight(r: int, c: int, blocked: Bools, sight: int) -> int:
+    """In how many directions a blocked cell is met."""
+    rows, columns = blocked.shape
+    met = 0
+    for k in range(DIRECTIONS):
+        dx, dy = math.cos(2.0 * math.pi * k / DIRECTIONS), math.sin(2.0 * math.pi * k / DIRECTIONS)
+        for step in range(1, sight):
+            y, x = int(r + 0.5 + step * dy), int(c + 0.5 + step * dx)
+            if not (0 <= y < rows and 0 <= x < columns):
+                break
+            if blocked[y, x]:
+                met += 1
+                break
+    return met
