@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Floors by pressure, simulated: how often the right floor is named, and for how long a wrong one.
 
 In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.people.vertical_day`,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The experiment of [Girard 2011, 3.4 and 4] in simulation: the paper's three systems and the default filter on the same walks.
 
 In: seeds. Out: rows in the form of the paper's Table 1, and the clouds of its Figures 10-13. Everything here is simulated: building, walker, sensors.
@@ -16,7 +17,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
 from echostep.evaluate.study import Study, StudyRequest
+from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
+from echostep.localization.start import Start
 from echostep.papers.girard2011 import Girard, GirardSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
@@ -128,8 +131,9 @@ def girard(
 def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[MethodOutput]:
     """The default filter: the same steps and headings, and every ping of the walk."""
     x0, y0 = walk.trunk_m[0].tolist()
-    start = Pose(x0, y0, walk.start_heading_rad)
-    map_filter = MapFilter(Walls(site.plan), start, walk.start_heading_rad, np.random.default_rng([seed, 21]))
+    start = Start(Pose(x0, y0, walk.start_heading_rad))
+    rng = np.random.default_rng([seed, 21])
+    map_filter = MapFilter(Building(Walls(site.plan)), start, walk.start_heading_rad, rng)
     since_s = -math.inf
     for k, (turning, step) in enumerate(_segments(walk)):
         if turning is not None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Walks through all floors of a building, tracked on its plan: by foot and board, by the board alone, from an unknown floor.
 
 In: seeds, and westport-house where it is at hand. Out: rows `storeys/...`. Everything is simulated but the plan. The whole tracker runs, from the
@@ -21,7 +22,7 @@ from echostep.errors import EchostepError
 from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.particles import ANY_LEVEL
+from echostep.localization.start import ANY_LEVEL
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Plan, Pose
 from echostep.plan.routing import RoutePlace, Routes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of the studies, for people: PNG files; colours that the colour-blind can tell apart [Okabe and Ito 2008].
 
 In: what a study has seen. Out: files. Owns nothing. matplotlib is loaded when a picture is drawn.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a study puts out: summary rows, tables on the terminal, JSON and Parquet files.
 
 In: rows, which are dictionaries with the same keys in every run. Out: printed tables and files. Owns nothing.

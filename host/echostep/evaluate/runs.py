@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The runs of a study: one function, many seeds, on all cores or on a Dask cluster, with a journal from which a killed study resumes.
 
 In: a function of one seed that returns rows. Out: the rows of all runs in order of their seeds. Owns the journal file.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The frame of every study: runs -> rows -> summary rows -> tables -> JSON -> Parquet -> pictures.
 
 In: a `Study` and a `StudyRequest`. Out: tables on the terminal, files. Owns the order of these stages.
@@ -33,7 +34,8 @@ class Study:
     """What one study states.
 
     `run`: rows of the run of one seed, importable and picklable. `summarize`: rows of all runs -> summary rows, which JSON gets.
-    `tables`: summary rows -> tables. `draw`: pictures from the folder, the first seed and the summary rows.
+    `tables`: summary rows -> tables. `draw`: pictures from the folder, the first seed and the summary rows. `draw_runs`: from the folder and the
+    rows of all runs.
     `seeds`: arguments of `run`; None: `request.seed` + 0 ... `request.runs` - 1. `journal`: False for a short study of one
     run, which is done in this process. `parquet`: which rows the Parquet file holds, if one is written.
     """
@@ -43,6 +45,7 @@ class Study:
     summarize: Callable[[list[Row]], list[Row]]
     tables: Callable[[list[Row], StudyRequest], Sequence[Table]]
     draw: Callable[[Path, int, list[Row]], None] | None = None
+    draw_runs: Callable[[Path, list[Row]], None] | None = None
     seeds: range | None = None
     journal: bool = True
     parquet: Literal["runs", "summary"] | None = "runs"
@@ -60,6 +63,8 @@ def run_study(study: Study, request: StudyRequest) -> list[Row]:
         write_parquet(request.out / f"{study.name}.parquet", rows_of_runs if study.parquet == "runs" else rows)
     if study.draw is not None:
         study.draw(request.out, request.seed, rows)
+    if study.draw_runs is not None:
+        study.draw_runs(request.out, rows_of_runs)
     return rows
 
 

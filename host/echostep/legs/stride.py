@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A stride and its flags; settings and counts of the estimator.
 
 In: nothing. Out: `Stride`, `Flag`, `StrideSettings`, `LegCounts`, and the uncertainty of a sum of strides. Owns nothing.

@@ -1,11 +1,13 @@
+# SPDX-License-Identifier: MIT
 """Strides from two gyros on one leg: the travel of the hips, stride by stride.
 
-In: time and pitch rates of thigh and shank, 50 to 500 Hz, either sign. Out: `Stride`s in order of time. Owns the angles, the gyros' biases and
-the bout under way. `kinematics` gives the travel of the hips over a stance, `swing_detection` the swings and the sign of each gyro.
+In: time, pitch rates of thigh and shank, either sign, and of the belt, 50 to 500 Hz. Out: `Stride`s in order of time. Owns the gyros' errors, the
+level and the bout under way. `kinematics` gives the travel of the hips over a stance, `swing_detection` the swings and the sign of each gyro,
+`edges` the first and the last swing.
 
 A stride goes from mid swing to mid swing. Before the first and after the last mid swing the hips move over the standing foot; these edges are
-reported, too. A gyro does not measure the vertical: the leg is taken as upright at rest, and its mean angle over a stride as the usual one.
-Each gyro's bias is its rate at rest, and the change of its angle over a stride.
+reported, too. A gyro does not measure the vertical (`level`). Its bias is its rate at rest, and the change of its angle over a stride, less
+what leaks into it from a turn (`gyro_bias`).
 
 Two gyros in the sagittal plane of one leg do not give the length of strides sideways, backward or in place: these are flagged, their length is 0,
 and their standard deviation covers the possible length.
@@ -14,64 +16,61 @@ and their standard deviation covers the possible length.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs import swing_detection as leg_swings
-from echostep.legs.kinematics import (
-    MEAN_SHANK_RAD,
-    MEAN_THIGH_RAD,
-    PELVIS,
-    STANDING_SHANK_RAD,
-    STANDING_THIGH_RAD,
-    TOE_OFF,
-    knee_at,
-    travel,
-)
+from echostep.legs.angle_grid import AngleGrid, Sample
+from echostep.legs.edges import SPEED_S, Swing, leaving_share, speed
+from echostep.legs.gyro_bias import GyroBias
+from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, knee_at, travel
+from echostep.legs.level import MEAN_RAD, MEAN_SD_RAD, STANDING_RAD, Level
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.swing_detection import GRID_HZ, Swings
-from echostep.legs.walking_bout import Bout, GyroBias, edge_pace, pace_flag, stairs_flag
+from echostep.legs.walking_bout import Bout, climbs, pace_flag, stairs_flag
 
 # The source of a value without a citation is not recorded.
-LONGEST_GAP_S = 0.25  # integrated over
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
 UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0  # growth of the sd in a gap, and for how long it grows
-FASTEST_RAD_S = 35.0  # a larger rate is impossible
 SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
 LONGEST_ON_STAIRS_M = 1.0  # length of a stride
 STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses differ by 2 cm each [DIN 18065]
 STAIRS_WEIGHT = 0.15  # of the length by the angles
-LEVEL_STRIDE_M = 0.85  # longer than any on stairs
-LEVEL_GAIN = 0.15  # of the correction of mean angles per stride
 CLOSURE_SD_RAD = math.radians(2.5)  # of the change of an angle over a stride
-SCALE_SD = 0.035  # of the common scale of all strides, by the lengths of the leg alone
-CALIBRATED_SD = 0.012  # the same after a walk of known length
+SCALE_SD = 0.078  # of the scale common to all strides: people differ so much, whether their legs are measured or not [14 legs of 7 people]
+CALIBRATED_SD = 0.025  # the same after a walk of known length: it changes by 2 to 3 % with a person's speed
 OWN_SD_M = 0.04  # of one stride, besides
 EDGE_SD_M = 0.08  # of an edge of a walk
 BLIND_SD_M = 0.4  # of a stride that this leg does not show
-REST_SD_RAD_S = math.radians(0.15)  # of the bias by one window of rest
+# Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
+REST_SD_RAD_S = math.radians(1.9)
+UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`
 LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
 STAYS = 0.44  # last phase of a foot that stays on the floor
+FEWEST_SPEED = 6  # grid samples that give a speed; by reason
+CALM = 6  # grid samples without motion at either end of a record, which show that it begins or ends with standing; by reason
 FORGET = 500  # grid samples no longer needed, from which on they are dropped
+# Strides in a row that confirm the signs, or contradict them; by reason: motion before a walk is seldom so regular.
+CONFIRMING = 3
 
 
 class StrideEstimator:
     """Strides from samples, returned when no later sample can change them; equal samples give equal strides, in blocks of any size."""
 
-    def __init__(self, settings: StrideSettings | None = None) -> None:
+    def __init__(self, settings: StrideSettings | None = None, sign: tuple[float, float] | None = None) -> None:
+        """`sign`: of the gyros of thigh and shank, where it is known from the same recording."""
         self.settings = settings or StrideSettings()
-        self.counts = LegCounts()
-        self.swings = Swings()
+        self.swings = Swings(sign)
         self.bias = (GyroBias(), GyroBias())
-        self._last: tuple[float, float, float] | None = None  # t, thigh, shank of the newest sample
-        self._turned = (0.0, 0.0)  # angles since the first sample, with the sensors' signs and biases
-        self._origin_s = 0.0
-        self._thigh: list[float] = []  # `_turned` every 1 / GRID_HZ
-        self._shank: list[float] = []
+        self.revised = False  # whether the signs were decided anew
+        self._grid = AngleGrid()
+        self._level = Level()
+        self._rested = Level()  # when the standing under way began
         self._moved = 0  # grid samples with a moving shank
         self._done = 0  # grid samples searched for swings and rest
         self._bout = Bout(0, stood=False)
@@ -79,88 +78,72 @@ class StrideEstimator:
         self._peak = (0.0, 0)  # of the swing under way: rate, grid index
         self._strides: list[Stride] = []
         self._keep = 0  # first grid index still needed
+        self._confirmed = sign is not None  # whether strides have confirmed the signs
+
+    @property
+    def counts(self) -> LegCounts:
+        """Counts of samples."""
+        return self._grid.counts
 
     @property
     def standing_since_s(self) -> float | None:
         """Time since which the leg stands; None while it does not, or is not known to."""
-        return None if self._still_since is None else self._time(self._still_since)
+        return None if self._still_since is None else self._grid.time(self._still_since)
 
-    def feed(self, t_s: Floats, thigh: Floats, shank: Floats) -> list[Stride]:
-        """Strides completed by samples (n,): time, rates in rad/s."""
-        for sample in zip(t_s.tolist(), thigh.tolist(), shank.tolist(), strict=True):
-            self._integrate(*sample)
+    def feed(self, t_s: Floats, thigh: Floats, shank: Floats, belt: Floats | None = None) -> list[Stride]:
+        """Strides completed by samples (n,): time, rates in rad/s; `belt`: of the trunk about the vertical, NaN or None where it is not measured."""
+        turns = np.full(len(t_s), np.nan) if belt is None else belt
+        for sample in zip(t_s.tolist(), thigh.tolist(), shank.tolist(), turns.tolist(), strict=True):
+            self._take(*sample)
         strides, self._strides = self._strides, []
         return strides
 
     def finish(self) -> list[Stride]:
         """The strides still under way; no samples may follow."""
-        if self.swings.known or self.swings.decide(self._rates(), final=True):
-            self._advance(len(self._thigh))
-            if self._still_since is None and len(self._thigh) > 1:
-                self._end_bout(len(self._thigh) - 1, stands=False)
+        if self.swings.known or self.swings.decide(self._grid.rates(), final=True):
+            self._advance(len(self._grid))
+            if self._still_since is None and len(self._grid) > 1:
+                self._end_bout(len(self._grid) - 1, stands=self._rests(len(self._grid) - 1 - CALM))
         strides, self._strides = self._strides, []
         return strides
 
-    def _integrate(self, t_s: float, thigh: float, shank: float) -> None:
-        """Integrate to one sample and interpolate the angles on the grid."""
-        self.counts.samples += 1
-        if not abs(thigh) < FASTEST_RAD_S or not abs(shank) < FASTEST_RAD_S or not math.isfinite(t_s):
-            self.counts.impossible += 1
-            return
-        if self._last is None:
-            self._last, self._origin_s = (t_s, thigh, shank), t_s
-            self._thigh, self._shank = [0.0], [0.0]
-            return
-        t0, *before = self._last
-        if t_s <= t0:
-            self.counts.not_later += 1
-            return
-        if t_s - t0 > LONGEST_GAP_S:
+    def _take(self, t_s: float, thigh: float, shank: float, belt: float) -> None:
+        """Take one sample; search the grid that it fills once the signs are known."""
+        before = len(self._grid)
+        kind = self._grid.add(t_s, thigh, shank, belt)
+        if kind is Sample.AFTER_GAP:
             self._bridge_gap(t_s)
-            self._last = (t_s, thigh, shank)
+            self._grid.restart(t_s, thigh, shank, belt)
             return
-        turned = tuple(
-            a + 0.5 * (t_s - t0) * (x + y) for a, x, y in zip(self._turned, before, (thigh, shank), strict=True)
-        )
-        while (grid_s := self._origin_s + len(self._thigh) / GRID_HZ) <= t_s:
-            share = (grid_s - t0) / (t_s - t0)
-            self._append(*(a + share * (b - a) for a, b in zip(self._turned, turned, strict=True)))
-        self._turned, self._last = (turned[0], turned[1]), (t_s, thigh, shank)
-
-    def _append(self, thigh: float, shank: float) -> None:
-        """Append angles to the grid; search them once the signs are known."""
-        self._thigh.append(thigh)
-        self._shank.append(shank)
+        if kind is Sample.SKIPPED or len(self._grid) == before:
+            return
         if self.swings.known:
-            self._advance(len(self._thigh) - LOOK)
+            self._advance(len(self._grid) - LOOK)
             return
-        if abs(self._shank[-1] - self._shank[-2]) * GRID_HZ > leg_swings.MOVING_RAD_S:
-            self._moved += 1
-            enough = self._moved >= leg_swings.DECIDE_S * GRID_HZ and self._moved % 20 == 0
-            if enough and self.swings.decide(self._rates(), final=False):
-                self._advance(len(self._thigh) - LOOK)
+        shanks = self._grid.shank
+        for k in range(max(before, 1), len(self._grid)):
+            if abs(shanks[k] - shanks[k - 1]) * GRID_HZ > leg_swings.MOVING_RAD_S:
+                self._moved += 1
+                enough = self._moved >= leg_swings.DECIDE_S * GRID_HZ and self._moved % 20 == 0
+                if enough and self.swings.decide(self._grid.rates(), final=False):
+                    self._advance(len(self._grid) - LOOK)
+                    return
 
     def _bridge_gap(self, t_s: float) -> None:
         """Samples are missing up to `t_s`: end the bout, and bridge a short gap at its pace."""
-        assert self._last is not None
-        self.counts.gaps += 1
-        t0 = self._last[0]
-        if not self.swings.known and not self.swings.decide(self._rates(), final=True):
+        t0 = self._grid.last_s
+        if not self.swings.known and not self.swings.decide(self._grid.rates(), final=True):
             pace = 0.0
         else:
-            self._advance(len(self._thigh))
+            self._advance(len(self._grid))
             pace = 0.0 if self._still_since is not None else self._bout.pace_m_s or 0.0
-            if self._still_since is None and len(self._thigh) > 1:
-                self._end_bout(len(self._thigh) - 1, stands=False)
+            if self._still_since is None and len(self._grid) > 1:
+                self._end_bout(len(self._grid) - 1, stands=False)
         span_s = t_s - t0
         length = pace * span_s if span_s < BRIDGED_S else 0.0
         self._add_stride(t0, t_s, length, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
-        self._origin_s, self._turned = t_s, (0.0, 0.0)
-        self._thigh, self._shank, self._done = [0.0], [0.0], 0
+        self._done, self._level = 0, Level()
         self._bout, self._still_since, self._peak, self._keep = Bout(0, stood=False), None, (0.0, 0), 0
-
-    def _rates(self) -> Floats:
-        return np.diff(np.column_stack([self._thigh, self._shank]), axis=0) * GRID_HZ
 
     def _advance(self, until: int) -> None:
         """Search the grid up to index `until` for swings and rest."""
@@ -169,8 +152,9 @@ class StrideEstimator:
             self._done += 1
             if k < LOOK:
                 continue
-            ahead = min(k + LOOK, len(self._shank) - 1)
-            turned = (self._shank[ahead] - self._shank[k - LOOK]) * GRID_HZ / (ahead - k + LOOK)
+            shank = self._grid.shank
+            ahead = min(k + LOOK, len(shank) - 1)
+            turned = (shank[ahead] - shank[k - LOOK]) * GRID_HZ / (ahead - k + LOOK)
             self._watch_swing(k, self.swings.sign[1] * turned - self.bias[1].value)
             if k % 5 == 0 and k >= leg_swings.STILL:
                 self._watch_rest(k)
@@ -191,14 +175,11 @@ class StrideEstimator:
             self._end_bout(k, stands=True)
 
     def _watch_rest(self, k: int) -> None:
-        """Detect standing: it ends a bout, measures the gyros' biases and sets the leg upright."""
-        first = k - leg_swings.STILL
-        if (
-            self._still_since is None
-            and abs(self._shank[k] - self._shank[k - 10]) * GRID_HZ / 10.0 > leg_swings.MOVING_RAD_S
-        ):
+        """Detect standing: it ends a bout, measures the gyros' biases and the level."""
+        first, shank = k - leg_swings.STILL, self._grid.shank
+        if self._still_since is None and abs(shank[k] - shank[k - 10]) * GRID_HZ / 10.0 > leg_swings.MOVING_RAD_S:
             return
-        window = np.column_stack([self._thigh[first : k + 1], self._shank[first : k + 1]])
+        window = np.column_stack([self._grid.thigh[first : k + 1], shank[first : k + 1]])
         rates = np.diff(window, axis=0) * GRID_HZ
         smoothed = np.column_stack([leg_swings.smooth(rates[:, 0]), leg_swings.smooth(rates[:, 1])])
         if not leg_swings.is_still(smoothed):
@@ -210,16 +191,20 @@ class StrideEstimator:
             if first > self._bout.begin and self._bout.peaks:
                 self._end_bout(first, stands=True)
             self._still_since = first
+            thigh, upright = self._angles(first, k)
+            self._rested = Level(float(thigh[-1]), float(upright[-1]), k, self._level.moved(0.0, 0.0, k).variance)
         for bias, sign, rate in zip(self.bias, self.swings.sign, rates.mean(axis=0).tolist(), strict=True):
             bias.learn(sign * rate, REST_SD_RAD_S)
-        self._bout = Bout(k, stood=True, level=(STANDING_THIGH_RAD, STANDING_SHANK_RAD), level_index=k, pace_m_s=0.0)
+        rested = self._rested.standing((k - self._still_since) / GRID_HZ)
+        self._level = Level(rested.thigh, rested.shank, k, rested.variance)
+        self._bout = Bout(k, stood=True, pace_m_s=0.0)
 
     def _end_standing(self, k: int) -> None:
         """Report standing up to grid index k."""
         assert self._still_since is not None
         begin = self._still_since
         if k > begin:
-            self._add_stride(self._time(begin), self._time(k), 0.0, 0.0, 0.0, Flag.STANDING)
+            self._add_stride(self._grid.time(begin), self._grid.time(k), 0.0, 0.0, 0.0, Flag.STANDING)
         self._bout.begin = min(max(self._bout.begin, begin), k)
         self._keep = begin
 
@@ -233,20 +218,36 @@ class StrideEstimator:
         bout.cycle = k - previous
         if len(bout.peaks) > 2 or not bout.stood:
             self._learn_closure(previous, k)
-        if bout.level is None:
-            bout.level, bout.level_index = (0.0, 0.0), previous
-            thigh, shank = self._angles(previous, k)
-            bout.level = (MEAN_THIGH_RAD - float(thigh.mean()), MEAN_SHANK_RAD - float(shank.mean()))
+        self._correct_level(previous, k)
         thigh, shank = self._angles(previous, k)
         length, rise, flags, sd = self._stride(thigh, shank)
-        pace = length * GRID_HZ / bout.cycle
+        bout.pace_m_s = length * GRID_HZ / bout.cycle
         bout.blind = flags & (Flag.UNSEEN | Flag.BACKWARD)
         if len(bout.peaks) == 2 and previous > bout.begin:
-            self._add_edge(bout.begin, previous, self._begin_piece(previous, pace))
-        self._add_stride(self._time(previous), self._time(k), length, sd, rise, flags)
-        bout.pace_m_s = pace
-        self._relevel(k, thigh, shank, length)
-        self._keep = previous
+            edge, less = self._begin_piece(previous, bout.strike)
+            self._add_edge(bout.begin, previous, edge)
+            length = max(length - less, 0.0)
+        self._add_stride(self._grid.time(previous), self._grid.time(k), length, sd, rise, flags)
+        self._level = self._level.moved(float(thigh[-1]), float(shank[-1]), k)
+        self._keep = previous if self._confirmed else bout.peaks[max(-CONFIRMING - 1, -len(bout.peaks))]
+        self._confirm_signs(k)
+
+    def _confirm_signs(self, k: int) -> None:
+        """Decide the signs once more by the first strides in a row: the first decision may come from motion that was no walk."""
+        peaks = self._bout.peaks
+        if self._confirmed or len(peaks) <= CONFIRMING:
+            return
+        first, anew = peaks[-CONFIRMING - 1], Swings()
+        if not anew.decide(self._grid.rates(first), final=False):
+            return
+        self._confirmed = True
+        if anew.sign == self.swings.sign:
+            return
+        for bias, old, new in zip(self.bias, self.swings.sign, anew.sign, strict=True):
+            if old != new:
+                bias.flip()
+        self.swings, self.revised = anew, True
+        self._bout, self._level, self._peak = Bout(k, stood=False), Level(index=k), (0.0, 0)
 
     def _stride(self, thigh: Floats, shank: Floats) -> tuple[float, float, Flag, float]:
         """Length, rise, flags and sd of the stride with these angles (n,), from mid swing to mid swing."""
@@ -254,15 +255,17 @@ class StrideEstimator:
         strike = leg_swings.heel_strike_index(shank)
         phase = np.arange(len(shank)) / cycle - strike / cycle
         stance = phase[strike:], thigh[strike:], shank[strike:]
-        self._bout.reach_m = self.settings.segments.ankle_ahead_m(thigh[strike], shank[strike])
-        self._bout.trail_m = -self.settings.segments.ankle_ahead_m(
-            *(np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank))
-        )
-        stairs = stairs_flag(knee_at(*stance, wanted_phase=0.02), knee_at(*stance, wanted_phase=0.5))
+        rise = travel(*stance, self.settings.segments, struck=None, rolls=False).stride()[1]
+        stairs = stairs_flag(*_knees(*stance), 0.5 * rise)
         way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
         length = way.stride()[0]
-        rates = np.column_stack([np.diff(thigh), np.diff(shank)])
-        if leg_swings.thigh_lead(rates) < leg_swings.BACKWARD_LEAD:
+        trailing = (np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank))
+        self._bout.trail_m = -self.settings.segments.ankle_ahead_m(*trailing)
+        rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
+        self._bout.strike = strike
+        self._bout.toe_off = self._bout.peaks[-2] + leg_swings.toe_off_index(rate, len(rate) - 1, strike)
+        self._bout.add_lead(leg_swings.thigh_lead(np.column_stack([np.diff(thigh), np.diff(shank)])))
+        if self._bout.lead < leg_swings.BACKWARD_LEAD:
             return 0.0, 0.0, Flag.BACKWARD, max(BLIND_SD_M, abs(length))
         if length < SHORTEST_M or way.passed() < LEAST_PASSED * length:
             return 0.0, 0.0, Flag.UNSEEN, BLIND_SD_M
@@ -272,38 +275,52 @@ class StrideEstimator:
         return length, 0.0, pace_flag(length * GRID_HZ / cycle, self.settings.segments), OWN_SD_M
 
     def _learn_closure(self, begin: int, end: int) -> None:
-        """Update the biases by the change of the angles over a stride, which is 0 without bias."""
-        span_s = (end - begin) / GRID_HZ
-        for bias, sign, angle in zip(self.bias, self.swings.sign, (self._thigh, self._shank), strict=True):
-            bias.learn(sign * (angle[end] - angle[begin]) / span_s, CLOSURE_SD_RAD / span_s)
+        """Update the gyros' errors by the change of the angles over a stride, which is 0 but for bias and leak."""
+        span_s, grid = (end - begin) / GRID_HZ, self._grid
+        turned = (grid.yaw[end] - grid.yaw[begin]) / span_s
+        for bias, sign, angle in zip(self.bias, self.swings.sign, (grid.thigh, grid.shank), strict=True):
+            bias.learn(sign * (angle[end] - angle[begin]) / span_s, CLOSURE_SD_RAD / span_s, turned)
 
-    def _relevel(self, k: int, thigh: Floats, shank: Floats, length_m: float) -> None:
-        """Set the level to the angles at the end of a stride, corrected in part so that their mean over the stride is the usual one.
+    def _correct_level(self, begin: int, end: int) -> None:
+        """Correct the level by the mean angles of a stride; a shorter one is nearer to standing, and on stairs they are others."""
+        thigh, shank = self._angles(begin, end)
+        strike = leg_swings.heel_strike_index(shank)
+        phase = (np.arange(strike, len(shank)) - strike) / (len(shank) - 1)
+        self._level = Level(float(thigh[0]), float(shank[0]), begin, self._level.variance)
+        if climbs(*_knees(phase, thigh[strike:], shank[strike:])):
+            return
+        share = min(float(np.ptp(shank)) / UPRIGHT_RANGE_RAD, 1.0)
+        usual = (s + share * (m - s) for s, m in zip(STANDING_RAD, MEAN_RAD, strict=True))
+        off = tuple(u - float(angle.mean()) for u, angle in zip(usual, (thigh, shank), strict=True))
+        self._level = self._level.corrected((off[0], off[1]), MEAN_SD_RAD)
 
-        A short stride is not corrected, as it may be on stairs.
+    def _begin_piece(self, peak: int, strike: int | None) -> tuple[float, float]:
+        """Travel (m) from the beginning of the walk to its first mid swing, and by how much less the stride after it is than in a steady walk.
+
+        `strike`: grid samples from mid swing to heel strike; None when no stride follows.
         """
-        ends, gain = [], LEVEL_GAIN if length_m > LEVEL_STRIDE_M else 0.0
-        for angle, usual in ((thigh, MEAN_THIGH_RAD), (shank, MEAN_SHANK_RAD)):
-            off = float(angle.mean()) - usual
-            ends.append(float(angle[-1]) - gain * off)
-        self._bout.level, self._bout.level_index = (ends[0], ends[1]), k
-
-    def _begin_piece(self, peak: int, pace_m_s: float) -> float:
-        """Travel (m) from the beginning of the walk to its first mid swing."""
         bout = self._bout
-        span = peak - bout.begin
+        span, pace = peak - bout.begin, bout.pace_m_s or 0.0
         thigh, shank = self._angles(bout.begin, peak)
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
         off = leg_swings.toe_off_index(rate, span - 1, 0)
         phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
         stood = bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
         stance = 0 if stood else int(np.argmax(phase > 0.0))
-        swinging = 1.0
-        if bout.stood or (stood and phase[0] < -0.1):
-            swinging = edge_pace(-self.settings.segments.ankle_ahead_m(thigh[off], shank[off]), bout.trail_m)
         way = travel(phase, thigh, shank, self.settings.segments, struck=None)
-        length = PELVIS * float(way.forward_m[off] - way.forward_m[stance])
-        return length + pace_m_s * (stance + swinging * (span - off)) / GRID_HZ
+        length = PELVIS * float(way.forward_m[off] - way.forward_m[stance]) + pace * stance / GRID_HZ
+        leaving = pace
+        if bout.stood or (stood and (phase[0] < -0.1 or self._rests(bout.begin))):
+            leaving *= leaving_share(-self.settings.segments.ankle_ahead_m(thigh[off], shank[off]), bout.trail_m)
+        swing = Swing(leaving, pace, (span - off) / GRID_HZ, (strike or 0) / GRID_HZ)
+        return length + swing.first_half_m(), pace * swing.after_s - swing.second_half_m()
+
+    def _rests(self, first: int) -> bool:
+        """Whether neither sensor moves in the CALM grid samples from an index on: so little happens in a walk only where it begins or ends."""
+        rates = self._grid.rates(max(first, 0))[:CALM] * np.array(self.swings.sign) - np.array(
+            [b.value for b in self.bias]
+        )
+        return len(rates) > 0 and float(np.abs(rates).max()) < leg_swings.MOVING_RAD_S
 
     def _calm(self, rate: Floats) -> bool:
         """Whether the shank's rates (n,) hold no swing, so that the foot stands."""
@@ -322,16 +339,15 @@ class StrideEstimator:
     def _end_step(self, peak: int, end: int, *, stands: bool) -> None:
         """End a bout with one swing only: a step, or a lifted foot."""
         bout = self._bout
-        if bout.level is None:
-            bout.level, bout.level_index = (MEAN_THIGH_RAD, 0.0), peak
-        begins = self._begin_piece(peak, bout.pace_m_s or 0.0) if peak > bout.begin else 0.0
+        bout.toe_off = peak
+        begins = self._begin_piece(peak, None)[0] if peak > bout.begin else 0.0
         length = begins + (self._end_piece(peak, end, stands=stands) if end > peak else 0.0)
         if length < SHORTEST_M:
             bout.blind = Flag.UNSEEN
         self._add_edge(bout.begin, end, length)
 
     def _end_piece(self, peak: int, end: int, *, stands: bool) -> float:
-        """Travel (m) from the last mid swing to the end of the walk."""
+        """Travel (m) from the last mid swing to the end of the walk, less what the stride before it was counted too long."""
         bout, span = self._bout, end - peak
         pace = bout.pace_m_s or 0.0
         thigh, shank = self._angles(peak, end)
@@ -343,35 +359,34 @@ class StrideEstimator:
         else:
             last = min(last, int(TOE_OFF * bout.cycle))
         way = travel(phase, thigh[strike:], shank[strike:], self.settings.segments)
-        length = PELVIS * float(way.forward_m[last] - way.forward_m[0])
-        swinging = (
-            edge_pace(self.settings.segments.ankle_ahead_m(thigh[strike], shank[strike]), bout.reach_m)
-            if stands
-            else 1.0
-        )
-        return length + pace * (swinging * strike + span - strike - last) / GRID_HZ
+        length = PELVIS * float(way.forward_m[last] - way.forward_m[0]) + pace * (span - strike - last) / GRID_HZ
+        flat = int(FLAT * bout.cycle)
+        seen = stands or last >= flat + FEWEST_SPEED
+        landing = PELVIS * speed(way, flat, flat + int(SPEED_S * GRID_HZ), GRID_HZ, pace) if seen else pace
+        swing = Swing(pace, landing, (peak - bout.toe_off) / GRID_HZ, strike / GRID_HZ)
+        return length + swing.second_half_m() + swing.first_half_m() - pace * swing.before_s
 
     def _add_edge(self, begin: int, end: int, length: float) -> None:
         """Report an edge of a walk; beside a stride of unknown length its length is unknown, too."""
         blind = self._bout.blind
         length, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
-        self._add_stride(self._time(begin), self._time(end), length, sd, 0.0, Flag.EDGE | blind)
+        self._add_stride(self._grid.time(begin), self._grid.time(end), length, sd, 0.0, Flag.EDGE | blind)
 
     def _angles(self, begin: int, end: int) -> tuple[Floats, Floats]:
-        """Angles (n,) of thigh and shank at grid indices begin..end, from the last level with the present biases."""
-        bout = self._bout
-        level = bout.level or (0.0, 0.0)
-        indices = np.arange(begin, end + 1)
-        angles = []
-        for turned, sign, bias, start in zip(
-            (self._thigh, self._shank), self.swings.sign, self.bias, level, strict=True
-        ):
-            angle = sign * (np.array(turned[begin : end + 1]) - turned[bout.level_index])
-            angles.append(start + angle - bias.value * (indices - bout.level_index) / GRID_HZ)
-        return angles[0], angles[1]
+        """Angles (n,) of thigh and shank at grid indices begin..end, from the level with the present biases.
 
-    def _time(self, k: int) -> float:
-        return self._origin_s + k / GRID_HZ
+        A turn between these indices is taken as even for its leak, so that the pelvis' rotation to and fro adds nothing.
+        """
+        level, grid = self._level, self._grid
+        indices = np.arange(begin, end + 1)
+        yaw = np.linspace(grid.yaw[begin], grid.yaw[end], len(indices)) - grid.yaw[level.index]
+        found = []
+        for turned, sign, bias, start in zip(
+            (grid.thigh, grid.shank), self.swings.sign, self.bias, (level.thigh, level.shank), strict=True
+        ):
+            angle = sign * (np.array(turned[begin : end + 1]) - turned[level.index])
+            found.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
+        return found[0], found[1]
 
     def _add_stride(self, t0: float, t1: float, length: float, sd: float, rise: float, flags: Flag) -> None:
         """Report a stride."""
@@ -380,17 +395,22 @@ class StrideEstimator:
 
     def _drop(self) -> None:
         """Drop grid values that are no longer needed."""
-        k = self._keep
+        k = min(self._keep, self._level.index)
         if k < FORGET:
             return
         self._keep = 0
-        del self._thigh[:k], self._shank[:k]
-        self._origin_s += k / GRID_HZ
+        self._grid.drop(k)
         self._done -= k
+        self._level, self._rested = (replace(level, index=level.index - k) for level in (self._level, self._rested))
         bout = self._bout
         bout.begin -= k
-        bout.level_index -= k
+        bout.toe_off -= k
         bout.peaks = [peak - k for peak in bout.peaks]
         if self._still_since is not None:
             self._still_since -= k
         self._peak = (self._peak[0], self._peak[1] - k)
+
+
+def _knees(phase: Floats, thigh: Floats, shank: Floats) -> tuple[float, float]:
+    """Flexion of the knee (rad) at the strike and half a stride later, from angles (n,) at phases (n,)."""
+    return knee_at(phase, thigh, shank, wanted_phase=0.02), knee_at(phase, thigh, shank, wanted_phase=0.5)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Detection of swings, heel strikes, toe offs and standing, and of the signs of the gyros of thigh and shank.
 
 In: rates of thigh and shank on a regular grid. Out: indices of events, signs, whether the leg stands. Owns the signs and the usual peak rate.
@@ -45,8 +46,8 @@ STILL_MEAN_RAD_S = 0.2  # largest mean rate over it: the bias of a poor gyro
 class Swings:
     """`sign` of the gyros of thigh and shank, 0 until known; `usual_rad_s`: median peak of the shank's rate."""
 
-    def __init__(self) -> None:
-        self.sign = (0.0, 0.0)
+    def __init__(self, sign: tuple[float, float] | None = None) -> None:
+        self.sign = sign or (0.0, 0.0)
         self._peaks: deque[float] = deque(maxlen=PEAKS)
         self.usual_rad_s = 0.0
 

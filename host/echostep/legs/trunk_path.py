@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trunk's path from the gyros of one leg and the belt, and the compass.
 
 In: samples of thigh, calf and belt, with the compass where it was read, in blocks. Out: `PathSegment`s, as from the foot. Owns the estimators of
@@ -69,7 +70,8 @@ class LegPath:
         """`iron`: errors of the compass, when it was calibrated."""
         lengths = LegLengths(settings.thigh_m, settings.shank_m, settings.leg_scale)
         self._strides = StrideEstimator(StrideSettings(lengths, calibrated=settings.leg_scale != 1.0))
-        self._clipping = ClippingRepair(np.full(2, -RANGE_RAD_S), np.full(2, RANGE_RAD_S))
+        limits = np.array([RANGE_RAD_S, RANGE_RAD_S, np.inf])  # of thigh, calf, belt
+        self._clipping = ClippingRepair(-limits, limits)
         self._left_m = settings.leg_left_m
         self._heading = Heading(HeadingSettings(iron=iron, first_sd_rad=FRAME_SD_RAD))
         self._headings: deque[tuple[float, float]] = deque()  # t_s, heading not wrapped
@@ -84,8 +86,8 @@ class LegPath:
         self._headings.extend(zip(block.t_s.tolist(), headings[:, 0].tolist(), strict=True))
         while self._headings and self._headings[0][0] < block.t_s[-1] - REMEMBERED_S:
             self._headings.popleft()
-        t_s, rates = self._clipping.feed(block.t_s, np.column_stack([block.thigh, block.calf]))
-        strides = self._strides.feed(t_s, rates[:, 0], rates[:, 1])
+        t_s, rates = self._clipping.feed(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
+        strides = self._strides.feed(t_s, rates[:, 0], rates[:, 1], rates[:, 2])
         segments = [segment for stride in strides if (segment := self._stride_segment(stride)) is not None]
         since_s = self._strides.standing_since_s
         until_s = float(block.t_s[-1]) - RECENT_S

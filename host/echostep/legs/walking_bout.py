@@ -1,7 +1,7 @@
-"""State of a walk under way, and the rules for its edges, stairs and pace.
+# SPDX-License-Identifier: MIT
+"""State of a walk under way, and the rules for stairs and pace.
 
-In: measured biases, angles of the knee, positions of the foot, speeds. Out: `GyroBias`, `Bout`, the relative pace in an edge swing, flags. Owns
-nothing but these records.
+In: angles of the knee, speeds. Out: `Bout`, flags. Owns nothing but these records.
 """
 
 from __future__ import annotations
@@ -13,68 +13,52 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag
 from echostep.legs.swing_detection import GRID_HZ
 
-# The source of a value without a citation is not recorded.
-USUAL_STRIDE_S = 1.2  # duration before a stride is known
-BENT_RAD = math.radians(
-    33.0
-)  # knee on stairs at the strike (up) or half a stride later (down); on the flat 5 to 25 degrees
-BIAS_SD_RAD_S = math.radians(3.0)  # at the start
-SMALLEST_BIAS_SD_RAD_S = math.radians(0.02)
-SLOWEST_EDGE = (
-    0.5  # relative pace in an edge swing with the feet together; 1 when the foot comes from or goes to a whole stride
-)
+USUAL_STRIDE_S = 1.2  # duration before a stride is known; by reason
+# Knee (rad) on stairs at the strike (up) or half a stride later (down), and its change between these moments. On the flat 5 to 15 degrees and +4
+# to -20, up stairs 62 and -48, down stairs 40 and +33 [curves of Riener 2002]. A drift of the angles, or a turn that leaks into them, changes the
+# difference less than the angle itself: both are needed, and the hips must rise or sink over the standing foot.
+BENT_RAD = math.radians(25.0)
+EXTENDS_RAD, BENDS_RAD = math.radians(30.0), math.radians(20.0)
+LEAST_RISE_M = 0.04  # in half a stride; a step is 0.15 to 0.2 m high [DIN 18065]
 PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
 GRAVITY_M_S2 = 9.81
-
-
-@dataclass(slots=True)
-class GyroBias:
-    """Bias of a gyro (rad/s) and its variance."""
-
-    value: float = 0.0
-    variance: float = BIAS_SD_RAD_S**2
-
-    def learn(self, measured: float, sd: float) -> None:
-        """Kalman update by a measured bias (rad/s) with standard deviation `sd`."""
-        gain = self.variance / (self.variance + sd * sd)
-        self.value += gain * (measured - self.value)
-        self.variance = max((1.0 - gain) * self.variance, SMALLEST_BIAS_SD_RAD_S**2)
 
 
 @dataclass(slots=True)
 class Bout:
     """A walk under way, in grid indices: `begin`, whether it begins with standing, `peaks`: its mid swings.
 
-    `level`: angles (rad) of thigh and shank at `level_index`; None until known. The fields from `cycle` (grid samples) on are those of the newest
-    stride.
+    The fields from `cycle` (grid samples) on are those of the newest stride.
     """
 
     begin: int
     stood: bool
     peaks: list[int] = field(default_factory=list)
-    level: tuple[float, float] | None = None
-    level_index: int = 0
     cycle: int = int(USUAL_STRIDE_S * GRID_HZ)
     pace_m_s: float | None = None
-    reach_m: float = 0.0  # ankle in front of the hip at heel strike
     trail_m: float = 0.0  # ankle behind the hip at toe off
+    strike: int = 0  # grid samples after the mid swing before
+    toe_off: int = 0  # index
     blind: Flag = Flag.NONE  # UNSEEN or BACKWARD
+    lead: float = math.nan  # of the thigh before the shank, mean of the last strides
+
+    def add_lead(self, lead: float) -> None:
+        """Add the lead of one stride: the direction does not change from stride to stride, but a stride that ends a walk has hardly any lead."""
+        self.lead = lead if math.isnan(self.lead) else 0.5 * (lead + self.lead)
 
 
-def edge_pace(reach_m: float, usual_m: float) -> float:
-    """Pace of the hips over the usual pace in the first or last swing of this leg, by the foot's distance from the hips over the usual one.
-
-    When this foot leaves from beside the other or comes to rest there, the hips are slow in this swing; otherwise they have full pace [Jian 1993].
-    """
-    share = min(max(reach_m / usual_m, 0.0), 1.0) if usual_m > 0.0 else 0.0
-    return SLOWEST_EDGE + (1.0 - SLOWEST_EDGE) * share
+def climbs(knee_at_strike: float, knee_half_later: float) -> bool:
+    """Whether the knee (rad) straightens or bends under load as on stairs; a drift of the angles does not matter."""
+    return not -EXTENDS_RAD < knee_half_later - knee_at_strike < BENDS_RAD
 
 
-def stairs_flag(knee_at_strike: float, knee_half_later: float) -> Flag:
-    """Stairs by the knee (rad): up stairs it is bent at heel strike, down stairs it bends under load half a stride later [Riener 2002]."""
-    if knee_at_strike > BENT_RAD:
-        return Flag.STAIRS_UP
-    return Flag.STAIRS_DOWN if knee_half_later > BENT_RAD else Flag.NONE
+def stairs_flag(knee_at_strike: float, knee_half_later: float, rise_m: float) -> Flag:
+    """Stairs: up, the knee (rad) is bent at heel strike and straightens; down, it bends under load [Riener 2002]. `rise_m`: of the hips meanwhile."""
+    if not climbs(knee_at_strike, knee_half_later):
+        return Flag.NONE
+    if knee_half_later < knee_at_strike:
+        return Flag.STAIRS_UP if knee_at_strike > BENT_RAD and rise_m > LEAST_RISE_M else Flag.NONE
+    return Flag.STAIRS_DOWN if knee_half_later > BENT_RAD and rise_m < -LEAST_RISE_M else Flag.NONE
 
 
 def pace_flag(speed_m_s: float, lengths: LegLengths) -> Flag:

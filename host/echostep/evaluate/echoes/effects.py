@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated pings that show one effect each [Girard 2011, 2.6, Figures 1-5].
 
 In: a seed. Out: `Effect`s. Owns nothing. The simulation computes sound levels from mirror images and shares nothing with the likelihood but the plan.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One sentence about each simulated effect, for the table.
 
 In: `Effect`s. Out: text. Owns nothing.

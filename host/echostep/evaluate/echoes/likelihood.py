@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the tracker's echo likelihood expects of simulated pings, and the settings under which it explains them best.
 
 In: poses and ranges. Out: log-densities; fitted settings. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The picture of what rangers hear: a panel an effect [Girard 2011, Figures 1-5].
 
 In: effects. Out: a PNG. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What simulated rangers hear, effect by effect [Girard 2011, 2.6, Figures 1-5], and how well the tracker's likelihood expects it.
 
 In: a seed. Out: rows, a picture of each effect, and on demand the settings that explain simulated pings best. The simulation and the likelihood share

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Public recordings of a walking foot, read from a folder laid out like ../shared/data, each with its own way to judge a track.
 
 In: the folder. Out: `FootRecording`s, the names of sets that are not there, and of files that could not be read. Owns nothing. Every file of a kind

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Latency of the step events and processor time of the foot filter, fed sample by sample.
 
 In: a recording. Out: seconds of data from the begin of a stance to the step that it ends, and the share of one core at 200 Hz. Owns nothing.

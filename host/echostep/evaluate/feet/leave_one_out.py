@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Leave-one-out check: errors on each set of recordings with constants chosen on the other sets only.
 
 In: recordings. Out: for each set with a close truth the choice and the rows of its recordings under that choice. Owns nothing. Every combination

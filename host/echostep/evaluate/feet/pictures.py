@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The tracks of the recordings from above.
 
 In: recordings and their tracks. Out: a PNG. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep evaluate feet`: the foot on real recordings with truth, one setting for all, beside the peers' figures.
 
 In: the folder of recordings. Out: rows `{set, recording, metric, value, distance_m, peer, peer_name}`, JSON, a table, on request a picture.

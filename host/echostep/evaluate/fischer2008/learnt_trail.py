@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A trail of beacons whose map is learnt on the way in, while they are dropped.
 
 In: a `BeaconGround`, a cloud without known beacons. Out: the cloud at the deepest point, and the way back as each particle believes it. Owns nothing.
@@ -54,12 +55,12 @@ def _walk_in(
 @kernel
 def believed_trail(cloud: BeaconCloud, i: int, exit_m: Floats) -> Floats:
     """The way back as particle i believes it, (b + 1, 2): from beacon to beacon to the exit. An unknown beacon has the place of the next one."""
-    count = len(cloud.health.known)
+    count = len(cloud.beacons.health.known)
     path = np.empty((count + 1, 2))
     path[count] = exit_m
     for k in range(count - 1, -1, -1):
-        if cloud.health.known[k]:
-            path[k, 0], path[k, 1] = cloud.beliefs.mean[i, k, X], cloud.beliefs.mean[i, k, Y]
+        if cloud.beacons.health.known[k]:
+            path[k, 0], path[k, 1] = cloud.beacons.beliefs.mean[i, k, X], cloud.beacons.beliefs.mean[i, k, Y]
         else:
             path[k] = path[k + 1]
     return path

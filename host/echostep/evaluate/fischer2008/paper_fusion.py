@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The paper's fusion of dead reckoning and ultrasound [Fischer 2008, 4.1.1]; without ultrasound, dead reckoning alone.
 
 In: dead-reckoned steps, and what the nearest beacon measures. Out: an estimated place and heading. Owns the fields of a `Fusion` record.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of the guided returns: [Fischer 2008, Figures 9 and 10], and success over what was varied.
 
 In: returns and rows. Out: PNG files. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One guided return: the event-based simulator of [Fischer 2008, 4.2] around the paper's fusion and around a particle filter with beacons.
 
 In: a `BeaconGround`, a system, how well the person obeys. Out: true and estimated places at each guidance, and whether the exit was reached. Owns the
@@ -14,18 +15,11 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.evaluate.fischer2008.beacon_cloud import BeaconCloud, new_cloud, set_beacons, update_by_ultrasound
-from echostep.evaluate.fischer2008.guidance import (
-    CONTACT,
-    SILENCE_S,
-    Advice,
-    Contact,
-    advise_by_cloud,
-    advise_by_fusion,
-    update_contact,
-)
+from echostep.evaluate.fischer2008.guidance import Advice, advise_by_cloud, advise_by_fusion, note_contact
 from echostep.evaluate.fischer2008.learnt_trail import walk_in
 from echostep.evaluate.fischer2008.paper_fusion import FUSION, Fusion, add_step, fuse_nearest, start_fusion
 from echostep.evaluate.fischer2008.walker import EXACT, SPEED_M_S, TICK_S, WALKER, GuidedWalker, Obedience, obey, walk
+from echostep.guidance.contact import CONTACT, Contact, start_contact
 from echostep.jit import kernel
 from echostep.localization.beacon_model import BeaconSettings
 from echostep.plan.polyline import along, way_m
@@ -35,9 +29,6 @@ PDR, PAPER, OURS = 0, 1, 2  # systems: dead reckoning alone, the paper's fusion,
 GUIDANCE_TICKS = 200  # between cues [Fischer 2008, 4.2]
 NEAR_EXIT_M = 3.0  # "within a short distance of the end" [Fischer 2008, 4.2]
 TIME_FACTOR = 2.5  # time allowed, in walks along the trail: "under a certain delay" [Fischer 2008, 4.2]; by reason
-SILENT_PERIODS = (
-    1.5  # without a measurement at least, until a walker counts as out of reach; by reason: one may be missing
-)
 PARTICLES = 100
 MORE_PARTICLES = 300  # where the map is learnt or uncertain, or measurements are rare
 RARE_S = 2.0  # time between rare measurements
@@ -67,12 +58,11 @@ class Return(NamedTuple):
 
 
 class _Rules(NamedTuple):
-    """What does not change during a return; `silence_s`: without a measurement, until the walker is sent back."""
+    """What does not change during a return."""
 
     system: int
     ultrasound_ticks: int
     deployed: bool
-    silence_s: float
     obedience: Obedience
 
 
@@ -92,7 +82,7 @@ def guided_return(
     """Guide one person back along the trail; equal seeds, equal returns. `period_s`: between ultrasound events."""
     rng = np.random.default_rng(seed)
     ticks = max(round(period_s / TICK_S), 1)
-    rules = _Rules(system, ticks, knowledge.deployed, max(SILENCE_S, SILENT_PERIODS * period_s), obedience)
+    rules = _Rules(system, ticks, knowledge.deployed, obedience)
     walker, fusion, contact = np.zeros(1, WALKER), np.zeros(1, FUSION), np.zeros(1, CONTACT)
     cloud = _first_cloud(world, system, period_s, knowledge, rng)
     if knowledge.deployed:
@@ -125,11 +115,11 @@ def _walk_back(
     walker, fusion, trail = state.walker, state.fusion, world.trail
     walker.x, walker.y, walker.heading = along(trail, 0.0)
     start_fusion(fusion, walker.x, walker.y)
-    state.contact.limit_s = rules.silence_s
+    start_contact(state.contact, 0.0, 0.0, 0.0)
     inside = np.zeros(len(world.sources), np.bool_)
     order = np.arange(len(world.beacons))
-    arrived, n, tick, end_m = False, 0, 0, np.inf
-    while n < len(truth):
+    arrived, n, end_m = False, 0, np.inf
+    for tick in range(GUIDANCE_TICKS * (len(truth) - 1) + 1):
         if tick % rules.ultrasound_ticks == 0:
             _measure(world, rules, state, tick, order, rng)
         if tick % GUIDANCE_TICKS == 0:
@@ -141,7 +131,6 @@ def _walk_back(
                 break
         if tick == walker.turn_tick:
             walker.heading += walker.turn
-        tick += 1
         dx, dy = walk(world, inside, walker)
         add_step(fusion, dx, dy)
         end_m = math.hypot(walker.x - trail[-1, 0], walker.y - trail[-1, 1])
@@ -156,7 +145,7 @@ def _measure(
     """One ultrasound event."""
     if rules.system == OURS:
         heard = update_by_ultrasound(world, state.cloud, state.walker, tick, order, rng)
-        update_contact(state.contact, state.walker, heard, tick, rules.silence_s)
+        note_contact(state.contact, state.walker, tick, heard)
     elif rules.system == PAPER:
         fuse_nearest(world, state.walker, state.fusion, rng)
 
@@ -165,5 +154,5 @@ def _measure(
 def _advise(trail: Floats, rules: _Rules, state: _ReturnState, tick: int) -> Advice:
     """One guidance event."""
     if rules.system == OURS:
-        return advise_by_cloud(state.cloud, state.contact, trail, rules.deployed, state.walker, tick, rules.silence_s)
+        return advise_by_cloud(state.cloud, state.contact, trail, rules.deployed, state.walker, tick)
     return advise_by_fusion(state.fusion, trail, state.walker)

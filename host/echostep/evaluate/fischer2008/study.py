@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The guided returns of [Fischer 2008, 4]: success of dead reckoning alone, the paper's fusion and the particle filter, also with worse beacons.
 
 Simulated. The particle filter has the tracker's kernels, but some rules of its own: see `beacon_cloud` and `guidance`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The simulated person: walks in the direction of the last cue, with dead reckoning whose heading magnetic sources disturb [Fischer 2008, 4.1.2].
 
 In: a `BeaconGround`, turns to be made. Out: the true position and the dead-reckoned path. Owns the fields of a `GuidedWalker` record.

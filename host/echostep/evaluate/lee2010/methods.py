@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The methods that the study compares: that of [Lee 2010], the default by dead reckoning and on the plan; floors by pressure [Lee 2010].
 
 In: `Measured`, the start. Out: `MethodTrack`s, floors. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One run of each experiment of [Lee 2010] as pictures of the kind of its Figures 6, 7 and 8.
 
 In: a seed. Out: `figure6.png` (lap), `figure7.png` (pressure on the way down), `figure8.png` (3D track). Owns nothing.

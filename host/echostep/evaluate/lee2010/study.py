@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track;
 the method of the paper and the default one.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated walks of the experiments of [Lee 2010], and what the host measures on them.
 
 In: a seed, which chooses the person. Out: `Walk`s, the bytes of the simulated board, `Measured`. Owns the routes. Frames, clock and counts are

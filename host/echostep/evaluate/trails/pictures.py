@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trails as pictures, after Figures 3-6 of [Fischer 2008].
 
 In: a seed. Out: `trail-<name>.png` for each trail and `trails.png` with all. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep evaluate trails`: the trails of [Fischer 2008, section 3.2], walked in simulation, by the paper's method and by ours.
 
 In: seeds. Out: rows for each trail, method and rate; pictures as its Figures 3-6. Owns nothing. All results are simulated. The magnitudes of the

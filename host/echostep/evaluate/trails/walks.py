@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated walks of the trails of [Fischer 2008], the tracks that the methods compute from them, and the errors of these tracks.
 
 In: a trail, a seed, the name of a method. Out: `JudgedTrack`. Owns nothing. The track begins at the true first position and heading of the foot;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep evaluate legs`: walks of about 5 m by many simulated people, legs known, no calibration, and what each fault of the sensors does.
 
 In: seeds, a person each. Out: rows `{name, pace, cause, runs, bias_percent, sd_percent, mean_abs_percent, worst_percent}`. Owns the causes.

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""Public recordings of legs with gyros of three axes, read from a folder laid out like ../shared/data.
+
+In: the folder. Out: `LegRecording`s, the names of sets that are not there, and of files that could not be read. Owns nothing. Each leg is a recording
+of its own. The truth is what both feet have gone: by their inertial tracks (`foot.steps`), or by motion capture of the middle between both ankles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.foot.steps import Track, walk_track
+from echostep.legs.kinematics import LegLengths
+
+WAY_HZ = 10.0  # of the feet's path: slow enough that the noise of standing markers adds nothing
+PAUSE_S = 3.0  # feet that rest for longer end a walk
+MOVING_M_S = 0.1  # mean speed of both feet over `PAUSE_S` in a walk; by reason
+MARGIN_S = 1.0  # of standing, kept before and after the walk
+
+
+@dataclass(frozen=True, slots=True)
+class LegRecording:
+    """Samples `t_s` (n,), rates `thigh`, `shank` (n, 3) in rad/s in each sensor's own frame, `belt` (n,) positive to the left.
+
+    `way_m` (m,): distance gone at `way_s` (m,), the mean of both feet. `lengths`: of the leg, where they were measured.
+    """
+
+    group: str
+    name: str
+    t_s: Floats
+    thigh: Floats
+    shank: Floats
+    belt: Floats
+    way_s: Floats
+    way_m: Floats
+    lengths: LegLengths | None = None
+
+    def walked_m(self, begin_s: float, end_s: float) -> float:
+        """True distance between two times."""
+        begin, end = np.interp([begin_s, end_s], self.way_s, self.way_m).tolist()
+        return float(end - begin)
+
+    def walk_s(self) -> tuple[float, float]:
+        """Begin and end of the longest walk, with the standing beside it: not what the feet do before or after."""
+        back = np.interp(self.way_s - 0.5 * PAUSE_S, self.way_s, self.way_m)
+        on = np.interp(self.way_s + 0.5 * PAUSE_S, self.way_s, self.way_m)
+        moving = np.concatenate([[False], (on - back) > MOVING_M_S * PAUSE_S, [False]])
+        edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)
+        begin, end = max(edges.tolist(), key=lambda e: self.way_m[min(e[1], len(self.way_m) - 1)] - self.way_m[e[0]])
+        last = len(self.way_s) - 1
+        return float(self.way_s[begin]) - MARGIN_S, float(self.way_s[min(end, last)]) + MARGIN_S
+
+
+def read_leg_recordings(folder: Path) -> tuple[list[LegRecording], list[str]]:
+    """All recordings in the folder, and a line about each set or file that was skipped."""
+    found: list[LegRecording] = []
+    skipped: list[str] = []
+    for group, pattern, read in SETS:
+        paths = sorted(folder.glob(pattern))
+        if not paths:
+            skipped.append(f"{group}: skipped, no {pattern} in {folder}")
+        for path in paths:
+            try:
+                found += read(path)
+            except Exception as error:  # foreign files: a reader may raise any exception
+                skipped.append(f"{group}: {path} skipped, cannot read it: {error or type(error).__name__}")
+    return found, skipped
+
+
+def _qmt(path: Path) -> Iterator[LegRecording]:
+    """One person, both legs, feet and lower back, 100 s [Laidig 2023]; the truth is the feet's inertial tracks."""
+    from scipy.io import loadmat
+
+    mat: dict[str, Any] = loadmat(path)
+    t_s = mat["t"].ravel()
+
+    def sensor(part: str, name: str) -> Floats:
+        return np.asarray(mat[part][name][0, 0], np.float64)
+
+    feet = [walk_track(t_s, sensor(f"foot_{k}", "acc"), sensor(f"foot_{k}", "gyr")) for k in ("left", "right")]
+    way_s = np.arange(t_s[0], t_s[-1], 1.0 / WAY_HZ)
+    ways = [_way_by_steps(way_s, foot) for foot in feet]
+    belt = sensor("lower_back", "gyr")[:, 0]  # x is up
+    for side in ("left", "right"):
+        thigh, shank = (sensor(f"{part}_{side}", "gyr") for part in ("upper_leg", "lower_leg"))
+        yield LegRecording("qmt", side, t_s, thigh, shank, belt, way_s, np.mean(ways, axis=0))
+
+
+def _gait_toolbox(path: Path) -> Iterator[LegRecording]:
+    """One person, both legs and pelvis, with motion capture [Sy 2020]. The rates are in the sensors' own frames, whatever the headers say."""
+    columns = _columns(path, "PELV_1")
+    t_s = np.arange(len(columns["PELV_1"])) / 100.0
+    way_s = np.arange(t_s[0], t_s[-1], 1.0 / WAY_HZ)
+
+    def marker(name: str) -> Floats:
+        return np.column_stack([columns[f"{name}_{k}"] for k in (1, 2, 3)])
+
+    def gyro(part: str) -> Floats:
+        rates = _columns(path.with_name(path.name.replace("vicon", part)), "ori_1")
+        return np.column_stack([rates[f"gyr_{k}"] for k in (1, 2, 3)])
+
+    between = 0.5 * (marker("LTIO") + marker("RTIO"))[:, :2]
+    places = np.column_stack([np.interp(way_s, t_s, column) for column in between.T])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    belt = gyro("Pelvis")[:, 0]  # x is up
+    for side, name in (("L", "left"), ("R", "right")):
+        hip, knee, ankle = (marker(side + point) for point in ("FEP", "FEO", "TIO"))
+        lengths = LegLengths(_mean_length(hip - knee), _mean_length(knee - ankle))
+        thigh, shank = gyro(f"{side}_UpLeg"), gyro(f"{side}_LowLeg")
+        trial = path.stem.removesuffix("-vicon")
+        yield LegRecording("gaittoolbox", f"{trial}, {name}", t_s, thigh, shank, belt, way_s, way, lengths)
+
+
+def _columns(path: Path, first: str) -> dict[str, Floats]:
+    """The columns of a CSV file whose header, which begins with the column `first`, follows comments."""
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("//")]
+    names = lines[0].split(",")
+    if names[0] != first:
+        raise ValueError(f"the first column is {names[0]}, not {first}")
+    table = np.array([line.split(",") for line in lines[1:]], np.float64)
+    return dict(zip(names, table.T, strict=True))
+
+
+def _way_by_steps(way_s: Floats, foot: Track) -> Floats:
+    """Distance (m,) gone by a foot at the times way_s (m,): its steps from stance to stance, each at an even pace."""
+    knots = [(-np.inf, 0.0)]
+    for step in foot.steps:
+        gone = knots[-1][1]
+        knots += [(step.t_start_s, gone), (step.t_end_s, gone + float(np.hypot(*step.move_m[:2])))]
+    return np.interp(way_s, *np.array(knots[1:]).T)
+
+
+def _mean_length(between: Floats) -> float:
+    return float(np.linalg.norm(between, axis=1).mean())
+
+
+SETS: tuple[tuple[str, str, Callable[[Path], Iterator[LegRecording]]], ...] = (
+    ("qmt", "legs_qmt/*.mat", _qmt),
+    ("gaittoolbox", "legs_gaittoolbox/*-vicon.csv", _gait_toolbox),
+)
