@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Indoor pedestrian tracking from a foot-mounted MTx, two ultrasonic rangers and the building's plan.
 
 `read_capture(path)` yields the messages of captured bytes, `Tracker` turns bytes into position estimates, `plan`, `foot` and `xsens` are useful

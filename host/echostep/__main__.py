@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`python -m echostep` runs the command `echostep`."""
 
 from echostep.cli import main

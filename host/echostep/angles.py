@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Angles.
 
 In: radians. Out: radians. Owns nothing.

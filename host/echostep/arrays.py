@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Types of numpy arrays that annotations use everywhere, and the numpy dtype of a record that a Protocol describes.
 
 In: a Protocol class with annotated fields. Out: names of array types; dtypes of records. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode` and groups of commands.
 
 In: the command's arguments and options. Out: files, views, an exit status (0: done; 2: a mistake, named in one line). Owns nothing.
@@ -6,7 +7,6 @@ Modules that are slow to import are imported inside the command that needs them,
 
 from __future__ import annotations
 
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,10 +18,10 @@ from echostep.commands.evaluate import app as evaluate
 from echostep.commands.plan import app as plan_app
 from echostep.commands.recordings import app as logs
 from echostep.errors import EchostepError
+from echostep.interruption import end_by_signals
 
 if TYPE_CHECKING:
     from echostep.page.server import Address
-    from echostep.plan.model import Pose
     from echostep.team.endpoint import Outlet
 
 LOCAL = "127.0.0.1"
@@ -37,14 +37,39 @@ app.add_typer(beacon_app, name="beacons")
 app.add_typer(logs)
 app.add_typer(plan_app, name="plan")
 
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        from echostep.board.messages import SCHEMA_HASH
+
+        typer.echo(f"echostep {version('echostep')}, protocol 0x{SCHEMA_HASH:08X}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end."),
+    ] = False,
+) -> None:
+    """Indoor pedestrian tracking."""
+
+
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
 Start = Annotated[
     str | None,
     typer.Option(
         "--start",
-        metavar="X,Y,DEG[,LEVEL]",
-        help="Position and heading of the wearer at the start; level 0 is the plan's first, ? any.",
+        metavar="X,Y,DEG[,LEVEL]|ROOM|?",
+        help="Position and heading of the wearer at the start (level 0 is the plan's first, ? any), a room, or ? for anywhere.",
     ),
+]
+StartSd = Annotated[
+    str | None,
+    typer.Option("--start-sd", metavar="M,DEG", help="Standard deviations of the start: metres per axis, degrees."),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
@@ -67,10 +92,22 @@ Host = Annotated[
 Port = Annotated[
     int | None, typer.Option("--port", help="TCP port of the page [8420, or a free one].", min=0, max=65535)
 ]
-BoardPort = Annotated[str, typer.Option("--board", metavar="PORT", help="Serial port of the sensor board.")]
+BoardPort = Annotated[
+    str | None,
+    typer.Option("--board", metavar="PORT", help="Serial port of the sensor board; without it, both are searched for."),
+]
 MtxPort = Annotated[
     str | None,
     typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the board's leg gyros are used."),
+]
+Keep = Annotated[
+    int | None,
+    typer.Option(
+        "--keep",
+        metavar="N",
+        help="Remove the oldest recordings of the folder until N are left; all are kept without it.",
+        min=2,
+    ),
 ]
 Publish = Annotated[
     list[str] | None,
@@ -113,23 +150,41 @@ def demo(
     page: Page = None,
     host: Host = LOCAL,
     port: Port = None,
+    plan: Annotated[
+        Path | None, typer.Option("--plan", help="Walk through the rooms of this plan instead of the demo's.")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            metavar="TIMES",
+            help="Times real time, for instance 1; 4 on a terminal, else as fast as it can.",
+            min=0.1,
+            max=100.0,
+        ),
+    ] = None,
+    browser: Annotated[
+        bool,
+        typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
+    ] = True,
 ) -> None:
     """Track a simulated walk through a simulated building."""
     from echostep.session import demo as demo_run
     from echostep.session.options import OutputOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
-    output = OutputOptions(out, not headless, address, bool(page), outlet)
-    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide), output)
+    output = OutputOptions(out, not headless, address, bool(page), outlet, browser and sys.stdout.isatty())
+    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed), output)
 
 
 @app.command()
 def live(
     plan: Plan,
-    board: BoardPort,
+    board: BoardPort = None,
     mtx: MtxPort = None,
     out: Out = Path("out/live"),
     start: Start = None,
+    start_sd: StartSd = None,
     settings: SettingsFile = None,
     seed: Seed = 0,
     headless: Headless = False,
@@ -142,6 +197,7 @@ def live(
     team: Team = "team",
     beacons: BeaconsPort = None,
     guide: GuideTo = None,
+    keep: Keep = None,
 ) -> None:
     """Track a wearer live and record everything. Without an MTx the board's leg gyros are used."""
     from echostep.session import live as live_run
@@ -149,25 +205,28 @@ def live(
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet)
-    tracking = TrackingOptions(plan, _pose(start), settings, seed, guide)
-    live_run.live(tracking, PortOptions(board, mtx, beacons, seconds), output)
+    tracking = TrackingOptions(plan, start, start_sd, settings, seed, guide)
+    board, mtx = _ports(board, mtx)
+    live_run.live(tracking, PortOptions(board, mtx, beacons, seconds, keep), output)
 
 
 @app.command()
 def record(
-    board: BoardPort,
+    board: BoardPort = None,
     mtx: MtxPort = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
         "out/recording.mcap"
     ),
     seconds: Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)] = None,
     beacons: BeaconsPort = None,
+    keep: Keep = None,
 ) -> None:
     """Record the ports without tracking."""
     from echostep.session import live as live_run
     from echostep.session.options import PortOptions
 
-    live_run.record(PortOptions(board, mtx, beacons, seconds), out)
+    board, mtx = _ports(board, mtx)
+    live_run.record(PortOptions(board, mtx, beacons, seconds, keep), out)
 
 
 @app.command()
@@ -176,6 +235,7 @@ def replay(
     plan: Plan,
     out: Out = Path("out/replay"),
     start: Start = None,
+    start_sd: StartSd = None,
     settings: SettingsFile = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
     truth: Annotated[
@@ -196,7 +256,7 @@ def replay(
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page) or sys.stdout.isatty(), outlet)
-    replay_run.replay(recording, TrackingOptions(plan, _pose(start), settings, seed, guide), truth, output)
+    replay_run.replay(recording, TrackingOptions(plan, start, start_sd, settings, seed, guide), truth, output)
 
 
 @app.command()
@@ -216,7 +276,13 @@ def foot(
 
 @app.command()
 def legs(
-    samples: Annotated[Path, typer.Argument(help="CSV: t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad].")],
+    samples: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV: t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]; 50 to 500 Hz, either sign. "
+            "Gyros of three axes: thigh_x,thigh_y,thigh_z, shank_x,shank_y,shank_z in rad/s, mounted anyhow."
+        ),
+    ],
     thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")],
     shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, or to the floor, metres.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
@@ -230,11 +296,12 @@ def legs(
         float | None,
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw track and strides as PNG, beside the CSV.")] = False,
 ) -> None:
-    """Distance and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
+    """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
     from echostep.commands import offline
 
-    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked))
+    offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), plot=plot)
 
 
 @app.command()
@@ -282,12 +349,26 @@ def floors(
 
 @app.command()
 def decode(
-    file: Annotated[Path, typer.Argument(help="Captured bytes of the board or the MTx, or a recording.")],
+    file: Annotated[Path, typer.Argument(help="Captured bytes of the board or of an Xsens MT, or a recording.")],
+    output_mode: Annotated[
+        str | None,
+        typer.Option(
+            "--output-mode", metavar="BITS", help="Output mode of legacy MTData, as 0x0006, instead of the one found."
+        ),
+    ] = None,
+    output_settings: Annotated[
+        str | None,
+        typer.Option(
+            "--output-settings",
+            metavar="BITS",
+            help="Output settings of legacy MTData, as 0x00000001, instead of those found.",
+        ),
+    ] = None,
 ) -> None:
-    """Print captured bytes as JSON, one message a line."""
+    """Print captured bytes as JSON, one message a line; on stderr, what was found and rejected."""
     from echostep.commands import offline
 
-    offline.decode(file)
+    offline.decode(file, output_mode, output_settings)
 
 
 @app.command()
@@ -356,10 +437,15 @@ def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
     return parse_outlet(publish, name, team) if publish else None
 
 
-def _pose(text: str | None) -> Pose | None:
-    from echostep.session.metadata import parse_pose
+def _ports(board: str | None, mtx: str | None) -> tuple[str, str | None]:
+    """The given ports; without the board's, both are searched for and printed."""
+    if board is not None:
+        return board, mtx
+    from echostep.commissioning.port_search import find_ports
 
-    return None if text is None else parse_pose(text)
+    found = find_ports(mtx)
+    typer.echo(f"Ports: --board {found.board}" + (f" --mtx {found.mtx}" if found.mtx else "; no MTx was found"))
+    return found.board, found.mtx
 
 
 def _page_address(headless: bool, page: bool | None, host: str, port: int | None) -> Address | None:
@@ -372,9 +458,8 @@ def _page_address(headless: bool, page: bool | None, host: str, port: int | None
 
 
 def main() -> None:
-    """Entry point: a mistake ends with one line and status 2; Ctrl-C and SIGTERM end a run after its files are written."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+    """Entry point: a mistake ends with one line and status 2; signals end a run after its files are written."""
+    end_by_signals()
     try:
         app()
     except EchostepError as error:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The error that ends a command with one line for the user."""
 
 

@@ -1,6 +1,7 @@
+# SPDX-License-Identifier: MIT
 """How kernels are compiled: the only place that configures numba.
 
-In: functions. Out: the same, compiled when first called and cached beside their source. Owns the options.
+In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names. Owns the options.
 
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
 than their work: `lean_kernel` counts none, so it returns numbers or tuples of them and makes no arrays. numba has no public option for this.
@@ -10,10 +11,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import config, njit
 from numba.np import linalg
+
+from echostep.kernel_cache import cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -24,22 +27,33 @@ _COUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": True}
 
 def kernel(function: Function) -> Function:
     """A kernel that may make arrays, but for when a lean kernel calls it: then it is compiled as lean as its caller."""
-    return njit(**_OPTIONS)(function)
+    return _compiled(function, _OPTIONS)
 
 
 def lean_kernel(function: Function) -> Function:
     """A kernel that makes no arrays and counts no references to those that it is given."""
-    return njit(**_UNCOUNTED)(function)
+    return _compiled(function, _UNCOUNTED)
 
 
 def allocating_kernel(function: Function) -> Function:
     """A kernel that makes arrays although a lean kernel calls it."""
-    return njit(**_COUNTED)(function)
+    return _compiled(function, _COUNTED)
 
 
 def inline_kernel(function: Function) -> Function:
     """A kernel that is copied into each of its callers and compiled with their options."""
-    return njit(**_OPTIONS, inline="always")(function)
+    return _compiled(function, {**_OPTIONS, "inline": "always"})
+
+
+def _compiled(function: Function, options: dict[str, Any]) -> Function:
+    """The function as numba compiles it. numba chooses the cache's folder in here, by `CACHE_DIR`; other users of numba keep theirs."""
+    setting = vars(config)  # numba's types do not name its settings
+    before = setting["CACHE_DIR"]
+    setting["CACHE_DIR"] = str(cache_folder(function.__code__.co_filename) or before)
+    try:
+        return cast("Function", njit(**options)(function))
+    finally:
+        setting["CACHE_DIR"] = before
 
 
 def _defer_blas() -> None:

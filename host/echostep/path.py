@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The types that odometry and localization exchange: the trunk's path in pieces, and what was measured on each.
 
 In: nothing. Out: `PathSegment`, `MeasuredSegment`, `Dropout`. Owns nothing. Frame: walk (z up, origin and yaw arbitrary at the start).
@@ -6,7 +7,7 @@ In: nothing. Out: `PathSegment`, `MeasuredSegment`, `Dropout`. Owns nothing. Fra
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,6 +64,14 @@ class MeasuredSegment:
     ranger: Ints
     range_m: Floats
     height_m: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def after(self, t_s: float) -> MeasuredSegment:
+        """The part of the segment after a time on it, with the pings triggered since."""
+        s = self.segment
+        share = (s.t1_s - t_s) / (s.t1_s - s.t0_s)
+        rest = replace(s, t0_s=t_s, dx_m=share * s.dx_m, dy_m=share * s.dy_m, heading0_rad=s.heading_rad(t_s))
+        kept = self.t_s >= t_s
+        return MeasuredSegment(rest, self.t_s[kept], self.ranger[kept], self.range_m[kept], self.height_m)
 
 
 @dataclass(frozen=True, slots=True)

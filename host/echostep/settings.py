@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Settings: the dataclasses of all stages, read from a TOML file.
 
 In: a TOML file (sections named as the fields of `Settings`). Out: `Settings`. Owns nothing; an error names the file, the section and the field.
@@ -42,6 +43,9 @@ class Settings:
     wearer: WearerSettings = field(default_factory=WearerSettings)
 
 
+RENAMED = {("echo", "short"): "hidden"}  # fields of older recordings, by their present names
+
+
 def read_settings(path: Path | str) -> str:
     """TOML text of a settings file; raises EchostepError that names the file."""
     try:
@@ -74,6 +78,7 @@ def _section(name: str, rows: Any, default: Any) -> Any:
     if not isinstance(rows, dict):
         raise ValueError(f"{name}: expected a section, [{name}]")
     known = {f.name: getattr(default, f.name) for f in dataclasses.fields(default)}
+    rows = {RENAMED.get((name, key), key): value for key, value in rows.items()}
     for key, value in rows.items():
         if key not in known:
             raise ValueError(f"[{name}] {key}: unknown; there are {', '.join(known)}")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The tracker: chunks in, estimates out. The only module where the stages meet.
 
 In: chunks in order of arrival. Out: estimates; for views, copies of the state (`TrackerState`, `StreamState`, `Particles`). Owns the front end,
@@ -13,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.board.findings import BoardReports
 from echostep.board.frames import FrameCounts
@@ -21,21 +23,25 @@ from echostep.board.messages import Identity, Status
 from echostep.errors import EchostepError
 from echostep.legs.heading import CompassErrors
 from echostep.localization.beacon_map import BeaconPlace
-from echostep.localization.estimate import Estimate, estimate, unobserved
+from echostep.localization.before_check_in import BeforeCheckIn
+from echostep.localization.building import Building
+from echostep.localization.estimate import Estimate, Right, estimate, unobserved
 from echostep.localization.map_filter import FilterSettings, MapFilter
-from echostep.localization.particle_kernels import Move, systematic
-from echostep.localization.particles import CloudSettings
+from echostep.localization.particle_kernels import systematic
+from echostep.localization.plausibility import STATED
+from echostep.localization.start import Start
 from echostep.odometry.front_end import FrontEnd, FrontEndCounts
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan, Pose
-from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, parse_check_in
+from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, Undo, parse_person
 from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
 from echostep.settings import Settings
 from echostep.walls.level_sheet import lay_out_levels
 from echostep.xsens.reader import MtxCounts
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
-KNOWN_SD_RAD = 0.5  # of a heading; by reason: with a larger one the particles are spread over all headings
+KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over; by reason
+KNOWN = 0.9  # probability of the estimate whose heading it is; by reason: a tap where the wearer is not says that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
 
@@ -44,19 +50,23 @@ Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each e
 class TrackerState:
     """The tracker after the newest chunk.
 
-    `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `plan_explained`: running mean log-likelihood of the
-    echoes under the plan (about 1 when tracked well), NaN before the first segment. `beacon_numbers`: by slot. `beacon_heard_s`: time of the newest
-    reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
+    `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `right`: probability that the wearer is where the
+    cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
+    newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
+    `undoable`: number of the check-in that can be undone.
     """
 
     estimate: Estimate | None
     last_segment: PathSegment | None
     pending_segments: tuple[PathSegment, ...]
     waits_for_start: bool
+    undoable: int | None
     check_ins: int
+    undone: int
     bad_check_ins: int
     particle_count: int
-    plan_explained: float
+    right: float
+    searches: bool
     beacon_numbers: tuple[int, ...]
     beacon_heard_s: float | None
 
@@ -96,34 +106,36 @@ class Tracker:
     def __init__(
         self,
         plan: Plan,
-        start: Pose | None = None,
+        start: Pose | Start | None = None,
         settings: Settings | None = None,
         seed: int = 0,
         *,
         waits: bool = False,
     ) -> None:
-        """`start`: pose of the trunk at the beginning; the plan's own start when None. `waits`: without either, wait for a check-in."""
-        pose = start or plan.start
-        if pose is None and not waits:
-            raise EchostepError("the plan has no start: give one with --start X,Y,DEG")
-        if pose is not None and pose.level >= len(plan.levels):
-            raise EchostepError(f"the start is on level {pose.level}, the plan has {len(plan.levels)}, counted from 0")
+        """`start`: where the trunk may be at the beginning; the plan's own start when None. Without either it may be anywhere in the building.
+
+        `waits`: without either, wait for a check-in.
+        """
         self.settings = settings or Settings()
-        self.plan = plan
-        self.start = pose
         s = self.settings
+        self.plan = plan
+        self.start = self._start_of(start or plan.start, waits)
         self.front_end = FrontEnd(
             s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == CompassErrors() else s.compass
         )
         self.laid_out = lay_out_levels(plan)
+        self._building = Building(self.laid_out.walls, self.laid_out.sheet)
         self.filter: MapFilter | None = None  # from the first segment on
         self.gateway = Gateway()
         self.watchers: list[Watch] = []  # called in this order
         self._readings: list[BeaconReading] = []  # that wait for their segment
-        self._check_ins = self._bad_check_ins = 0
+        self._check_ins = self._bad_check_ins = self._undone = 0
+        self._before: BeforeCheckIn | None = None  # the newest check-in, while it can be undone
         self._check_in: CheckIn | None = None  # the newest
+        self._check_in_s = -math.inf  # its time: the path before it does not move the cloud
         self._segment: PathSegment | None = None  # the newest
         self._estimate: Estimate | None = None  # the newest
+        self._published_s = -math.inf  # time of the newest published estimate
         self._rng = np.random.default_rng(seed)
 
     @property
@@ -134,10 +146,13 @@ class Tracker:
             last_segment=self._segment,
             pending_segments=self.front_end.pending_segments,
             waits_for_start=self.start is None and self._check_in is None,
+            undoable=self._check_ins if self._before else None,
             check_ins=self._check_ins,
+            undone=self._undone,
             bad_check_ins=self._bad_check_ins,
             particle_count=0 if self.filter is None else len(self.filter.cloud.x_m),
-            plan_explained=math.nan if self.filter is None else self.filter.explained,
+            right=math.nan if self.filter is None else self.filter.tracked.plausibility.probability,
+            searches=self.filter is not None and (self.filter.search is not None or self.filter.cloud.is_coarse),
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
         )
@@ -192,7 +207,7 @@ class Tracker:
                 estimates += self._track(part)
             check_in = piece.of(PERSON)
             if len(check_in.row):
-                estimates += self._apply_check_in(check_in.received)
+                estimates += self._apply_person(check_in.received)
         return estimates
 
     def warm_up(self) -> None:
@@ -200,9 +215,10 @@ class Tracker:
         self.front_end.warm_up()
         segment = PathSegment(0.0, 1.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0)
         measured = MeasuredSegment(segment, np.array([0.5]), np.array([0]), np.array([1.0]))
-        other = self._new_filter(Pose(0.0, 0.0, 0.0), 0.0, np.random.default_rng(0))
-        other.update(measured, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
-        other.beacon_map.places(other.cloud, 1.0)
+        for start in (Start(Pose(0.0, 0.0, 0.0)), Start()):
+            other = self._new_filter(start, 0.0, np.random.default_rng(0), 1000)
+            other.update(measured, [BeaconReading(t_s, 0, 0.5, 0.0) for t_s in (0.4, 0.6)])
+            other.beacon_map.places(other.cloud, 1.0)
         systematic(np.ones(2), 0.5, 2)
 
     def _track(self, portion: Portion) -> list[Estimate]:
@@ -211,19 +227,33 @@ class Tracker:
         # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
         for piece in self.front_end.process(portion):
             if isinstance(piece, MeasuredSegment):
-                self._segment = piece.segment
-                self.filter = self.filter or self._first_filter(piece.segment.heading0_rad)
-                if self.filter is None:
-                    continue
-                # Localization: propagate by the segment, reweight by pings and beacon readings.
-                self._estimate = self.filter.update(piece, self._pop_readings(piece.segment.t1_s))
-                estimates.append(self._publish(piece, self._estimate))
+                estimates += self._follow(piece)
             elif self._estimate is not None:
                 estimates.append(self._publish(None, unobserved(self._estimate, piece.t_s)))
         # Beacons: bytes of the gateway -> readings.
         if received := portion.of(GATEWAY).received:
             self._readings += self.gateway.read(received, self.front_end.newest_s)
         return estimates
+
+    def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
+        """Localization: propagate by the segment, reweight by pings and beacon readings. Of a segment before a check-in only its heading counts."""
+        segment = measured.segment
+        self.filter = self.filter or self._first_filter(segment.heading0_rad)
+        last, self._segment = self._segment, segment
+        if self.filter is None:
+            return []
+        readings = self._pop_readings(segment.t1_s)
+        if self._before and not self._before.add(measured, readings):
+            self._before = None
+        if segment.t0_s < self._check_in_s:
+            last_rad = segment.heading0_rad if last is None else last.heading1_rad
+            until_s = min(self._check_in_s, segment.t1_s)
+            self.filter.turn_walk_frame(wrap(last_rad - segment.heading_rad(until_s)))
+            if segment.t1_s <= self._check_in_s:
+                return []
+            measured = measured.after(self._check_in_s)
+        self._estimate = self.filter.update(measured, readings)
+        return [self._publish(measured, self._estimate)]
 
     def _pop_readings(self, t_s: float) -> list[BeaconReading]:
         """The waiting beacon readings up to a time."""
@@ -232,29 +262,59 @@ class Tracker:
         return ready
 
     def _publish(self, measured: MeasuredSegment | None, new: Estimate) -> Estimate:
-        """Call the watchers with a new estimate."""
+        """Call the watchers with a new estimate; its time is never before that of an earlier one."""
+        self._published_s = max(self._published_s, new.t_s)
+        new = new if new.t_s == self._published_s else replace(new, t_s=self._published_s)
         for watch in self.watchers:
             watch(measured, new)
         return new
 
-    def _apply_check_in(self, received: bytes) -> list[Estimate]:
-        """Draw a new filter about a check-in; before the first segment it is the start. A check-in that is not valid is counted.
+    def _apply_person(self, received: bytes) -> list[Estimate]:
+        """Apply a check-in or its undoing; bytes that are neither are counted."""
+        match parse_person(received):
+            case CheckIn() as check_in if check_in.level < len(self.plan.levels):
+                return self._apply_check_in(check_in)
+            case Undo(number) if self._before and number == self._check_ins:
+                return self._undo(self._before)
+        self._bad_check_ins += 1
+        return []
 
-        A missing heading is taken from the last estimate. Segments that are still pending are added on top: a check-in needs a standing wearer.
+    def _apply_check_in(self, check_in: CheckIn) -> list[Estimate]:
+        """Draw a new filter about a check-in; before the first segment it is the start.
+
+        The place is that of the moment of the check-in, so of the segments that are not known yet only the part after it will move the cloud.
         """
-        check_in = parse_check_in(received)
-        if check_in is None or check_in.level >= len(self.plan.levels):
-            self._bad_check_ins += 1
-            return []
+        state = self._rng.bit_generator.state
+        self._before = BeforeCheckIn(self.filter, self._check_in, self._estimate, state)
         self._check_ins += 1
         self._check_in = check_in
         segment = self._segment
         if segment is None:
             return []
         self.filter = self._filter_at(check_in, segment.heading1_rad)
+        self._check_in_s = self.front_end.newest_s
         t_s = max(segment.t1_s, self._estimate.t_s) if self._estimate else segment.t1_s
-        self._estimate = estimate(self.filter.cloud, t_s, segment.heading1_rad, segment.step)
+        self._estimate = estimate(self.filter.cloud, t_s, segment.heading1_rad, segment.step, 0.0, Right(STATED))
         return [self._publish(MeasuredSegment(segment, *NO_PINGS), self._estimate)]
+
+    def _undo(self, before: BeforeCheckIn) -> list[Estimate]:
+        """Go back to the state before the newest check-in, and process the segments since then again."""
+        self._before = None
+        self._undone += 1
+        self.filter, self._check_in, self._estimate = before.filter, before.check_in, before.estimate
+        self._check_in_s = -math.inf
+        self._rng.bit_generator.state = before.random_state
+        waiting: list[BeaconReading] = []
+        for measured, readings in before.since:
+            self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
+            if self.filter is None:
+                waiting += readings
+            else:
+                self._estimate = self.filter.update(measured, readings)
+        self._readings = (waiting + self._readings)[-MAX_READINGS:]
+        if self._segment is None or self._estimate is None:
+            return []
+        return [self._publish(MeasuredSegment(self._segment, *NO_PINGS), self._estimate)]
 
     def _first_filter(self, walk_heading_rad: float) -> MapFilter | None:
         """The filter at the first segment; None while neither a start nor a check-in is known."""
@@ -263,22 +323,32 @@ class Tracker:
         return None if self.start is None else self._new_filter(self.start, walk_heading_rad, self._rng)
 
     def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> MapFilter:
-        """A filter about a check-in; without a known heading its particles are many and point anywhere."""
+        """A filter about a check-in; without a heading it is the last estimate's, unless that is not known: then it is any."""
         heading_rad, sd_rad = check_in.heading_rad, HEADING_SD_RAD
         if heading_rad is None:
             last = self._estimate
-            heading_rad, sd_rad = (last.heading_rad, last.heading_sd_rad) if last else (0.0, math.pi)
-        turn_sd_deg = math.degrees(min(sd_rad, KNOWN_SD_RAD))
-        spread = replace(self.settings.cloud, start_sd_m=check_in.sd_m, start_turn_sd_deg=turn_sd_deg)
-        start = Pose(check_in.x_m, check_in.y_m, heading_rad, check_in.level)
-        drawn = self._new_filter(start, walk_heading_rad, self._rng, spread)
-        if sd_rad > KNOWN_SD_RAD:
-            drawn.cloud.scatter(Move(0.0, 0.0, 0.0, sd_rad))
-        return drawn
+            known = last is not None and last.right > KNOWN and last.heading_sd_rad < KNOWN_SD_RAD
+            heading_rad, sd_rad = (last.heading_rad, last.heading_sd_rad) if last and known else (0.0, math.pi)
+        pose = Pose(check_in.x_m, check_in.y_m, heading_rad, check_in.level)
+        return self._new_filter(Start(pose, check_in.sd_m, sd_rad), walk_heading_rad, self._rng)
+
+    def _start_of(self, start: Pose | Start | None, waits: bool) -> Start | None:
+        """The start as a distribution; raises EchostepError for a level that the plan does not have."""
+        if isinstance(start, Pose):
+            cloud = self.settings.cloud
+            start = Start(start, cloud.start_sd_m, math.radians(cloud.start_turn_sd_deg))
+        if start is None:
+            return None if waits else Start()
+        level = start.level if start.pose is None else start.pose.level
+        if level >= len(self.plan.levels):
+            raise EchostepError(f"the start is on level {level}, the plan has {len(self.plan.levels)}, counted from 0")
+        return start
 
     def _new_filter(
-        self, start: Pose, walk_heading_rad: float, rng: np.random.Generator, cloud: CloudSettings | None = None
+        self, start: Start, walk_heading_rad: float, rng: np.random.Generator, searching: int | None = None
     ) -> MapFilter:
-        s, laid_out = self.settings, self.laid_out
-        settings = FilterSettings(cloud or s.cloud, s.echo, s.climb, s.beacons)
-        return MapFilter(laid_out.walls, start, walk_heading_rad, rng, settings, laid_out.sheet)
+        """A filter about a start; `searching`: particles of a search, where not the settings' number."""
+        s = self.settings
+        cloud = s.cloud if searching is None else replace(s.cloud, searching=searching)
+        settings = FilterSettings(cloud, s.echo, s.climb, s.beacons, self.plan.uncertainty_m or 0.0)
+        return MapFilter(self._building, start, walk_heading_rad, rng, settings)

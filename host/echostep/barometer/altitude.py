@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Heights from pressure, sample by sample; effects of weather, doors and fans are separated from vertical motion.
 
 In: pressures with times, and what is known of temperature, gait, foot and plan. Out: `Heights`: height above the start with its variance,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Which floor: a hidden state over the building's storeys, with stairs and lifts between them.
 
 In: `Pressures` and the storeys' heights. Out: probabilities of each floor, the height in the building's frame; live, sample by sample, or from a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Evaluation of a whole record of pressures: unknown heights of the floors, stays on floors, metres climbed.
 
 In: `Pressures`, `Floors`. Out: heights of the floors, `Stay`s, sums, a description. Owns nothing.
@@ -209,16 +210,50 @@ def stays(floors: Floors, shortest_s: float = SHORTEST_STAY_S, moving_p: float =
     return found
 
 
+def visits(floors: Floors) -> list[Stay]:
+    """The stays as `floors.floor` names them at every sample, and the floors at which the way turned without a stay, in order of time.
+
+    Floors that are only passed, or named for less than SHORTEST_STAY_S, are left out. So the rises between visits are those of `floors.floor`.
+    """
+    edges = np.flatnonzero(np.diff(floors.floor, prepend=-1, append=-1)).tolist()
+    found: list[tuple[Stay, bool]] = []  # and whether it is a stay
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        floor, ends = int(floors.floor[a]), a == 0 or b == edges[-1]
+        if still := _still(floors, a, b, SHORTEST_END_S if ends else SHORTEST_STAY_S):
+            found.append((Stay(floor, *still), True))
+        elif floors.t_s[b - 1] - floors.t_s[a] >= SHORTEST_STAY_S:
+            found.append((Stay(floor, float(floors.t_s[a]), float(floors.t_s[b - 1])), False))
+    kept: list[Stay] = []
+    for k, (visit, stayed) in enumerate(found):
+        around = (kept[-1].floor if kept else visit.floor, found[k + 1][0].floor if k + 1 < len(found) else visit.floor)
+        if stayed or not min(around) < visit.floor < max(around):
+            kept.append(visit)
+    return kept
+
+
+def _still(floors: Floors, begin: int, end: int, shortest_s: float) -> tuple[float, float] | None:
+    """Times of the first and the last sample of the stretches without vertical motion of at least `shortest_s` among these samples."""
+    moving = np.concatenate([[True], (floors.up + floors.down)[begin:end] >= MOVING_P, [True]])
+    edges = begin + np.flatnonzero(np.diff(moving)).reshape(-1, 2)
+    long = [
+        (floors.t_s[a], floors.t_s[b - 1]) for a, b in edges.tolist() if floors.t_s[b - 1] - floors.t_s[a] >= shortest_s
+    ]
+    return (float(long[0][0]), float(long[-1][1])) if long else None
+
+
 def climbed_m(heights_m: Floats, visited: list[Stay]) -> tuple[float, float]:
-    """Metres up and metres down between the stays, by the heights of the floors (k,)."""
+    """Metres up and metres down between the visits, by the heights of the floors (k,)."""
     rises = np.diff([heights_m[stay.floor] for stay in visited])
     return float(rises[rises > 0].sum()), float(np.abs(rises[rises < 0]).sum())
 
 
 def describe(floors: Floors) -> str:
-    """Stays, metres climbed, and a warning when the floor is uncertain, a line each."""
-    visited = stays(floors)
-    lines = [f"floor {s.floor} ({floors.heights_m[s.floor]:g} m): {s.from_s:.0f} to {s.to_s:.0f} s" for s in visited]
+    """Visits, metres climbed between them, and a warning when the floor is uncertain, a line each."""
+    visited = visits(floors)
+    lines = [
+        f"floor {s.floor} ({floors.heights_m[s.floor]:g} m): {round(s.from_s, 2)} to {round(s.to_s, 2)} s"
+        for s in visited
+    ]
     up, down = climbed_m(floors.heights_m, visited)
     lines.append(
         f"{len(visited)} stays on {len({s.floor for s in visited})} floors; climbed {up:.1f} m up, {down:.1f} m down; {len(floors.t_s)} samples"

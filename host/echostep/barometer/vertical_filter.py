@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The vertical filter's state, and its two passes: forward as samples come, and backward smoothing of a whole record.
 
 In: rows of observations. Out: weight and height of each hypothesis at each sample. Owns the state.

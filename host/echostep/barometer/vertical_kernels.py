@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Vertical motion from pressure: a filter over hypotheses on the wearer's level, way of moving and the state of the air.
 
 In: rows of observations: claimed heights (m), their noise, gait, place and foot speed. Out: a weight and a Gaussian for each hypothesis.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One hypothesis of the vertical filter: its state, its constants, propagation and likelihoods.
 
 In: mean x (4,) and covariance c (4, 4) of a hypothesis, a row of observations. Out: both propagated and updated in place, the likelihood, and their

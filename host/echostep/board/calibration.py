@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Raw counts of the board's sensors -> SI units.
 
 In: rows of messages, by the dtypes of the schema. Out: ranges, rates, headings and heights. Owns nothing.

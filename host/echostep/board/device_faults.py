@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Findings on single devices: faults in the board's status, and the gyros' self-tests and temperatures, each with a remedy.
 
 In: `BoardReports`. Out: `Finding`s; a cause that explains several devices gives one. Owns the texts.
@@ -58,7 +59,7 @@ _TESTS = {
     ),
     SelfTest.NOT_RUN: (
         Severity.NOTE,
-        "was not tested after the restart by the board's watchdog",
+        "was not tested, because the board was restarted by its watchdog or by a low supply",
         "run echostep doctor",
     ),
 }

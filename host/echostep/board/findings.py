@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Findings on the board's health, and the board's reports about itself from which they are made.
 
 In: the board's messages. Out: `BoardReports`; the types and names of findings. Owns the newest reports and the previous status.
@@ -8,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from echostep.board.messages import Configuration, GyroHealth, Healthy, Identity, Message, Sensors, Status
+from echostep.board.messages import BoardHealth, Configuration, GyroHealth, Healthy, Identity, Message, Sensors, Status
 
 TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
 
@@ -66,6 +67,8 @@ class BoardReports:
     configuration: Configuration | None = None
     status: Status | None = None
     previous_status: Status | None = None
+    board_health: BoardHealth | None = None
+    usual_supply_mv: int = 0  # highest voltage so far
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
 
     def add(self, message: Message) -> None:
@@ -74,6 +77,9 @@ class BoardReports:
             self.identity = message
         elif isinstance(message, Configuration):
             self.configuration = message
+        elif isinstance(message, BoardHealth):
+            self.board_health = message
+            self.usual_supply_mv = max(self.usual_supply_mv, message.supply_mv)
         elif isinstance(message, GyroHealth):
             self.gyros[message.gyro] = message
         elif isinstance(message, Status):

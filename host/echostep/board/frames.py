@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Board frames, sans-I/O: bytes in any split -> messages, and messages -> bytes.
 
 In: bytes from the board's USB port. Out: frames as columns (`Frames`), and as messages (`echostep.messages`). Owns the unfinished frame and the
@@ -17,7 +18,7 @@ import numpy as np
 from cobs import cobs
 from numpy.typing import NDArray
 
-from echostep.arrays import Ints, Octets
+from echostep.arrays import Bools, Ints, Octets
 from echostep.board.messages import BY_ID, GREATEST, ROWS, SCHEMA_HASH, SCHEMA_SEED, Message
 from echostep.errors import EchostepError
 from echostep.jit import kernel, lean_kernel
@@ -26,13 +27,16 @@ MAX_ENCODED = 65  # bytes; payloads are at most 64 bytes [protocol/README.md], C
 HEAD = 3  # bytes before the body: id, sequence
 CHECKSUM = 2  # bytes
 SHORTEST = HEAD + CHECKSUM + 2  # bytes of a frame with an empty body: one byte of COBS, the closing zero
+TICKS_SIZE = 4  # bytes at the beginning of a body with a time stamp; ticks of 0.5 us [protocol/messages.toml]
+# Ticks from the last frame, in which numbers are missing because frames were lost; else the board restarted. By reason: pings are reported late.
+OLDEST_TICKS, GAP_TICKS = 2_000_000, 120_000_000  # 1 s, 60 s: in less, the sequence number does not wrap
 MAX_BODY = max(kind.itemsize for kind in ROWS.values())
 _HEAD_FORMAT = struct.Struct("<BH")
 _IDENTITY, _IDENTIFY, _BEACON = 0x01, 0x81, 0x20
 _FIXED_SEED = 0xFFFF  # the same in every schema [protocol/README.md]
 _FIXED_SEED_IDS = (_IDENTITY, _IDENTIFY, _BEACON)
-# Entries of a tally: the counters in the order of `FrameCounts`, the last sequence number (-1: none), and the length of a tally.
-_GOOD, _BAD_COBS, _BAD_LENGTH, _BAD_CRC, _BAD_MESSAGE, _LOST, _SEQUENCE, _TALLY = range(8)
+# Entries of a tally: the counters in the order of `FrameCounts`, the last sequence number and ticks (-1: none), and the length of a tally.
+_GOOD, _BAD_COBS, _BAD_LENGTH, _BAD_CRC, _BAD_MESSAGE, _LOST, _SEQUENCE, _TICKS, _TALLY = range(9)
 
 
 class _Schema(NamedTuple):
@@ -44,6 +48,7 @@ class _Schema(NamedTuple):
     seed: int
     hash: int
     hash_offset: int  # of the schema's hash in the body of an `Identity`
+    timed: Bools  # (256,) whether the body begins with ticks
 
 
 def _schema() -> _Schema:
@@ -55,7 +60,8 @@ def _schema() -> _Schema:
         greatest[identifier, offset] = value
     hash_offset = int(ROWS[_IDENTITY].fields["schema_hash"][1])  # type: ignore[index]
     crcs = np.array([binascii.crc_hqx(bytes([k]), 0) for k in range(256)], np.int64)
-    return _Schema(sizes, greatest, crcs, SCHEMA_SEED, SCHEMA_HASH, hash_offset)
+    timed = np.array([i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)])
+    return _Schema(sizes, greatest, crcs, SCHEMA_SEED, SCHEMA_HASH, hash_offset, timed)
 
 
 _SCHEMA = _schema()
@@ -124,7 +130,7 @@ class BoardReader:
     def __init__(self) -> None:
         self._rest = b""
         self._tally = np.zeros(_TALLY, np.int64)
-        self._tally[_SEQUENCE] = -1
+        self._tally[_SEQUENCE] = self._tally[_TICKS] = -1
 
     @property
     def counts(self) -> FrameCounts:
@@ -181,7 +187,7 @@ def _find_frames(
                 sequences[count] = payload[1] | payload[2] << 8
                 ends[count] = end + 1
                 bodies[count, :size] = payload[HEAD : HEAD + size]
-                _count_sequence(payload[1] | payload[2] << 8, identifier, tally)
+                _count_sequence(payload[1] | payload[2] << 8, identifier, _uint32(payload, HEAD), schema, tally)
                 count += 1
             else:
                 tally[_BAD_MESSAGE] += 1
@@ -240,18 +246,32 @@ def _is_valid(payload: Octets, size: int, schema: _Schema) -> bool:
 @lean_kernel
 def _schema_hash(payload: Octets, schema: _Schema) -> int:
     """The schema's hash in the payload of an identity."""
+    return _uint32(payload, HEAD + schema.hash_offset)
+
+
+@lean_kernel
+def _uint32(payload: Octets, offset: int) -> int:
+    """A little-endian number of 32 bits."""
     value = 0
-    for k in range(4):
-        value |= (payload[HEAD + schema.hash_offset + k] & 0xFF) << 8 * k
+    for k in range(TICKS_SIZE):
+        value |= (payload[offset + k] & 0xFF) << 8 * k
     return value
 
 
 @lean_kernel
-def _count_sequence(sequence: int, identifier: int, tally: Ints) -> None:
-    """Count a good frame, and the frames lost before it."""
+def _count_sequence(sequence: int, identifier: int, ticks: int, schema: _Schema, tally: Ints) -> None:
+    """Count a good frame, and the frames lost before it. `ticks`: the first four bytes of the body.
+
+    A board that restarts begins at any number with small ticks. Where they are less than before, or by minutes more, no loss is counted.
+    """
     tally[_GOOD] += 1
-    if tally[_SEQUENCE] >= 0 and identifier != _IDENTIFY:
+    passed = 0
+    if schema.timed[identifier]:
+        passed = (ticks - tally[_TICKS] + OLDEST_TICKS) % (1 << 32) - OLDEST_TICKS if tally[_TICKS] >= 0 else 0
+        if passed > 0 or tally[_TICKS] < 0:
+            tally[_TICKS] = ticks
+    if tally[_SEQUENCE] >= 0 and identifier != _IDENTIFY and passed <= GAP_TICKS:
         gap = (sequence - tally[_SEQUENCE] - 1) & 0xFFFF
-        if gap < 0x8000:  # a step back is a restart of the board
+        if gap < 0x8000:
             tally[_LOST] += gap
     tally[_SEQUENCE] = sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The beacon gateway: its bytes -> readings of beacons, on the tracker's clock.
 
 In: bytes of the gateway's port, and the tracker's time when they arrive. Out: `BeaconReading`s in order of arrival. Owns the frame reader, the slot
@@ -20,6 +21,11 @@ GAP_S = 0.045  # least time between two readings of a beacon; by reason: a beaco
 CLOCK_S = 1.0  # largest jump of the gateway's clock relative to the tracker's between two messages; by reason
 CLOCK_GAIN = 0.05  # of a message in the running mean of the gateway's clock offset; by reason
 NEW_CLOCK_MESSAGES = 10  # consecutive messages that agree on a new clock offset before it is accepted; by reason
+FEW_READINGS, FEW_S = (
+    5,
+    60.0,
+)  # a beacon of so few readings gives up its slot after so long without one; by reason: invented numbers
+SILENT_S = 1800.0  # any beacon does after so long; by reason: it is out of power or out of the building
 LARGEST_BEARING_DEG = 180.0
 _BEACON = next(identifier for identifier, kind in BY_ID.items() if kind is Beacon)
 
@@ -60,6 +66,7 @@ class Gateway:
         self._slots: dict[int, int] = {}  # slot by the beacon's number
         self._units: dict[int, int] = {}  # unit by the beacon's number
         self._last_s: dict[int, float] = {}  # time of the last reading by slot
+        self._readings: dict[int, int] = {}  # number of readings by slot
         self._reader = BoardReader()
         self._counts = GatewayCounts()
         self._offset_s = math.nan  # gateway's time minus the tracker's
@@ -128,19 +135,36 @@ class Gateway:
             self.duplicates.add(beacon.number)
             return None
         if beacon.number not in self._slots:
-            if len(self.numbers) >= MOST_BEACONS:
+            slot = self._free_slot(reading.t_s)
+            if slot is None:
                 counts.too_many += 1
                 return None
-            self._slots[beacon.number] = len(self.numbers)
-            self._units[beacon.number] = beacon.unit
-            self.numbers.append(beacon.number)
+            self._slots[beacon.number], self._units[beacon.number] = slot, beacon.unit
+            self.numbers[slot:] = [beacon.number, *self.numbers[slot + 1 :]]
         slot = self._slots[beacon.number]
         if abs(reading.t_s - self._last_s.get(slot, -math.inf)) < GAP_S:
             counts.flood += 1
             return None
         self._last_s[slot] = reading.t_s
+        self._readings[slot] = self._readings.get(slot, 0) + 1
         counts.words += 1
         return reading._replace(slot=slot)
+
+    def _free_slot(self, t_s: float) -> int | None:
+        """The next slot; when all are in use, that of the beacon that has been silent for longest, if that is long enough."""
+        if len(self.numbers) < MOST_BEACONS:
+            return len(self.numbers)
+        waits_s = {
+            slot: last_s + (FEW_S if self._readings[slot] <= FEW_READINGS else SILENT_S)
+            for slot, last_s in self._last_s.items()
+        }
+        slot = min(waits_s, key=lambda slot: waits_s[slot])
+        if waits_s[slot] > t_s:
+            return None
+        number = self.numbers[slot]
+        del self._slots[number], self._units[number], self._last_s[slot], self._readings[slot]
+        self.duplicates.discard(number)
+        return slot
 
     def _clock_continues(self, offset_s: float) -> bool:
         """Whether the gateway's clock goes on without a jump; `offset_s`: its time minus the tracker's, by the newest message.

@@ -1,7 +1,8 @@
+# SPDX-License-Identifier: MIT
 """Findings on the board's health, each with a remedy.
 
 In: the board's reports about itself, and the measured rates of its streams. Out: `Finding`s, the most severe first. Owns nothing; the texts for
-single devices are in `device_faults`.
+single devices are in `device_faults`, those for restarts and supply in `restart_findings`.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from echostep.board.findings import (
     span_s,
     status_field,
 )
-from echostep.board.messages import Fault, Healthy, PressureMode, ResetCause, Schedule, Sensors, Status
+from echostep.board.messages import Fault, Healthy, PressureMode, Schedule, Sensors, Status
+from echostep.board.restart_findings import restart_findings, supply_findings
 
 __all__ = [
     "NAMES", "SELECTS", "BoardReports", "Finding", "Severity", "board_findings", "expected_rates", "gyro_celsius", "rate_findings",
@@ -44,7 +46,7 @@ _STREAMS = {  # by message: subject and unit of a finding, devices
 
 def board_findings(reports: BoardReports) -> list[Finding]:
     """Findings by the board's reports, the most severe first; empty without problems or before the first report."""
-    findings = _restart_findings(reports) + gyro_findings(reports)
+    findings = restart_findings(reports) + supply_findings(reports) + gyro_findings(reports)
     if reports.status is not None:
         findings += (
             device_findings(reports, reports.status)
@@ -52,18 +54,6 @@ def board_findings(reports: BoardReports) -> list[Finding]:
             + _loss_findings(reports.status, reports.previous_status)
         )
     return sorted(findings, key=lambda finding: -finding.severity)
-
-
-def _restart_findings(reports: BoardReports) -> list[Finding]:
-    """Finding on an unwanted cause of the last restart."""
-    cause = ResetCause(0 if reports.identity is None else reports.identity.reset_cause)
-    if cause & ResetCause.WATCHDOG:
-        what, remedy = "was restarted by its watchdog", "if it happens again, write down what was done and report it"
-    elif cause & ResetCause.BROWN_OUT:
-        what, remedy = "restarted because its supply was too low", "use a shorter USB cable or a powered hub"
-    else:
-        return []
-    return [Finding(Severity.WARNING, "board", what, remedy)]
 
 
 def _intermittent_findings(reports: BoardReports) -> list[Finding]:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plays a beacon gateway: what beacons along a walk measure, as frames over UDP or a serial port, in real time.
 
 In: plan, true path of the wearer (CSV). Out: `beacon` frames. Owns the socket or the port that it sends from.
@@ -17,7 +18,9 @@ import serial
 
 from echostep.errors import EchostepError
 from echostep.localization.metrics import load_truth
-from echostep.plan.importers.formats import open_plan
+from echostep.plan.importers.limited import open_limited
+from echostep.ports.datagram_key import seal
+from echostep.ports.udp import key_of
 from echostep.session.console import console
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 
@@ -28,7 +31,7 @@ WRITE_TIMEOUT_S = 0.5
 
 def simulate_gateway(plan_path: Path, truth_path: Path, to: str, spacing_m: float, pace: float, seed: int) -> None:
     """Send frames until the walk is over, `pace` times as fast as real time; raises EchostepError for files and ports that do not open."""
-    plan, truth = open_plan(plan_path), load_truth(truth_path)
+    plan, truth = open_limited(plan_path), load_truth(truth_path)
     send, close = _open_sender(to)
     beacons_m = lay_beacons(truth.xy_m, spacing_m, np.random.default_rng([seed, 8]))
     arrival_ns = np.rint(truth.t_s * 1e9).astype(np.int64)
@@ -60,14 +63,18 @@ def _open_sender(to: str) -> tuple[Callable[[bytes], object], Callable[[], None]
         return port.write, port.close
     try:
         parts = urlsplit(to)
+        key = key_of(to)
         address = (parts.hostname or "127.0.0.1", parts.port or DEFAULT_PORT)
         datagrams = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         datagrams.connect(address)
     except (OSError, ValueError) as error:
-        raise EchostepError(f"{to}: cannot send there: {error}; expected udp://HOST:PORT") from error
+        raise EchostepError(
+            f"{to}: cannot send there: {error}; expected udp://HOST:PORT or udp://HOST:PORT?key=FILE"
+        ) from error
 
     def send(frame: bytes) -> None:
         with suppress(ConnectionRefusedError):  # no program has opened the port yet
-            datagrams.send(frame)
+            # The counter must grow over restarts of the gateway: a real one without a clock stores it.
+            datagrams.send(frame if key is None else seal(key, frame, time.time_ns()))
 
     return send, datagrams.close

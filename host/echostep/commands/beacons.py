@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep beacons simulate`: simulated beacons and their gateway, to try a tracker without any.
 
 In: the command's options. Out: frames on a port. Slow imports wait until the command runs.
@@ -25,7 +26,7 @@ def simulate(
         Path, typer.Option("--truth", metavar="FILE", help="Path of the wearer: CSV t_s,x,y,heading_rad.")
     ],
     to: Annotated[
-        str, typer.Option("--to", metavar="PORT", help="udp://HOST:PORT, or a serial port.")
+        str, typer.Option("--to", metavar="PORT", help="udp://HOST:PORT[?key=FILE], or a serial port.")
     ] = "udp://127.0.0.1:9000",
     spacing: Annotated[
         float, typer.Option("--spacing", metavar="M", help="Distance between beacons along the walk.", min=0.5)

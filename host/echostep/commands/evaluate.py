@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep evaluate ...`: one command a study. Heavy imports wait until a command runs."""
 
 from __future__ import annotations
@@ -87,15 +88,20 @@ def trails(
 def legs_command(
     runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
     seed: Seed = 1,
+    folder: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Real legs instead: folder of the public recordings.")
+    ] = None,
     json: Json = None,
     out: Out = Path("out/legs"),
     scheduler: Scheduler = None,
 ) -> None:
-    """Walks of 5 m by many people without calibration, and what each fault of the sensors does (simulated)."""
-    from echostep.evaluate.legs import STUDY
+    """Walks of 5 m by many simulated people, and what each fault of the sensors does; with --data, real legs against the feet."""
+    from echostep.evaluate.legs.people import STUDY
+    from echostep.evaluate.legs.recordings import recordings_study
     from echostep.evaluate.study import StudyRequest, run_study
 
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
+    study = STUDY if folder is None else recordings_study(folder)
+    run_study(study, StudyRequest(runs if folder is None else 1, seed, json, out, scheduler))
 
 
 @app.command("floors")
@@ -162,3 +168,39 @@ def fischer2008(
     from echostep.evaluate.study import StudyRequest, run_study
 
     run_study(fischer2008_study(runs, seed), StudyRequest(runs, seed, json, out, scheduler))
+
+
+@app.command("anywhere")
+def anywhere_command(
+    runs: Annotated[int, typer.Option("--runs", help="Walks of each row.", min=1)] = 200,
+    seed: Seed = 1,
+    folder: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
+    ] = None,
+    rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: 'kidnap/*'.")] = "*",
+    json: Json = None,
+    out: Out = Path("out/anywhere"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Wrong and unknown starts, kidnappings, wrong plans, poor echoes: found or not, and what is claimed (simulated)."""
+    from echostep.evaluate.anywhere.study import anywhere_study
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    run_study(anywhere_study(folder, rows), StudyRequest(runs, seed, json, out, scheduler))
+
+
+@app.command("clutter")
+def clutter_command(
+    folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of CARMEN logs: *.log, *.log.gz.")],
+    starts: Annotated[int, typer.Option("--starts", help="Unknown starts of each log.", min=0)] = 50,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/clutter"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Laser scans of real buildings as pings: furniture, people and doors that the plan does not have."""
+    from echostep.evaluate.clutter.study import clutter_study
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    study = clutter_study(folder, starts, seed)
+    run_study(study, StudyRequest(len(study.seeds or ()), seed, json, out, scheduler))

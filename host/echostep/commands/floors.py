@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep floors`: the floors of a recorded barometer as CSV, in words and as a picture.
 
 In: a CSV file of pressures, the heights of the floors or `auto`. Out: a CSV file, a picture, a summary on the console. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep foot`, `legs` and `decode`: recorded files of single sensors, without a plan.
 
 In: CSV files of a foot IMU or of leg gyros, captured bytes. Out: track files and a summary; JSON lines. Owns nothing.
@@ -19,13 +20,17 @@ from echostep.legs.stride import StrideSettings
 from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
 from echostep.offline.leg_csv import load_legs
 from echostep.offline.leg_lengths import calibrated_scale, checked_lengths
-from echostep.offline.leg_summary import describe_legs, write_leg_track
+from echostep.offline.leg_summary import describe_legs, describe_strides, write_leg_track
 from echostep.offline.leg_track import PROFILES as LEG_PROFILES
+from echostep.output.leg_plot import draw_legs
 from echostep.output.track_plot import draw_foot
 from echostep.papers import fischer2008
 from echostep.recording.capture import Decoder, as_json, read_capture
+from echostep.recording.capture_summary import summary
 from echostep.session.console import console
+from echostep.xsens.message import MessageReader
 from echostep.xsens.onboard_filter import orientations
+from echostep.xsens.output_formats import OutputFormats
 
 SCALE_RANGE = (0.5, 2.0)  # of --scale; by reason: beyond it the lengths of the leg are wrong
 
@@ -74,7 +79,7 @@ class LegOptions:
     walked_m: float | None = None
 
 
-def legs(path: Path, out: Path, options: LegOptions) -> None:
+def legs(path: Path, out: Path, options: LegOptions, *, plot: bool = False) -> None:
     """Track a recorded leg with this project's method or that of a paper."""
     profile, scale = options.profile, options.scale
     if profile not in LEG_PROFILES:
@@ -90,15 +95,35 @@ def legs(path: Path, out: Path, options: LegOptions) -> None:
         console.print(f"--shank {options.shank_m:g} is taken as knee to floor: {ankle}")
     track = LEG_PROFILES[profile](samples, StrideSettings(lengths, calibrated=scale is not None))
     write_leg_track(out, track)
+    for line in describe_strides(track):
+        console.print(line)
     console.print(f"{path.name}: {describe_legs(track)}")
+    if plot:
+        draw_legs(out.with_suffix(".png"), track.rows, track.strides, path.name)
+        console.print(f"{out} and {out.with_suffix('.png')}")
     if options.walked_m is not None:
         factor = calibrated_scale(track.distance_m, options.walked_m)
         console.print(f"--scale {(scale or 1.0) * factor:.4f} makes this walk {options.walked_m:g} m long")
 
 
-def decode(path: Path) -> None:
-    """Print a capture as JSON lines; print on stderr what was rejected."""
-    decoder = Decoder()
+def decode(path: Path, mode: str | None = None, settings: str | None = None) -> None:
+    """Print a capture as JSON lines; tell on stderr, in sentences, what it held. `mode`, `settings`: of legacy data, where they are known."""
+    formats = OutputFormats(_bits("--output-mode", mode, 0xFFFF), _bits("--output-settings", settings, 0xFFFF_FFFF))
+    decoder = Decoder(mt=MessageReader(formats))
     for message in read_capture(path, decoder):
-        sys.stdout.write(json.dumps(as_json(message)) + "\n")
-    print(f"board: {decoder.board.counts}\nmtx: {decoder.mtx.counts}", file=sys.stderr)
+        sys.stdout.write(json.dumps(as_json(message), allow_nan=False) + "\n")
+    for line in summary(decoder):
+        print(line, file=sys.stderr)
+
+
+def _bits(option: str, text: str | None, most: int) -> int | None:
+    """The number of an option, as 6 or 0x0006; None without it."""
+    if text is None:
+        return None
+    try:
+        value = int(text, 0)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= most:
+        raise EchostepError(f"{option} {text}: a number up to 0x{most:X} is expected, as 0x0006")
+    return value

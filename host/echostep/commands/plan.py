@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep plan import | check | show | edit`.
 
 In: command-line arguments. Out: plans, pictures, findings. Owns the options. Heavy modules are imported when a command runs.
@@ -46,17 +47,46 @@ def import_(
     units: Annotated[
         str | None, typer.Option("--units", metavar="UNIT", help="DXF: mm, cm, m, in or ft instead of the file's.")
     ] = None,
+    doors: Annotated[
+        float | None,
+        typer.Option(
+            "--doors",
+            metavar="M",
+            help="IMDF: assume doors of this width where rooms or openings have none.",
+            min=0.5,
+            max=5.0,
+        ),
+    ] = None,
 ) -> None:
     """Make a plan of a building that is drawn in another format."""
-    from echostep.plan.importers.formats import Hints, import_plan
+    from echostep.plan.importers.assumed_doors import ASSUMED
+    from echostep.plan.importers.formats import Hints
+    from echostep.plan.importers.limited import import_limited
     from echostep.plan.writer import save_plan
 
-    plan = import_plan(files[0], Hints(storey, _unit(units), _layers(layer or [])), files[1:])
+    plan = import_limited(files[0], Hints(storey, _unit(units), _layers(layer or []), doors), files[1:])
     save_plan(plan, out)
     for level in plan.levels:
         counts = f"{len(level.walls)} walls, {len(level.windows)} windows, {len(level.doors)} doors, {len(level.rooms)} rooms"
         print(f"{level.name}, {level.height_m:g} m: {counts}")
     print(f"{len(plan.connectors)} stairs, lifts and ramps; {out}")
+    assumed = sum(door.name == ASSUMED for level in plan.levels for door in level.doors)
+    if assumed:
+        print(f"{assumed} doors are assumed, named {ASSUMED!r}: compare them with the building")
+    for line in _levels_without_doors(plan):
+        print(line)
+
+
+def _levels_without_doors(plan: Plan) -> list[str]:
+    """One line when levels with rooms have no door; what to do about it."""
+    closed = [level.name for level in plan.levels if level.rooms and not level.doors]
+    if not closed:
+        return []
+    where = "The source" if len(closed) == len(plan.levels) else f"The source of {', '.join(closed)}"
+    return [
+        f"{where} has no door openings, so nobody can enter the rooms: "
+        "--doors 0.9 assumes doors 0.9 m wide (IMDF), echostep plan edit draws them"
+    ]
 
 
 def _unit(name: str | None) -> str | None:
@@ -92,9 +122,9 @@ def check(
     """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
     from echostep.plan.check import check_plan
     from echostep.plan.drawing import draw_plan
-    from echostep.plan.importers.formats import open_plan
+    from echostep.plan.importers.limited import open_limited
 
-    plan = open_plan(file)
+    plan = open_limited(file)
     findings = check_plan(plan)
     for finding in findings[:MOST_LINES]:
         x, y = finding.position_m
@@ -123,9 +153,9 @@ def show(
 ) -> None:
     """Draw a plan."""
     from echostep.plan.drawing import draw_plan
-    from echostep.plan.importers.formats import open_plan
+    from echostep.plan.importers.limited import open_limited
 
-    plan = open_plan(file)
+    plan = open_limited(file)
     draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
 
 

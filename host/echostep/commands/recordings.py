@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep info`, `cut`, `repair` and `export`: commands about recordings.
 
 In: the command's arguments and options. Out: a summary, a new recording, a track for other programs. Slow imports wait until a command runs.
@@ -56,11 +57,10 @@ def export(
 ) -> None:
     """Track a recording and write its track for other programs."""
     from echostep.output.track_files import export as export_track
-    from echostep.session.metadata import parse_pose
     from echostep.session.options import TrackingOptions
     from echostep.session.replay import tracker_of
 
-    tracking = TrackingOptions(plan, None if start is None else parse_pose(start), settings, seed)
+    tracking = TrackingOptions(plan, start, None, settings, seed)
     print(export_track(file, plan, out, lambda recording, on: tracker_of(recording, on, tracking)))
 
 

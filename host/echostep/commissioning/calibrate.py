@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep calibrate`: biases of the gyros, mounting, compass and leg scale, measured in a minute and written as settings.
 
 In: the board's port, while the wearer stands still, turns and walks as asked. Out: a settings file (TOML) for `--settings`, whose other sections
@@ -19,6 +20,7 @@ from rich.console import Console
 from echostep.board.calibration import GYROS, GyroSettings
 from echostep.board.health import Severity, board_findings
 from echostep.commissioning.fitting import Fit, fit_compass, fit_gyros, fit_legs, fit_mounting
+from echostep.commissioning.listening_bar import listening_bar
 from echostep.commissioning.probe import ProbeResult, probe
 from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep.errors import EchostepError
@@ -111,7 +113,7 @@ def _check_wearer(wearer: Wearer) -> None:
 def _probe(port: str, seconds: float, console: Console) -> ProbeResult:
     if sys.stdin.isatty():
         console.input("Press Enter to begin. ")
-    with console.status(f"Listening for {seconds:g} s."):
+    with listening_bar(f"Listening for {seconds:g} s", seconds, console):
         probed = probe({BOARD: port}, seconds)
     _check(probed, port)
     return probed

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The diagnosis of a board and an MTx from a few seconds of their bytes: lines of facts, and findings.
 
 In: `ProbeResult`. Out: a `Diagnosis`. Owns nothing; `board.health` interprets what the board reports about itself.
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field
 from echostep.board.health import (
     NAMES,
     SELECTS,
+    BoardReports,
     Finding,
     Severity,
     board_findings,
@@ -18,7 +20,9 @@ from echostep.board.health import (
     gyro_celsius,
     rate_findings,
 )
-from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Outcome, Ranger, SelfTest
+from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Ranger, SelfTest
+from echostep.board.restart_findings import crash_text
+from echostep.board.subscription import knows_subscriptions
 from echostep.commissioning.probe import Drift, ProbeResult, drift_of
 from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import MtxTiming
@@ -58,15 +62,39 @@ def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     report.lines.append(
         f"board     {port}: firmware {i.version_major}.{i.version_minor}.{i.version_patch}, schema 0x{SCHEMA_HASH:08X} as this host"
     )
-    report.lines += _device_lines(probed) + _rate_lines(probed)
-    report.findings += board_findings(reports) + rate_findings(reports, probed.rates_hz) + _stream_findings(probed)
+    report.lines += _supply_lines(reports) + _device_lines(probed) + _rate_lines(probed)
+    report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(i, port)
+    if probed.rates_hz:
+        report.findings += rate_findings(reports, probed.rates_hz)
+    else:
+        what, remedy = "has just started: its rates are not known yet", "run echostep doctor again"
+        report.findings.append(Finding(Severity.NOTE, "board", what, remedy))
     drift = drift_of(probed)
-    if drift is None:
+    if drift is None and probed.replies:
+        report.lines.append("clock     too few answers for its rate")
+    elif drift is None:
         what, remedy = "answers no clock queries", "it receives nothing: unplug it and plug it in again"
         report.findings.append(Finding(Severity.FAULT, "board", what, remedy))
     else:
         report.lines.append(f"clock     {describe(drift)}")
         report.findings += _clock_findings(drift)
+
+
+def _supply_lines(reports: BoardReports) -> list[str]:
+    health = reports.board_health
+    if health is None:
+        return []
+    starts = f"{health.starts} start{'s' if health.starts != 1 else ''} since it got power"
+    crashes = f", crashes: {crash_text(health)}" if health.crashes else ""
+    voltage = f"{1e-3 * health.supply_mv:.2f} V (within 9 %), least {1e-3 * health.supply_least_mv:.2f} V"
+    return [f"supply    {voltage}; {starts}{crashes}"]
+
+
+def _version_findings(identity: Identity, port: str) -> list[Finding]:
+    if knows_subscriptions(identity):
+        return []
+    what = "its firmware is older than 1.2: it reports neither its supply voltage nor its crashes"
+    return [Finding(Severity.NOTE, "board", what, f"flash it: echostep flash --port {port}")]
 
 
 def _silent(probed: ProbeResult, port: str) -> Finding:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep doctor`: checks the ports, the board and the MTx, and prints each fault with its remedy.
 
 In: ports by name, or those found on this computer. Out: a report as text. Owns nothing.
@@ -10,6 +11,7 @@ from rich.text import Text
 
 from echostep.board.health import Finding, Severity
 from echostep.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
+from echostep.commissioning.listening_bar import listening_bar
 from echostep.commissioning.probe import probe
 from echostep.commissioning.serial_ports import (
     BOARD_NAME,
@@ -26,6 +28,7 @@ from echostep.commissioning.serial_ports import (
 )
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX
+from echostep.recording.device import sender, wrong_device
 
 PROBE_S = 6.0
 STYLES = {Severity.NOTE: "cyan", Severity.WARNING: "yellow", Severity.FAULT: "bold red"}
@@ -36,7 +39,7 @@ __all__ = ["examine", "rules_text", "run"]
 def run(board: str | None, mtx: str | None, seconds: float) -> bool:
     """Check everything and print the report; returns whether there is no warning and no fault."""
     console = Console(soft_wrap=True, highlight=False)
-    with console.status("Looking at the ports and listening for some seconds: stand still."):
+    with listening_bar("Looking at the ports and listening: stand still", seconds, console):
         report = examine(board, mtx, seconds)
     print_report(report, console)
     return report.fine
@@ -46,7 +49,7 @@ def examine(board: str | None, mtx: str | None, seconds: float = PROBE_S) -> Dia
     """Check everything; ports that are None are searched for."""
     report = Diagnosis()
     seen = list_seen()
-    report.lines += [f"port      {port.path}: {port.role.value} ({port.text})" for port in seen]
+    report.lines += [f"port      {port.name}: {port.role.value} ({port.text})" for port in seen]
     ports = {
         BOARD: board or find(seen, Role.BOARD, BOARD_NAME),
         MTX: mtx or find(seen, Role.MTX, MTX_NAME),
@@ -84,10 +87,10 @@ def _no_board(seen: list[PortSeen]) -> Finding:
 
 
 def _several_boards(seen: list[PortSeen], chosen: str | None) -> list[Finding]:
-    boards = [port.path for port in seen if port.role is Role.BOARD]
+    boards = [port.name for port in seen if port.role is Role.BOARD]
     if len(boards) < 2:
         return []
-    what = f"{len(boards)} boards are plugged in ({', '.join(boards)}); this report is on {chosen}"
+    what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {chosen}"
     return [Finding(Severity.NOTE, "board", what, "name the other one with --board")]
 
 
@@ -105,6 +108,10 @@ def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float) -> 
         return
     for notice in probed.notices:
         report.findings.append(Finding(Severity.WARNING, "ports", notice, "check the cable and its plugs"))
+    if wrong := [name for name in ports if sender(probed.first_bytes.get(name, b"")) not in (None, name)]:
+        what, _, remedy = wrong_device(wrong[0], ports).partition(": ")
+        report.findings.append(Finding(Severity.FAULT, "ports", what, remedy))
+        return
     if BOARD in ports:
         judge_board(report, probed, ports[BOARD])
     if MTX in ports:

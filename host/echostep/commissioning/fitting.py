@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Calibration values from a few seconds of the board's samples: gyro biases, mounting of the belt gyro, compass errors, leg scale.
 
 In: `ProbeResult`. Out: settings by section and a line for the wearer; EchostepError says which measurement to repeat, and how. Owns nothing.

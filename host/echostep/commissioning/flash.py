@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep flash`: writes the firmware to a board through its Caterina bootloader.
 
 In: a port and a hex file, or the port found on this computer and the firmware of this package. Out: a board that runs the firmware, or an error.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reads a board and an MTx for a few seconds, for `echostep doctor`, `calibrate` and `flash`.
 
 In: ports. Out: `ProbeResult`: messages, rates, losses, and the data for the drift of the board's clock. Owns the ports while it reads.
@@ -6,7 +7,6 @@ In: ports. Out: `ProbeResult`: messages, rates, losses, and the data for the dri
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,8 +27,12 @@ from echostep.board.messages import (
     SelfTest,
     Sync,
 )
+from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.errors import EchostepError
-from echostep.ports.chunks import BOARD, MTX, Chunk, SerialPorts
+from echostep.ports.arrival_clock import now_s as clock_s
+from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.ports.serial_ports import SerialPorts
+from echostep.recording.device import LISTENED_BYTES
 from echostep.timing.timeline import MtxTiming
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
@@ -42,6 +46,10 @@ SELF_TEST_S = 2.2  # for a self-test and its report
 SETTLED_S = 0.7  # of board time after the first message; until then buffered bytes arrive
 MTX_WINDOW_S = 1.5  # for the rate of the MTx
 LEAST_REPLIES = 8  # for a drift
+LEAST_BOARD_S = (
+    3.0  # of a board that starts while it is listened to; by reason: all its streams run 1 s after the start
+)
+LEAST_RATE_S = 1.0  # for rates
 
 
 @dataclass(slots=True)
@@ -59,6 +67,7 @@ class ProbeResult:
     compass: list[Compass] = field(default_factory=list)
     replies: list[tuple[float, float, int]] = field(default_factory=list)
     bytes_of: Counter[str] = field(default_factory=Counter)
+    first_bytes: dict[str, bytes] = field(default_factory=dict)  # by port, as many as tell the device
     rejected: int = 0
     lost: int = 0
     stale_firmware: str = ""  # why the board's firmware does not fit; empty when it fits
@@ -69,11 +78,11 @@ class ProbeResult:
 
     @property
     def rates_hz(self) -> dict[str, float]:
-        """Messages per second of the board's clock, by kind, after SETTLED_S."""
+        """Messages per second of the board's clock, by kind, after SETTLED_S; empty when less than LEAST_RATE_S came after it."""
         last = max((t[-1] for t in self.ticks.values()), default=0)
         first = SETTLED_S * TICKS_PER_S
         span_s = (last - first) / TICKS_PER_S
-        if span_s < 1.0:
+        if span_s < LEAST_RATE_S:
             return {}
         return {kind: sum(t > first for t in ticks) / span_s for kind, ticks in self.ticks.items()}
 
@@ -122,27 +131,32 @@ class _Probe:
         self.result = ProbeResult()
         self._ports, self._names, self._check_gyros = ports, names, check_gyros
         self._board, self._mtx = BoardReader(), MtxReader()
+        self._subscription = Subscription()
         self._start = MtxStart(MtxTiming().rate_hz, lambda sent: ports.send(MTX, sent), self.result.mtx_messages.append)
-        self._start_s = time.monotonic()
+        self._start_s = clock_s()
         self._sequence = 0
         self._query_sent_s: dict[int, float] = {}
         self._first_ticks: int | None = None
+        self._first_message_s = math.inf  # after the start
+        self._least_board_s = LEAST_BOARD_S if check_gyros else 0.0
         self.extra_s = 0.0
 
     def run(self, seconds: float) -> None:
-        """Read for `seconds`, and longer for a self-test that was requested."""
+        """Read for `seconds`, and longer for a self-test that was requested, or a board that has just started."""
         if BOARD in self._names:
             self._send(Identify())
         for chunk in self._ports.chunks():
-            now_s = time.monotonic() - self._start_s
+            now_s = clock_s() - self._start_s
             if chunk is not None:
                 self._receive(chunk)
             self._set_up_mtx(chunk)
             if BOARD in self._names and not self.result.stale_firmware:
                 self._query_board(now_s)
-            if now_s >= seconds + self.extra_s:
+            self._first_message_s = min(self._first_message_s, now_s if self._first_ticks is not None else math.inf)
+            late_s = self._first_message_s + self._least_board_s if self._first_message_s <= seconds else 0.0
+            if now_s >= max(seconds + self.extra_s, late_s):
                 break
-        self.result.seconds = time.monotonic() - self._start_s
+        self.result.seconds = clock_s() - self._start_s
         self.result.rejected, self.result.lost = self._board.counts.rejected, self._board.counts.lost
         self.result.notices += self._ports.notices
 
@@ -152,7 +166,7 @@ class _Probe:
 
     def _query_board(self, now_s: float) -> None:
         if now_s >= QUERY_PERIOD_S * len(self._query_sent_s):
-            self._query_sent_s[len(self._query_sent_s)] = time.monotonic()
+            self._query_sent_s[len(self._query_sent_s)] = clock_s()
             self._send(ClockQuery(len(self._query_sent_s) - 1))
         if self._check_gyros and now_s > HEALTH_S and self.result.reports.gyros:
             self._check_gyros = False
@@ -163,6 +177,8 @@ class _Probe:
     def _receive(self, chunk: Chunk) -> None:
         result = self.result
         result.bytes_of[chunk.port] += len(chunk.data)
+        if len(first := result.first_bytes.get(chunk.port, b"")) < LISTENED_BYTES:
+            result.first_bytes[chunk.port] = first + chunk.data
         arrived_s = chunk.t_arrival_ns * 1e-9
         if chunk.port == MTX:
             result.mtx_times_s += [arrived_s - self._start_s] * len(self._mtx.feed(chunk.data))
@@ -178,6 +194,8 @@ class _Probe:
     def _add_message(self, message: Message, arrived_s: float) -> None:
         result = self.result
         result.reports.add(message)
+        if self._subscription.is_due(message):
+            self._send(SUBSCRIBE)
         ticks: int = getattr(message, "ticks", 0)
         self._first_ticks = ticks if self._first_ticks is None else self._first_ticks
         elapsed = (ticks - self._first_ticks + (1 << 31)) % (1 << 32) - (1 << 31)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The serial ports of this computer: which is the board, which the MTx, and whether this user may open them.
 
 In: the system's list of ports, /sys and /proc. Out: `PortSeen`s, and `Finding`s about them. Opens nothing.
@@ -15,6 +16,7 @@ from pathlib import Path
 from serial.tools import list_ports
 
 from echostep.board.health import Finding, Severity
+from echostep.ports.access import holders, is_url, refusal
 
 BOARD_NAME, MTX_NAME = Path("/dev/echostep"), Path("/dev/echostep-mtx")  # links made by the udev rules
 RULES = "99-echostep.rules"
@@ -46,12 +48,20 @@ class PortSeen:
     path: str
     role: Role
     text: str
+    serial_number: str = ""
+
+    @property
+    def name(self) -> str:
+        """The path, with the serial number of a sensor board: two boards differ by it."""
+        return (
+            f"{self.path}, number {self.serial_number}" if self.role is Role.BOARD and self.serial_number else self.path
+        )
 
 
 def list_seen() -> list[PortSeen]:
     """The USB serial ports of this computer."""
     return [
-        PortSeen(port.device, _role(port.vid, port.pid), port.description or "")
+        PortSeen(port.device, _role(port.vid, port.pid), port.description or "", port.serial_number or "")
         for port in sorted(list_ports.comports())
         if port.vid is not None
     ]
@@ -71,40 +81,17 @@ def find(seen: list[PortSeen], role: Role, name: Path) -> str | None:
     return next((port.path for port in seen if port.role is role), None)
 
 
-def is_url(port: str) -> bool:
-    """Whether it is a pyserial URL, not a device file."""
-    return "://" in port
-
-
 def access_findings(subject: str, port: str) -> list[Finding]:
     """Why this user cannot open the port; empty when it can be opened. Raises nothing."""
-    path = Path(port)
-    if is_url(port):
-        return []
-    if not path.exists():
-        remedy = "plug it in and look again; see which ports there are: ls /dev/serial/by-id"
-        return [Finding(Severity.FAULT, subject, f"{port}: there is no such port", remedy)]
-    if not path.is_char_device():
-        return [Finding(Severity.FAULT, subject, f"{port} is no serial port", "name one such as /dev/ttyACM0")]
-    if os.access(path, os.R_OK | os.W_OK):
-        return []
-    what = f"{port}: this user may not open it (it belongs to {path.owner()}:{path.group()})"
-    remedy = f"sudo usermod -aG {path.group()} $USER, then log out and in; or install the udev rules (echostep doctor --udev)"
-    return [Finding(Severity.FAULT, subject, what, remedy)]
+    refused = refusal(port)
+    return [Finding(Severity.FAULT, subject, refused.what, refused.remedy)] if refused else []
 
 
 def holder_findings(subject: str, port: str, processes: Path = Path("/proc")) -> list[Finding]:
     """Other programs that have the port open: each byte reaches only one of them. A pseudo terminal is always open in its simulator."""
     if is_url(port) or os.path.realpath(port).startswith("/dev/pts/"):
         return []
-    held = []
-    target = os.path.realpath(port)
-    for folder in processes.glob("[0-9]*"):
-        if folder.name == str(os.getpid()):
-            continue
-        with contextlib.suppress(OSError):
-            if any(os.path.realpath(link) == target for link in (folder / "fd").iterdir()):
-                held.append(f"{(folder / 'comm').read_text().strip()} (process {folder.name})")
+    held = holders(port, processes)
     if not held:
         return []
     what = f"{port} is also open in {', '.join(held)}"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Zero-velocity inertial navigation of one foot, and the trunk's path that follows from it.
 
 In: accelerations, rates and magnetic field of a foot-mounted IMU (sensor frame, SI). Out: `Step` and `Stance` (walk frame), and from them

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The walk frame turned so that its x axis points to the toe, whatever the mounting of the sensor.
 
 In: `Step` and `Stance` in the walk frame of `foot.steps`; each step carries the toe's direction as estimated so far (`toe_rad`).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The inertial kernel: strapdown integration and its error-state Kalman filter.
 
 In: specific force and angular rate of the foot. Out: position, velocity, attitude and their covariance, in a `Nav` that the caller owns.
@@ -155,6 +156,12 @@ def set_level(nav: Nav, force: Vector, yaw: float, at_rest: bool) -> None:
 def _set_attitude(nav: Nav, q: Quaternion) -> None:
     """Set the attitude."""
     nav.attitude[0], nav.attitude[1], nav.attitude[2], nav.attitude[3] = q
+
+
+@lean_kernel
+def turn_by(nav: Nav, rotation_vector: Vector) -> None:
+    """Turn the attitude by a rotation vector (rad) in the walk frame."""
+    _set_attitude(nav, multiply(turning(rotation_vector[0], rotation_vector[1], rotation_vector[2]), nav.attitude))
 
 
 @lean_kernel

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Yaw correction by the foot's magnetometer, used only where the field is found to be undisturbed.
 
 In: the magnetic field while the foot rests, in any unit. Out: corrections of the navigation's yaw, or none. The caller owns the `Magnetometer`.

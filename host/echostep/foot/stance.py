@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Stance detection, and the zero-velocity and zero-angular-rate updates of a standing foot.
 
 In: the latest samples and the navigation state. Out: test statistics, and corrections of that state. The caller owns `SampleWindow` and `ZaruSums`.
@@ -21,7 +22,7 @@ from echostep.foot import ins
 from echostep.foot.ins import GYRO_BIAS, TILT, VEL, Nav, Vector
 from echostep.jit import lean_kernel
 
-RING = 32  # samples
+RING = 64  # samples: 0.12 s at the highest rate, for the plateaus of `soft_limit`
 WINDOW_S = 0.03
 REST_RAD_S, REST_M_S2 = 1.6, 6.0  # rms over the window: `stillness_statistic` is 1 on the ellipse between them
 CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a foot at rest

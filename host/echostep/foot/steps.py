@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Zero-velocity-aided inertial navigation of one foot: samples -> stances and steps.
 
 In: time, specific force and angular rate of the foot, any mounting, 50-500 Hz. Out: `Step` when the foot has landed, `Stance` when it has left.

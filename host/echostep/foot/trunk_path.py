@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trunk's path from the steps and stances of one foot.
 
 In: `Step` and `Stance` of one foot (walk frame). Out: `PathSegment`s: straight pieces of the trunk's path between anchors. Owns the last anchor.

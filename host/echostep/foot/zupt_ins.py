@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The foot's kernel: zero-velocity-aided inertial navigation, sample by sample, and the steps and stances that follow from it.
 
 In: `Samples`, and the `FootState`. Out: rows of `Output`, which `steps` turns into events. The caller owns the `FootState`.
@@ -11,7 +12,7 @@ from __future__ import annotations
 import math
 
 from echostep.arrays import Floats
-from echostep.foot import ins, mounting, stance
+from echostep.foot import ins, mounting, soft_limit, stance
 from echostep.foot import magnetometer as magnetic
 from echostep.foot.ins import POS, TILT, VEL, YAW, Nav
 from echostep.foot.magnetometer import Magnetometer
@@ -191,6 +192,7 @@ def _navigate(
     dt, t_s, accel, gyro = sample
     ins.propagate(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
     _inflate_at_limits(s, nav, dt, accel, gyro)
+    s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak)
     if not _update_if_resting(s, nav, window, sample):
         stance.clear_rest(sums)
         s.rest_s = 0.0

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """State, input and output of the foot's kernel (`zupt_ins`).
 
 In: nothing. Out: records and column names. Owns nothing.
@@ -39,6 +40,7 @@ class ZuptState(Protocol):
     lost_s: float  # of missing samples, not yet in the covariance
     force_limit_s: Floats  # duration of each axis at its limit
     rate_limit_s: Floats
+    rate_peak: Floats  # greatest rate of each axis
     rest_s: float
     rest_end_s: float
     rest_yaw_rad: float

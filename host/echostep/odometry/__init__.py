@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Odometry: bytes of board and MTx -> the trunk's path with the pings triggered on each segment.
 
 In: `Portion`s of chunks. Out: `MeasuredSegment`s and `Dropout`s in order of time. Owns the readers, the timeline, the foot and leg odometry, and the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Handover between foot and leg odometry: one path of the trunk from both.
 
 In: segments of the foot's path and blocks of leg gyro samples, in order of their messages. Out: `PathSegment`s of one walk frame, without overlap.
@@ -28,7 +29,9 @@ SILENT_S = 0.5  # the foot is silent when its newest sample is older than the le
 KEPT_S = 30.0  # of leg samples and foot segments
 MAX_LENGTH_ERROR = 0.35  # share by which the legs' length may differ from the foot's; beyond it no leg gyros are worn
 MIN_OVERLAP_M = 3.0  # of the foot's path, to compare lengths
-PRIOR_M = 10.0  # weight of the prior scale, 1, as a length of path
+# Weight of the prior scale, 1, as a length of path: people's scales differ by 7.8 %, and the foot gives the scale of 8 m to 2 % (4 cm a stride).
+PRIOR_M = 0.6
+ALIGNED_SD = 0.025  # of the scale after that: a person's scale changes by 2 to 3 % with speed
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over
 BRIDGE_M_S, BRIDGE_M = 0.4, 1.5  # standard deviation of an unobserved gap: per second, and at most
 BRIEF_S = 1.0  # a longer gap counts as unobserved
@@ -49,6 +52,7 @@ class FootLegsHandover:
         self._covered_s = -math.inf  # end of the common path
         self._foot_turn_rad = self._leg_turn_rad = 0.0  # rotation of each source's frame into the common walk frame
         self._leg_scale = 1.0
+        self._compared_m = (0.0, 0.0)  # path that both have measured, by foot and by legs, of all dropouts
         self._foot_seen = False
         self._step = 0  # of the last segment
         self._step_base: int | None = 0  # added to the active source's own count; None: set at its next segment
@@ -101,7 +105,8 @@ class FootLegsHandover:
         legs_m = _length_m(leg_segments, begin_s, end_s)
         if foot_m < MIN_OVERLAP_M or not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
             return False
-        self._leg_scale = (foot_m + PRIOR_M) / (legs_m + PRIOR_M)
+        self._compared_m = (self._compared_m[0] + foot_m, self._compared_m[1] + legs_m)
+        self._leg_scale = (self._compared_m[0] + PRIOR_M) / (self._compared_m[1] + PRIOR_M)
         remembered = (s for s in self._kept_segments if _is_straight(s) and s.t1_s >= path.remembered_s)
         straight = list(remembered) or [self._kept_segments[-1]]
         turns = [segment.heading1_rad - path.heading_rad(segment.t1_s) for segment in straight]
@@ -111,11 +116,12 @@ class FootLegsHandover:
 
     def _append_leg_segments(self, segments: list[PathSegment]) -> list[PathSegment]:
         """The legs' segments beyond the end of the common path, scaled and rotated."""
-        return [
-            self._append(rotated_segment(segment, self._leg_turn_rad, self._leg_scale), 0.0)
-            for segment in segments
-            if segment.t1_s > self._covered_s
-        ]
+        return [self._append(self._as_common(segment), 0.0) for segment in segments if segment.t1_s > self._covered_s]
+
+    def _as_common(self, segment: PathSegment) -> PathSegment:
+        """A segment of the legs in the common frame; where the foot has given its scale, the scale is known as well as that."""
+        scaled = rotated_segment(segment, self._leg_turn_rad, self._leg_scale)
+        return replace(scaled, scale_sd=min(scaled.scale_sd, ALIGNED_SD)) if self._compared_m[0] > 0.0 else scaled
 
     def _return_to_foot(self) -> list[PathSegment]:
         """Make the foot active again at its first straight stride, once the legs have reached it or CATCH_UP_S is over."""

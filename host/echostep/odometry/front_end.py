@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Front end: chunks -> segments of the trunk's path, each with the pings that were triggered on it.
 
 In: portions of chunks in order of arrival. Out: `MeasuredSegment`s and `Dropout`s in order of time, as they become certain. Owns the readers, the
@@ -23,6 +24,7 @@ from echostep.board.health import BoardReports
 from echostep.board.messages import (
     BY_ID,
     ROWS,
+    BoardHealth,
     Configuration,
     GyroHealth,
     Identity,
@@ -48,7 +50,7 @@ from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, p
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
-_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth)]
+_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth, BoardHealth)]
 _TIMED = np.array([i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)])  # the body begins so
 
 
@@ -60,6 +62,8 @@ class FrontEndCounts:
     late_pings: int = 0
     dropped_pings: int = 0
     bad_times: int = 0
+    bad_arrivals: int = 0  # messages whose arrival time contradicts their counter; most keep their time by the counter
+    clock_steps: int = 0  # of the host's clock
 
 
 class FrontEnd:
@@ -96,8 +100,15 @@ class FrontEnd:
     @property
     def counts(self) -> FrontEndCounts:
         """Counts since the start."""
-        synchronizer = self._synchronizer
-        return FrontEndCounts(self._unknown_ports, synchronizer.late, synchronizer.dropped, self._bad_times)
+        synchronizer, timeline = self._synchronizer, self.timeline
+        return FrontEndCounts(
+            self._unknown_ports,
+            synchronizer.late,
+            synchronizer.dropped,
+            self._bad_times,
+            timeline.contradicted,
+            timeline.clock_steps,
+        )
 
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
         """Segments and dropouts that a portion completes; raises StaleFirmwareError when the board has another schema."""

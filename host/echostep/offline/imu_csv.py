@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A recorded foot IMU as a CSV file: samples checked and read, the track written and described.
 
 In: columns `t_s,ax,ay,az,gx,gy,gz[,mx,my,mz]` (s, m/s2, rad/s, any unit), 50 to 500 Hz, any mounting. Out: `Imu` with notes on what was

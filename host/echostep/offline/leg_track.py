@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The track of a recorded leg, by this project's method or by that of Lee and Lee 2010.
 
 In: `LegSamples`, `StrideSettings`. Out: `LegTrack`. Owns nothing. The estimators are the same as live.
@@ -19,13 +20,26 @@ from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples
 from echostep.papers import lee2010
 
-# The source of these limits is not recorded.
-START_SD_RAD = math.radians(3.0)  # of a heading given for the start
-TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning
-SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged
-STANDING_MARGIN_S = 0.2  # left out at either end of standing
-SIGN_TURN_RAD = math.radians(30.0)  # least turning that shows the sign of the belt's gyro
-FEWEST_READINGS = 20  # of the compass that show it
+# By reason, all of them.
+START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read from a plan
+TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning: 28 degrees in 1.1 s
+SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged: strides take about 1 s
+STANDING_MARGIN_S = 0.2  # left out at either end of standing: a leg may move there
+HALF_PELVIS_M = 0.09  # of a leg from the middle of the trunk, as in `WearerSettings`
+LANDS, TWIST_POINTS = (
+    0.18,
+    50,
+)  # phase of the strike after mid swing: half of the swing, which is 38 % of a stride [Perry 1992]
+LEAST_STRIDE_M = 0.5  # of a stride whose pelvis turns visibly
+STRAIGHT_RAD = math.radians(15.0)  # largest turn of a stride that shows it: a turn hides the twist
+FEWEST_TWISTS, LEAST_TWIST_RAD, CLEAR_TWIST = (
+    4,
+    math.radians(1.0),
+    4.0,
+)  # strides, mean, and mean over its own sd, that show the side
+# Least turning that shows the sign of the belt's gyro: far above the compass's errors (8 degrees).
+SIGN_TURN_RAD = math.radians(30.0)
+FEWEST_READINGS = 20  # of the compass that show it: single outliers do not decide
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,23 +64,40 @@ class LegTrack:
 
 def track_default(samples: LegSamples, settings: StrideSettings, heading_rad: float | None = None) -> LegTrack:
     """The method of this project: strides by both gyros of the leg, heading by belt gyro and compass; `heading_rad` at the start, if known."""
-    legs = StrideEstimator(settings)
-    thigh, shank = repair_clipping(samples.t_s, np.column_stack([samples.thigh, samples.shank])).T
-    strides = (*legs.feed(samples.t_s, thigh, shank), *legs.finish())
+    legs, strides = _strides(samples, settings)
     sign, sign_notes = belt_sign(samples)
-    heading = Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD)
-    still = standing(strides, samples.t_s)
-    angles = heading.feed(
-        samples.t_s, np.where(np.isnan(samples.belt), 0.0, sign * samples.belt), samples.compass, still
-    )
+    heading, angles = _headings(samples, sign, standing(strides, samples.t_s), heading_rad)
     if np.isnan(samples.belt).all() and np.isnan(samples.compass).all():
         angles = np.zeros_like(angles)
+    if not np.isnan(samples.belt).all():
+        strides = about_trunk(strides, samples.t_s, angles[:, 0])
     rows = _rows(samples.t_s, strides, angles[:, 0])
     accepted = heading.read - heading.refused
     compass_notes = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
     notes = (*sign_notes, *compass_notes, *_doubts(strides))
     strides = with_turns(strides, samples.t_s, angles[:, 0])
     return LegTrack(rows, strides, legs.counts, _source(samples), float(angles[-1, 1]), notes)
+
+
+def _strides(samples: LegSamples, settings: StrideSettings) -> tuple[StrideEstimator, tuple[Stride, ...]]:
+    """The estimator after all samples, and its strides; a second time with the signs that it found in the end, if it revised them."""
+    rates = repair_clipping(samples.t_s, np.column_stack([samples.thigh, samples.shank]))
+    legs = StrideEstimator(settings)
+    for _ in range(2):
+        strides = (*legs.feed(samples.t_s, rates[:, 0], rates[:, 1], samples.belt), *legs.finish())
+        if not legs.revised:
+            break
+        legs = StrideEstimator(settings, legs.swings.sign)
+    return legs, strides
+
+
+def _headings(samples: LegSamples, sign: float, still: Bools, heading_rad: float | None) -> tuple[Heading, Floats]:
+    """The filter after all samples, and (n, 2) heading and sd; a second pass knows from the first the gyro's bias and the iron beside the compass."""
+    belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
+    first, heading = (Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD) for _ in range(2))
+    first.feed(samples.t_s, belt, samples.compass, still)
+    heading.adopt_errors(first)
+    return heading, heading.feed(samples.t_s, belt, samples.compass, still)
 
 
 def track_lee2010(samples: LegSamples, settings: StrideSettings) -> LegTrack:
@@ -95,8 +126,8 @@ def _doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
     steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
     if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
         return ("most steps go backward: are the columns of thigh and shank exchanged?",)
-    if len(steps) > 2 and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) > 0.5 * len(steps):
-        return ("most of this is no walk that one leg can observe: do not trust the distance",)
+    if len(steps) > 2 and sum(bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in steps) >= 0.5 * len(steps):
+        return ("half or more of this is no walk that one leg can observe: do not trust the distance",)
     return () if steps else ("no step was seen",)
 
 
@@ -109,6 +140,37 @@ def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tup
         turns = span > SHORTEST_TURN_S and abs(h1 - h0) / span > TURNING_RAD_S
         flagged.append(replace(stride, flags=stride.flags | Flag.TURNING) if turns else stride)
     return tuple(flagged)
+
+
+def about_trunk(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:
+    """The strides of the trunk instead of those of this leg's hip, which goes farther on the outside of a turn and less far inside."""
+    left_m = leg_left_m(strides, t_s, heading)
+    if left_m == 0.0:
+        return strides
+    moved = []
+    for stride in strides:
+        h0, h1 = np.interp([stride.t_start_s, stride.t_end_s], t_s, heading)
+        length = max(stride.length_m + left_m * float(h1 - h0), 0.0) if stride.length_m > 0.0 else 0.0
+        moved.append(replace(stride, length_m=length))
+    return tuple(moved)
+
+
+def leg_left_m(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> float:
+    """How far to the left of the trunk this leg is: the pelvis turns forward with the leg that lands [Perry 1992]; 0 where this is not clear.
+
+    A stride begins at mid swing, so the pelvis is turned to the left about at LANDS of it when the leg is the right one.
+    """
+    phase = np.linspace(0.0, 1.0, TWIST_POINTS)
+    wave, twists = np.cos(2.0 * np.pi * (phase - LANDS)), []
+    for stride in (s for s in strides if s.length_m > LEAST_STRIDE_M and not s.flags & (Flag.EDGE | Flag.GAP)):
+        angle = np.interp(stride.t_start_s + phase * (stride.t_end_s - stride.t_start_s), t_s, heading)
+        if abs(angle[-1] - angle[0]) < STRAIGHT_RAD:
+            twist = angle - np.linspace(angle[0], angle[-1], len(angle))
+            twists.append(2.0 * float((twist * (wave - wave.mean())).mean()))
+    if len(twists) < FEWEST_TWISTS:
+        return 0.0
+    mean, sd = float(np.median(twists)), float(np.std(twists)) / math.sqrt(len(twists))
+    return 0.0 if abs(mean) < max(LEAST_TWIST_RAD, CLEAR_TWIST * sd) else -math.copysign(HALF_PELVIS_M, mean)
 
 
 def standing(strides: tuple[Stride, ...], t_s: Floats) -> Bools:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A recorded barometer as a CSV file: samples checked and read, the floors written.
 
 In: columns `t_s,pressure_pa[,temperature_c]`, 0.5 to 50 Hz. Out: `Pressures` with notes on what was mended, or an EchostepError that names file,
@@ -34,13 +35,13 @@ TEMPERATURE = "temperature_c"
 FLOOR_COLUMNS = ("t_s", "floor", "probability", "height_m")
 TIME, PRESSURE, AIR_TEMPERATURE = range(3)  # columns of a table of samples
 
-# The source of these limits is not recorded.
-LIMITS = CsvLimits(line_chars=1000, lines=19_999_999, early_rows=None)
+# By reason, all of them.
+LIMITS = CsvLimits(line_chars=1000, lines=19_999_999, early_rows=None)  # they bound the memory: four days at 50 Hz
 RATE_HZ = (0.45, 55.0)  # 0.5 to 50 Hz with a margin of 10 %
-BACK_SHARE = 0.01  # largest share of rows whose time goes back
-LONGEST_GAP_S = 5.0  # a longer gap is reported
+BACK_SHARE = 0.01  # largest share of rows whose time goes back: damage, not another order of rows
+LONGEST_GAP_S = 5.0  # a longer gap is reported: in it a storey can be climbed
 MOST_GAPS = 3  # reported one by one
-KELVIN_FROM = 200.0  # a median temperature above this number is likely in kelvins
+KELVIN_FROM = 200.0  # a median temperature above this number is likely in kelvins: no air is so hot in degC
 UNITS = (  # name, and pascals in it
     ("hPa", 100.0),
     ("kPa", 1000.0),

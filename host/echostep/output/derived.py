@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Derived messages of a recording, for viewers: estimates, steps, echoes, pressure, status of the board.
 
 In: portions, and the estimates that the tracker made of them. Out: `DerivedMessage`s for the recorder. Owns a board reader, the last estimate and the
@@ -64,6 +65,7 @@ _SHAPES: dict[str, Shape] = {
     "str": TEXT,
     "bool": TRUTH,
     "tuple[float, ...]": array(NUMBER),
+    "tuple[Hypothesis, ...]": array({"type": "object"}),
 }
 _SIDES = ("left", "right")
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Messages that viewers of recordings (Foxglove, PlotJuggler) show without a plug-in.
 
 In: positions, headings, a plan. Out: `DerivedMessage`s for a `Recorder`: JSON with JSON Schemas, those of Foxglove where one fits

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Writes points and lines as a GeoPackage, the exchange format of geographic information systems.
 
 In: points and lines in longitude and latitude. Out: an SQLite file [OGC 12-128r19, GeoPackage 1.4]. Owns nothing.

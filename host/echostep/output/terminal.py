@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The terminal view: plan, track and health of the streams, redrawn ten times a second.
 
 In: a tracker and its estimates. Out: text on the terminal. Owns the canvas.
@@ -95,7 +96,8 @@ class TerminalView:
     ) -> None:
         self._tracker = tracker
         self._title = title
-        level = tracker.start.level if tracker.start else 0
+        pose = tracker.start.pose if tracker.start else None
+        level = pose.level if pose else 0
         self._level = level if level in range(len(tracker.plan.levels)) else 0
         self._canvas = Canvas(tracker.plan.levels[self._level])
         self._progress = Progress(

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tracks of recordings as files for other programs.
 
 In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, or a recording with newly derived messages, chosen by the suffix of the file
@@ -11,7 +12,8 @@ import math
 import sqlite3
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +26,12 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.output.derived import Derived, earth_of
 from echostep.plan.georeference import EarthTransform
-from echostep.plan.importers.formats import open_plan
+from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Portion
-from echostep.recording.recorder import Recorder, Recording, open_recording
+from echostep.recording.clock import clock_of
+from echostep.recording.reading import Recording, open_recording
+from echostep.recording.recorder import Recorder
 from echostep.tracker import Tracker
 
 Columns = dict[str, list[Any]]
@@ -44,7 +48,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
     """
     if out.suffix not in FORMATS:
         raise EchostepError(f"{out}: unknown kind of file: choose from {', '.join(FORMATS)}")
-    recording, plan = open_recording(path), open_plan(plan_path)
+    recording, plan = open_recording(path), open_limited(plan_path)
     if earth_of(plan) is None and out.suffix in NEEDS_GEOREFERENCE:
         raise EchostepError(
             f"{plan_path}: {out.suffix} needs a georeference: add longitude and latitude of the map's origin to the plan"
@@ -62,10 +66,34 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
                 estimates += tracker.take(portion)
             if not estimates:
                 raise EchostepError(f"{path}: no estimate: the foot never stood still, or no MTx bytes came")
-            FORMATS[out.suffix](out, estimates, plan)
+            FORMATS[out.suffix](out, TrackOnPlan(estimates, plan, moments_of(recording, tracker, estimates)))
     except (OSError, sqlite3.Error) as error:
         raise EchostepError(f"{out}: cannot write: {getattr(error, 'strerror', None) or error}") from error
     return f"{out}: {len(estimates)} estimates, {estimates[-1].t_s - estimates[0].t_s if estimates else 0.0:.1f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class TrackOnPlan:
+    """What is exported; `moments`: time of day of each estimate, empty where it was not recorded."""
+
+    estimates: list[Estimate]
+    plan: Plan
+    moments: list[str]
+
+
+def moments_of(recording: Recording, tracker: Tracker, estimates: list[Estimate]) -> list[str]:
+    """The time of day of each estimate, UTC [RFC 3339]; empty without a usable clock in the recording."""
+    clock = clock_of(recording.metadata)
+    try:
+        times_s = [clock(tracker.arrival_ns(e.t_s)) for e in estimates] if clock else []
+        return [moment(t_s) for t_s in times_s]
+    except (ValueError, OverflowError, OSError):  # damaged times
+        return []
+
+
+def moment(unix_s: float) -> str:
+    """Unix time as RFC 3339 in UTC, to the millisecond."""
+    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def with_progress(recording: Recording, title: str) -> Iterator[Portion]:
@@ -82,6 +110,7 @@ def columns_of(estimates: list[Estimate], plan: Plan) -> Columns:
     """The estimates' fields by name, and longitude and latitude where the plan has a georeference."""
     columns: Columns = {f.name: [getattr(e, f.name) for e in estimates] for f in fields(Estimate)}
     columns["status"] = [e.status.value for e in estimates]
+    columns["hypotheses"] = [" ".join(map(str, e.hypotheses)) for e in estimates]
     if earth := earth_of(plan):
         columns["longitude_deg"], columns["latitude_deg"] = _degrees(estimates, earth).T.tolist()
     return columns
@@ -113,28 +142,28 @@ def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[E
         raise EchostepError(recorder.notices[0])
 
 
-def _write_csv(out: Path, estimates: list[Estimate], plan: Plan) -> None:
-    columns = _flat(columns_of(estimates, plan))
+def _write_csv(out: Path, track: TrackOnPlan) -> None:
+    columns = _flat(columns_of(track.estimates, track.plan))
     with out.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
 
 
-def _write_parquet(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+def _write_parquet(out: Path, track: TrackOnPlan) -> None:
     import pyarrow
     from pyarrow import parquet
 
-    table = pyarrow.table(columns_of(estimates, plan))
-    parquet.write_table(table.replace_schema_metadata({"plan": plan.name, "plan_sha256": plan.digest}), out)
+    table = pyarrow.table(columns_of(track.estimates, track.plan))
+    parquet.write_table(table.replace_schema_metadata({"plan": track.plan.name, "plan_sha256": track.plan.digest}), out)
 
 
-def _write_geopackage(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+def _write_geopackage(out: Path, track: TrackOnPlan) -> None:
     import shapely
 
     from echostep.output.geopackage import Layer, write_geopackage
 
-    columns = _flat(columns_of(estimates, plan))
+    columns = _flat(columns_of(track.estimates, track.plan))
     longitude, latitude = columns.pop("longitude_deg"), columns.pop("latitude_deg")
     kinds = {float: "REAL", int: "INTEGER", str: "TEXT"}
     named = [(name, kinds.get(type(values[0]), "TEXT")) for name, values in columns.items()]
@@ -142,18 +171,22 @@ def _write_geopackage(out: Path, estimates: list[Estimate], plan: Plan) -> None:
     layers = [Layer("estimates", "POINT", named, list(zip(points, zip(*columns.values(), strict=True), strict=True)))]
     if len(points) > 1:
         line = shapely.LineString(points)
-        layers.append(Layer("track", "LINESTRING", [("name", "TEXT")], [(line, (plan.name,))]))
+        layers.append(Layer("track", "LINESTRING", [("name", "TEXT")], [(line, (track.plan.name,))]))
     write_geopackage(out, layers)
 
 
-def _write_kml(out: Path, estimates: list[Estimate], plan: Plan) -> None:
+def _write_kml(out: Path, track: TrackOnPlan) -> None:
     """The track as a line, each estimate as a point with its 95 % ellipse."""
-    earth = earth_of(plan)
+    earth = earth_of(track.plan)
     assert earth is not None
+    estimates = track.estimates
+    moments = track.moments or [moment(e.t_s) for e in estimates]
     ET.register_namespace("", KML)
     root = ET.Element(f"{{{KML}}}kml")
     document = _element(root, "Document")
-    _element(document, "name", plan.name)
+    _element(document, "name", track.plan.name)
+    if not track.moments:
+        _element(document, "description", "No time of day was recorded: times count from 1970-01-01T00:00:00Z.")
     for status, color in COLORS.items():
         style = _element(document, "Style", id=status)
         line = _element(style, "LineStyle")
@@ -161,16 +194,20 @@ def _write_kml(out: Path, estimates: list[Estimate], plan: Plan) -> None:
         _element(line, "width", "2")
         _element(_element(style, "PolyStyle"), "color", "40" + color[2:])
     degrees = _degrees(estimates, earth)
-    track = _element(document, "Placemark")
-    _element(track, "name", "track")
-    _element(track, "styleUrl", "#tracking")
-    _element(_element(track, "LineString"), "coordinates", _coordinates(degrees))
+    line_mark = _element(document, "Placemark")
+    _element(line_mark, "name", "track")
+    span = _element(line_mark, "TimeSpan")
+    _element(span, "begin", moments[0])
+    _element(span, "end", moments[-1])
+    _element(line_mark, "styleUrl", "#tracking")
+    _element(_element(line_mark, "LineString"), "coordinates", _coordinates(degrees))
     folder = _element(document, "Folder")
     _element(folder, "name", "estimates")
     for k, e in enumerate(estimates):
         mark = _element(folder, "Placemark")
         _element(mark, "name", f"{e.t_s:.1f} s")
         _element(mark, "description", f"step {e.step}, {e.status.value}, 95 % within {e.ellipse95.major_m:.2f} m")
+        _element(_element(mark, "TimeStamp"), "when", moments[k])
         _element(mark, "styleUrl", f"#{e.status.value}")
         geometry = _element(mark, "MultiGeometry")
         _element(_element(geometry, "Point"), "coordinates", _coordinates(degrees[k : k + 1]))
@@ -200,7 +237,7 @@ def _ellipse(e: Estimate, earth: EarthTransform) -> Floats:
     return earth.degrees(np.column_stack((e.x_m + c * u - s * v, e.y_m + s * u + c * v)))
 
 
-Write = Callable[[Path, list[Estimate], Plan], None]
+Write = Callable[[Path, TrackOnPlan], None]
 FORMATS: dict[str, Write] = {
     ".csv": _write_csv,
     ".parquet": _write_parquet,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """track.csv and track.png of a run, and the picture of a foot's track.
 
 In: a plan, estimates, the true path where it is known. Out: CSV and PNG files. Owns nothing.

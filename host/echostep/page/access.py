@@ -1,6 +1,8 @@
+# SPDX-License-Identifier: MIT
 """Access control: which requests the server answers.
 
-In: every request to the server. Out: the same request, or a refusal. Owns the count of refused requests. On the loopback interface a web page of
+In: every request to the server. Out: the same request, or a refusal. Owns the count of refused requests; tells the connections
+when a request begins and ends. On the loopback interface a web page of
 another site must not reach the socket: `Host` must name this machine and `Origin` must be the page's own. On other interfaces the address contains
 a random token, and requests without it are refused.
 """
@@ -13,6 +15,8 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from echostep.page.connections import Connections, Peer
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 SECURITY_HEADERS = {
@@ -29,8 +33,9 @@ SECURITY_HEADERS = {
 class AccessControl:
     """ASGI middleware. `token`: first part of each path; None: only requests to the loopback interface are answered."""
 
-    def __init__(self, app: ASGIApp, token: str | None) -> None:
+    def __init__(self, app: ASGIApp, token: str | None, connections: Connections) -> None:
         self.refused = 0
+        self._connections = connections
         self._app = app
         self._token = token
 
@@ -39,6 +44,14 @@ class AccessControl:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        peer = _peer(scope)
+        self._connections.begin(peer, stays=scope["type"] == "websocket" and self._is_allowed(scope))
+        try:
+            await self._answer(scope, receive, send)
+        finally:
+            self._connections.end(peer)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         if not self._is_allowed(scope):
             self.refused += 1
             if scope["type"] == "http":
@@ -65,6 +78,12 @@ class AccessControl:
         if origin is None:
             return bool(scope["type"] == "http")
         return origin.lower() == f"http://{host.lower()}"
+
+
+def _peer(scope: Scope) -> Peer:
+    """Address and port of the other end."""
+    host, port = scope.get("client") or ("", 0)
+    return str(host), int(port)
 
 
 def _host_name(host: str) -> str | None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The plan editor: walls, doors and rooms are drawn in a browser on this machine, over a picture of a plan if there is one.
 
 In: a plan file (which need not exist yet), a picture, plans posted by the page. Out: the page, the plan as JSON, the plan file. Owns the server, and
@@ -26,6 +27,8 @@ from starlette.routing import Mount, Route
 
 from echostep.errors import EchostepError
 from echostep.page.access import AccessControl
+from echostep.page.connections import Connections
+from echostep.page.gated_server import GatedServer
 from echostep.page.server import STATIC, STOP_S, Address, open_listener
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
@@ -107,16 +110,15 @@ class EditServer:
         self._listener = open_listener(Address(port=port))
         token = secrets.token_urlsafe(16)
         self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}/{token}/"
-        checks_token = AccessControl(self._application(token), token)
-        self.access_control = AccessControl(checks_token, None)  # checks that Host is this machine
+        connections = Connections(self._listener)
+        checks_token = AccessControl(self._application(token), token, connections)
+        self.access_control = AccessControl(checks_token, None, connections)  # checks that Host is this machine
         settings = uvicorn.Config(
             self.access_control, log_config=None, log_level="critical", access_log=False, server_header=False, date_header=False,
-            limit_concurrency=64, timeout_graceful_shutdown=1,
+            timeout_graceful_shutdown=1,
         )  # fmt: skip
-        self._server = uvicorn.Server(settings)
-        self._thread = threading.Thread(
-            target=self._server.run, kwargs={"sockets": [self._listener]}, name="echostep plan edit", daemon=True
-        )
+        self._server = GatedServer(settings, connections)
+        self._thread = threading.Thread(target=self._server.run, name="echostep plan edit", daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()

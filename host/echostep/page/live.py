@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The live page of a run, or the page of a replay: watches a tracker and publishes scenes.
 
 In: a tracker, perhaps the guidance of its wearer, and each portion of bytes after the tracker has taken it. Out: scenes in a mailbox that a server
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 from operator import attrgetter
@@ -23,9 +25,12 @@ from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep.page.elements.lookahead import extrapolate
 from echostep.page.elements.scene import MOST_SHOWN, PageScene, sample_of, status_text
 from echostep.page.elements.stream_rates import StreamRateMeter
+from echostep.page.elements.true_position import TruePath
+from echostep.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.path import MeasuredSegment
+from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, MTX, Portion
 from echostep.tracker import Tracker
 
@@ -35,6 +40,8 @@ RATES_NS = 250_000_000  # time between two measurements of the stream rates
 SILENT_S = 2.0  # without bytes of the MTx and the board: the position is lost
 STEPLESS_S = 6.0  # with bytes but without an estimate: the same; longer than the delay of the first steps
 STALE_S = 1.5  # an echo line is shown for this long
+OPENING_S = 5.0  # longest wait for a browser that was started
+OPENING_POLL_S = 0.05
 MOST_KEPT = 2000  # particles in each scene of a replay
 
 
@@ -42,13 +49,24 @@ class LivePage:
     """Call `note_arrival` and `publish` for each portion; `pop_check_ins` gives the pages' check-ins as bytes of chunks."""
 
     def __init__(
-        self, tracker: Tracker, title: str, address: Address, guided: GuidedRun | None = None, *, replay: bool = False
+        self,
+        tracker: Tracker,
+        title: str,
+        address: Address,
+        guided: GuidedRun | None = None,
+        *,
+        replay: bool = False,
+        keeps: bool = False,
     ) -> None:
-        """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate."""
+        """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate.
+
+        `keeps`: keep the scenes of a live run, so that it can be played again after `end`.
+        """
         self._tracker = tracker
         self._guided = guided
         self._replay = replay
-        self._mailbox = Mailbox(tracker.plan, title, replay=replay)
+        self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
+        self.truth: TruePath | None = None  # shown beside the estimates
         self.server = PageServer(self._mailbox, address)
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
@@ -64,7 +82,8 @@ class LivePage:
         self._lookahead_s = -math.inf
         self._new: list[PageScene] = []  # to publish
         self._trail_end: Estimate | None = None
-        self._check_ins = 0
+        self._check_ins = (0, 0)  # check-ins and undoings
+        self._undo_clock = UndoClock()
         if not replay:
             self._mailbox.publish(self._scene)
         expected_range(0.0, 0.0, 0.0, tracker.laid_out.walls.index, self._model)  # compiled now, not at the first step
@@ -79,6 +98,11 @@ class LivePage:
         """Number of connected pages."""
         return self.server.pages
 
+    @property
+    def notices(self) -> deque[str]:
+        """Faults of the server that are not printed yet."""
+        return self.server.shared.faults.notices
+
     def __enter__(self) -> Self:
         self._tracker.watchers.append(self._watch)
         self.server.__enter__()
@@ -88,8 +112,23 @@ class LivePage:
         self._tracker.watchers.remove(self._watch)
         self.server.__exit__(kind, error, at)
 
+    def announce(self, text: str) -> None:
+        """Show what the run is doing, until its first bytes."""
+        if not self._replay:
+            self._mailbox.publish(replace(self._scene, status_text=text))
+
+    def wait_for_page(self) -> None:
+        """Wait until a browser shows the page, for at most `OPENING_S`."""
+        end_s = time.monotonic() + OPENING_S
+        while not self.pages and time.monotonic() < end_s:
+            time.sleep(OPENING_POLL_S)
+
+    def end(self, summary: str) -> None:
+        """The run is over: pages say so and how well it went; a run whose scenes were kept can be played again."""
+        self._mailbox.end(summary)
+
     def pop_check_ins(self) -> Iterator[bytes]:
-        """Check-ins that pages have made since the last call, encoded as the tracker takes them."""
+        """Check-ins and undoings that pages have made since the last call, encoded as the tracker takes them."""
         for check_in in self._mailbox.pop_check_ins():
             yield check_in.encode()
 
@@ -107,10 +146,17 @@ class LivePage:
         due = self._arrived_ns - self._rates_ns >= RATES_NS
         if due:
             self._rates_ns = self._arrived_ns
-            self._scene = replace(self._scene, streams=self._rate_meter.measure(self._tracker, self._arrived_ns))
+        if due or self._new:
+            streams, state = self._rate_meter.measure(self._tracker, self._arrived_ns), self._tracker.state
+            undo = None if self._replay else self._undo_clock.offer(state, time.monotonic_ns())
+            self._scene = replace(self._scene, streams=streams, undo=undo, echoes_fit=echoes_fit(state))
         if self._new or (due and not self._replay):
             for scene in self._new or [self._scene_without_news()]:
-                self._mailbox.publish(replace(scene, streams=self._scene.streams))
+                shown = self._scene
+                scene = replace(scene, streams=shown.streams, undo=shown.undo, echoes_fit=shown.echoes_fit)
+                self._mailbox.publish(scene)
+                if self._new:
+                    self._mailbox.keep(scene)
             self._new = []
 
     def _advance_clock(self, portion: Portion) -> None:
@@ -120,7 +166,7 @@ class LivePage:
             if BOARD in portion.ports or MTX in portion.ports:
                 self._sensors_ns = self._arrived_ns
         else:
-            self._arrived_ns = max(self._arrived_ns, time.monotonic_ns())
+            self._arrived_ns = max(self._arrived_ns, now_ns())
 
     def _publish_lookahead(self) -> None:
         """Publish a new step of the foot at once, by dead reckoning; the estimate with its echoes follows about 0.25 s later."""
@@ -141,6 +187,7 @@ class LivePage:
             particles=particles and particles.moved(moved.x_m - estimate.x_m, moved.y_m - estimate.y_m),
             status_text=status_text(moved),
             guidance=guidance and guidance.turned(moved.heading_rad - estimate.heading_rad),
+            truth=self.truth.at(moved.t_s) if self.truth else None,
         )
         self._mailbox.publish(self._lookahead)
 
@@ -179,16 +226,18 @@ class LivePage:
             echo_lines=self._echo_lines(measured, estimate),
             guidance=self._guidance(estimate),
             beacons=beacon_marks(self._tracker, estimate.t_s),
+            truth=self.truth.at(estimate.t_s) if self.truth else None,
         )
         self._new.append(self._scene)
 
     def _extend_trail(self, estimate: Estimate) -> None:
-        """Append the estimate to the trail when it has moved; a check-in breaks the line."""
+        """Append the estimate to the trail when it has moved; a check-in or its undoing breaks the line."""
         end, trail = self._trail_end, self._mailbox.trail
         moved_m = max(abs(estimate.x_m - end.x_m), abs(estimate.y_m - end.y_m)) if end is not None else math.inf
         if end is not None and estimate.level == end.level and moved_m <= STEP_M:
             return
-        check_ins = self._tracker.state.check_ins
+        state = self._tracker.state
+        check_ins = state.check_ins, state.undone
         if check_ins != self._check_ins:
             trail.add(math.nan, math.nan, estimate.level)
         self._trail_end, self._check_ins = estimate, check_ins

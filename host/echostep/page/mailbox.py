@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The mailbox between the tracker's thread and the server's thread; neither waits for the other.
 
 In: scenes from the tracker's thread, check-ins from the server's thread. Out: the latest scene (in a replay: the history of all scenes), the trail,
@@ -13,7 +14,8 @@ from collections.abc import Callable, Iterator
 
 from echostep.page.elements.scene import PageScene
 from echostep.plan.model import Plan
-from echostep.ports.check_in import CheckIn
+from echostep.plan.routing import RoutePlace
+from echostep.ports.check_in import CheckIn, Undo
 
 MOST_CHECK_INS = (
     16  # in the queue to the tracker; further ones are refused. By reason: a person makes a few in a minute
@@ -66,29 +68,51 @@ class SceneHistory:
 
 
 class Mailbox:
-    """State shared by the tracker's thread and the server's thread."""
+    """State shared by the tracker's thread and the server's thread. `goal`: the destination chosen on a page, the same for all pages."""
 
-    def __init__(self, plan: Plan, title: str, *, replay: bool) -> None:
-        """`replay`: keep all scenes, and refuse check-ins."""
+    def __init__(self, plan: Plan, title: str, *, replay: bool, keeps: bool = False) -> None:
+        """`replay`: pages play the scenes, and check-ins are refused. `keeps`: the same from `end` on."""
         self.plan = plan
         self.title = title
         self.trail = PageTrail()
-        self.history = SceneHistory() if replay else None
+        self.history = SceneHistory()
+        self.replay = replay
+        self.summary: str | None = None  # how well the run went, once it is over
+        self._keeps = keeps
         self.latest: PageScene | None = None
+        self.goal: RoutePlace | None = None
         self.on_publish: Callable[[], None] | None = None
-        self._check_ins: queue.Queue[CheckIn] = queue.Queue(MOST_CHECK_INS)
+        self._check_ins: queue.Queue[CheckIn | Undo] = queue.Queue(MOST_CHECK_INS)
 
     def publish(self, scene: PageScene) -> None:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
-        if self.history is not None:
+        if self.replay:
             self.history.add(scene)
         self.latest = scene
         if self.on_publish:
             self.on_publish()
 
-    def add_check_in(self, check_in: CheckIn) -> bool:
-        """Queue a check-in for the tracker; False when it is refused: in a replay, on an unknown level, or with a full queue."""
-        if self.history is not None or check_in.level >= len(self.plan.levels):
+    def set_goal(self, goal: RoutePlace | None) -> None:
+        """Set the destination of all pages and call `on_publish`; None ends the guidance to it."""
+        self.goal = goal
+        if self.on_publish:
+            self.on_publish()
+
+    def keep(self, scene: PageScene) -> None:
+        """Add the scene of an estimate to the history that is played after `end`, if the run keeps one."""
+        if self._keeps and not self.replay:
+            self.history.add(scene)
+
+    def end(self, summary: str) -> None:
+        """The run is over; a history that was kept is played from now on."""
+        self.summary = summary
+        self.replay = self.replay or (self._keeps and len(self.history) > 0)
+        if self.on_publish:
+            self.on_publish()
+
+    def add_check_in(self, check_in: CheckIn | Undo) -> bool:
+        """Queue a check-in or its undoing for the tracker; False when it is refused: in a replay, or with a full queue."""
+        if self.replay:
             return False
         try:
             self._check_ins.put_nowait(check_in)
@@ -96,7 +120,7 @@ class Mailbox:
             return False
         return True
 
-    def pop_check_ins(self) -> Iterator[CheckIn]:
+    def pop_check_ins(self) -> Iterator[CheckIn | Undo]:
         """Remove and yield the queued check-ins; never waits."""
         while True:
             try:

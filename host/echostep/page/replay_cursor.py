@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The replay cursor: which moment of a replay one page shows.
 
 In: requests to play, pause, seek and step; the history as far as it has been computed. Out: the scene to show. Owns the position and the speed.
@@ -5,21 +6,33 @@ In: requests to play, pause, seek and step; the history as far as it has been co
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 from echostep.page.elements.scene import PageScene
 from echostep.page.mailbox import SceneHistory
-from echostep.page.protocol import Request, Seek, SetPlaying, SetSpeed, StepBy
+from echostep.page.requests import Request, Seek, SetPlaying, SetSpeed, StepBy
+
+
+@dataclass(frozen=True, slots=True)
+class PlayState:
+    """Position and speed of a replay for the page's time bar. The field names are keys of the frame's JSON."""
+
+    t_s: float
+    begin_s: float
+    end_s: float
+    playing: bool
+    times: float
 
 
 class ReplayCursor:
     """A position in a history that moves with the clock while it plays. `position_s` is in data time; None before the first scene."""
 
-    def __init__(self, history: SceneHistory) -> None:
-        self.playing = True
+    def __init__(self, history: SceneHistory, *, at_end: bool = False) -> None:
+        """`at_end`: begin with the last scene, paused."""
+        self.playing = not at_end
         self.times = 1.0
         self._history = history
-        self._position_s: float | None = None
+        self._position_s: float | None = history.t_s(-1) if at_end else None
         self._now_s = 0.0
 
     def handle(self, request: Request) -> None:
@@ -27,10 +40,7 @@ class ReplayCursor:
         match request:
             case SetPlaying(playing):
                 self.playing = playing
-                ended = (
-                    len(self._history) and self._position_s is not None and self._position_s >= self._history.t_s(-1)
-                )
-                if playing and ended:
+                if playing and self.at_end:
                     self._position_s = self._history.t_s(0)
             case SetSpeed(times):
                 self.times = times
@@ -41,6 +51,11 @@ class ReplayCursor:
                 start_s = self._position_s if self._position_s is not None else self._history.t_s(0)
                 index = self._history.index_at(start_s) + by
                 self._position_s = self._history.t_s(min(max(index, 0), len(self._history) - 1))
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the last scene is shown."""
+        return bool(len(self._history)) and self._position_s is not None and self._position_s >= self._history.t_s(-1)
 
     def scene(self, now_s: float) -> PageScene | None:
         """The scene to show at `now_s` of the monotonic clock; None while the history is empty."""
@@ -55,14 +70,8 @@ class ReplayCursor:
         self._position_s = min(max(self._position_s, begin_s), end_s)
         return self._history[self._history.index_at(self._position_s)]
 
-    def state(self) -> dict[str, Any] | None:
-        """Position and speed for the page's time bar, as sent in frames; None before the first scene."""
+    def state(self) -> PlayState | None:
+        """Position and speed for the page's time bar; None before the first scene."""
         if not len(self._history) or self._position_s is None:
             return None
-        return {
-            "t_s": self._position_s,
-            "begin_s": self._history.t_s(0),
-            "end_s": self._history.t_s(-1),
-            "playing": self.playing,
-            "times": self.times,
-        }
+        return PlayState(self._position_s, self._history.t_s(0), self._history.t_s(-1), self.playing, self.times)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The server: the page and its sockets, in a thread with an event loop of its own.
 
 In: a mailbox, an address. Out: HTML, walls and frames to browsers. Owns the thread, the listening socket and the sessions.
@@ -20,7 +21,7 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
@@ -28,9 +29,13 @@ from starlette.websockets import WebSocket
 from echostep.errors import EchostepError
 from echostep.page import protocol
 from echostep.page.access import LOOPBACK, AccessControl
-from echostep.page.elements.guidance import RouteFinder
+from echostep.page.connections import Connections
+from echostep.page.gated_server import GatedServer
+from echostep.page.log_budget import logged_to
 from echostep.page.mailbox import Mailbox
-from echostep.page.session import PageCounts, PageSession
+from echostep.page.requests import MOST_REQUEST
+from echostep.page.session import PageSession
+from echostep.page.shared import PageCounts, Shared
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
@@ -53,27 +58,27 @@ class PageServer:
     """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address."""
 
     def __init__(self, mailbox: Mailbox, address: Address = Address()) -> None:
-        self.counts = PageCounts()
+        self.shared = Shared.of(mailbox.plan)
         self.sessions: set[PageSession] = set()
         self._mailbox = mailbox
-        self._route_finder = RouteFinder(mailbox.plan)
         self._listener = open_listener(address)
         token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
         self.url = _url(self._listener, token)
-        self.access_control = AccessControl(self._application(token), token)
+        self.connections = Connections(self._listener)
+        self.access_control = AccessControl(self._application(token), token, self.connections)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._wake_pending = False
         settings = uvicorn.Config(
             self.access_control, log_config=None, log_level="critical", access_log=False, server_header=False, date_header=False,
-            ws_max_size=protocol.MOST_REQUEST, ws_per_message_deflate=False, limit_concurrency=512, timeout_graceful_shutdown=1,
+            ws_max_size=MOST_REQUEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
         )  # fmt: skip
-        self._server = uvicorn.Server(settings)
-        self._thread = threading.Thread(
-            target=self._server.run, kwargs={"sockets": [self._listener]}, name="echostep page", daemon=True
-        )
+        self._server = GatedServer(settings, self.connections)
+        self._thread = threading.Thread(target=self._server.run, name="echostep page", daemon=True)
+        self._logged = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
         self._mailbox.on_publish = self._request_wake
+        self._logged.enter_context(logged_to(self.shared.faults.note_text))
         self._thread.start()
         return self
 
@@ -81,12 +86,18 @@ class PageServer:
         self._mailbox.on_publish = None
         self._server.should_exit = True
         self._thread.join(STOP_S)
+        self._logged.close()
         self._listener.close()
 
     @property
     def pages(self) -> int:
         """Number of connected pages."""
         return len(self.sessions)
+
+    @property
+    def counts(self) -> PageCounts:
+        """Counts over all pages."""
+        return self.shared.counts
 
     def _request_wake(self) -> None:
         """Have the loop wake the sessions; may be called from any thread. Requests until the loop runs count as one."""
@@ -108,7 +119,15 @@ class PageServer:
             WebSocketRoute("/socket", self._socket),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
-        return Starlette(routes=[Mount(f"/{token}", routes=routes)] if token else routes, lifespan=self._lifespan)
+        return Starlette(
+            routes=[Mount(f"/{token}", routes=routes)] if token else routes,
+            lifespan=self._lifespan,
+            exception_handlers={Exception: self._fail},
+        )
+
+    async def _fail(self, _: Request, error: Exception) -> Response:
+        """Log a fault and answer with it."""
+        return PlainTextResponse(self.shared.faults.note(error), 500)
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
@@ -128,10 +147,10 @@ class PageServer:
     async def _socket(self, websocket: WebSocket) -> None:
         await websocket.accept()
         if len(self.sessions) >= MOST_PAGES:
-            self.counts.refused += 1
+            self.shared.counts.refused += 1
             await websocket.close(TRY_AGAIN_LATER)
             return
-        session = PageSession(websocket, self._mailbox, self._route_finder, self.counts)
+        session = PageSession(websocket, self._mailbox, self.shared)
         self.sessions.add(session)
         try:
             session.wake()

@@ -1,6 +1,7 @@
+# SPDX-License-Identifier: MIT
 """The session of one page: sends scenes at most 30 times a second, with at most two frames not yet drawn; takes requests.
 
-In: a WebSocket, the mailbox. Out: frames. Owns what this page has been sent, its destination and its position in a replay. A page in the background
+In: a WebSocket, the mailbox. Out: frames. Owns what this page has been sent and its position in a replay. A page in the background
 draws nothing, so nothing is sent to it; when it is visible again it gets the newest scene and the rest of the trail.
 """
 
@@ -10,46 +11,37 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from dataclasses import dataclass
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
-from echostep.page import protocol
-from echostep.page.elements.guidance import Destination, RouteFinder, ShownGuidance
+from echostep.page import protocol, requests
+from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.scene import PageScene, ParticleSample
 from echostep.page.mailbox import Mailbox
 from echostep.page.replay_cursor import ReplayCursor
-from echostep.ports.check_in import CheckIn
+from echostep.page.shared import Shared
+from echostep.ports.check_in import CheckIn, Undo
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
-POLICY_VIOLATION = 1008  # WebSocket close code [RFC 6455, 7.4.1]
-
-
-@dataclass(slots=True)
-class PageCounts:
-    """Counts over all pages. `unknown`: requests that could not be parsed. `refused`: requests and pages. `flooding`: pages that asked too often."""
-
-    unknown: int = 0
-    refused: int = 0
-    flooding: int = 0
+POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]
 
 
 class PageSession:
     """Serves one page until it disconnects."""
 
-    def __init__(self, socket: WebSocket, mailbox: Mailbox, route_finder: RouteFinder, counts: PageCounts) -> None:
+    def __init__(self, socket: WebSocket, mailbox: Mailbox, shared: Shared) -> None:
         self.latency_s: deque[float] = deque(
             maxlen=512
         )  # from the arrival of an estimate's bytes to its frame being drawn
         self._socket = socket
         self._mailbox = mailbox
-        self._route_finder = route_finder
-        self._counts = counts
-        self._cursor = ReplayCursor(mailbox.history) if mailbox.history is not None else None
+        self._shared = shared
+        self._counts = shared.counts
+        self._cursor = ReplayCursor(mailbox.history) if mailbox.replay else None
         self._destination: Destination | None = None
         self._searches: set[asyncio.Task[None]] = set()
         self._news = asyncio.Event()
@@ -60,6 +52,7 @@ class PageSession:
         self._last: PageScene | None = None
         self._particles: ParticleSample | None = None
         self._trail_count = 0  # points of the trail that the page has
+        self._told_end = False
         self._frame_due = True  # the page needs a frame, even of the same scene
 
     def wake(self) -> None:
@@ -67,56 +60,100 @@ class PageSession:
         self._news.set()
 
     async def run(self) -> None:
-        """Serve until the page disconnects or sends too many requests."""
-        replay = self._cursor is not None
-        await self._socket.send_text(protocol.hello(self._mailbox.plan, self._mailbox.title, replay=replay))
-        tasks = [asyncio.create_task(self._receive()), asyncio.create_task(self._send())]
+        """Serve until the page disconnects or sends too many requests; a fault is logged, and told to the page."""
+        tasks: list[asyncio.Task[None]] = []
         try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            await self._send_hello()
+            tasks = [asyncio.create_task(self._receive()), asyncio.create_task(self._send())]
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        except WebSocketDisconnect:
+            pass
+        except Exception as error:
+            await self._fail(error)
         finally:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
+    async def _fail(self, error: Exception) -> None:
+        """Log a fault, tell it to the page, close the socket."""
+        text = self._shared.faults.note(error)
+        with contextlib.suppress(WebSocketDisconnect):
+            await self._tell(protocol.encode(protocol.Failed(text)))
+            await self._socket.close(INTERNAL_ERROR)
+
+    async def _tell(self, message: str | bytes) -> None:
+        """Send a text or a frame; raises WebSocketDisconnect when the page has disconnected."""
+        try:
+            await (self._socket.send_text(message) if isinstance(message, str) else self._socket.send_bytes(message))
+        except RuntimeError as error:  # of Starlette: the socket is closed
+            raise WebSocketDisconnect(INTERNAL_ERROR) from error
+
+    async def _send_hello(self) -> None:
+        hello = protocol.hello(self._mailbox.plan, self._mailbox.title, replay=self._cursor is not None)
+        await self._tell(protocol.encode(hello))
+
+    async def _begin_replay(self) -> None:
+        """The live run is over: from now on the page plays its scenes, beginning with the last one, at rest."""
+        self._cursor = ReplayCursor(self._mailbox.history, at_end=True)
+        self._trail_count, self._particles, self._frame_due = 0, None, True
+        await self._send_hello()
+
     async def _receive(self) -> None:
         """Handle requests; returns when the page disconnects or floods."""
-        second_began, requests = time.monotonic(), 0
+        second_began, count = time.monotonic(), 0
         while True:
             event = await self._socket.receive()
             if event["type"] != "websocket.receive":
                 return
             if time.monotonic() - second_began > 1.0:
-                second_began, requests = time.monotonic(), 0
-            requests += 1
-            if requests > MOST_REQUESTS_A_SECOND:
+                second_began, count = time.monotonic(), 0
+            count += 1
+            if count > MOST_REQUESTS_A_SECOND:
                 self._counts.flooding += 1
                 await self._socket.close(POLICY_VIOLATION)
                 return
             await self._handle(event.get("text"))
 
     async def _handle(self, text: str | None) -> None:
-        request = None if text is None else protocol.parse_request(text)
+        request = None if text is None else requests.parse_request(text)
+        levels = len(self._mailbox.plan.levels)
         match request:
             case None:
                 self._counts.unknown += 1
                 return
-            case protocol.FrameDrawn(seq):
+            case requests.FrameDrawn(seq):
                 if (arrived_ns := self._undrawn.pop(seq, None)) is not None:
                     self.latency_s.append((time.monotonic_ns() - arrived_ns) * 1e-9)
-            case CheckIn():
-                if not self._mailbox.add_check_in(request):
-                    self._counts.refused += 1
-                    await self._socket.send_text('{"kind":"refused","what":"check_in"}')
-            case protocol.GoTo(goal) if goal.level < len(self._mailbox.plan.levels):
-                self._destination, self._frame_due = Destination(goal), True
-            case protocol.EndGuidance():
-                self._destination, self._frame_due = None, True
+            case requests.Consider(check_in) if check_in.level < levels:
+                answer = self._shared.taps.consider(check_in, self._mailbox.latest)
+                await self._tell(protocol.encode(answer))
+            case CheckIn() if request.level < levels:
+                await self._take(request, self._shared.taps.refusal(request))
+            case Undo():
+                offer = self._mailbox.latest.undo if self._mailbox.latest else None
+                is_late = offer is None or offer.undo != request.undo
+                await self._take(request, "It is too late to undo this." if is_late else "")
+            case requests.GoTo(goal) if goal.level < levels:
+                self._mailbox.set_goal(goal)
+            case requests.EndGuidance():
+                self._mailbox.set_goal(None)
             case _ if self._cursor is not None:
                 self._cursor.handle(request)
                 self._frame_due = True
             case _:
                 self._counts.refused += 1
         self._news.set()
+
+    async def _take(self, request: CheckIn | Undo, refusal: str) -> None:
+        """Pass a check-in or its undoing on to the tracker, or tell the page why not."""
+        if not refusal and not self._mailbox.add_check_in(request):
+            refusal = "Not accepted: this is a replay, or the tracker is too busy."
+        if refusal:
+            self._counts.refused += 1
+            await self._tell(protocol.encode(protocol.Refused(refusal)))
 
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
@@ -128,16 +165,24 @@ class PageSession:
             if (early_s := due_s - time.monotonic()) > 0.0:
                 await asyncio.sleep(early_s)
             self._news.clear()
+            if self._cursor is None and self._mailbox.replay:
+                await self._begin_replay()
+            if self._mailbox.summary is not None and not self._told_end:
+                self._told_end = self._frame_due = True
             if len(self._undrawn) >= MOST_UNDRAWN:
                 continue
+            self._follow_goal()
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
             if scene is None or (scene is self._last and not self._frame_due and not playing):
                 continue
             due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
-            try:
-                await self._socket.send_bytes(self._frame(scene))
-            except (WebSocketDisconnect, RuntimeError):
-                return
+            await self._tell(self._frame(scene))
+
+    def _follow_goal(self) -> None:
+        """Guide to the run's goal, which any page may have changed."""
+        goal = self._mailbox.goal
+        if goal is not (self._destination.goal if self._destination else None):
+            self._destination, self._frame_due = None if goal is None else Destination(goal), True
 
     def _frame(self, scene: PageScene) -> bytes:
         """A frame with what this page has not been sent yet; from then on it counts as sent."""
@@ -146,15 +191,23 @@ class PageSession:
         new_estimate = self._cursor is None and (self._last is None or scene.estimate is not self._last.estimate)
         self._undrawn[self._seq] = scene.arrived_ns if new_estimate else None
         begin = min(self._trail_count, scene.trail_count)  # a replay may go back
-        particles = scene.particles if scene.particles is not self._particles else None
-        guidance = self._guidance(scene)
-        play = self._cursor.state() if self._cursor else None
+        parts = protocol.FrameParts(
+            seq=self._seq,
+            where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
+            places=self._shared.taps.places(scene.estimate) if scene.estimate else (),
+            trail=self._mailbox.trail.part(begin, scene.trail_count),
+            trail_from=begin,
+            particles=scene.particles if scene.particles is not self._particles else None,
+            guidance=self._guidance(scene),
+            goal=self._mailbox.goal,
+            play=self._cursor.state() if self._cursor else None,
+            ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
+        )
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
-        trail = self._mailbox.trail.part(begin, scene.trail_count)
-        return protocol.frame(scene, self._seq, trail, begin, particles, guidance, play)
+        return protocol.frame(scene, parts)
 
     def _guidance(self, scene: PageScene) -> ShownGuidance | None:
-        """Guidance to the page's own destination, else the run's; starts a search for a route when one is due."""
+        """Guidance to the destination chosen on a page, else the run's; starts a search for a route when one is due."""
         if not (scene.estimate and self._destination):
             return scene.guidance
         guidance = self._destination.guidance_at(scene.estimate)
@@ -168,9 +221,11 @@ class PageSession:
     async def _search(self, destination: Destination, estimate: Estimate) -> None:
         """Search for the route to a destination in a thread; frames are sent meanwhile."""
         try:
-            route = await asyncio.to_thread(self._route_finder.find, estimate, destination.goal)
+            route = await asyncio.to_thread(self._shared.route_finder.find, estimate, destination.goal)
             destination.set_route(route, "", estimate)
         except EchostepError as error:
             destination.set_route(None, str(error), estimate)
+        except Exception as error:  # a search that fails must not seem to go on for ever
+            destination.set_route(None, self._shared.faults.note(error), estimate)
         self._frame_due = True
         self._news.set()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pedestrian dead reckoning exactly as [Fischer 2008, section 3.1]: profile `fischer2008` of the foot.
 
 In: specific force and angular rate of a sensor on the shoe, and the MTx's own matrices. Out: the same `Track` as `foot.walk_track`. Owns nothing.

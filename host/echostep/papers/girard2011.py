@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The particle filter of [Girard 2011], step by step as printed: profile `girard2011`.
 
 In: the motion vector and heading of each step, one ping of each ranger. Out: the position estimate. Owns its particles; draws from the generator

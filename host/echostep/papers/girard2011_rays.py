@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Readings of both rangers at many poses, tile by tile.
 
 In: poses and the tables of their tiles. Out: for each ranger the shortest ray that counts [Girard 2011, eq. 3]. Owns nothing.

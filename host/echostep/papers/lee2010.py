@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The ambulatory system of Lee and Lee 2010 as printed: distance from thigh and calf gyros, heading by compass and belt gyro, floor by pressure.
 
 In: angles and rates of thigh and calf (forward positive), compass and belt gyro, pressure. Out: travel, velocity, covariance, heading, place, floor.

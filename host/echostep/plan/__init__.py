@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The building's plan: plan.json, its checks, its drawing, routes through it, and importers of other formats.
 
 In: plan files; drawings and maps of other programs (`importers`). Out: `Plan`: levels of walls, doors, rooms and connectors, in metres (map frame).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checks of a plan: gaps, overlaps, loose doors, open rooms, unreachable rooms, stairs and lifts without access.
 
 In: a `Plan`. Out: `PlanFinding`s, numbered from 1, level by level. Owns the tolerances.
@@ -6,7 +7,7 @@ In: a `Plan`. Out: `PlanFinding`s, numbered from 1, level by level. Owns the tol
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -17,16 +18,16 @@ from echostep.plan.faces import (
     JAMB_M,
     OUTSIDE,
     TOUCH_M,
-    Face,
     Faces,
-    connected_groups,
     extend,
     faces_under,
     find_faces,
-    leader_of,
 )
+from echostep.plan.findings import Lines, PlanFinding
 from echostep.plan.leaks import narrowest_opening
 from echostep.plan.model import Level, Plan
+from echostep.plan.reachability import unreachable_rooms
+from echostep.plan.standing import StandingGround
 
 # Tolerances, by reason:
 NEAR_M = 0.1  # a wall's end that is nearer than this to a wall was meant to touch it
@@ -35,20 +36,6 @@ ELBOW_M2 = 1.0  # stairs with less free area beside them than this have no acces
 MOST_LEAKS = 20  # searches for the opening of a room in one plan, because each takes a while
 NOT_ENCLOSED = "is not enclosed by walls and doors"
 PARALLEL = 0.02  # sine of the angle below which walls count as parallel
-
-Lines = tuple[tuple[float, float, float, float], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class PlanFinding:
-    """One error in a plan: its kind, level (index), position, description, and the lines that it concerns."""
-
-    kind: str
-    level: int
-    position_m: tuple[float, float]
-    text: str
-    lines_m: Lines = ()
-    number: int = 0
 
 
 def check_plan(plan: Plan) -> list[PlanFinding]:
@@ -59,8 +46,9 @@ def check_plan(plan: Plan) -> list[PlanFinding]:
         for level in plan.levels
     ]
     findings = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
-    findings += _unreachable(plan, faces)
+    findings += unreachable_rooms(plan, faces)
     findings += _connectors(plan, faces)
+    findings += _start(plan)
     findings.sort(key=lambda finding: finding.level)
     not_enclosed = [k for k, finding in enumerate(findings) if finding.text.endswith(NOT_ENCLOSED)]
     for k in not_enclosed[:MOST_LEAKS]:
@@ -163,27 +151,14 @@ def _with_leak(finding: PlanFinding, level: Level) -> PlanFinding:
     return replace(finding, position_m=(x, y), text=text, lines_m=((*finding.position_m, x, y),))
 
 
-def _unreachable(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
-    """Enclosed rooms without a connection by doors, stairs or lifts to the start; without a start: to the group with most rooms."""
-    leader = connected_groups(plan, faces)
-    rooms: list[tuple[int, str, tuple[float, float], Face]] = []
-    for i, level in enumerate(plan.levels):
-        at = faces[i].indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
-        rooms += [
-            (i, r.name, r.at_m, leader_of(leader, (i, int(f))))
-            for r, f in zip(level.rooms, at, strict=True)
-            if f != OUTSIDE
-        ]
-    if not rooms:
+def _start(plan: Plan) -> Iterator[PlanFinding]:
+    """A start that is impossible."""
+    start = plan.start
+    if start is None or start.level < 0:
         return
-    ends = [face for *_, face in rooms]
-    home = max(ends, key=ends.count)
-    if plan.start is not None:
-        at = faces[plan.start.level].indices_of(np.array([[plan.start.x_m, plan.start.y_m]]))
-        home = leader_of(leader, (plan.start.level, int(at[0])))
-    for i, name, at_m, face in rooms:
-        if face != home:
-            yield PlanFinding("unreachable", i, at_m, f"room {name!r} cannot be reached by doors, stairs or lifts")
+    if objection := StandingGround(plan).objection(start.x_m, start.y_m, start.level):
+        advice = f"; {objection.advice}" if objection.advice else ""
+        yield PlanFinding("start", start.level, (start.x_m, start.y_m), f"the start: {objection.reason}{advice}")
 
 
 def _connectors(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:

@@ -1,9 +1,12 @@
-"""Cropping: the walls that lie in a rectangle, and the rectangle around walls.
+# SPDX-License-Identifier: MIT
+"""The walls that lie in a rectangle or between two points, and the rectangle around walls.
 
-In: segments (n, 4), a rectangle. Out: segments, or a rectangle. Owns nothing.
+In: segments (n, 4), a rectangle or points. Out: segments, a rectangle, or whether a line is clear. Owns nothing.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,6 +31,15 @@ def within(segments: Floats, bounds: Bounds, least_m: float = 0.0) -> Floats:
     if least_m > 0.0:
         seen &= (np.abs(bx - ax) >= least_m) | (np.abs(by - ay) >= least_m)
     return segments[seen]
+
+
+def is_clear(segments: Floats, a: Sequence[float] | Floats, b: Sequence[float] | Floats) -> bool:
+    """Whether no segment meets the straight line between two points (x, y)."""
+    import shapely
+
+    line = shapely.LineString((a, b))
+    near = within(segments, line.bounds)
+    return not shapely.intersects(shapely.linestrings(near.reshape(-1, 2, 2)), line).any()
 
 
 def extent(segments: Floats) -> Bounds:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of plans, PNG or SVG: rooms, walls, windows, doors, stairs and lifts, and the findings of the check.
 
 In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
@@ -15,10 +16,11 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent, within
+from echostep.plan.labels import Label, draw_labels
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
 
 if TYPE_CHECKING:
-    from echostep.plan.check import PlanFinding
+    from echostep.plan.findings import PlanFinding
 
 WALL, WINDOW, DOOR, OBSTACLE = "#333333", "#56b4e9", "#d55e00", "#bbbbbb"
 ROOM, ROOM_NAME = "#f3efe6", "#555555"
@@ -27,6 +29,16 @@ WRONG = "#d0021b"
 WIDTH_PX = 1500  # least width of a picture
 LEVEL_WIDTH_PX = 900  # least width of a level
 MANY = 20_000  # with more lines than these, pixels are drawn instead of lines
+BESIDE_RING_PT = (
+    (9.0, 9.0),
+    (9.0, -9.0),
+    (-9.0, 9.0),
+    (-9.0, -9.0),
+    (0.0, 14.0),
+    (0.0, -14.0),
+    (16.0, 0.0),
+    (-16.0, 0.0),
+)  # of a finding's number
 MOST_NAMES = 500  # names of rooms on one level; with more of them none is drawn, because they cannot be read
 
 
@@ -45,6 +57,7 @@ def draw_plan(
     """Draw levels side by side, all of them or the part within the bounds; raises EchostepError when the file cannot be written."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     if path.suffix.casefold() not in (".png", ".svg"):
         raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
@@ -54,18 +67,22 @@ def draw_plan(
     x0, y0, x1, y1 = bounds or _about([plan.levels[i] for i in levels])
     shape = min(max((y1 - y0) / (x1 - x0), 0.3), 2.5)
     cell = 10.0 if columns == 1 else 6.0  # inches
-    figure = Figure(figsize=(cell * columns, ((cell - 0.4) * shape + 0.5) * rows), layout="constrained")
+    size = (cell * columns, ((cell - 0.4) * shape + 0.5) * rows)
+    layout = ConstrainedLayoutEngine()
+    figure = Figure(figsize=size, dpi=max(60, round(wide_px / size[0])), layout=layout)
     FigureCanvasAgg(figure)
     view = View((x0, y0, x1, y1), 72.0 * cell / (x1 - x0), 1.1 * max(x1 - x0, (y1 - y0) / shape) * columns / wide_px)
+    drawn = {}
     for number, i in enumerate(levels):
-        axes = figure.add_subplot(rows, columns, number + 1, aspect="equal")
-        _draw_level(axes, plan, i, view, [f for f in findings if f.level == i])
+        drawn[i] = figure.add_subplot(rows, columns, number + 1, aspect="equal")
+        _draw_level(drawn[i], plan, i, view, [f for f in findings if f.level == i])
+    layout.execute(figure)
+    figure.set_layout_engine("none")
+    for i, axes in drawn.items():
+        axes.apply_aspect()
+        _draw_names(axes, plan, i, view, [f for f in findings if f.level == i])
     try:
-        figure.savefig(
-            path,
-            dpi=max(60, round(wide_px / figure.get_figwidth())),
-            metadata={"Date": None} if path.suffix == ".svg" else None,
-        )
+        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
 
@@ -87,7 +104,6 @@ def _draw_level(axes: Any, plan: Plan, level_index: int, view: View, findings: S
     _lines(axes, level.walls, view, WALL, 0.9)
     _lines(axes, level.windows, view, WINDOW, 0.9)
     _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
-    _draw_names(axes, level, connectors, view)
     if plan.start is not None and plan.start.level == level_index:
         _draw_start(axes, plan.start)
     for finding in findings:
@@ -107,22 +123,22 @@ def _draw_areas(axes: Any, level: Level, connectors: Sequence[Connector]) -> Non
     axes.add_collection(obstacles)
 
 
-def _draw_names(axes: Any, level: Level, connectors: Sequence[Connector], view: View) -> None:
-    """Names of connectors, and of the rooms in view unless there are too many to read."""
+def _draw_names(axes: Any, plan: Plan, level_index: int, view: View, findings: Sequence[PlanFinding]) -> None:
+    """Numbers of findings, names of connectors, and names of rooms, the largest first, unless there are too many to read; none over another."""
+    level = plan.levels[level_index]
+    labels = [Label(f.position_m, str(f.number), 7, WRONG, BESIDE_RING_PT) for f in findings]
+    for connector in plan.connectors:
+        if level_index in connector.levels:
+            x_m, y_m = connector.outline_m.mean(axis=0).tolist()
+            labels.append(Label((x_m, y_m), shown(connector.name), 6, WAY_NAME))
     x0, y0, x1, y1 = view.bounds
-    for connector in connectors:
-        x_m, y_m = connector.outline_m.mean(axis=0)
-        _draw_name(axes, (x_m, y_m), connector.name, 6, WAY_NAME)
     rooms = [room for room in level.rooms if x0 <= room.at_m[0] <= x1 and y0 <= room.at_m[1] <= y1]
-    for room in rooms if len(rooms) <= MOST_NAMES else ():
-        _draw_name(axes, room.at_m, room.name, _font_size_pt(room, view.points_m), ROOM_NAME)
-
-
-def _draw_name(axes: Any, position_m: tuple[float, float], name: str, size_pt: float, colour: str) -> None:
-    axes.text(
-        *position_m, shown(name), parse_math=False, size=size_pt, ha="center", va="center", color=colour,
-        clip_on=True, zorder=5,
-    )  # fmt: skip
+    if len(rooms) <= MOST_NAMES:
+        sized = [Label(room.at_m, shown(room.name), _font_size_pt(room, view.points_m), ROOM_NAME) for room in rooms]
+        labels += sorted(sized, key=lambda label: -label.size_pt)
+    if left_out := draw_labels(axes, labels):
+        what = "name does" if left_out == 1 else "names do"
+        axes.title.set_text(f"{axes.title.get_text()} ({left_out} {what} not fit: --bounds shows a part larger)")
 
 
 def _draw_start(axes: Any, start: Pose) -> None:
@@ -193,7 +209,7 @@ def _pixels(segments: Any, view: View) -> Any:
 
 
 def _mark(axes: Any, finding: PlanFinding) -> None:
-    """A numbered ring at the finding's position, and the lines that are wrong."""
+    """A ring at the finding's position, and the lines that are wrong."""
     for x0, y0, x1, y1 in finding.lines_m:
         axes.plot((x0, x1), (y0, y1), color=WRONG, linewidth=2.0, alpha=0.6, zorder=7)
     axes.plot(
@@ -204,14 +220,4 @@ def _mark(axes: Any, finding: PlanFinding) -> None:
         markeredgecolor=WRONG,
         markeredgewidth=1.2,
         zorder=8,
-    )
-    axes.annotate(
-        str(finding.number),
-        finding.position_m,
-        (5, 5),
-        textcoords="offset points",
-        size=7,
-        color=WRONG,
-        zorder=8,
-        annotation_clip=True,
     )

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Faces: the enclosed spaces of a level, and which of them doors and stairs connect.
 
 In: a `Plan`. Out: `Faces` of each level, and groups of connected faces. Owns nothing.
@@ -66,7 +67,7 @@ def connected_groups(plan: Plan, faces: Sequence[Faces]) -> dict[Face, Face]:
     """For each face with a door or a connector: the representative of its connected group (union-find)."""
     leader: dict[Face, Face] = {}
     for i, level in enumerate(plan.levels):
-        for a, b in _door_faces(level.doors, faces[i]):
+        for a, b in door_faces(level.doors, faces[i]):
             _join(leader, (i, a), (i, b))
     for connector in plan.connectors:
         area = shapely.make_valid(shapely.Polygon(connector.outline_m))
@@ -91,7 +92,7 @@ def _join(leader: dict[Face, Face], one: Face, other: Face) -> None:
     leader[a] = b
 
 
-def _door_faces(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
+def door_faces(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
     """The two faces that each door separates."""
     sides = np.array([_beside(door) for door in doors]).reshape(-1, 2)
     found = faces.indices_of(sides).reshape(-1, 2)

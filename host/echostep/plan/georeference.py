@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Longitude and latitude -> metres on the plan, and back.
 
 In: degrees (WGS 84 unless the georeference names another system). Out: map metres. Azimuthal equidistant projection about the plan's origin, accurate

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checks of fields in untrusted JSON.
 
 In: a value and its path in the file, as `levels[0].doors[2].line`. Out: the value with its type, or a ValueError that begins with the path.
@@ -7,13 +8,14 @@ Owns nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
+from itertools import chain, groupby
 from typing import Any
 
 import numpy as np
 
 from echostep.arrays import Floats
 
+MOST_CORNERS = 10_000  # of an outline. By reason: a room of a drawing with arcs has hundreds
 LIMIT_M = 1e5  # greatest coordinate. By reason: 100 km, more than any site
 
 
@@ -53,8 +55,12 @@ def point(value: Any, where: str) -> tuple[float, float]:
 
 
 def outline(value: Any, where: str) -> Floats:
-    """An outline of at least three corners -> (n, 2) float64; a repeated first corner at the end is removed."""
-    corners = [point(row, f"{where}[{i}]") for i, row in enumerate(typed(value, where, list))]
+    """An outline of at least three corners -> (n, 2) float64; corners repeated one after the other are one."""
+    rows = typed(value, where, list)
+    if len(rows) > MOST_CORNERS:
+        raise ValueError(f"{where}: {len(rows)} corners, expected {MOST_CORNERS} at most")
+    found = [point(row, f"{where}[{i}]") for i, row in enumerate(rows)]
+    corners = [corner for corner, _ in groupby(found)]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()
     if len(set(corners)) < 3:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The narrowest opening of a room that should be enclosed.
 
 In: walls and doors around a point. Out: position and width of the opening. The walls are made thicker until the room is closed; the width is found by

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The building's plan: a JSON file in metres -> levels with walls, doors, windows, obstacles and rooms, and connectors between levels.
 
 In: plan.json (format in host/README.md). Out: `Plan`. Owns nothing; every error names the file and the field.
@@ -119,15 +120,24 @@ def sides(corners: Floats) -> Floats:
     return np.concatenate((corners, np.roll(corners, -1, axis=0)), axis=1)
 
 
+class NotJsonError(ValueError):
+    """A file that is not JSON, so not a plan of echostep's own format."""
+
+
 def load_plan(path: Path | str) -> Plan:
     """Read a plan file; raises EchostepError that names the file and the field."""
     path = Path(path)
     try:
         raw = path.read_bytes()
     except OSError as error:
-        raise EchostepError(f"{path}: cannot read the plan: {error.strerror or error}") from error
+        remedy = "give the building's file with --plan; echostep plan import makes one of a drawing"
+        raise EchostepError(f"{path}: cannot read the plan: {error.strerror or error}: {remedy}") from error
     try:
         return parse_plan(raw)
+    except NotJsonError as error:
+        formats = "DXF, IMDF, OSM, IFC, GeoJSON or WRLD"
+        remedy = f"of another format ({formats}), echostep plan import makes one"
+        raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
 
@@ -137,7 +147,7 @@ def parse_plan(raw: bytes) -> Plan:
     try:
         tree = json.loads(raw)
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"not a plan: {error}") from error
+        raise NotJsonError(f"not a plan: {error}") from error
     return _plan(tree, hashlib.sha256(raw).hexdigest())
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Polylines (k, 2) in metres: length, the point at a distance along them, the nearest point.
 
 In: polylines, points. Out: lengths, points, distances. Used by guidance, routing and simulation. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Routes through a building: the shortest walk through doors, stairs and lifts.
 
 In: a plan, start and destination. Out: a `Route`: one polyline per level. Owns the grids of a plan's levels. Doors are gaps in the walls.
@@ -8,13 +9,14 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep.jit import kernel
+from echostep.plan.cropping import is_clear
 from echostep.plan.model import Plan
 from echostep.plan.polyline import way_m
 
@@ -23,6 +25,7 @@ CELL_M = 0.15  # side of a grid cell
 BODY_M = 0.25  # half a person's width: shortest distance of a route from a wall
 MARGIN_M = 1.5  # of the grid around the walls
 ASIDE_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
+MOST_TRIED = 60  # nearest free cells that are tried for one without a wall before it
 MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
 LIFT_M = 20.0  # cost of waiting for a lift, in metres of level walk
@@ -76,7 +79,9 @@ class Routes:
         self._blocked = np.zeros((len(plan.levels), rows, columns), np.bool_)
         for k, level in enumerate(plan.levels):
             walls_cells = (np.asarray(level.solid, np.float64) - np.tile(self._low, 2)) / CELL_M
-            _block(walls_cells, BODY_M / CELL_M, self._blocked[k])
+            mark_near_walls(walls_cells, BODY_M / CELL_M, self._blocked[k])
+            for corners in level.obstacles:
+                self._blocked[k][self._inside(corners)] = True
         self._lay_connectors(plan)
         self._height = np.array([level.height_m for level in plan.levels])
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
@@ -103,7 +108,7 @@ class Routes:
         return Route(tuple(self._stretches(trail, start, end)))
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
-        """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end."""
+        """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is before them."""
         stretches = []
         cuts = [0, *(np.flatnonzero(np.diff(trail[:, 0])) + 1).tolist(), len(trail)]
         for first, beyond in zip(cuts[:-1], cuts[1:], strict=True):
@@ -117,12 +122,23 @@ class Routes:
                 connector = self._plan.connectors[int(self._connector[level, part[-1, 1], part[-1, 2]])]
                 by = connector.name or connector.kind
             stretches.append(Stretch(level, line, by))
-        stretches[0].line_m[0] = start.x_m, start.y_m
-        stretches[-1].line_m[-1] = end.x_m, end.y_m
+        stretches[0] = replace(stretches[0], line_m=self._from_place(start, stretches[0].line_m))
+        stretches[-1] = replace(stretches[-1], line_m=self._from_place(end, stretches[-1].line_m[::-1])[::-1])
         return stretches
 
+    def _from_place(self, place: RoutePlace, line_m: Floats) -> Floats:
+        """A line that begins at a place instead of at its cell, where no wall is between them."""
+        at = np.array([[place.x_m, place.y_m]])
+        if len(line_m) > 1 and self._is_clear(place, line_m[1]):
+            return np.concatenate((at, line_m[1:]))
+        return np.concatenate((at, line_m)) if self._is_clear(place, line_m[0]) else line_m
+
+    def _is_clear(self, place: RoutePlace, to_m: Floats) -> bool:
+        """Whether no wall is between a place and a point (2,) on its level."""
+        return is_clear(self._plan.levels[place.level].solid, (place.x_m, place.y_m), to_m)
+
     def _cell(self, place: RoutePlace, what: str) -> tuple[int, int, int]:
-        """Level, row and column of the free cell nearest to a position. `what`: its name in errors."""
+        """Level, row and column of the free cell nearest to a position, if possible with no wall between. `what`: its name in errors."""
         levels, rows, columns = self._blocked.shape
         if not (0 <= place.level < levels and math.isfinite(place.x_m) and math.isfinite(place.y_m)):
             raise EchostepError(f"{what} is on level {place.level}, the plan has {levels}, counted from 0")
@@ -138,7 +154,9 @@ class Routes:
         if not (0 <= r < rows and 0 <= c < columns) or not len(near):
             raise EchostepError(f"{what} ({place.x_m:.1f}, {place.y_m:.1f}) is outside the plan or inside a wall")
         near += [max(int(r) - reach, 0), max(int(c) - reach, 0)]
-        best = near[((near + 0.5 - [r, c]) ** 2).sum(1).argmin()]
+        order = near[((near + 0.5 - [r, c]) ** 2).sum(1).argsort(kind="stable")]
+        centres = self._low + (order[:MOST_TRIED, ::-1] + 0.5) * CELL_M
+        best = order[next((k for k, centre in enumerate(centres) if self._is_clear(place, centre)), 0)]
         return place.level, int(best[0]), int(best[1])
 
     def _inside(self, outline: Floats) -> Bools:
@@ -152,7 +170,7 @@ class Routes:
 
 
 @kernel
-def _block(walls: Floats, reach: float, blocked: Bools) -> None:
+def mark_near_walls(walls: Floats, reach: float, blocked: Bools) -> None:
     """Mark the cells whose centre is nearer than `reach` to a wall (n, 4); all lengths in cells."""
     rows, columns = blocked.shape
     for k in range(len(walls)):

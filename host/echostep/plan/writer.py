@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Writes a plan as plan.json without loss.
 
 In: a `Plan`. Out: the text or the file, with one wall per line. Owns nothing.

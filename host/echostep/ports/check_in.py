@@ -1,6 +1,7 @@
-"""Check-in: the wearer's position, entered by hand.
+# SPDX-License-Identifier: MIT
+"""Check-in: the wearer's position, entered by hand, and its undoing.
 
-In: a position from the page. Out: the bytes of a chunk of the port `PERSON`, and `CheckIn`s from such bytes. Owns nothing.
+In: a position from the page. Out: the bytes of a chunk of the port `PERSON`, and `CheckIn`s or `Undo`s from such bytes. Owns nothing.
 The bytes are recorded like those of any port, so a replay has the same check-ins in the same order. They may be damaged or hostile.
 """
 
@@ -36,14 +37,34 @@ class CheckIn:
         return json.dumps(asdict(self)).encode()
 
 
-def parse_check_in(payload: bytes) -> CheckIn | None:
-    """The check-in of a chunk; None when the bytes are not a valid check-in."""
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Takes back check-in number `undo`, counted from 1, if it is still the newest."""
+
+    undo: int
+
+    def encode(self) -> bytes:
+        """The undoing as JSON: the bytes of a chunk."""
+        return json.dumps(asdict(self)).encode()
+
+
+def parse_person(payload: bytes) -> CheckIn | Undo | None:
+    """The check-in or the undoing of a chunk; None when the bytes are neither."""
     if len(payload) > MOST_BYTES:
         return None
     try:
-        return check_in_of(json.loads(payload))
+        tree = json.loads(payload)
     except (ValueError, RecursionError):
         return None
+    return undo_of(tree) if isinstance(tree, dict) and "undo" in tree else check_in_of(tree)
+
+
+def undo_of(tree: Any) -> Undo | None:
+    """The undoing in a JSON object; None when its number is not one."""
+    number = tree.get("undo") if isinstance(tree, dict) else None
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 < number < 1 << 31:
+        return None
+    return Undo(number)
 
 
 def check_in_of(tree: Any) -> CheckIn | None:

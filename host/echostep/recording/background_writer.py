@@ -1,20 +1,22 @@
+# SPDX-License-Identifier: MIT
 """A file that is written by its own thread, so that the caller never waits for the disk.
 
 In: bytes, at any time. Out: the same bytes in the file: passed to the operating system every `WRITE_S` and to the disk every `SYNC_S`.
-Owns the file, the thread, and the buffer of bytes that are not written yet. A disk that refuses bytes is reported once, and tried again
-every `RETRY_S`.
+Owns the file, which is new and locked for this process, the thread, and the buffer of bytes that are not written yet. A disk that refuses bytes
+is reported once, and tried again every `RETRY_S`; a disk that is nearly full is reported before.
 """
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
 import threading
 import time
 from collections import deque
 from pathlib import Path
 
-from echostep.errors import EchostepError
+from echostep.recording.names import create
 
 # All by reason: a killed process loses less than a tenth of a second, a power failure less than a second.
 WRITE_S = 0.05  # between two writes
@@ -23,20 +25,19 @@ RETRY_S = 1.0  # between two attempts on a disk that refuses bytes
 MAX_WAIT_S = 1.0  # of `wait_until_written`
 CLOSE_S = 10.0  # longest wait for the thread when the file is closed
 MOST_NOTICES = 8  # kept; the oldest is dropped
+RESERVE_BYTES = 1 << 28  # of free space: for more than an hour of the ports' bytes [host/docs/recordings.md]
 
 
 class BackgroundWriter:
-    """An append-only file; raises EchostepError when it cannot be created. `notices` holds messages about the disk."""
+    """A new, append-only file; raises EchostepError when it cannot be created, or exists. `notices` holds messages about the disk."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.notices: deque[str] = deque(maxlen=MOST_NOTICES)
         self.failed = False  # the disk refused the bytes of the last write
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
-        except OSError as error:
-            raise EchostepError(f"{path}: cannot write: {error.strerror}") from error
+        self.nearly_full = False  # less than `RESERVE_BYTES` are free
+        self._file = create(self.path)
+        self._check_space()
         self._lock = threading.Condition()
         self._pending = bytearray()  # not yet seen by the thread
         self._written = 0  # bytes passed to the operating system
@@ -98,6 +99,7 @@ class BackgroundWriter:
             dirty = dirty or count > 0
             if dirty and (closing or time.monotonic() - synced_s >= SYNC_S):
                 self._sync()
+                self._check_space()
                 synced_s, dirty = time.monotonic(), False
             if closing:
                 return
@@ -118,6 +120,17 @@ class BackgroundWriter:
             self.failed = False
             self.notices.append(f"{self.path}: the disk takes bytes again; the recording goes on")
         return count
+
+    def _check_space(self) -> None:
+        """Compare the free space with `RESERVE_BYTES`; a notice when it has become less."""
+        try:
+            free = shutil.disk_usage(self.path.parent).free
+        except OSError:
+            return
+        if free < RESERVE_BYTES and not self.nearly_full:
+            what = f"only {free / 1e6:.0f} MB are free; from now on only the ports' bytes are recorded, nothing derived"
+            self.notices.append(f"{self.path}: {what}: free some space")
+        self.nearly_full = free < RESERVE_BYTES
 
     def _sync(self) -> None:
         """Ask the operating system to bring the file to the disk; pipes and some file systems have no fsync."""

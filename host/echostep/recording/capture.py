@@ -1,13 +1,16 @@
+# SPDX-License-Identifier: MIT
 """Captured bytes -> messages.
 
-In: a file: bytes of the board's port, bytes of the MTx's port (Xbus), or a recording (.mcap). Out: messages in order. Owns nothing.
+In: a file: bytes of the board's port, bytes of an MT's port (Xbus), or a recording (.mcap). Out: messages in order, one for each valid frame of
+an MT. Owns nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -16,28 +19,36 @@ from echostep.board.messages import BY_ID, Message
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording.mcap_records import MCAP_MAGIC
-from echostep.recording.recorder import open_recording
-from echostep.xsens import MtSample, MtxReader
+from echostep.recording.reading import open_recording
+from echostep.xsens import FrameReader, MtMessage, MtxReader
+from echostep.xsens.message import MessageReader, as_object
 
 READ_BYTES = 1 << 16  # of one read of the file; by reason: many frames, little memory
+HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; by reason
+BOARD_FRAME, MT_FRAME = 10, 5  # bytes of a frame besides the body, about: to compare what two readers have understood
 MESSAGE_NAMES: dict[type, str] = {kind: kind.__name__ for kind in BY_ID.values()}
+Chunks = Iterator[tuple[str, bytes]]  # port, bytes
 
 
 @dataclass
 class Decoder:
-    """Bytes of named ports -> messages; the readers count good and damaged frames."""
+    """Bytes of named ports -> messages; the readers count good and damaged frames. `tracked` counts what the tracker would make of the MT's bytes."""
 
     board: BoardReader = field(default_factory=BoardReader)
-    mtx: MtxReader = field(default_factory=MtxReader)
+    mt: MessageReader = field(default_factory=MessageReader)
+    tracked: MtxReader = field(default_factory=MtxReader)
 
-    def feed(self, port: str, received: bytes) -> list[Message | MtSample]:
-        """Messages completed by these bytes; none for a port that is neither the board's nor the MTx's."""
+    def feed(self, port: str, received: bytes, *, ended: bool = False) -> list[Message | MtMessage]:
+        """Messages completed by these bytes; none for a port that is neither the board's nor the MT's. `ended`: no byte follows."""
         if port == BOARD:
             return list(self.board.feed(received))
-        return list(self.mtx.feed(received)) if port == MTX else []
+        if port != MTX:
+            return []
+        self.tracked.feed_batch(received)
+        return list(self.mt.feed(received, ended=ended))
 
 
-def read_capture(path: Path | str, decoder: Decoder | None = None) -> Iterator[Message | MtSample]:
+def read_capture(path: Path | str, decoder: Decoder | None = None) -> Iterator[Message | MtMessage]:
     """Messages of a captured file, in order. A `Decoder` given by the caller holds the counts afterwards.
 
     Raises EchostepError when the file cannot be read or holds neither board frames, nor Xbus frames, nor a recording.
@@ -45,42 +56,68 @@ def read_capture(path: Path | str, decoder: Decoder | None = None) -> Iterator[M
     path, decoder = Path(path), decoder or Decoder()
     try:
         with path.open("rb") as file:
-            head = file.read(READ_BYTES)
+            recorded = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the capture: {error.strerror}") from error
-    if head.startswith(MCAP_MAGIC):
-        for chunk in open_recording(path).chunks():
-            yield from decoder.feed(chunk.port, chunk.data)
-        return
-    port = _guess_port(head)
-    if port is None:
-        raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
+    port = "" if recorded else _port_of(path)
+    decoder.mt.formats.learn(FrameReader().feed(_head(_chunks(path, port)), ended=True))
+    for name, received in _chunks(path, port):
+        yield from decoder.feed(name, received)
+    yield from decoder.feed(MTX, b"", ended=True)
+
+
+def _chunks(path: Path, port: str) -> Chunks:
+    """The bytes of a recording by port (`port`: ""), or of a file of one port's bytes."""
+    if not port:
+        return ((chunk.port, chunk.data) for chunk in open_recording(path).chunks())
+    return zip(repeat(port), _blocks(path), strict=False)
+
+
+def _blocks(path: Path) -> Iterator[bytes]:
     with path.open("rb") as file:
         while received := file.read(READ_BYTES):
-            yield from decoder.feed(port, received)
+            yield received
 
 
-def _guess_port(head: bytes) -> str | None:
-    """The port whose reader decodes more messages from the first bytes of the file; None when there are no messages."""
-    trial = Decoder()
-    message_counts = {port: len(trial.feed(port, head)) for port in (BOARD, MTX)}
-    best = max(message_counts, key=lambda port: message_counts[port])
-    return best if message_counts[best] else None
+def _head(chunks: Iterable[tuple[str, bytes]]) -> bytes:
+    """The first bytes of the MT's port, at most about HEAD_BYTES."""
+    head = bytearray()
+    for port, received in chunks:
+        head += received if port == MTX else b""
+        if len(head) >= HEAD_BYTES:
+            break
+    return bytes(head)
 
 
-def as_json(message: Message | MtSample) -> dict[str, Any]:
+def _port_of(path: Path) -> str:
+    """The port whose reader understands more bytes of the first blocks in which one is understood; raises EchostepError when none is."""
+    board, mt = BoardReader(), FrameReader()
+    for received in _blocks(path):
+        understood = {BOARD: BOARD_FRAME * len(board.feed(received)), MTX: _bytes_of_frames(mt, received)}
+        if any(understood.values()):
+            return max(understood, key=lambda port: understood[port])
+    if _bytes_of_frames(mt, b"", ended=True):
+        return MTX
+    raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
+
+
+def _bytes_of_frames(reader: FrameReader, received: bytes, *, ended: bool = False) -> int:
+    """Bytes of the MT's frames that these bytes complete."""
+    length = reader.scan(received, ended=ended).length
+    return int(length.sum()) + MT_FRAME * len(length)
+
+
+def as_json(message: Message | MtMessage) -> dict[str, Any]:
     """A message as a JSON object: its kind, then its fields."""
-    if isinstance(message, tuple) and type(message) in MESSAGE_NAMES:
-        return {"message": MESSAGE_NAMES[type(message)], **message._asdict()}
-    return {"message": type(message).__name__, **_fields(message)}
+    if isinstance(message, MtMessage):
+        return dict(_finite(as_object(message)))
+    return {"message": MESSAGE_NAMES[type(message)], **message._asdict()}
 
 
-def _fields(sample: Any) -> dict[str, Any]:
-    """Fields of an MTx sample by name, without those that the device did not send."""
-    names = sample._fields if hasattr(sample, "_fields") else sample.__dataclass_fields__
-    return {name: value for name in names if (value := getattr(sample, name)) is not None and not _is_absent(value)}
-
-
-def _is_absent(value: Any) -> bool:
-    """A vector of NaN: the device did not send this quantity."""
-    return isinstance(value, tuple) and all(map(math.isnan, value))
+def _finite(value: Any) -> Any:
+    """The value with None in place of what JSON cannot say: not a number, infinite."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, tuple | list):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Contents of a recording: counts per port, decoded frames, gaps, and what is wrong with the file.
 
 In: a recording. Out: a summary as lines of text. Owns nothing.
@@ -12,9 +13,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from echostep.board.messages import BY_ID, Identity
+from echostep.board.messages import BY_ID, SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, LATEST_NS, MTX
+from echostep.recording.arrival_order import ArrivalOrder
 from echostep.recording.capture import Decoder
 from echostep.recording.mcap_records import port_of
 from echostep.recording.recovery import RecordedMessage, Recovery
@@ -57,9 +59,10 @@ class Contents:
     first_ns: int = LATEST_NS  # earliest arrival
     last_ns: int = 0  # latest arrival
     out_of_order: int = 0  # chunks that arrived before an earlier chunk of the file
+    order: ArrivalOrder = field(default_factory=ArrivalOrder)  # corrects what is counted here
     decoder: Decoder = field(default_factory=Decoder)
     errors: list[str] = field(default_factory=list)  # of the decoder
-    firmware: str = ""  # version in the board's newest Identity message
+    firmware: str = ""  # version and protocol hash in the board's newest Identity message
     _undecoded: dict[str, bytearray] = field(default_factory=dict)  # bytes by port
 
     @property
@@ -97,7 +100,7 @@ class Contents:
             if port == BOARD:
                 self._decode_board(bytes(undecoded))
             elif port == MTX:
-                self.decoder.mtx.feed_batch(bytes(undecoded))
+                self.decoder.tracked.feed_batch(bytes(undecoded))
         except EchostepError as error:
             if str(error) not in self.errors:
                 self.errors.append(str(error))
@@ -106,13 +109,14 @@ class Contents:
     def _decode_board(self, received: bytes) -> None:
         for row in self.decoder.board.frames(received).rows(IDENTITY)[1]:
             identity = Identity.unpack(row.tobytes())
-            self.firmware = f"{identity.version_major}.{identity.version_minor}.{identity.version_patch}"
+            version = f"{identity.version_major}.{identity.version_minor}.{identity.version_patch}"
+            self.firmware = f"{version}, protocol 0x{identity.schema_hash:08X}"
 
 
 def info(path: Path) -> list[str]:
     """The summary of a recording, as lines; raises EchostepError when it holds no readable message."""
     recovery, contents = Recovery(path), Contents()
-    for message in with_progress(recovery, f"reading {path.name}"):
+    for message in with_progress(recovery, contents, f"reading {path.name}"):
         contents.add(message)
     contents.finish()
     if not contents.ports and not contents.derived:
@@ -149,10 +153,12 @@ def _port_lines(contents: Contents) -> list[str]:
     for name, port in sorted(contents.ports.items()):
         gaps = f", silent {port.gaps} times, {port.longest_gap_s:.1f} s at most" if port.gaps else ""
         lines.append(f"  {name}: {port.received} bytes in {port.chunks} chunks{gaps}")
-    board, mtx = contents.decoder.board.counts, contents.decoder.mtx.counts
+    board, mtx = contents.decoder.board.counts, contents.decoder.tracked.counts
     if BOARD in contents.ports:
-        firmware = f"; firmware {contents.firmware}" if contents.firmware else ""
-        lines.append(f"  board frames: {board.good} good, {board.rejected} bad, {board.lost} lost{firmware}")
+        lines.append(f"  board frames: {board.good} good, {board.rejected} bad, {board.lost} lost")
+        lines.append(
+            f"  firmware: {contents.firmware or 'the board did not say'}; this host: protocol 0x{SCHEMA_HASH:08X}"
+        )
     if MTX in contents.ports:
         rate = f" ({mtx.good / contents.seconds:.1f}/s)" if contents.seconds > 0.0 else ""
         lines.append(f"  MTx samples: {mtx.good}{rate}, {mtx.bad_checksum} bad checksums")
@@ -170,6 +176,10 @@ def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
         lines.append(f"  damaged: {byte_count} bytes in {len(inside)} places are not valid, the first at byte {first}")
     if recovery.unreadable_chunks:
         lines.append(f"  damaged: {recovery.unreadable_chunks} compressed chunks cannot be opened")
+    if contents.order.corrected:
+        lines.append(f"  {contents.order.corrected} arrival times contradict their neighbours; repair corrects them")
+    if recovery.altered:
+        lines.append("  its checksum is wrong: bytes have changed since it was written")
     if contents.out_of_order:
         lines.append(f"  {contents.out_of_order} chunks are out of time order")
     if not recovery.has_footer:
@@ -178,12 +188,12 @@ def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
     return lines
 
 
-def with_progress(recovery: Recovery, title: str) -> Iterator[RecordedMessage]:
-    """All messages, with a progress bar on a terminal."""
+def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:
+    """All messages with corrected arrival times, with a progress bar on a terminal."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(title, total=1.0)
-        for message_index, message in enumerate(recovery.messages()):
+        for message_index, message in enumerate(contents.order.correct(recovery.messages())):
             if not message_index % MESSAGES_PER_UPDATE:
                 progress.update(task, completed=recovery.fraction)
             yield message

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """New recordings from old ones: a piece cut out, or everything readable of a damaged file.
 
 In: a recording. Out: a new recording, and lines of text about it. Owns nothing.
@@ -12,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.recording.arrival_order import ArrivalOrder
 from echostep.recording.contents import Contents, problems_of, with_progress
 from echostep.recording.mcap_records import port_of
 from echostep.recording.recovery import RecordedMessage, Recovery
@@ -27,7 +29,7 @@ def repair(path: Path, out: Path) -> list[str]:
     """Write everything readable of a recording to a complete file; raises EchostepError when no message is readable."""
     recovery, saved = Recovery(path), Contents()
     with RewrittenRecording(out, path, recovery.schemas) as rewritten:
-        messages = with_progress(recovery, f"repairing {path.name}")
+        messages = with_progress(recovery, saved, f"repairing {path.name}")
         _copy(messages, rewritten, saved, lambda: recovery.metadata)
         if not saved.ports and not saved.derived:
             raise EchostepError(f"{path}: nothing in it can be saved: no message is readable")
@@ -59,7 +61,7 @@ def cut(path: Path, begin_s: float, end_s: float, out: Path) -> list[str]:
         return {**recovery.metadata, **new_start, "cut": f"{begin_s:g} to {end_s:g} s of {path.name}"}
 
     with RewrittenRecording(out, path, recovery.schemas) as rewritten:
-        messages = (m for m in with_progress(recovery, f"cutting {path.name}") if begin_ns <= m.t_ns < end_ns)
+        messages = (m for m in with_progress(recovery, kept, f"cutting {path.name}") if begin_ns <= m.t_ns < end_ns)
         _copy(messages, rewritten, kept, metadata)
         if not kept.ports:
             raise EchostepError(
@@ -87,7 +89,7 @@ def _copy(
 
 def _first_arrival_ns(path: Path) -> int:
     """Arrival time of the first chunk in the file."""
-    for message in Recovery(path).messages():
+    for message in ArrivalOrder().correct(Recovery(path).messages()):
         if port_of(message.channel):
             return message.t_ns
     raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")

@@ -1,6 +1,7 @@
-"""Recordings: every chunk is written to an MCAP file before it is used, and read again as portions.
+# SPDX-License-Identifier: MIT
+"""The recorder: every chunk is written to an MCAP file before it is used.
 
-In: chunks in order of arrival, and messages derived from them. Out: a file, and the same chunks again. Owns the open file.
+In: chunks in order of arrival, and messages derived from them. Out: a file, which `reading.py` reads. Owns the open file.
 The file is MCAP without chunk records, written by a thread (`background_writer`). After a crash it is readable up to its last whole record, and
 a slow disk does not delay the tracker.
 """
@@ -8,38 +9,22 @@ a slow disk does not delay the tracker.
 from __future__ import annotations
 
 import json
-import os
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from mcap.opcode import Opcode
-from mcap.records import Metadata
 from mcap.writer import CompressionType, IndexType, Writer
 
-from echostep.errors import EchostepError
-from echostep.ports.chunks import Chunk, Portion
+from echostep.ports.chunks import Chunk
 from echostep.recording.background_writer import BackgroundWriter
-from echostep.recording.mcap_records import (
-    HEAD_SIZE,
-    MCAP_MAGIC,
-    RAW_ENCODING,
-    RECORD_LIMIT,
-    PortChannels,
-    decompress_chunk,
-    parse_record,
-    read_messages,
-    read_record,
-    records_in_chunk,
-)
+from echostep.recording.mcap_records import RAW_ENCODING
 
 METADATA_NAME = "echostep"  # of the metadata record
 # All by reason.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
-READ_BYTES = 1 << 18  # of one read of a file: about five seconds of a walk
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
 DERIVED_LIMIT = 1 << 20  # unwritten bytes from which on derived messages are skipped: they can be computed again
 
@@ -63,7 +48,7 @@ class DerivedMessage:
 
 
 class Recorder:
-    """Writes chunks to a new file; raises EchostepError when the file cannot be created."""
+    """Writes chunks to a new file; raises EchostepError when the file cannot be created, or exists."""
 
     def __init__(self, path: Path | str, metadata: Mapping[str, str]) -> None:
         """`metadata`: what a replay needs and a reader may want to know (start, seed, plan, note), as text."""
@@ -81,7 +66,14 @@ class Recorder:
         self._sequence = 0
         self._waited_ns: int | None = None  # arrival time of the chunk of the last wait
         self.lost_chunks = 0  # not recorded: more than `RAW_LIMIT` bytes waited for the disk
-        self.skipped_messages = 0  # derived ones, not recorded: more than `DERIVED_LIMIT` bytes waited
+        self.skipped_messages = (
+            0  # derived ones, not recorded: more than `DERIVED_LIMIT` bytes waited, or the disk is nearly full
+        )
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._file.path
 
     @property
     def notices(self) -> deque[str]:
@@ -103,9 +95,9 @@ class Recorder:
             self._file.wait_until_written()
 
     def write_derived(self, messages: Iterable[DerivedMessage]) -> None:
-        """Record derived messages; they are skipped while the disk is behind, in favour of the chunks."""
+        """Record derived messages; they are skipped while the disk is behind or nearly full, in favour of the chunks."""
         for message in messages:
-            if self._file.unwritten_bytes > DERIVED_LIMIT:
+            if self._file.nearly_full or self._file.unwritten_bytes > DERIVED_LIMIT:
                 self.skipped_messages += 1
                 continue
             channel = self._channels.get(message.topic.name) or self._register_topic(message.topic)
@@ -139,85 +131,3 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
-
-
-@dataclass
-class Recording:
-    """A recording on disk: its metadata and its chunks. `truncated` is set when the file ends without a footer."""
-
-    path: Path
-    metadata: dict[str, str] = field(default_factory=dict)
-    truncated: bool = False
-    fraction: float = 0.0  # of the file, read so far
-    unreadable_chunks: int = 0  # chunk records of the file that could not be decompressed
-
-    def chunks(self) -> Iterator[Chunk]:
-        """Chunks in the order in which they were recorded."""
-        for portion in self.portions():
-            yield from portion.chunks()
-
-    def portions(self) -> Iterator[Portion]:
-        """The same chunks as portions of many."""
-        for record in self._records():
-            if isinstance(record, Portion):
-                yield record
-        self.fraction = 1.0
-
-    def _records(self) -> Iterator[Portion | tuple[int, bytes]]:
-        """Messages as portions, other records as opcode and body, in order; ends at the footer or before the first incomplete record."""
-        channels = PortChannels()
-        with self.path.open("rb") as file:
-            size = max(1, os.fstat(file.fileno()).st_size)
-            buffer_begin = len(file.read(len(MCAP_MAGIC)))  # offset of `buffer` in the file
-            self.truncated = True
-            rest, missing = b"", 0
-            while missing <= RECORD_LIMIT and (more := file.read(max(READ_BYTES, missing))):
-                buffer, offset = rest + more, 0
-                while True:
-                    portion, offset = read_messages(buffer, offset, channels)
-                    self.fraction = (buffer_begin + offset) / size
-                    if portion:
-                        yield portion
-                    record, missing = read_record(buffer, offset)
-                    if record is None:
-                        break
-                    opcode, body = record
-                    if opcode == Opcode.FOOTER:
-                        self.truncated = False
-                        return
-                    if opcode == Opcode.CHANNEL:
-                        channels.add(body)
-                    if opcode == Opcode.CHUNK:
-                        yield from self._records_in_chunk(body, channels)
-                    yield record
-                    offset += HEAD_SIZE + len(body)
-                buffer_begin, rest = buffer_begin + offset, buffer[offset:]
-
-    def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
-        records = decompress_chunk(body)
-        if records is None:
-            self.unreadable_chunks += 1
-            return
-        yield from records_in_chunk(records, channels)
-
-
-def open_recording(path: Path | str) -> Recording:
-    """A recording and its metadata; raises EchostepError when the file is missing or holds no recorded bytes."""
-    recording, has_bytes = Recording(Path(path)), False
-    try:
-        with recording.path.open("rb") as file:
-            is_mcap = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
-        for record in recording._records() if is_mcap else ():
-            if isinstance(record, Portion):
-                has_bytes = True
-                if recording.metadata:
-                    break
-                continue
-            opcode, body = record
-            if opcode == Opcode.METADATA and (stored := parse_record(Metadata, body)) and stored.name == METADATA_NAME:
-                recording.metadata = dict(stored.metadata)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the recording: {error.strerror}") from error
-    if has_bytes:
-        return recording
-    raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Writes a new recording from the messages of another one.
 
 In: metadata and messages. Out: an MCAP file of compressed, indexed chunk records, as viewers read it fastest. Owns the new file.
@@ -5,6 +6,7 @@ In: metadata and messages. Out: an MCAP file of compressed, indexed chunk record
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,6 +15,7 @@ from mcap.records import Channel, Schema
 from mcap.writer import Writer
 
 from echostep.errors import EchostepError
+from echostep.recording.names import create
 from echostep.recording.recorder import METADATA_NAME
 from echostep.recording.recovery import RecordedMessage
 
@@ -28,10 +31,8 @@ class RewrittenRecording:
         self._schemas = schemas
         self._schema_ids: dict[int, int] = {0: 0}  # by number in the source; 0: no schema
         self._channels: dict[tuple[str, str, int], int] = {}  # by topic, encoding and schema number in the source
-        with self._report_write_errors():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("wb")
-        self._writer = Writer(self._file)
+        self._file = os.fdopen(create(path), "wb")
+        self._writer = Writer(self._file, enable_data_crcs=True)
         self._writer.start(profile="", library="echostep")
 
     def write_metadata(self, metadata: Mapping[str, str]) -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Stages between a source of chunks and the tracker: pacing, check-ins, recording, grouping into portions.
 
 In: chunks in order of arrival; None where a live port delivered nothing for a while. Out: the same chunks with check-ins among them, and portions.
@@ -9,12 +10,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
+from typing import TYPE_CHECKING
 
-from echostep.page.live import LivePage
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.recording.recorder import Recorder
 from echostep.session.console import print_notices
+
+if TYPE_CHECKING:
+    from echostep.page.live import LivePage
 
 LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
 

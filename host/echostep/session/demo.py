@@ -1,56 +1,75 @@
-"""`echostep demo`: track a simulated walk through the demo plan.
+# SPDX-License-Identifier: MIT
+"""`echostep demo`: track a simulated walk through the demo plan, or through the rooms of another one.
 
-In: a seed, and a program that plays the sensor board, or the Python board. Out: recording, true path, track, summary. Owns the simulated board.
+In: a seed, a plan, and a program that plays the sensor board, or the Python board. Out: recording, true path, track, summary. Owns the simulated
+board. A demo on a terminal is slowed down to be watched; elsewhere it runs as fast as it can. Its estimates are the same at any speed.
 """
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
+from pathlib import Path
 
 from echostep.localization.metrics import load_truth
-from echostep.plan.importers.formats import open_plan
+from echostep.page.elements.true_position import TruePath
+from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import paced, portions_of, recorded, with_check_ins
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import run_metadata
+from echostep.session.metadata import SIMULATED, run_metadata
 from echostep.session.options import OutputOptions
+from echostep.session.progress import progress_line
+from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
 from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import Board, BoardProcess, PythonBoard
-from echostep.simulation.scenario import Scenario, demo_scenario
+from echostep.simulation.people.tours import room_tour
+from echostep.simulation.people.walker import Person, Waypoint
+from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
 from echostep.tracker import Tracker
 
-SHOWN_SPEED = 8.0  # times real time, for a run that is watched; by reason: a walk of 90 s is seen in 12 s
+WATCHED_SPEED = 4.0  # times real time, on a terminal; by reason: a walk of 90 s is seen in 22 s
+WATCHED_PORTION = 16  # chunks that are tracked together in a run that is watched: 20 ms of the walk; by reason: no step is shown later
 UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run; by reason: fewer calls
+TOUR_CORNER_M = 0.3  # how far corners are cut on a tour; by reason: doors of any plan are passed without touching them
 
 
 @dataclass(frozen=True, slots=True)
 class DemoOptions:
-    """`board_command` starts the program that plays the board; `guide` adds beacons and guidance to the end of the walk."""
+    """`board_command` starts the program that plays the board; `guide` adds beacons and guidance to the end of the walk.
+
+    `plan_path` None: the demo's plan. `speed`: times real time; None: `WATCHED_SPEED` on a terminal, else as fast as it can.
+    """
 
     seed: int
     board_command: str | None = None
     guide: bool = False
+    plan_path: Path | None = None
+    speed: float | None = None
 
 
 def demo(options: DemoOptions, output: OutputOptions) -> None:
     """Simulate a walk, track and record it."""
-    board = _board(options)
-    output = replace(output, folder=output_folder(output.folder))
-    with as_file(files("echostep") / "plans" / "demo.json") as plan_path:
-        plan = open_plan(plan_path)
-    scenario = demo_scenario(plan, options.seed, board)
-    try:
-        _track(scenario, plan, options, output)
-    finally:
-        scenario.close()
+    with _plan_file(options) as plan_path:
+        plan = open_limited(plan_path)
+    waypoints = DEMO_WAYPOINTS if options.plan_path is None else room_tour(plan)
+    with closing(_board(options)) as board:
+        output = replace(output, folder=output_folder(output.folder))
+        _track(board, plan, waypoints, options, output)
+
+
+def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
+    """The plan's file; that of the demo may be inside an archive."""
+    path = options.plan_path
+    return as_file(files("echostep") / "plans" / "demo.json") if path is None else nullcontext(path)
 
 
 def _board(options: DemoOptions) -> Board:
@@ -61,26 +80,38 @@ def _board(options: DemoOptions) -> Board:
     return board
 
 
-def _track(scenario: Scenario, plan: Plan, options: DemoOptions, output: OutputOptions) -> None:
-    scenario.write_truth(output.folder / "truth.csv")
-    truth = load_truth(output.folder / "truth.csv")
-    tracker = Tracker(plan, scenario.start, seed=options.seed)
-    end = RoutePlace(*scenario.truth[-1, 1:3].tolist()) if options.guide else None
-    metadata = run_metadata(plan, scenario.start, options.seed, "simulated walk, simulated sensors")
-    with Session(tracker, "echostep demo (simulated)", "simulated", output, end) as session:
-        with Recorder(output.folder / "walk.mcap", metadata) as recorder:
+def _track(
+    board: Board, plan: Plan, waypoints: Sequence[Waypoint], options: DemoOptions, output: OutputOptions
+) -> None:
+    start = start_of(plan, waypoints)
+    tracker = Tracker(plan, start, seed=options.seed)
+    speed = options.speed or (WATCHED_SPEED if console.is_terminal and output.watched else None)
+    title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
+    end = RoutePlace(*waypoints[-1][:2], start_of(plan, waypoints[::-1]).level) if options.guide else None
+    with Session(tracker, title, "simulated", output, end) as session:
+        session.prepare()
+        with progress_line("Simulating the walk"):
+            person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
+            scenario = Scenario(plan, waypoints, options.seed, board, person)
+        scenario.write_truth(output.folder / "truth.csv")
+        session.show_truth(TruePath.of(scenario.truth, plan))
+        metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)
+        with start_recording(output.folder / "walk.mcap", metadata) as recorder:
             chunks = with_beacons(scenario, plan, options.seed) if options.guide else scenario.chunks()
-            session.track(_portions(chunks, session, recorder), lambda: scenario.fraction, recorder)
+            portions = _portions(chunks, session, recorder, speed)
+            session.track(portions, lambda: scenario.fraction, recorder)
         print_notices(recorder.notices)
-        session.finish("simulated walk", truth)
+        session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
         session.keep_page_open()
 
 
-def _portions(chunks: Iterator[Chunk], session: Session, recorder: Recorder) -> Iterator[Portion]:
-    """The simulated chunks, recorded; a run that is watched is slowed down and tracked chunk by chunk."""
-    source = paced(chunks, SHOWN_SPEED) if session.watched else chunks
+def _portions(chunks: Iterator[Chunk], session: Session, recorder: Recorder, speed: float | None) -> Iterator[Portion]:
+    """The simulated chunks, recorded; a run that is watched is slowed down and tracked in small portions."""
+    source = paced(chunks, speed) if speed else chunks
     with_people = with_check_ins(source, session.page, _arrival_ns)
-    return portions_of(recorded(with_people, recorder, wait_for_disk=True), 1 if session.watched else UNSEEN_PORTION)
+    return portions_of(
+        recorded(with_people, recorder, wait_for_disk=True), WATCHED_PORTION if speed else UNSEEN_PORTION
+    )
 
 
 def _arrival_ns(chunk: Chunk | None) -> int:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep live` and `echostep record`: chunks from serial ports, until Ctrl-C or for a given time.
 
 In: ports. Out: a recording; from `live` also track and summary. Owns the ports while the run lasts.
@@ -8,23 +9,30 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 
-from echostep.board.frames import encode
+from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
+from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.guidance.guided_run import destination
 from echostep.page.live import LivePage
-from echostep.plan.importers.formats import open_plan
-from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk, SerialPorts
+from echostep.plan.importers.limited import open_limited
+from echostep.ports.arrival_clock import SleepWatch, now_ns
+from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk
+from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_check_ins
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import clock_metadata, run_metadata, version_metadata
+from echostep.session.metadata import clock_metadata, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
+from echostep.session.port_roles import with_role_check
+from echostep.session.progress import with_bar
+from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
+from echostep.session.starts import check_start
 from echostep.settings import parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
@@ -36,23 +44,25 @@ BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
 
 def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -> None:
     """Track a wearer and record everything."""
-    plan = open_plan(tracking.plan_path)
+    plan = open_limited(tracking.plan_path)
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
     settings, seed = parse_settings(settings_toml, str(path)), tracking.seed or 0
-    tracker = Tracker(plan, tracking.start, settings, seed, waits=output.page is not None)
+    tracker = Tracker(plan, start_given(tracking, plan), settings, seed)
+    check_start(plan, tracker.start, given=tracking.start is not None)
     guide_to = destination(tracking.guide_to, plan) if tracking.guide_to else None
     session = Session(tracker, "echostep live", "live", output, guide_to)
-    tracker.warm_up()
+    session.prepare()
     folder = output_folder(output.folder)
     with closing(_open_ports(ports)) as opened:
         opened.send(BOARD, encode(Identify(), 0))
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
-        with session, Recorder(folder / "walk.mcap", metadata) as recorder:
-            chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session.page)
-            session.track(portions_of(chunks, 1), None, recorder)
-        print_notices(recorder.notices)
-    session.finish("live")
+        with session:
+            with start_recording(folder / "walk.mcap", metadata, ports.keep) as recorder:
+                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session.page)
+                session.track(portions_of(chunks, 1), None, recorder)
+            print_notices(recorder.notices)
+            session.finish("live")
 
 
 def record(ports: PortOptions, out: Path) -> None:
@@ -62,13 +72,22 @@ def record(ports: PortOptions, out: Path) -> None:
     with closing(_open_ports(ports)) as opened:
         opened.send(BOARD, encode(Identify(), 0))
         metadata = version_metadata() | clock_metadata() | {"note": "recorded without tracking"}
-        with Recorder(out, metadata) as recorder, suppress(KeyboardInterrupt):
-            for chunk in _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds):
+        with start_recording(out, metadata, ports.keep) as recorder, suppress(KeyboardInterrupt):
+            chunks = _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds)
+            for chunk in with_bar(chunks, "recording; Ctrl-C ends it", _passed(ports.seconds)):
                 if chunk is not None:
                     byte_count[chunk.port] += len(chunk.data)
         print_notices(recorder.notices)
     from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
-    console.print(f"{out}: {byte_count[BOARD]} bytes from the board, {byte_count[MTX]} from the MTx{from_gateway}")
+    console.print(
+        f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {byte_count[MTX]} from the MTx{from_gateway}"
+    )
+
+
+def _passed(seconds: float | None) -> Callable[[], float | None]:
+    """The share of the given time that has passed; None without one."""
+    began_s = time.monotonic()
+    return lambda: None if seconds is None else (time.monotonic() - began_s) / max(seconds, 1e-3)
 
 
 def _open_ports(options: PortOptions) -> SerialPorts:
@@ -80,19 +99,34 @@ def _recorded_chunks(
     ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None, page: LivePage | None = None
 ) -> Iterator[Chunk | None]:
     """Chunks of the ports and check-ins of the page, each recorded before anything else sees it. The MTx is set up on the way."""
-    chunks = with_check_ins(_chunks_for(ports, seconds), page, lambda _: time.monotonic_ns())
-    chunks = recorded(chunks, recorder)
+    chunks = with_check_ins(_chunks_for(ports, seconds), page, lambda _: now_ns())
+    chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 
 
 def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | None]:
     """Chunks of the ports for so many seconds, None: without end; None as a chunk when nothing came for a while."""
     end_s = math.inf if seconds is None else time.monotonic() + seconds
+    watch = SleepWatch()
     for chunk in ports.chunks():
         print_notices(ports.notices)
+        if slept_s := watch.slept_s():
+            console.print(f"The computer slept for {slept_s:.0f} s: nothing was received; the position is uncertain")
         yield chunk
         if time.monotonic() >= end_s:
             return
+
+
+def _with_subscription(chunks: Iterable[Chunk | None], ports: SerialPorts) -> Iterator[Chunk | None]:
+    """The same chunks, while the board is asked for its optional messages at the start and whenever it has restarted."""
+    board, subscription = BoardReader(), Subscription()
+    for chunk in chunks:
+        if chunk is not None and chunk.port == BOARD:
+            with suppress(StaleFirmwareError):  # the tracker reports it
+                for message in board.feed(chunk.data):
+                    if subscription.is_due(message):
+                        ports.send(BOARD, encode(SUBSCRIBE, 0))
+        yield chunk
 
 
 def _with_mtx_setup(chunks: Iterable[Chunk | None], ports: SerialPorts, rate_hz: float) -> Iterator[Chunk | None]:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Options that several commands share, as the command line parsed them.
 
 In: values of command-line options. Out: frozen dataclasses. Owns nothing.
@@ -9,10 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echostep.page.server import Address
-from echostep.plan.model import Pose
-
 if TYPE_CHECKING:
+    from echostep.page.server import Address
     from echostep.team.endpoint import Outlet
 
 
@@ -25,6 +24,12 @@ class OutputOptions:
     page: Address | None = None  # address to serve the page at; None: no page
     page_stays: bool = False  # serve the page until Ctrl-C after the run is over
     outlet: Outlet | None = None  # where estimates are published; None: nowhere
+    browser: bool = False  # open the page in a browser, where there is one
+
+    @property
+    def watched(self) -> bool:
+        """Whether the run is shown, on the terminal or on the page."""
+        return self.terminal or self.page is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +37,8 @@ class TrackingOptions:
     """What the tracker is made from. A value of None is replaced by that of the plan, of the recording, or by the default."""
 
     plan_path: Path
-    start: Pose | None = None
+    start: str | None = None  # as given: X,Y,DEG[,LEVEL], a room, or ?
+    start_sd: str | None = None  # as given: M,DEG
     settings_path: Path | None = None
     seed: int | None = None
     guide_to: str | None = None  # destination of the guidance; None: no guidance
@@ -40,9 +46,10 @@ class TrackingOptions:
 
 @dataclass(frozen=True, slots=True)
 class PortOptions:
-    """Ports to read, as serial ports or pyserial URLs, and for how long."""
+    """Ports to read, as serial ports or pyserial URLs, for how long, and how many recordings stay."""
 
     board: str
     mtx: str | None = None
     beacons: str | None = None
     seconds: float | None = None  # None: until Ctrl-C
+    keep: int | None = None  # recordings to keep in the folder; None: all

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep replay`: track a recorded walk again, through the same stages as a live run.
 
 In: a recording, its plan. Out: track, summary, errors where the true path is given. Owns nothing.
@@ -10,37 +11,45 @@ from pathlib import Path
 
 from echostep.guidance.guided_run import destination
 from echostep.localization.metrics import load_truth
-from echostep.plan.importers.formats import open_plan
+from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
-from echostep.recording.recorder import Recording, open_recording
+from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
-from echostep.session.metadata import CHECK_IN_START, recorded_seed, recorded_start
+from echostep.session.metadata import CHECK_IN_START, SIMULATED, recorded_seed, recorded_start, start_given
 from echostep.session.options import OutputOptions, TrackingOptions
+from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
 from echostep.session.session import Session
+from echostep.session.skipped import skipped
+from echostep.session.starts import check_start
 from echostep.settings import parse_settings, read_settings
 from echostep.tracker import Tracker
 
 
 def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
     """Track a recording; start, settings and seed are the recorded ones unless `tracking` gives others."""
-    recording, plan = open_recording(path), open_plan(tracking.plan_path)
+    recording, plan = open_recording(path), open_limited(tracking.plan_path)
     if recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {tracking.plan_path} is not the plan that {path} was tracked on.")
     truth = load_truth(truth_path) if truth_path else None
     tracker = tracker_of(recording, plan, tracking)
+    check_start(plan, tracker.start, given=tracking.start is not None, recorded="start_x_y_rad" in recording.metadata)
     output_folder(output.folder)
     if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
     guide_to = destination(tracking.guide_to, plan) if tracking.guide_to else None
-    session = Session(tracker, f"echostep replay {path.name}", "replay", output, guide_to)
-    tracker.warm_up()
-    with session:
+    simulated = recording.metadata.get("source") == SIMULATED
+    title = f"echostep replay {path.name}{' (simulated)' if simulated else ''}"
+    with Session(tracker, title, "simulated" if simulated else "replay", output, guide_to, recording) as session:
+        session.prepare()
         start_s = time.perf_counter()
-        session.track(recording.portions(), lambda: recording.fraction)
+        portions = recording.portions()
+        if not output.terminal:
+            portions = with_bar(portions, f"tracking {path.name}", lambda: recording.fraction)
+        session.track(portions, lambda: recording.fraction)
         elapsed_s = time.perf_counter() - start_s
-        if recording.truncated:
-            console.print(f"{path}: the recording ends in the middle of a record; all before it was used")
+        for line in skipped(recording, tracker.streams):
+            console.print(line, markup=False, highlight=False)
         session.finish(path.name, truth, elapsed_s)
         session.keep_page_open()
 
@@ -54,6 +63,6 @@ def tracker_of(recording: Recording, plan: Plan, tracking: TrackingOptions) -> T
     settings_path = tracking.settings_path
     text = read_settings(settings_path) if settings_path else metadata.get("settings_toml", "")
     settings = parse_settings(text, str(settings_path or path))
-    start = tracking.start or recorded_start(metadata, path)
+    start = start_given(tracking, plan) or recorded_start(metadata, path)
     seed = recorded_seed(metadata, path) if tracking.seed is None else tracking.seed
     return Tracker(plan, start, settings, seed, waits=metadata.get("start") == CHECK_IN_START)

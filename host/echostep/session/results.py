@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Result files of a tracked run, and its summary on the terminal.
 
 In: a tracker, its estimates, the true path where it is known. Out: track.csv, track.png and cues.csv in the output folder; a few lines. Owns nothing.
@@ -14,18 +15,21 @@ from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.metrics import Errors, Truth, errors
 from echostep.output.track_plot import draw_track, write_track
+from echostep.plan.model import Plan
+from echostep.plan.whereabouts import Whereabouts
 from echostep.session.console import console
 from echostep.tracker import Tracker
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What a run gave: `estimates`, the true path to compare with, and the computing time where it is worth printing."""
+    """What a run gave: `estimates`, the true path to compare with, the computing time where it is worth printing, and how much was lost."""
 
     title: str
     estimates: Sequence[Estimate]
     truth: Truth | None = None
     elapsed_s: float | None = None
+    losses: str = ""
 
 
 def output_folder(path: Path) -> Path:
@@ -38,29 +42,30 @@ def output_folder(path: Path) -> Path:
 
 
 def write_results(folder: Path, tracker: Tracker, guided: GuidedRun | None, result: Result) -> None:
-    """Write the files, then print the summary; raises EchostepError at the end when a file cannot be written."""
+    """Write the tables, print the summary, draw the picture; raises EchostepError at the end when a file cannot be written.
+
+    The picture comes last: drawing it takes longer than tracking a short walk.
+    """
     deviation = errors(result.estimates, result.truth) if result.truth else None
-    failure = _write_files(folder, tracker, guided, result, deviation)
+    failure = _write_tables(folder, guided, result)
+    if result.estimates:
+        _print_summary(result, tracker.plan, deviation)
+    failure = failure or _draw(folder, tracker, guided, result, deviation)
     if not result.estimates:
         console.print(
             "No estimate: the foot never stood still, or no MTx bytes came; without an MTx, no stride was seen."
         )
         return
-    _print_summary(result, deviation, "" if failure else f"; track.csv and track.png are in {folder}")
+    if not failure:
+        console.print(f"files: track.csv and track.png in {folder}")
     if failure:
         raise failure
 
 
-def _write_files(
-    folder: Path, tracker: Tracker, guided: GuidedRun | None, result: Result, deviation: Errors | None
-) -> EchostepError | None:
-    """Write all files; an error is returned, so that the summary is printed before it is raised."""
-    title = f"{result.title}: mean error {deviation.mean_m:.2f} m" if deviation else result.title
-    route = guided.route if guided else None
+def _write_tables(folder: Path, guided: GuidedRun | None, result: Result) -> EchostepError | None:
+    """Write track.csv and cues.csv; an error is returned, so that the summary is printed before it is raised."""
     try:
         write_track(folder / "track.csv", result.estimates)
-        beacons = tracker.beacon_places(result.estimates[-1].t_s) if result.estimates else []
-        draw_track(folder / "track.png", tracker.plan, result.estimates, result.truth, title, route, beacons)
         if guided:
             guided.write(folder / "cues.csv")
     except OSError as error:
@@ -68,16 +73,46 @@ def _write_files(
     return None
 
 
-def _print_summary(result: Result, deviation: Errors | None, written: str) -> None:
+def _draw(
+    folder: Path, tracker: Tracker, guided: GuidedRun | None, result: Result, deviation: Errors | None
+) -> EchostepError | None:
+    """Draw track.png; an error is returned."""
+    title = f"{result.title}: mean error {deviation.mean_m:.2f} m" if deviation else result.title
+    route = guided.route if guided else None
+    beacons = tracker.beacon_places(result.estimates[-1].t_s) if result.estimates else []
+    try:
+        draw_track(folder / "track.png", tracker.plan, result.estimates, result.truth, title, route, beacons)
+    except OSError as error:
+        return EchostepError(f"{folder}: cannot draw the track: {error.strerror}")
+    return None
+
+
+def summary_words(estimates: Sequence[Estimate], truth: Truth | None) -> str:
+    """How well a run went, in a sentence for the page."""
+    if not estimates:
+        return "no position was found"
+    deviation = errors(estimates, truth) if truth else None
+    if deviation is None:
+        return f"{len(estimates)} positions in {estimates[-1].t_s - estimates[0].t_s:.0f} s"
+    return f"mean error {deviation.mean_m:.2f} m, at most {deviation.max_m:.2f} m"
+
+
+def _print_summary(result: Result, plan: Plan, deviation: Errors | None) -> None:
+    """The summary, a fact a line."""
     if deviation is not None:
         console.print(
             f"error: mean {deviation.mean_m:.2f} m, sd {deviation.sd_m:.2f}, max {deviation.max_m:.2f}, "
-            f"end {deviation.ending_m:.2f} m; RMSE {deviation.rmse_m:.2f} m; "
-            f"truth inside the 95 % ellipse {100 * deviation.coverage95:.0f} % of the time"
+            f"end {deviation.ending_m:.2f} m; RMSE {deviation.rmse_m:.2f} m"
         )
-    estimates = result.estimates
+        console.print(f"95 % ellipse: holds the truth {100 * deviation.coverage95:.0f} % of the time")
+    estimates, end = result.estimates, result.estimates[-1]
+    if result.losses:
+        console.print(f"walk: {result.losses}", highlight=False)
+    if words := Whereabouts(plan).words(end.x_m, end.y_m, end.level):
+        floor = f", {plan.levels[end.level].name}" if len(plan.levels) > 1 else ""
+        console.print(f"end: {words}{floor}", markup=False, highlight=False)
     if result.elapsed_s:
         span_s = estimates[-1].t_s - estimates[0].t_s
         speed = span_s / result.elapsed_s
-        console.print(f"{span_s:.0f} s of walk in {result.elapsed_s:.2f} s: {speed:.0f} x real time")
-    console.print(f"{len(estimates)} estimates, sha256 {digest(estimates)[:16]}{written}")
+        console.print(f"speed: {span_s:.0f} s of walk in {result.elapsed_s:.2f} s, {speed:.0f} x real time")
+    console.print(f"estimates: {len(estimates)}, sha256 {digest(estimates)[:16]}")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One tracked run: the tracker, and everything that shows, publishes, guides or records what it estimates.
 
 In: a tracker, portions of chunks. Out: estimates to the views, the page, the commander and the recording; result files at the end.
@@ -21,16 +22,22 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.metrics import Truth
 from echostep.output.derived import Derived
 from echostep.output.terminal import TerminalView
-from echostep.page.live import LivePage
+from echostep.page.elements.true_position import TruePath
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Portion
+from echostep.recording.clock import clock_of
+from echostep.recording.reading import Recording
 from echostep.recording.recorder import Recorder
-from echostep.session.console import console
+from echostep.session.browser import open_browser
+from echostep.session.console import console, print_notices
+from echostep.session.losses import Losses
 from echostep.session.options import OutputOptions
-from echostep.session.results import Result, write_results
+from echostep.session.progress import progress_line
+from echostep.session.results import Result, summary_words, write_results
 from echostep.tracker import Tracker
 
 if TYPE_CHECKING:
+    from echostep.page.live import LivePage
     from echostep.team.publish import Publishing, Source
 
 PAGE_POLL_S = 0.2
@@ -40,14 +47,25 @@ class Session:
     """Serves the page and publishes estimates while it is entered; `track` feeds the tracker, `finish` writes the results."""
 
     def __init__(
-        self, tracker: Tracker, title: str, source: Source, output: OutputOptions, guide_to: RoutePlace | None = None
+        self,
+        tracker: Tracker,
+        title: str,
+        source: Source,
+        output: OutputOptions,
+        guide_to: RoutePlace | None = None,
+        recorded: Recording | None = None,
     ) -> None:
-        """`source`: origin of the estimates, as a commander is told. Raises EchostepError when no route leads to `guide_to`."""
+        """`source`: origin of the estimates, as a commander is told; `recorded`: what is replayed.
+
+        Raises EchostepError when no route leads to `guide_to`.
+        """
         self.tracker = tracker
         self.title = title
         self.source = source
+        self.recorded = recorded
         self.output = output
         self.guided = GuidedRun(tracker, guide_to) if guide_to else None
+        self.losses = Losses(tracker)
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
         self._publishing: Publishing | None = None
@@ -68,23 +86,43 @@ class Session:
         address = self.output.page
         if address is None:
             return
-        page = LivePage(self.tracker, self.title, address, self.guided, replay=self.source == "replay")
-        self.page = opened.enter_context(page)
+        from echostep.page.live import LivePage
+
+        page = LivePage(
+            self.tracker,
+            self.title,
+            address,
+            self.guided,
+            replay=self.recorded is not None,
+            keeps=self.source == "simulated",
+        )
         console.print(f"The page: {page.url}", highlight=False)
+        self.page = opened.enter_context(page)
+        if self.output.browser and open_browser(page.url):
+            page.wait_for_page()
+
+    def prepare(self) -> None:
+        """Compile what is not compiled yet, before the first bytes come."""
+        text = "Preparing; the first time on a computer its kernels are compiled, which takes about a minute"
+        if self.page:
+            self.page.announce(f"{text[0].lower()}{text[1:]}")
+        with progress_line(text):
+            self.tracker.warm_up()
+
+    def show_truth(self, truth: TruePath) -> None:
+        """Show the true position beside the estimate, on the page."""
+        if self.page:
+            self.page.truth = truth
 
     def _open_publishing(self, opened: ExitStack) -> None:
         if self.output.outlet is None:
             return
         from echostep.team.publish import Publishing
 
+        clock = clock_of(self.recorded.metadata) if self.recorded else None
         print_line = partial(console.print, markup=False, highlight=False)
-        publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line)
+        publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line, clock)
         self._publishing = opened.enter_context(publishing)
-
-    @property
-    def watched(self) -> bool:
-        """Whether the run is shown, on the terminal or on the page."""
-        return self.output.terminal or self.output.page is not None
 
     def track(
         self,
@@ -96,14 +134,15 @@ class Session:
 
         `progress` gives the finished fraction, 0 to 1. `recorder` gets the derived messages of each portion, after the portion was shown.
         """
-        derived = Derived(self.tracker)
-        view = TerminalView(self.tracker, self.title, progress, console) if self.output.terminal else None
+        derived = Derived(self.tracker) if recorder else None
+        shown = self.output.terminal and console.is_terminal
+        view = TerminalView(self.tracker, self.title, progress, console) if shown else None
         with view or nullcontext():
             try:
                 for portion in portions:
                     estimates = self._take(portion)
                     self._show(estimates, view)
-                    if recorder:
+                    if recorder and derived:
                         recorder.write_derived(derived.take(portion, estimates))
             except KeyboardInterrupt:
                 self._interrupted = True
@@ -115,6 +154,7 @@ class Session:
         estimates = self.tracker.take(portion)
         if self.page:
             self.page.publish(portion)
+            print_notices(self.page.notices)
         self.estimates += estimates
         if self._publishing:
             self._publishing.publish(estimates)
@@ -130,8 +170,18 @@ class Session:
             _print_spoken(cues)
 
     def finish(self, title: str, truth: Truth | None = None, elapsed_s: float | None = None) -> None:
-        """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written."""
-        write_results(self.output.folder, self.tracker, self.guided, Result(title, self.estimates, truth, elapsed_s))
+        """Write track.csv, track.png and cues.csv and print a summary; raises EchostepError when a file cannot be written.
+
+        The page is told that the run has ended, and how well it went.
+        """
+        if self.page:
+            self.page.end(summary_words(self.estimates, truth))
+        write_results(
+            self.output.folder,
+            self.tracker,
+            self.guided,
+            Result(title, self.estimates, truth, elapsed_s, self.losses.describe()),
+        )
 
     def keep_page_open(self) -> None:
         """Serve the page after the run: while a browser shows it, or until Ctrl-C if that was asked for."""
@@ -143,6 +193,7 @@ class Session:
         try:
             while stays or page.pages:
                 time.sleep(PAGE_POLL_S)
+                print_notices(page.notices)
         except KeyboardInterrupt:
             pass
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A simulated run: a walk through a building with a board and an MTx.
 
 In: a plan, waypoints, a seed, a board. Out: the chunks of both ports in order of arrival, and the truth. Owns the board.
@@ -5,6 +6,7 @@ In: a plan, waypoints, a seed, a board. Out: the chunks of both ports in order o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -99,6 +101,14 @@ class Scenario:
         arrivals = START_NS + np.rint(self.mtx.portion_s * 1e9).astype(np.int64)
         for t_ns, part in zip(arrivals.tolist(), self.mtx.portions, strict=True):
             yield Chunk(MTX, t_ns, part)
+
+
+def start_of(plan: Plan, waypoints: Sequence[Waypoint]) -> Pose:
+    """Where a walk along these waypoints begins, and in which direction."""
+    (x, y), (to_x, to_y) = waypoints[0][:2], waypoints[1][:2]
+    begin_m = waypoints[0][3] if len(waypoints[0]) > 3 else 0.0
+    level = min(range(len(plan.levels)), key=lambda k: abs(plan.levels[k].height_m - begin_m))
+    return Pose(x, y, math.atan2(to_y - y, to_x - x), level)
 
 
 def demo_scenario(plan: Plan, seed: int, board: Board) -> Scenario:

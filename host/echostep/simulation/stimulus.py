@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Inputs of the simulated board's sensors, as rows of one millisecond (host/DESIGN.md, the bench).
 
 In: a walk, the levels of a building, a seeded generator. Out: rows for a board. Owns the sensors.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A connection to a broker, run by the thread that uses it.
 
 In: an endpoint. Out: a connected paho client. Owns nothing. Every fault is raised as an OSError, malformed packets of the broker included.

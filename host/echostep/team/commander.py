@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The commander's view: a team on one plan, the most urgent states first.
 
 In: a plan, a broker's URL. Out: a table on the terminal, a picture, or the roster as JSON. Owns the loop.
@@ -30,15 +31,15 @@ from echostep.team.report import checked_name
 from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
 
 REFRESH_S = 0.25
-ALL_COLUMNS_WIDTH = 110  # characters; a narrower terminal shows fewer columns
+ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
 MAX_COLUMN_WIDTH = 24  # characters
 LOW_BATTERY_PERCENT = 20
 NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
 COLUMNS = {
-    "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "to start": "right",
+    "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "where": "left", "to start": "right",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
-OPTIONAL_COLUMNS = ("looks", "nearest m", "walked m")  # not shown on a narrow terminal
+LEAST_WIDTHS = {"looks": 110, "nearest m": 110, "walked m": 110, "where": 136}  # of a terminal that shows these columns
 STYLES = {
     MemberState.LOST: "bold white on red", MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
     MemberState.WAITING: "cyan", MemberState.TRACKING: "green", MemberState.ENDED: "grey62",
@@ -99,7 +100,7 @@ def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns:
     grid = Table(
         title=f"{plan.name}: {summary(members, now_s)}", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
     )
-    names = [name for name in COLUMNS if columns >= ALL_COLUMNS_WIDTH or name not in OPTIONAL_COLUMNS]
+    names = [name for name in COLUMNS if columns >= LEAST_WIDTHS.get(name, 0)]
     duplicates = roster.duplicates(now_s)
     rows = [_cells(m, members, plan, now_s, duplicates) for m in members]
     left = columns - 2
@@ -140,6 +141,7 @@ def _cells(
         "x, y m": f"{p.x_m:.1f}, {p.y_m:.1f}" if p else "",
         "±95% m": f"{p.radius95_m:.1f}" if p else "",
         "floor": p.floor_name if p else "",
+        "where": p.where if p else "",
         "to start": "" if from_start is None else f"{from_start:.0f} m",
         "looks": "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
         "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cursor on Target: a report as an event for TAK, over UDP, TCP or TLS.
 
 In: reports with a position on Earth. Out: `event` elements [CoT Event 2.0 schema, MITRE], one per datagram, or one after the other on a
@@ -5,7 +6,7 @@ stream. Owns one socket, used by one thread. XML is made by the standard library
 the newest position must go first.
 
 `ce` and `le` follow the schema: one standard deviation, `ce` along the direction of the largest variance, the plan's uncertainty included.
-The remarks contain the 95 % radius.
+The remarks contain the 95 % radius. `start` is when the position was recorded, in a replay; `time` is when it was sent.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from echostep.team.report import Report
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 UNKNOWN = "9999999.0"  # value of `hae` and `le` when they are not known [CoT Event 2.0 schema]
-HOW = {"live": "m-f", "replay": "m-f", "simulated": "m-s"}  # made by a machine: by fusion, by simulation
+HOW = {"live": "m-f", "replay": "m-p", "simulated": "m-s"}  # made by a machine: fused now, passed on, simulated
 SOCKET_TIMEOUT_S = 3.0  # for connecting and for sending
 GROUPS = {
     "White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple",
@@ -37,7 +38,12 @@ def event(report: Report) -> bytes | None:
     if place is None or position is None:
         return None
     top = ElementTree.Element("event", version="2.0", uid=uid(report.team, report.name), type=FRIEND_ON_FOOT)
-    top.attrib |= {"time": report.time, "start": report.time, "stale": report.stale, "how": HOW[report.source]}
+    top.attrib |= {
+        "time": report.time,
+        "start": report.recorded or report.time,
+        "stale": report.stale,
+        "how": HOW[report.source],
+    }
     hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
     point = {
         "lat": f"{place.lat_deg:.8f}",
@@ -69,11 +75,11 @@ def uid(team: str, name: str) -> str:
 
 
 def remarks(report: Report) -> str:
-    """Status, 95 % radius, floor, age, and other facts for which the event has no field."""
+    """Status, 95 % radius, room and floor, age, and other facts for which the event has no field."""
     p = report.position
     words = [f"{report.status}, 95 % within {p.radius95_m:.1f} m" if p else report.status]
     if p:
-        words.append(p.floor_name)
+        words.append(", ".join(filter(None, (p.where, p.floor_name))))
         if p.age_s > 1.0:
             words.append(f"no estimate for {p.age_s:.0f} s")
     if report.motion:
@@ -81,6 +87,8 @@ def remarks(report: Report) -> str:
     words.append(f"team {report.team}")
     if report.source != "live":
         words.append(report.source)
+    if report.recorded:
+        words.append(f"recorded {report.recorded}")
     return "; ".join(words)
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The URL of a broker or of a TAK receiver, parsed into an `Endpoint`.
 
 In: a URL. Out: an `Endpoint`, its TLS context. Owns nothing. Errors name the URL without its password, and what to do.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A position on the plan as latitude and longitude.
 
 In: a plan with a georeference, a position, a heading. Out: `ReportedPlace`. Owns the projection.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The inbox: a bounded buffer between the broker's messages and the commander's view, which empties it a few times a second.
 
 In: messages from a `Listener`, in its own thread. Out: the newest messages of each topic, on demand. Owns the thread and the limits: a flood on one

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """MQTT: sends reports to a broker, and receives the reports of a team from it.
 
 In: reports; or an endpoint to subscribe at. Out: messages on `echostep/<team>/<wearer>/estimate` (retained, QoS 1: a commander that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The outbox: a bounded queue of reports between the tracker's thread and a network connection.
 
 In: reports, from the tracker's thread. Out: the same reports, numbered and dated, through a `Transport`, from a thread of its own. Owns

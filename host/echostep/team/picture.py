@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A picture of the team on its plan.
 
 In: a plan, members. Out: a PNG or SVG. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Publishing: a tracker's estimates as reports, to each endpoint of `--publish`.
 
 In: estimates, in the tracker's thread. Out: reports, to one outbox per endpoint. Owns the outboxes, and the history that steps, distance walked and
@@ -21,12 +22,13 @@ from echostep.board.health import board_findings
 from echostep.errors import EchostepError
 from echostep.localization.estimate import CHI2_95, Estimate
 from echostep.plan.model import Level, Plan
+from echostep.plan.whereabouts import Whereabouts
 from echostep.team.cot import StreamTransport, UdpTransport
 from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.georeference import GroundPlane
 from echostep.team.mqtt import MqttTransport
 from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
-from echostep.team.report import Motion, Position, Report, StreamReport, printable
+from echostep.team.report import Motion, Position, Report, StreamReport, moment, printable
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -39,13 +41,23 @@ POWER_SUPPLIES = Path("/sys/class/power_supply")
 class Publishing:
     """`publish` offers new estimates to all outboxes; leaving the context sends the last ones and prints the counts."""
 
-    def __init__(self, outlet: Outlet, tracker: Tracker, source: Source, print_line: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        outlet: Outlet,
+        tracker: Tracker,
+        source: Source,
+        print_line: Callable[[str], None],
+        recorded: Callable[[int], float] | None = None,
+    ) -> None:
+        """`recorded`: arrival time in ns -> Unix time of a recording that is replayed."""
+        self._recorded = recorded
         self._tracker, self._print_line = tracker, print_line
         self._history, self._levels = ReportHistory(), tracker.plan.levels
         self._history_before_estimate, self._offered_s = ReportHistory(), time.monotonic()
         run = secrets.token_hex(4)
         self._empty = empty_report(tracker.plan, outlet.name, outlet.team, run, source)
         self._ground = GroundPlane(tracker.plan) if tracker.plan.georeference else None
+        self._whereabouts = Whereabouts(tracker.plan)
         transports = [(_transport(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(transport, name, print_line) for transport, name in transports]
         self._offer(self._empty)
@@ -58,9 +70,21 @@ class Publishing:
         self._offered_s = math.inf
         streams = self._history.streams(self._tracker, estimates[0].t_s)
         for estimate in estimates:
-            self._offer(
-                report_of(self._empty, self._levels, self._ground, estimate, self._history.motion(estimate), streams)
-            )
+            where = printable(self._whereabouts.words(estimate.x_m, estimate.y_m, estimate.level), 100)
+            motion = self._history.motion(estimate)
+            report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)
+            assert report.position
+            position, recorded = replace(report.position, where=where), self._recorded_at(estimate.t_s)
+            self._offer(replace(report, position=position, recorded=recorded))
+
+    def _recorded_at(self, t_s: float) -> str | None:
+        """When an estimate was recorded; None in a live run, and where the recording has no time of day."""
+        if self._recorded is None:
+            return None
+        try:
+            return moment(self._recorded(self._tracker.arrival_ns(t_s)))
+        except (ValueError, OverflowError, OSError):  # damaged times
+            return None
 
     def _offer_heartbeat(self, now_s: float) -> None:
         """Before the first estimate, report the streams every HEARTBEAT_S."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The report that a tracker sends to its commander, as JSON.
 
 In: a `Report`, or the bytes of a payload from an untrusted sender. Out: the bytes, or the `Report`. Owns nothing. The limits of each field
@@ -63,6 +64,9 @@ class Position:
         float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="height of the floor under the wearer, on the plan's scale, m")
     ]
     z_sd_m: Annotated[float, Meta(ge=0.0, le=LIMIT_M, description="standard deviation of z_m, m")]
+    where: Annotated[
+        str, Meta(max_length=100, description="the room or the corridor, in words; empty where the plan names none")
+    ] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +143,9 @@ class Report:
     superseded: Annotated[
         int, Meta(ge=0, le=2**53, description="reports that a newer one overtook before they could be sent")
     ]
+    recorded: Annotated[
+        Moment | None, Meta(description="when the position was recorded, in a replay: UTC, by the recorder's clock")
+    ] = None
 
     @property
     def sent_s(self) -> float:
@@ -181,7 +188,7 @@ def decode(payload: bytes) -> Report:
     if (p is None) != (report.status == "waiting"):
         raise BadReportError("status and position contradict each other")
     findings = report.streams.findings if report.streams else ()
-    for text in (report.plan, report.version, p.floor_name if p else "", *findings):
+    for text in (report.plan, report.version, p.floor_name if p else "", p.where if p else "", *findings):
         if not _printable(text):
             raise BadReportError("unprintable text")
     return report

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The roster: the last report and the state of each member of a team.
 
 In: payloads from untrusted senders, with topic and time of arrival on the commander's clock. Out: `Member`s, the most urgent state first,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A device's clock on the host's clock, by the lower envelope of its arrival times.
 
 In: device seconds and arrival times. Out: device seconds -> host seconds, and back. Owns nothing: the caller keeps the `ArrivalClock`.
@@ -28,6 +29,10 @@ BUCKET_S = 1.0  # device time for which one point is kept; by reason
 KEPT_BUCKETS = 60  # one minute; by reason
 DRIFT_SD = 130e-6  # s/s, standard deviation of the drift between two crystals; by reason
 LEAST_DELAY_S = 20e-6  # lower bound of the mean delay in the fit; by reason: the resolution of arrival times
+EARLY_S = 0.02  # an arrival further below the line needs others like it; by reason: half the error that a damaged one may cause
+CONFIRMING = (
+    3  # different arrival times that are believed together; by reason: two damaged ones within a minute are rare
+)
 
 
 class ArrivalClock(Protocol):
@@ -42,6 +47,10 @@ class ArrivalClock(Protocol):
     offset_s: float
     drift: float
     pivot_s: float
+    early: int  # arrivals below the line by more than `EARLY_S` that are not believed yet
+    early_bucket: int  # of the first of them
+    early_newest_ns: int  # the newest of them
+    early_lag_s: float  # of the least early one
 
 
 @kernel
@@ -49,6 +58,7 @@ def reset(clock: ArrivalClock) -> None:
     """Discard all points and the line."""
     clock.kept = 0
     clock.begun = 0
+    clock.early = 0
     clock.origin_ns = 0
     clock.offset_s = clock.drift = clock.pivot_s = 0.0
 
@@ -62,6 +72,10 @@ def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
     lag = (t_arrival_ns - clock.origin_ns) * 1e-9 - device_s
     bucket = int(device_s // BUCKET_S)
     last = clock.kept - 1
+    if last >= 0 and lag < line(clock, device_s) - EARLY_S:
+        lag = _believed_lag(clock, bucket, lag, t_arrival_ns)
+        if lag == np.inf:
+            return
     if last < 0 or bucket > clock.bucket[last]:
         if clock.kept == KEPT_BUCKETS:
             clock.bucket[:-1] = clock.bucket[1:].copy()
@@ -74,8 +88,29 @@ def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
         _fit(clock)
     elif bucket == clock.bucket[last] and lag < clock.lag_s[last]:
         clock.device_s[last], clock.lag_s[last] = device_s, lag
-        if lag < clock.offset_s + clock.drift * (device_s - clock.pivot_s):
+        if lag < line(clock, device_s):
             _fit(clock)
+
+
+@kernel
+def line(clock: ArrivalClock, device_s: float) -> float:
+    """Lag of undelayed bytes of device time `device_s`."""
+    return clock.offset_s + clock.drift * (device_s - clock.pivot_s)
+
+
+@kernel
+def _believed_lag(clock: ArrivalClock, bucket: int, lag: float, t_arrival_ns: int) -> float:
+    """The lag to use for an early arrival: that of the least early one when `CONFIRMING` of them came within the kept buckets, else infinite."""
+    if clock.early == 0 or bucket - clock.early_bucket > KEPT_BUCKETS:
+        clock.early, clock.early_bucket, clock.early_lag_s = 1, bucket, lag
+    else:
+        clock.early += t_arrival_ns != clock.early_newest_ns
+        clock.early_lag_s = max(clock.early_lag_s, lag)
+    clock.early_newest_ns = t_arrival_ns
+    if clock.early < CONFIRMING:
+        return np.inf
+    clock.early = 0
+    return clock.early_lag_s
 
 
 @kernel
@@ -132,7 +167,7 @@ def most_probable_slope(x: Floats, y: Floats, hull: Ints, pivot: float, weight: 
 @kernel
 def to_arrival_s(clock: ArrivalClock, device_s: float) -> float:
     """Host seconds at which undelayed bytes of device time `device_s` arrive; `device_s` itself before the first update."""
-    lag = clock.offset_s + clock.drift * (device_s - clock.pivot_s)
+    lag = line(clock, device_s)
     return clock.origin_ns * 1e-9 + device_s + lag
 
 

@@ -1,7 +1,15 @@
+# SPDX-License-Identifier: MIT
 """Wrapping device counters -> device seconds that never wrap.
 
 In: counter values with their arrival times. Out: seconds since the device's first reset. Owns nothing: the caller keeps the `DeviceClock`.
-After a restart of the device, its arrival time sets the new epoch.
+
+Counters are protected by checksums, arrival times are not: a recording may have flipped bits, and a host that slept may have a clock that stood
+still. So a message whose counter goes on from the newest one keeps its time by the counter, whatever its arrival time; a message whose counter jumps
+needs an arrival time that agrees. What contradicts is counted. Only several arrival times that contradict in the same way are believed:
+
+    the counter fits a device that started since the newest message    a restart: the arrival time sets the new epoch
+    the arrival is whole wraps of the counter later                    a gap
+    else                                                               the host's clock stepped or stood still: the counter is right
 """
 
 from __future__ import annotations
@@ -13,11 +21,14 @@ import numpy as np
 from echostep.arrays import record_dtype
 from echostep.jit import kernel
 from echostep.timing import arrival_envelope as arrival
-from echostep.timing.arrival_envelope import KEPT_BUCKETS, ArrivalClock
+from echostep.timing.arrival_envelope import CONFIRMING, KEPT_BUCKETS, ArrivalClock
 
-AHEAD_S = 1.0  # a counter further ahead of its arrival is impossible: a restart or damaged bytes; by reason
-BEHIND_S = 1.0  # greatest age of a message relative to the newest one; by reason: a ping is sent after its ranging
-JUMPS_TO_RESTART = 3  # impossible values in a row that make a restart; by reason
+# All by reason.
+AHEAD_S = 1.0  # a counter further ahead of its arrival contradicts it; the arrivals of a run agree to this
+BEHIND_S = 1.0  # greatest age of a message relative to the newest one: a ping is sent after its ranging
+SMOOTH_S = 1.0  # a counter that is at most this far from the newest goes on from it
+RATE_ERROR = 400e-6  # s/s, greatest difference of two crystals over a gap
+BACKLOG_S = 1.0  # late arrivals of a counter that goes on are believed after so long: a process that was stopped reads its backlog in less
 
 
 class DeviceClock(ArrivalClock, Protocol):
@@ -27,12 +38,17 @@ class DeviceClock(ArrivalClock, Protocol):
     modulus: int
     started: int  # whether there was a value
     newest: int  # newest value, unwrapped
-    newest_arrival_ns: int
     epoch_s: float  # device seconds of the unwrapped value 0
-    jumped: int  # impossible values since the last possible one
+    run: int  # different arrival times that contradicted since the last one that agreed
+    run_begin_ns: int  # the first of them
+    run_newest_ns: int
+    run_late_s: float  # by how much the first of them was later than its counter says
+    contradicted: int  # messages whose arrival time contradicts their counter
+    jumps: int  # those of them that were dropped
     restarts: int
-    jumps: int  # impossible values that were dropped
+    steps: int  # of the host's clock
     newest_s: float  # used by the timeline: `t_s` of the newest message, NaN before it
+    behind: int  # used by the timeline: messages far behind it, in a row
 
 
 CLOCK = record_dtype(DeviceClock, array_size=KEPT_BUCKETS)
@@ -46,43 +62,94 @@ def new_clock(unit_s: float, modulus: int) -> Any:
 
 
 @kernel
-def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool) -> float:
-    """Device seconds of a counter value; NaN for an impossible one (a jump, counted). `restarted`: in the first message after a start."""
+def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool, leads: bool) -> float:
+    """Device seconds of a counter value; NaN for one that is dropped (a jump, counted).
+
+    `restarted`: in the first message after a start. `leads`: no other clock is above this one; else a contradiction is settled by a new epoch.
+    """
     if not clock.started:
         return _begin(clock, value, t_arrival_ns, value * clock.unit_s)
-    delta, possible = _delta(clock, value, t_arrival_ns)
-    if not possible:
-        clock.jumped += 1
-        if not restarted and clock.jumped < JUMPS_TO_RESTART:
-            clock.jumps += 1
-            return np.nan
-        clock.restarts += 1
-        return _begin(clock, value, t_arrival_ns, arrival.to_device_s(clock, t_arrival_ns * 1e-9))
-    clock.jumped = 0
-    unwrapped = clock.newest + delta
-    seconds = clock.epoch_s + unwrapped * clock.unit_s
-    if delta > 0:
-        clock.newest, clock.newest_arrival_ns = unwrapped, t_arrival_ns
-        arrival.update(clock, seconds, t_arrival_ns)
-    return seconds
+    back = min(int(BEHIND_S / clock.unit_s), clock.modulus // 2)
+    delta = (value - clock.newest + back) % clock.modulus - back
+    late_s = _elapsed_s(clock, t_arrival_ns) - delta * clock.unit_s
+    wraps = max(round(late_s / (clock.modulus * clock.unit_s)), 0)
+    if not _agrees(clock, delta, late_s, wraps):
+        return _contradiction(clock, value, delta, t_arrival_ns, restarted, leads)
+    clock.run = 0
+    return _advance(clock, delta + wraps * clock.modulus, t_arrival_ns)
 
 
 @kernel
-def _delta(clock: DeviceClock, value: int, t_arrival_ns: int) -> tuple[int, bool]:
-    """Counts from the newest value to this one, whole wraps by arrival times included, and whether the value is possible."""
-    back = min(int(BEHIND_S / clock.unit_s), clock.modulus // 2)
-    delta = (value - clock.newest + back) % clock.modulus - back
-    elapsed_s = (t_arrival_ns - clock.newest_arrival_ns) * 1e-9
-    wraps = round((elapsed_s - delta * clock.unit_s) / (clock.modulus * clock.unit_s))
-    delta += max(wraps, 0) * clock.modulus
-    return delta, delta * clock.unit_s <= elapsed_s + AHEAD_S
+def _elapsed_s(clock: DeviceClock, t_arrival_ns: int) -> float:
+    """Time from the arrival of the newest value, had it not been delayed, to this arrival."""
+    newest_s = clock.epoch_s + clock.newest * clock.unit_s
+    return (t_arrival_ns - clock.origin_ns) * 1e-9 - newest_s - arrival.line(clock, newest_s)
+
+
+@kernel
+def _agrees(clock: DeviceClock, delta: int, late_s: float, wraps: int) -> bool:
+    """Whether an arrival is about where a counter `delta` counts from the newest one puts it; whole wraps of one that goes on need confirmation."""
+    if wraps > 0 and delta * clock.unit_s <= SMOOTH_S:
+        return False
+    limit_s = AHEAD_S + RATE_ERROR * abs(late_s + delta * clock.unit_s)
+    return abs(late_s - wraps * clock.modulus * clock.unit_s) <= limit_s
+
+
+@kernel
+def _contradiction(
+    clock: DeviceClock, value: int, delta: int, t_arrival_ns: int, restarted: bool, leads: bool
+) -> float:
+    """Device seconds of a value whose arrival contradicts it; NaN while it may be damaged."""
+    clock.contradicted += 1
+    elapsed_s, smooth = _elapsed_s(clock, t_arrival_ns), delta * clock.unit_s <= SMOOTH_S
+    late_s = elapsed_s - delta * clock.unit_s
+    _extend_run(clock, late_s, t_arrival_ns)
+    backlog = clock.kept > 1 and clock.run_newest_ns - clock.run_begin_ns < BACKLOG_S * 1e9
+    unsettled = clock.run < CONFIRMING or (smooth and late_s > 0.0 and backlog)
+    if unsettled and (smooth or not restarted):
+        if smooth:
+            return _advance(clock, delta, -1)
+        clock.jumps += 1
+        return np.nan
+    if not leads or (not smooth and value * clock.unit_s <= elapsed_s + AHEAD_S):
+        clock.restarts += 1
+        return _begin(clock, value, t_arrival_ns, max(arrival.to_device_s(clock, t_arrival_ns * 1e-9), now_s(clock)))
+    clock.run = 0
+    wraps = max(round(late_s / (clock.modulus * clock.unit_s)), 0)
+    if abs(late_s - wraps * clock.modulus * clock.unit_s) > AHEAD_S + RATE_ERROR * abs(elapsed_s):
+        clock.steps += 1
+        clock.origin_ns += round(late_s * 1e9)
+        wraps = 0
+    return _advance(clock, delta + wraps * clock.modulus, t_arrival_ns)
+
+
+@kernel
+def _extend_run(clock: DeviceClock, late_s: float, t_arrival_ns: int) -> None:
+    """Count one more arrival time that contradicts; another one than those before begins a new run. Messages of one chunk count once."""
+    if clock.run == 0 or abs(late_s - clock.run_late_s) > AHEAD_S:
+        clock.run, clock.run_begin_ns, clock.run_late_s = 1, t_arrival_ns, late_s
+    elif t_arrival_ns != clock.run_newest_ns:
+        clock.run += 1
+    clock.run_newest_ns = t_arrival_ns
+
+
+@kernel
+def _advance(clock: DeviceClock, delta: int, t_arrival_ns: int) -> float:
+    """Device seconds of the value `delta` counts from the newest one, which it becomes when it is newer; -1: without an arrival time to use."""
+    unwrapped = clock.newest + delta
+    seconds = clock.epoch_s + unwrapped * clock.unit_s
+    if delta > 0:
+        clock.newest = unwrapped
+        if t_arrival_ns >= 0:
+            arrival.update(clock, seconds, t_arrival_ns)
+    return seconds
 
 
 @kernel
 def _begin(clock: DeviceClock, value: int, t_arrival_ns: int, seconds: float) -> float:
     """Begin a new epoch: `value` is at device time `seconds`."""
     clock.started = 1
-    clock.newest, clock.newest_arrival_ns, clock.jumped = value, t_arrival_ns, 0
+    clock.newest, clock.run = value, 0
     clock.epoch_s = seconds - value * clock.unit_s
     arrival.reset(clock)
     arrival.update(clock, seconds, t_arrival_ns)

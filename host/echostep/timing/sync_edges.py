@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """SyncOut edges: which edge belongs to which MTx sample, and so the time of each sample.
 
 In: edges that the board has timed; sample counters with their time by arrival. Out: times of samples. Owns nothing: the caller keeps the
@@ -61,7 +62,7 @@ def reset(s: SyncEdges) -> None:
 @kernel
 def add(s: SyncEdges, edge: int, t_s: float) -> None:
     """Add an edge (u16 count) and its time, and measure the period."""
-    if s.seen == 0:
+    if s.seen == 0 or t_s - s.newest_s > KEPT * s.nominal_s:
         s.newest = s.first = edge
         s.first_s = t_s
     else:
@@ -91,7 +92,8 @@ def time_of(s: SyncEdges, counter: int, by_arrival_s: float) -> float:
                 return s.t_s[slot]
             break
     ahead = ((edge - s.newest + 0x8000) & 0xFFFF) - 0x8000
-    return s.newest_s + ahead * s.period_s
+    t_s = s.newest_s + ahead * s.period_s
+    return t_s if abs(t_s - by_arrival_s) < MATCH_PERIODS * s.nominal_s else np.nan
 
 
 @kernel

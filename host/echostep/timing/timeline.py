@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Timeline: board ticks, MTx sample counters and arrival times -> `t_s`.
 
 In: board messages and MTx samples with their time of arrival, many at once. Out: `t_s`, seconds of the board's clock since its first reset
@@ -19,6 +20,7 @@ from echostep.jit import kernel
 from echostep.timing import arrival_envelope as arrival
 from echostep.timing import device_clock as clocks
 from echostep.timing import sync_edges as sync
+from echostep.timing.arrival_envelope import CONFIRMING
 from echostep.timing.device_clock import DeviceClock
 from echostep.timing.sync_edges import SyncEdges
 
@@ -87,6 +89,16 @@ class Timeline:
         """Restarts of the board's clock."""
         return int(self._board["restarts"])
 
+    @property
+    def contradicted(self) -> int:
+        """Messages whose arrival time contradicts the counter of their device."""
+        return int(self._board["contradicted"] + self._mtx["contradicted"])
+
+    @property
+    def clock_steps(self) -> int:
+        """Steps of the host's clock, or times for which it stood still."""
+        return int(self._board["steps"] + self._mtx["steps"])
+
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any message."""
         clock = self._board if self._board["started"] else self._mtx
@@ -116,7 +128,10 @@ def _assign_times(
     b, m = 0, 0
     for message_index in range(len(board.value) + len(mtx.value)):
         if m == len(mtx.value) or (b < len(board.value) and board.row[b] <= mtx.row[m]):
+            steps = board_clock.steps
             times.board_s[b] = _board_time(board_clock, edges, board.value[b], board.t_arrival_ns[b], board.kind[b])
+            if board_clock.steps != steps:
+                mtx_clock.started = 0  # begun anew on the clock after the step
             times.board_message_index[b] = message_index
             b += 1
         else:
@@ -133,7 +148,7 @@ def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: 
     if kind == SILENT:
         return np.nan
     restarts = board.restarts
-    t_s = clocks.read(board, ticks, t_arrival_ns, kind == FIRST_MESSAGE)
+    t_s = clocks.read(board, ticks, t_arrival_ns, kind == FIRST_MESSAGE, True)
     if board.restarts != restarts:
         sync.reset(edges)
     if kind >= 0 and not np.isnan(t_s):
@@ -145,9 +160,12 @@ def _board_time(board: DeviceClock, edges: SyncEdges, ticks: int, t_arrival_ns: 
 def _mtx_time(
     board: DeviceClock, mtx: DeviceClock, edges: SyncEdges, counter: int, t_arrival_ns: int, latency_s: float
 ) -> float:
-    """`t_s` of an MTx sample, always later than the one before; NaN for an impossible counter."""
+    """`t_s` of an MTx sample, later than the one before; NaN for an impossible counter.
+
+    Only samples that are far behind several times in a row are believed: the newest time was wrong.
+    """
     restarts = mtx.restarts
-    device_s = clocks.read(mtx, counter, t_arrival_ns, False)
+    device_s = clocks.read(mtx, counter, t_arrival_ns, False, not board.started)
     if np.isnan(device_s):
         return np.nan
     if mtx.restarts != restarts:
@@ -158,7 +176,12 @@ def _mtx_time(
         by_arrival_s = arrival.to_device_s(board, (sampled_s + BOARD_LATENCY_S) * 1e9 * 1e-9)
         by_edge_s = sync.time_of(edges, counter, by_arrival_s)
         t_s = by_arrival_s if np.isnan(by_edge_s) else by_edge_s
-    if t_s <= mtx.newest_s:
+    if t_s < mtx.newest_s - clocks.BEHIND_S:
+        mtx.behind += 1
+        if mtx.behind < CONFIRMING:
+            return np.nan
+    elif t_s <= mtx.newest_s:
         t_s = mtx.newest_s + MIN_STEP_S
+    mtx.behind = 0
     mtx.newest_s = t_s
     return t_s

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Xsens MT protocol, sans-I/O: frames, both measurement messages, configuration, and the axes of the MT world.
 
 In: bytes from an MT's port. Out: batches of measurements that have passed every gate, and the bytes that configure the device.
@@ -10,11 +11,12 @@ CMT: the constants of Xsens' public C++ SDK (cmtdef.h), for what both documents 
 """
 
 from echostep.xsens.frames import MTDATA, MTDATA2, Frame, FrameReader, encode_frame
+from echostep.xsens.message import MtMessage
 from echostep.xsens.mtdata import PROJECT, OutputFormat, pack_mtdata
 from echostep.xsens.reader import MtBatch, MtxCounts, MtxLimits, MtxReader
 from echostep.xsens.sample import MtSample
 
 __all__ = [
-    "MTDATA", "MTDATA2", "PROJECT", "Frame", "FrameReader", "MtBatch", "MtSample", "MtxCounts", "MtxLimits", "MtxReader",
+    "MTDATA", "MTDATA2", "PROJECT", "Frame", "FrameReader", "MtBatch", "MtMessage", "MtSample", "MtxCounts", "MtxLimits", "MtxReader",
     "OutputFormat", "encode_frame", "pack_mtdata",
 ]  # fmt: skip

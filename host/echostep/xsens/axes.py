@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Orientations of an MT -> quaternions, and the MT's world frame -> the map frame. No other module converts MT axes.
 
 In: Euler angles, matrices or quaternions in one of the MT's worlds. Out: quaternions w x y z, sensor -> MT world or sensor -> map. Owns nothing.

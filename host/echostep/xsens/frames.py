@@ -1,12 +1,14 @@
+# SPDX-License-Identifier: MIT
 """Xsens frames: bytes -> message identifier and payload, in any split of the bytes.
 
 In: bytes of the port, in order. Out: position and length of each complete frame. Owns the unfinished frame (at most 2054 bytes) and the counts of
 rejected bytes.
 
-    FA | bus FF | message | length        | payload | checksum      length < FF
-    FA | bus FF | message | FF | length, 2 | payload | checksum      extended
+    FA | bus | message | length        | payload | checksum      length < FF
+    FA | bus | message | FF | length, 2 | payload | checksum      extended
 
-All bytes after FA sum to 0 mod 256 [Manual 5.3.1; LLCP, message structure and extended length].
+All bytes after FA sum to 0 mod 256 [Manual 5.3.1; LLCP, message structure and extended length]. The bus is FF for a device alone and for a
+master, and 1 upward for the devices of an Xbus or Awinda master.
 """
 
 from __future__ import annotations
@@ -20,14 +22,16 @@ from echostep.arrays import Ints, Octets
 from echostep.jit import kernel
 
 PREAMBLE = 0xFA  # this and the next two [Manual 5.3.1]
-BUS_ID = 0xFF
+BUS_ID = 0xFF  # of a device alone, and of a master
+FIRST_BUS, LAST_BUS = 1, 32  # of the devices of a master; the last: more than any master has, by reason
 EXTENDED = 0xFF
 MTDATA, MTDATA2, WAKE_UP, ERROR = 0x32, 0x36, 0x3E, 0x42  # message identifiers [LLCP]
+CONFIGURATION, OUTPUT_MODE, OUTPUT_SETTINGS = 0x0D, 0xD1, 0xD3  # the same: answers to requests
 MAX_LENGTH = 2048  # bytes, longest payload that an MT sends [LLCP, extended length]
 SHORTEST = 5  # bytes of a frame without payload
 
 SKIPPED, BAD_CHECKSUM, _TALLY = range(3)  # entries of a tally, and its length
-_MID, _BODY, _LENGTH, _CERTAIN, _COLUMNS = range(5)  # columns of a row of `_find_frames`, and their number
+_BUS, _MID, _BODY, _LENGTH, _CERTAIN, _COLUMNS = range(6)  # columns of a row of `_find_frames`, and their number
 _NO_HEADER, _UNFINISHED = -1, 0  # results of `_header`; else the header's size in bytes
 
 
@@ -36,16 +40,18 @@ class Frame(NamedTuple):
 
     mid: int
     payload: bytes
+    bus: int = BUS_ID
 
 
 class MtFrames(NamedTuple):
-    """Complete frames: identifier `mid` (n,), and first byte `body` (n,) and `length` (n,) of the payload in `stream`.
+    """Complete frames: `bus` (n,), identifier `mid` (n,), and first byte `body` (n,) and `length` (n,) of the payload in `stream`.
 
     `end` (n,): index, in the bytes just fed, behind the byte that completed the frame. That is the frame's last byte, or the last byte of a false
     frame that began before it and had to be rejected first.
     """
 
     stream: Octets
+    bus: Ints
     mid: Ints
     body: Ints
     length: Ints
@@ -81,24 +87,25 @@ class FrameReader:
         """Bytes of the unfinished frame."""
         return len(self._rest)
 
-    def scan(self, received: bytes) -> MtFrames:
-        """Frames completed by these bytes."""
+    def scan(self, received: bytes, *, ended: bool = False) -> MtFrames:
+        """Frames completed by these bytes. `ended`: no byte follows, so a frame that is still unfinished is rejected and searched inside."""
         stream = np.frombuffer(self._rest + received, np.uint8)
         rows = np.empty((len(stream) // SHORTEST, _COLUMNS), np.int64)
         tally = np.zeros(_TALLY, np.int64)
-        count, resume = _find_frames(stream, rows, tally)
+        count, resume = _find_frames(stream, ended, rows, tally)
         self.counts.skipped_bytes += int(tally[SKIPPED])
         self.counts.bad_checksum += int(tally[BAD_CHECKSUM])
         before = len(self._rest)
         self._rest = stream[resume:].tobytes()
-        mid, body, length, certain = rows[:count].T
-        return MtFrames(stream, mid, body, length, certain - before)
+        bus, mid, body, length, certain = np.ascontiguousarray(rows[:count].T)
+        return MtFrames(stream, bus, mid, body, length, certain - before)
 
-    def feed(self, received: bytes) -> list[Frame]:
+    def feed(self, received: bytes, *, ended: bool = False) -> list[Frame]:
         """Frames completed by these bytes, one by one."""
-        frames = self.scan(received)
-        rows = zip(frames.mid.tolist(), frames.body.tolist(), frames.length.tolist(), strict=True)
-        return [Frame(mid, frames.stream[body : body + length].tobytes()) for mid, body, length in rows]
+        frames = self.scan(received, ended=ended)
+        columns = (frames.bus, frames.mid, frames.body, frames.length)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        return [Frame(mid, frames.stream[body : body + length].tobytes(), bus) for bus, mid, body, length in rows]
 
 
 @kernel
@@ -111,8 +118,8 @@ def copy_payloads(stream: Octets, begin: Ints, length: int) -> Octets:
 
 
 @kernel
-def _find_frames(stream: Octets, rows: Ints, tally: Ints) -> tuple[int, int]:
-    """Fill `rows` (n, 4) with the columns `_MID` to `_CERTAIN`; returns the number of frames, and where the unfinished frame begins.
+def _find_frames(stream: Octets, ended: bool, rows: Ints, tally: Ints) -> tuple[int, int]:
+    """Fill `rows` (n, 5) with the columns `_BUS` to `_CERTAIN`; returns the number of frames, and where the unfinished frame begins.
 
     After a rejected frame the search goes on one byte later. Running sums make each checksum two look-ups, so noise full of preambles costs no
     more than frames.
@@ -128,15 +135,19 @@ def _find_frames(stream: Octets, rows: Ints, tally: Ints) -> tuple[int, int]:
             continue
         end = begin + head + length + 1
         if head == _UNFINISHED or end > size:
-            break
+            if not ended:
+                break
+            tally[SKIPPED] += 1
+            certain, begin = size, begin + 1
+            continue
         certain = max(certain, end)
         if sums[end] != sums[begin + 1]:
             tally[BAD_CHECKSUM] += 1
             tally[SKIPPED] += 1
             begin += 1
             continue
-        rows[count, _MID], rows[count, _BODY] = stream[begin + 2], begin + head
-        rows[count, _LENGTH], rows[count, _CERTAIN] = length, certain
+        rows[count, _BUS], rows[count, _MID] = stream[begin + 1], stream[begin + 2]
+        rows[count, _BODY], rows[count, _LENGTH], rows[count, _CERTAIN] = begin + head, length, certain
         count += 1
         begin = end
     return count, begin
@@ -158,12 +169,12 @@ def _running_sums(stream: Octets) -> Octets:
 def _header(stream: Octets, begin: int) -> tuple[int, int]:
     """Size of the header at `begin` and length of the payload; `_UNFINISHED` when bytes are missing.
 
-    `_NO_HEADER` with the number of bytes that show it: no preamble, another bus, or an impossible extended length.
+    `_NO_HEADER` with the number of bytes that show it: no preamble, an impossible bus, or an impossible extended length.
     """
     have = len(stream) - begin
     if stream[begin] != PREAMBLE:
         return _NO_HEADER, 1
-    if have > 1 and stream[begin + 1] != BUS_ID:
+    if have > 1 and stream[begin + 1] != BUS_ID and not FIRST_BUS <= stream[begin + 1] <= LAST_BUS:
         return _NO_HEADER, 2
     if have < 4:
         return _UNFINISHED, 0

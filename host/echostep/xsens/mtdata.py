@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """MTData (0x32), the measurement message of the MTi and the MTx, in every output mode and setting of an MTx.
 
 In: payloads, and the output format that was set on the device, as the message does not contain it. Out: values in SI units. Owns nothing.
@@ -89,13 +90,17 @@ class OutputFormat:
         return (self.mode & TEMPERATURE > 0) + 3 * len(self.calibrated) + self.orientation_values
 
     @cached_property
+    def analog_inputs(self) -> int:
+        """Number of analog inputs that are sent."""
+        return (not self.settings & NO_ANALOG_1) + (not self.settings & NO_ANALOG_2) if self.mode & AUXILIARY else 0
+
+    @cached_property
     def length(self) -> int:
         """Bytes of a payload."""
         counter = 2 * (self.settings & SAMPLE_COUNTER)
         if self.mode & RAW:
             return RAW_BYTES + counter
-        analog = (not self.settings & NO_ANALOG_1) + (not self.settings & NO_ANALOG_2) if self.mode & AUXILIARY else 0
-        return 4 * self.numbers + 2 * analog + (self.mode & STATUS > 0) + counter
+        return 4 * self.numbers + 2 * self.analog_inputs + (self.mode & STATUS > 0) + counter
 
 
 PROJECT = OutputFormat(CALIBRATED | ORIENTATION, SAMPLE_COUNTER | QUATERNION | FLOAT)  # 54 bytes
@@ -128,6 +133,19 @@ def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
     if output.orientation_values:
         values[:, ATTITUDE] = _quaternions(numbers[:, first:])
     return Decoded(values, counter, sent)
+
+
+def rest_of(payload: bytes, output: OutputFormat) -> dict[str, list[int] | int]:
+    """What a payload has besides `Decoded`, as sent: `raw` (accel, gyro, mag, temperature), `analog` (one or two inputs), `status`."""
+    if output.mode & RAW:
+        return {"raw": list(struct.unpack_from(">10H", payload))}
+    found: dict[str, list[int] | int] = {}
+    begin = 4 * output.numbers
+    if output.analog_inputs:
+        found["analog"] = list(struct.unpack_from(f">{output.analog_inputs}H", payload, begin))
+    if output.mode & STATUS:
+        found["status"] = payload[begin + 2 * output.analog_inputs]
+    return found
 
 
 def _quaternions(orientation: Floats) -> Floats:

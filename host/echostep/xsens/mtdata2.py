@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """MTData2 (0x36), the measurement message of the MTi 10, 100 and 1 series: a list of packets with identifiers.
 
 In: frames. Out: the same values as from MTData, frame by frame. Owns nothing. Packets of other quantities are skipped (packets.py reads them all).

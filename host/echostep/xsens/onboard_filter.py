@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Model of the orientation filter on board of an MTx, a closed filter with known weaknesses [Fischer 2008, 3.2.2].
 
 In: specific force, angular rate and magnetic field in the sensor's axes. Out: matrices sensor -> MTx world (x magnetic north, y west, z up).

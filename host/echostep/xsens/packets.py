@@ -1,7 +1,8 @@
+# SPDX-License-Identifier: MIT
 """All packets of an MTData2 message, by name, to inspect captures.
 
-In: the payload of an MTData2 message. Out: packets with their names and values. Owns nothing; raises ValueError for a payload whose lengths disagree.
-[LLCP, MTData2: data identifiers and their fields].
+In: the payload of an MTData2 message. Out: packets with their names and values; of an unknown packet or size the bytes alone. Owns
+nothing; raises ValueError for a payload whose lengths disagree. [LLCP, MTData2: data identifiers and their fields; MTw: CMT].
 """
 
 from __future__ import annotations
@@ -9,9 +10,7 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-import numpy as np
-
-from echostep.xsens.mtdata2 import FORMAT_MASK, TYPE_MASK, WIDTHS, WORLD_MASK, read_numbers
+from echostep.xsens.mtdata2 import FLOAT32, FLOAT64, FORMAT_MASK, FP1220, TYPE_MASK, WIDTHS, WORLD_MASK
 
 NUMBERS = {  # packets in one of the four number formats: name, fields
     0x0810: ("Temperature", ("",)),
@@ -22,6 +21,7 @@ NUMBERS = {  # packets in one of the four number formats: name, fields
     0x4020: ("Acceleration", tuple("XYZ")),
     0x4030: ("FreeAcceleration", tuple("XYZ")),
     0x4040: ("AccelerationHR", tuple("XYZ")),
+    0x5010: ("AltitudeMsl", ("",)),
     0x5020: ("AltitudeEllipsoid", ("",)),
     0x5030: ("PositionECEF", tuple("XYZ")),
     0x5040: ("LatLon", ("Lat", "Lon")),
@@ -35,16 +35,33 @@ _PVT = (
     "ITOW Year Month Day Hour Min Sec Valid TAcc Nano FixType Flags NumSV Reserved1 Lon Lat Height HMSL HAcc VAcc "
     "VelN VelE VelD GSpeed HeadMot SAcc HeadAcc HeadVeh GDOP PDOP TDOP VDOP HDOP NDOP EDOP"
 )
+_RAW = "AccX AccY AccZ GyrX GyrY GyrZ MagX MagY MagZ Temperature"
 INTEGERS = {  # packets of integers: name, layout, fields
     0x1010: ("UTCTime", ">IHBBBBBB", ("Ns", "Year", "Month", "Day", "Hour", "Minute", "Second", "Flags")),
     0x1020: ("PacketCounter", ">H", ("",)),
     0x1030: ("ITOW", ">I", ("",)),
+    0x1040: ("GnssAge", ">B", ("",)),
+    0x1050: ("PressureAge", ">B", ("",)),
     0x1060: ("SampleTimeFine", ">I", ("",)),
     0x1070: ("SampleTimeCoarse", ">I", ("",)),
+    0x1090: ("PacketCounter8", ">B", ("",)),
+    0x10A0: ("SampleTime64", ">Q", ("",)),
     0x3010: ("BaroPressure", ">I", ("",)),
     0x7010: ("GNSSPVTData", ">IHBBBBBBIiBBBBiiiiIIiiiiiIIi7H", tuple(_PVT.split())),
+    0xA010: (
+        "RawAccGyrMagTemp",
+        ">10H",
+        tuple(_RAW.split()),
+    ),
+    0xA030: ("RawAcc", ">3H", tuple("XYZ")),
+    0xA040: ("RawGyr", ">3H", tuple("XYZ")),
+    0xA050: ("RawMag", ">3H", tuple("XYZ")),
+    0xB010: ("AnalogIn1", ">H", ("",)),
+    0xB020: ("AnalogIn2", ">H", ("",)),
     0xE010: ("StatusByte", ">B", ("",)),
     0xE020: ("StatusWord", ">I", ("",)),
+    0xE040: ("Rssi", ">b", ("",)),
+    0xE080: ("DeviceId", ">I", ("",)),
 }
 SATELLITES = 0x7020
 HEAD = 3  # bytes before a packet's content: identifier (2), length (1)
@@ -54,7 +71,7 @@ SATELLITE_HEAD, SATELLITE = 8, 4  # bytes of GNSSSatInfo before the satellites, 
 class Packet(NamedTuple):
     """One packet; `form` (number format) and `world` are bits of the identifier.
 
-    `name`: "" if unknown. `fields`: values by the field's name, "" if there is only one.
+    `name`: "" if unknown. `fields`: values by the field's name, "" if there is only one; none for an unknown packet or size. `content`: its bytes.
     """
 
     identifier: int
@@ -62,6 +79,7 @@ class Packet(NamedTuple):
     form: int
     world: int
     fields: dict[str, float]
+    content: bytes
 
 
 def read_packets(payload: bytes) -> list[Packet]:
@@ -78,26 +96,37 @@ def read_packets(payload: bytes) -> list[Packet]:
 
 
 def _decode(identifier: int, content: bytes) -> Packet:
-    """The packet with this identifier; raises ValueError for content of a wrong size."""
+    """The packet with this identifier."""
     kind, form, world = identifier & TYPE_MASK, identifier & FORMAT_MASK, identifier & WORLD_MASK
+    name, fields = "", dict[str, float]()
     if kind in NUMBERS:
-        name, fields = NUMBERS[kind]
-        _check_size(name, content, len(fields) * WIDTHS[form])
-        numbers = read_numbers(np.frombuffer(content, np.uint8)[None, :], form)[0]
-        return Packet(identifier, name, form, world, dict(zip(fields, numbers.tolist(), strict=True)))
-    if kind in INTEGERS:
-        name, layout, fields = INTEGERS[kind]
-        _check_size(name, content, struct.calcsize(layout))
-        return Packet(identifier, name, form, world, dict(zip(fields, struct.unpack(layout, content), strict=True)))
-    if kind == SATELLITES:
-        return Packet(identifier, "GNSSSatInfo", form, world, _satellites(content))
-    return Packet(identifier, "", form, world, {})
+        name, names = NUMBERS[kind]
+        if len(content) == len(names) * WIDTHS[form]:
+            fields = dict(zip(names, _numbers(content, form), strict=True))
+    elif kind in INTEGERS:
+        name, layout, names = INTEGERS[kind]
+        if len(content) == struct.calcsize(layout):
+            fields = dict(zip(names, struct.unpack(layout, content), strict=True))
+    elif kind == SATELLITES:
+        name, fields = "GNSSSatInfo", _satellites(content)
+    return Packet(identifier, name, form, world, fields, content)
+
+
+def _numbers(content: bytes, form: int) -> list[float]:
+    """Numbers in float32, 12.20, 16.32 (fraction first) or double [LLCP, output formats]."""
+    count = len(content) // WIDTHS[form]
+    if form in (FLOAT32, FLOAT64):
+        return list(struct.unpack(f">{count}{'f' if form == FLOAT32 else 'd'}", content))
+    if form == FP1220:
+        return [number * 2.0**-20 for number in struct.unpack(f">{count}i", content)]
+    parts = struct.unpack(">" + "Ih" * count, content)
+    return [whole + fraction * 2.0**-32 for fraction, whole in zip(parts[::2], parts[1::2], strict=True)]
 
 
 def _satellites(content: bytes) -> dict[str, float]:
-    """Fields of GNSSSatInfo: time of week, number of satellites; of each: system, number, carrier to noise (dBHz), flags."""
+    """Fields of GNSSSatInfo: time of week, number of satellites; of each: system, number, carrier to noise (dBHz), flags. None for a wrong size."""
     if len(content) < SATELLITE_HEAD or len(content) != SATELLITE_HEAD + SATELLITE * content[4]:
-        raise ValueError(f"MTData2: GNSSSatInfo of {len(content)} bytes does not fit its number of satellites")
+        return {}
     fields: dict[str, float] = dict(
         zip(("ITOW", "NumSVS", "Res1", "Res2", "Res3"), struct.unpack_from(">IBBBB", content), strict=True)
     )
@@ -106,9 +135,3 @@ def _satellites(content: bytes) -> dict[str, float]:
         for name, value in zip(("GnssId", "SvId", "Cno", "Flags"), content[begin : begin + SATELLITE], strict=True):
             fields[f"{name}{k}"] = value
     return fields
-
-
-def _check_size(name: str, content: bytes, size: int) -> None:
-    """Raise ValueError unless the content has this size in bytes."""
-    if len(content) != size:
-        raise ValueError(f"MTData2: {name} has {len(content)} bytes, not {size}")

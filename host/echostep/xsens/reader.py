@@ -1,6 +1,8 @@
+# SPDX-License-Identifier: MIT
 """Measurements of an MT that have passed every gate, in batches of arrays.
 
-In: bytes from the MT's port, in any split. Out: `MtBatch`es. Owns the unfinished frame, the last counter and the counts.
+In: bytes from the MT's port, in any split. Out: `MtBatch`es. Owns the unfinished frame, the last counter, a sample that waits for the next one,
+and the counts. Of several devices behind a master, that of the first whole sample is followed.
 Vectors are in the sensor frame. Orientations are sensor -> MT world (magnetic north, west, up).
 """
 
@@ -11,9 +13,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, Ints
-from echostep.jit import kernel
+from echostep.arrays import Floats, Ints
 from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, FrameReader, MtFrames, copy_payloads, encode_frame
+from echostep.xsens.gates import (
+    BAD_COUNTER,
+    BAD_QUATERNION,
+    GOOD,
+    INCOMPLETE,
+    LOST,
+    NO_MESSAGES,
+    NOT_FINITE,
+    OTHER_DEVICE,
+    OUT_OF_RANGE,
+    REPEATED,
+    Messages,
+    apply_gates,
+    joined,
+)  # fmt: skip
 from echostep.xsens.mtdata import (
     ACCEL,
     ATTITUDE,
@@ -29,17 +45,6 @@ from echostep.xsens.mtdata import (
 )  # fmt: skip
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
 from echostep.xsens.sample import MtSample
-
-# Results of the gates, in the order of the gates; also entries of the tally. LOST is an entry only.
-GOOD, INCOMPLETE, NOT_FINITE, BAD_QUATERNION, OUT_OF_RANGE, REPEATED, BAD_COUNTER, LOST = range(8)
-
-MAX_GAP = 500  # samples; a larger jump of the counter is accepted when the next counter confirms it; by reason
-ACCEPTED, JUMPED = 0, 1  # entries of the last counters: the last accepted one, and one that jumped since; -1: none
-_ACCEL, _GYRO, _MAG, _ATTITUDE, _GROUPS = range(
-    5
-)  # groups of values: columns of `Decoded.sent` and entries of the limits; their number
-_BEGIN = (ACCEL.start, GYRO.start, MAG.start, ATTITUDE.start, ATTITUDE.stop)  # first column of each group, and the end
-_Q = ATTITUDE.start  # column of the quaternion's w
 
 
 class MtBatch(NamedTuple):
@@ -74,11 +79,12 @@ EMPTY = MtBatch(
 class MtxCounts:
     """What an `MtxReader` has counted.
 
-    `lost`: numbers of samples that never came. `incomplete`: samples without counter, accel or gyro. `bad_counter`: samples whose counter jumps;
-    they are dropped until the next counter confirms the jump.
+    `lost`: counters between samples that never came, with a sample or with another message. `incomplete`: messages without counter, accel or gyro.
+    `bad_counter`: samples whose counter jumped while the next one did not follow it. `other_device`: samples of devices that are not followed.
     """
 
     good: int = 0
+    other_device: int = 0
     skipped_bytes: int = 0
     bad_checksum: int = 0
     bad_length: int = 0
@@ -116,7 +122,8 @@ class MtxReader:
         self._output = output
         self._limits = np.array([limits.accel_m_s2, limits.gyro_rad_s, limits.mag, limits.quaternion_error])
         self._tally = np.zeros(LOST + 1, np.int64)
-        self._last = np.full(2, -1, np.int64)  # counters ACCEPTED and JUMPED
+        self._state = np.array([-1, -1, -1, 0])
+        self._waiting = NO_MESSAGES  # a sample whose counter jumped; one at most
         self._bad_length = self._other = self._wake_ups = self._errors = 0
 
     @property
@@ -125,6 +132,7 @@ class MtxReader:
         tally = self._tally.tolist()
         return MtxCounts(
             good=tally[GOOD],
+            other_device=tally[OTHER_DEVICE],
             skipped_bytes=self._frames.counts.skipped_bytes,
             bad_checksum=self._frames.counts.bad_checksum,
             bad_length=self._bad_length,
@@ -154,21 +162,20 @@ class MtxReader:
         frames = self._frames.scan(received)
         if not len(frames.mid):
             return EMPTY
-        (values, counter, sent), end = self._decode(frames)
-        kept = _apply_gates(values, counter, sent, self._limits, self._last, self._tally)
-        if not kept.all():
-            values, counter, end = values[kept], counter[kept], end[kept]
+        messages = joined(self._waiting, self._decode(frames))
+        kept, waits = apply_gates(messages, self._limits, self._state, self._tally)
+        self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else NO_MESSAGES
+        values, counter, _, _, end = messages if kept.all() else messages.at(np.flatnonzero(kept))
         return MtBatch(
             counter, values[:, ACCEL], values[:, GYRO], values[:, MAG], values[:, ATTITUDE], values[:, CELSIUS], end
         )
 
-    def _decode(self, frames: MtFrames) -> tuple[Decoded, Ints]:
-        """Values of all measurement messages in order, and their ends (n,); other messages are counted."""
+    def _decode(self, frames: MtFrames) -> Messages:
+        """Values of all measurement messages in order; other messages are counted."""
         legacy = (frames.mid == MTDATA) & (frames.length == self._output.length)
         if legacy.all():
-            return decode_mtdata(
-                copy_payloads(frames.stream, frames.body, self._output.length), self._output
-            ), frames.end
+            rows = copy_payloads(frames.stream, frames.body, self._output.length)
+            return Messages(*decode_mtdata(rows, self._output), frames.bus, frames.end)
         self._count_others(frames)
         count = len(frames.mid)
         decoded = Decoded(np.empty((count, COLUMNS)), np.empty(count, np.int64), np.empty((count, 4), np.bool_))
@@ -182,7 +189,7 @@ class MtxReader:
             _fill(decoded, second, decode_mtdata2(frames.stream, packets))
             usable[second] = packets.whole
             self._bad_length += int(np.sum(~packets.whole))
-        return Decoded(*(part[usable] for part in decoded)), frames.end[usable]
+        return Messages(*decoded, frames.bus, frames.end).at(np.flatnonzero(usable))
 
     def _count_others(self, frames: MtFrames) -> None:
         """Count messages that are no measurements, and MTData of a wrong length."""
@@ -197,57 +204,6 @@ def _fill(decoded: Decoded, rows: Ints, part: Decoded) -> None:
     """Write `part` (k,) into these rows (k,)."""
     for into, values in zip(decoded, part, strict=True):
         into[rows] = values
-
-
-@kernel
-def _apply_gates(values: Floats, counter: Ints, sent: Bools, limits: Floats, last: Ints, tally: Ints) -> Bools:
-    """Whether each sample (n,) passes every gate; updates the counters `last`, and `tally` by the results.
-
-    The gates are needed because the checksum has 8 bits: one damaged frame in 256 passes it.
-    """
-    kept = np.zeros(len(values), np.bool_)
-    for k in range(len(values)):
-        complete = counter[k] >= 0 and sent[k, _ACCEL] and sent[k, _GYRO]
-        result = _value_gate(values[k], sent[k], limits) if complete else INCOMPLETE
-        if result == GOOD and last[ACCEPTED] >= 0:
-            result = _counter_gate(counter[k], last, tally)
-        tally[result] += 1
-        if result == GOOD:
-            kept[k], last[ACCEPTED], last[JUMPED] = True, counter[k], -1
-    return kept
-
-
-@kernel
-def _counter_gate(counter: int, last: Ints, tally: Ints) -> int:
-    """Whether a counter follows the last accepted one; the samples missing between them are counted as lost."""
-    gap = (counter - last[ACCEPTED]) & 0xFFFF
-    if gap == 0:
-        return REPEATED
-    confirmed = last[JUMPED] >= 0 and 0 < ((counter - last[JUMPED]) & 0xFFFF) <= MAX_GAP
-    if gap > MAX_GAP and not confirmed:
-        last[JUMPED] = counter
-        return BAD_COUNTER
-    if gap < 0x8000:  # else a jump back
-        tally[LOST] += gap - 1
-    return GOOD
-
-
-@kernel
-def _value_gate(row: Floats, sent: Bools, limits: Floats) -> int:
-    """The first gate that a sample fails, for the quantities that were sent: finite, |q| = 1, within the sensor's range."""
-    for group in range(_GROUPS):
-        for column in range(_BEGIN[group], _BEGIN[group + 1]):
-            if sent[group] and not np.isfinite(row[column]):
-                return NOT_FINITE
-    if sent[_ATTITUDE]:
-        square = row[_Q] ** 2 + row[_Q + 1] ** 2 + row[_Q + 2] ** 2 + row[_Q + 3] ** 2
-        if abs(np.sqrt(square) - 1.0) > limits[_ATTITUDE]:
-            return BAD_QUATERNION
-    for group in range(_ATTITUDE):
-        for column in range(_BEGIN[group], _BEGIN[group + 1]):
-            if sent[group] and abs(row[column]) > limits[group]:
-                return OUT_OF_RANGE
-    return GOOD
 
 
 def warm_up() -> None:

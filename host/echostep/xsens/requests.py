@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Requests to an MT, as messages with their expected acknowledgements.
 
 In: rates and modes. Out: `Request`s. Owns nothing; raises ValueError for settings that no MTx has.

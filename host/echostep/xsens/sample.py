@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One measurement of an MT as plain Python numbers.
 
 In: nothing. Out: `MtSample`. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Configuring an MT, sans-I/O: requests, acknowledgements, timeouts, retries, WakeUp and error messages.
 
 In: bytes from the MT's port, and a clock in seconds. Out: bytes to send, and the result in one line. Owns the requests that are not yet acknowledged.

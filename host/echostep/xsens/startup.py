@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Setup of the MTx on a live port: at the start, and again after each WakeUp.
 
 In: the chunks of all ports, in order, after they were recorded. Out: bytes to the MTx, and messages for the terminal. Owns the `MtxSetup`.
@@ -5,10 +6,10 @@ In: the chunks of all ports, in order, after they were recorded. Out: bytes to t
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from echostep.errors import EchostepError
+from echostep.ports.arrival_clock import now_s as clock_s
 from echostep.ports.chunks import MTX, Chunk
 from echostep.xsens.requests import project_requests
 from echostep.xsens.setup import MtxSetup, State
@@ -31,7 +32,7 @@ class MtxStart:
         """Process the next chunk of any port; None when nothing came, so that timeouts are checked."""
         was_busy = not self._setup.finished
         wake_ups = self._setup.wake_ups
-        now_s = time.monotonic()
+        now_s = clock_s()
         received, arrived_s = b"", now_s
         if chunk is not None and chunk.port == MTX:
             received, arrived_s = chunk.data, chunk.t_arrival_ns * 1e-9

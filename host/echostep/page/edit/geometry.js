@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Geometry of the plan editor: pure functions from a level of plan.json {walls, doors, windows, rooms, ...} to a new level. Metres, x east, y north.
 
 export const GRID_M = 0.05;

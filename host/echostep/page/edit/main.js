@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
 import { box } from './geometry.js';
@@ -131,7 +132,7 @@ function key(e) {
 }
 
 const HINTS = {
-  select: 'Drag walls, ends of walls, doors and names', wall: 'Click from corner to corner; Escape or End ends a wall', door: 'Click on a wall', erase: 'Click on an element to delete it',
+  select: 'Drag walls, ends of walls, doors and names', wall: 'Click from corner to corner, or drag; Escape or End ends a wall. Two fingers or the right button move the sheet', door: 'Click on a wall', erase: 'Click on an element to delete it',
   room: 'Click into a room', scale: 'Click two points whose distance you know', origin: 'Drag the picture',
 };
 
@@ -164,7 +165,7 @@ async function start() {
   sheet = new Sheet(tree);
   await loadPicture(tree.name);
   tools = new Tools(sheet, view, { ask, say, changed, doorWidth });
-  new Pointer(map, view, { down: (p) => tools.down(p), move: (p) => tools.move(p), up: (p, click) => tools.up(p, click), cancel: () => { tools.stop(); changed(); }, moved: changed });
+  new Pointer(map, view, { down: (p) => tools.down(p), move: (p) => tools.move(p), up: (p, click) => tools.up(p, click), cancel: () => { tools.cancel(); changed(); }, moved: changed });
   new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
   view.resize(map.clientWidth, map.clientHeight);
   show();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The sheet in SVG. In: a level, the picture's position, the view, the selected element and the draft. Owns the SVG elements.
 
 import { ends, length } from './geometry.js';

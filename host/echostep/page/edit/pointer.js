@@ -1,4 +1,5 @@
-// Mouse and fingers on the sheet. `actions`: down(position) -> whether an element is held, move(position), up(position, whether it was a click), cancel(), moved().
+// SPDX-License-Identifier: MIT
+// Mouse and fingers on the sheet. `actions`: down(position) -> whether the tool uses the press, move(position), up(position, whether it was a click), cancel(), moved().
 
 const SLOP_PX = 6; // a movement below this is a click
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The sheet: the plan and the picture's position, with undo and redo. Owns the history; every change makes a new tree.
 
 const MOST_KEPT = 300; // changes that can be undone

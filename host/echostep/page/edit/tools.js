@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tools: what a press, a move and a click on the sheet do. In: positions in metres. Out: changes of the sheet. Owns the held element, the draft and the selection.
 
 import { cutDoor, distance, ends, fillDoor, foot, hit, moveDoor, moveJoints, moveWall, onGrid, round, same, scaled, snap } from './geometry.js';
@@ -7,7 +8,7 @@ const REACH_PX = 14;
 export class Tools {
   // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), doorWidth() in metres
   constructor(sheet, view, desk) {
-    Object.assign(this, { sheet, view, desk, name: 'select', held: null, live: null, chosen: null, draft: null, chain: null, points: [], cross: [0, 0] });
+    Object.assign(this, { sheet, view, desk, name: 'select', pressed: null, held: null, live: null, chosen: null, draft: null, chain: null, points: [], cross: [0, 0] });
   }
 
   get reach() { return REACH_PX / this.view.scale; }
@@ -22,10 +23,18 @@ export class Tools {
   }
 
   // End a chain of walls, release the held element.
-  stop() { Object.assign(this, { held: null, live: null, draft: null, chain: null, points: [] }); }
+  stop() { Object.assign(this, { pressed: null, held: null, live: null, draft: null, chain: null, points: [] }); }
 
+  // A second finger moves the sheet: give up what this press began, but not a chain of walls from before.
+  cancel() {
+    if (!this.chain || this.pressed?.began) this.stop();
+    else Object.assign(this, { pressed: null, held: null, live: null });
+  }
+
+  // Returns whether the press belongs to the tool; otherwise dragging moves the sheet.
   down(p) {
     this.cross = p;
+    this.pressed = { at: p, began: false };
     if (this.name === 'origin' && this.sheet.picture) this.held = { from: p };
     if (this.name === 'select') {
       const found = hit(this.level, p, this.reach);
@@ -33,12 +42,16 @@ export class Tools {
       if (found) this.held = { found, from: p };
     }
     this.desk.changed();
-    return Boolean(this.held);
+    return Boolean(this.held) || !this.drags;
   }
 
   move(p) {
     this.cross = p;
     const { held, sheet } = this;
+    if (this.name === 'wall' && this.pressed && !this.chain) {  // a drag draws a wall from where it began
+      this.wall(this.pressed.at);
+      this.pressed.began = true;
+    }
     if (held?.found) {
       const level = this.dragged(held.found, held.from, p);
       if (level) this.live = { level };
@@ -60,12 +73,16 @@ export class Tools {
   snapped(p) { return snap(p, { walls: this.sheet.level.walls, from: this.chain?.at, before: this.chain?.before, reach: this.reach }); }
 
   up(p, click) {
-    const { live, held } = this;
+    const { live, held, pressed } = this;
+    this.pressed = null;
     if (held && (live || this.drags)) {
       [this.held, this.live] = [null, null];
       if (live?.level) { this.sheet.setLevel(live.level); this.rechoose(); this.desk.say('Moved'); }
       if (live?.picture) { this.sheet.change(this.sheet.tree, live.picture); this.desk.say('Picture moved'); }
-    } else if (click && !this.drags) this[this.name](p);
+    } else if (!this.drags && (click || this.name === 'wall')) {
+      this[this.name](p);
+      if (pressed?.began) this.stop();
+    } else if (!this.drags) this.desk.say('Nothing changed: click. Two fingers or the right button move the sheet');
     this.desk.changed();
   }
 

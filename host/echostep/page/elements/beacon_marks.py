@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beacon marks: beacons as a page draws them.
 
 In: a tracker, in its thread. Out: `BeaconMark`s that any thread may read. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Echo lines: the last measured range of each ranger, beside the range that the plan predicts.
 
 In: a measured segment, the estimate at its end, the walls. Out: `EchoLine`s in the map frame. Owns nothing. It reads only wall tiles that the filter
@@ -15,7 +16,7 @@ from echostep.angles import wrap
 from echostep.jit import kernel
 from echostep.localization.echo_likelihood import EchoModel, detection
 from echostep.localization.estimate import Estimate
-from echostep.localization.map_filter import RANGER_AXES_RAD
+from echostep.localization.usable_pings import RANGER_AXES_RAD
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex

@@ -1,8 +1,9 @@
+# SPDX-License-Identifier: MIT
 """Guidance as a page shows it: of the run's cues, or to a destination that was chosen on the page.
 
-In: cues with their route; for a page's own destination: estimates, a place, the plan. Out: `ShownGuidance`. Owns the plan's route planner (made at
-the first request, in a thread) and the progress along a page's own route. Until that route is found, and where there is none, the straight line is
-shown.
+In: cues with their route; for a destination chosen on a page: estimates, a place, the plan. Out: `ShownGuidance`. Owns the plan's route planner
+(made at the first request, in a thread) and the progress along a route to a chosen destination. Until that route is found, and where there is none,
+neither a direction nor a line is shown.
 """
 
 from __future__ import annotations
@@ -13,21 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.angles import wrap
-from echostep.guidance.cues import NO_HEADING, Cue, CueKind, GuidanceSettings, Guide
+from echostep.guidance.cues import Cue, CueKind, Guide
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Plan
 from echostep.plan.polyline import along, way_m
 from echostep.plan.routing import Route, RoutePlace, Routes
 
-ARRIVED_M = 1.0  # from the destination, on the straight line
 AGAIN_S = 5.0  # shortest time between two searches for a route, in data time
-UNKNOWN_RAD = math.radians(
-    GuidanceSettings().heading_sd_deg
-)  # above this standard deviation the heading counts as unknown
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
-NO_WAY = "No way was found. The arrow shows the straight line."
-STRAIGHT = "straight"  # kind of a guidance without a route
+LOOKING, NO_ROUTE = "looking", "none"  # kinds of a guidance without a route
 
 Points = tuple[tuple[float, float], ...]  # (x, y) in map metres
 
@@ -36,9 +31,9 @@ Points = tuple[tuple[float, float], ...]  # (x, y) in map metres
 class ShownGuidance:
     """What the wearer should do. The field names are keys of the frame's JSON.
 
-    `kind`: a `CueKind` or `STRAIGHT`. `arrow_rad`: direction to walk, counter-clockwise from the heading; None: no arrow is drawn. `left_m`:
-    length of the remaining route; None where it does not help. `path`: the remaining route on the estimate's level. `spoken`: the last sentence;
-    `spoken_s`: the time at which it was due. `own`: the page's own destination, not the run's.
+    `kind`: a `CueKind`, `LOOKING` or `NO_ROUTE`. `arrow_rad`: direction to walk, counter-clockwise from the heading; None: no arrow is drawn.
+    `left_m`: length of the remaining route; None where it does not help. `path`: the remaining route on the estimate's level. `spoken`: the last
+    sentence; `spoken_s`: the time at which it was due. `own`: to a destination chosen on a page, not the run's.
     """
 
     kind: str
@@ -104,7 +99,7 @@ class RouteFinder:
 
 
 class Destination:
-    """A destination chosen on one page: estimates and, once it is found, a route -> guidance."""
+    """A destination chosen on a page: estimates and, once it is found, a route -> guidance."""
 
     def __init__(self, goal: RoutePlace) -> None:
         self.goal = goal
@@ -128,7 +123,7 @@ class Destination:
     def guidance_at(self, estimate: Estimate) -> ShownGuidance:
         """The guidance at an estimate; the same object while the estimate is the same."""
         if self._last is None or self._last[0] is not estimate:
-            shown = self._along_route(estimate) if self._guide else straight_line(estimate, self.goal, self._reason)
+            shown = self._along_route(estimate) if self._guide else without_route(self.goal, estimate, self._reason)
             self._last = estimate, replace(shown, own=True)
         return self._last[1]
 
@@ -141,16 +136,13 @@ class Destination:
         return guidance_of_cue(cue, self._guide.route, estimate.level, self._last[1] if self._last else None)
 
 
-def straight_line(estimate: Estimate, goal: RoutePlace, reason: str = "") -> ShownGuidance:
-    """The straight line to a place. `reason`: why there is no route, empty while it is being searched for."""
-    dx, dy, floors = goal.x_m - estimate.x_m, goal.y_m - estimate.y_m, goal.level - estimate.level
-    distance_m = math.hypot(dx, dy)
-    path = ((estimate.x_m, estimate.y_m), (goal.x_m, goal.y_m))
-    if distance_m <= ARRIVED_M and not floors:
-        return ShownGuidance(CueKind.ARRIVED.value, "You have arrived", None, None, path, "You have arrived.")
-    if estimate.heading_sd_rad > UNKNOWN_RAD:
-        return ShownGuidance(CueKind.STOP.value, NO_HEADING, None, None, path, f"{NO_HEADING}.")
+def without_route(goal: RoutePlace, estimate: Estimate, reason: str) -> ShownGuidance:
+    """What is shown while no route is known: no direction and no line, which would lead through walls.
+
+    `reason`: why there is none, empty while it is searched for.
+    """
+    floors = goal.level - estimate.level
     climb = f", {abs(floors)} floor{'s' if abs(floors) > 1 else ''} {'up' if floors > 0 else 'down'}" if floors else ""
-    arrow = wrap(math.atan2(dy, dx) - estimate.heading_rad)
-    text = f"In a straight line{climb}{': ' if reason else ''}{reason}"
-    return ShownGuidance(STRAIGHT, text, arrow, distance_m, path, NO_WAY if reason else "")
+    if not reason:
+        return ShownGuidance(LOOKING, f"Looking for a way{climb}", None, None, ())
+    return ShownGuidance(NO_ROUTE, f"No way was found{climb}: {reason}", None, None, (), "No way was found.")

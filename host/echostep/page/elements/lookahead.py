@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Look-ahead: the position after a step whose echoes have not been used yet.
 
 In: the last estimate, the path segment at whose end it is, the later segments. Out: an estimate by dead reckoning from there. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The scene: everything that a page shows of one moment, immutable.
 
 In: a tracker, in the tracker's thread. Out: `PageScene`s that any thread may read. Owns nothing; all arrays are copies.
@@ -11,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Octets
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.estimate import UNFIT, Estimate, TrackStatus
 from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
 from echostep.page.elements.stream_rates import StreamRates
+from echostep.page.elements.true_position import TruePosition
+from echostep.page.elements.undo_offer import UndoOffer
 from echostep.tracker import Particles
 
 KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
@@ -41,7 +44,8 @@ class PageScene:
     """What a page shows of one moment.
 
     `arrived_ns`: host's monotonic clock when the bytes of the estimate arrived. `trail_count`: number of points of the trail up to this moment.
-    `guidance`: of the run; a page's own destination is added by its session.
+    `guidance`: of the run; that to a destination chosen on a page is added by the page's session. `echoes_fit`: the plan explains the last echoes.
+    `truth`: the true position, where it is known.
     """
 
     arrived_ns: int
@@ -53,7 +57,10 @@ class PageScene:
     trail_count: int
     status_text: str
     beacons: tuple[BeaconMark, ...] = ()
+    undo: UndoOffer | None = None
+    echoes_fit: bool = False
     guidance: ShownGuidance | None = None
+    truth: TruePosition | None = None
 
 
 def sample_of(particles: Particles) -> ParticleSample:
@@ -69,8 +76,13 @@ def status_text(estimate: Estimate | None, *, needs_start: bool = False, accepts
 
     `needs_start`: the tracker waits for a check-in that gives the start. `accepts_taps`: the page takes check-ins (not so in a replay).
     """
+    tap = " or tap where you are" if accepts_taps else ""
     if estimate is None:
         return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
+    if estimate.plan_fits < UNFIT:
+        return "this plan does not fit: is it another building or floor, or mirrored?"
+    if estimate.status != TrackStatus.TRACKING and len(estimate.hypotheses) > 1:
+        return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
     return f"{estimate.status.value}, {format_metres(estimate.ellipse95.major_m)}"

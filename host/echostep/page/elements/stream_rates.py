@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rates and losses of each input stream.
 
 In: the tracker's counters at arrival times. Out: `StreamRates`. Owns the counters of the last seconds.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Fingers, mouse and keys on the map: pan, zoom, rotate, tap. In a mode that takes a position: a tap gives the position, a drag also the heading.
 
 const SLOP_PX = 10;  // a movement below this is a tap

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: MIT
 // The WebSocket to the server: reconnects when it closes, parses frames, sends requests.
 
 const LONGEST_WAIT_MS = 5000;
 
 export class Link {
-  constructor({ onHello, onFrame, onRefused, onState }) {
-    Object.assign(this, { onHello, onFrame, onRefused, onState, wait: 250 });
+  constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onState }) {
+    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, wait: 250 });
     this.open();
   }
 
@@ -26,7 +27,12 @@ export class Link {
       this.wait = 250;
       this.onState(true);
       this.onHello(message);
-    } else if (message.kind === 'refused') this.onRefused(message.what);
+    } else if (message.kind === 'refused') this.onRefused(message.reason);
+    else if (message.kind === 'considered') this.onConsidered(message);
+    else if (message.kind === 'failed') {
+      this.wait = LONGEST_WAIT_MS;
+      this.onFailed(message.reason);
+    }
   }
 
   send(kind, fields = {}) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live page: connects the link to the server, the map, the panel and the user's actions. *Level*: index into the plan's levels; *floor*: its name on the page.
 
 import { Gestures } from './gestures.js';
@@ -7,19 +8,24 @@ import { Panel } from './panel.js';
 import { PlanView } from './plan.js';
 import { Replay } from './replay.js';
 import { Speech } from './speech.js';
+import { Taps } from './taps.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
 
 const $ = (id) => document.getElementById(id);
-const FINGER_PX = 20;  // standard deviation of a tap on the screen
-const LEAST_SD_M = 0.3;  // of a check-in
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], sheetPosition = null, turned = 0, fitted = false, wantedLevel = 0, invited = false;
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, invited = false;
 
-const link = new Link({ onHello: hello, onFrame: frame, onRefused: () => hint('Not accepted: this is a replay, or the tracker is too busy.', 3000), onState: connection });
+const taps = new Taps(view, {
+  send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
+  keptHeading: () => (scene.frame?.told?.heading_known ? scene.frame.told.heading_rad : null),
+});
+const link = new Link({
+  onHello: hello, onFrame: frame, onRefused: (reason) => hint(reason, 6000), onFailed: (reason) => panel.fault(reason), onConsidered: (answer) => taps.considered(answer), onState: connection,
+});
 const speech = new Speech($('speech'), $('sentence'));
 const replay = new Replay((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
@@ -27,18 +33,36 @@ painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn',
 const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
 
 async function hello(message) {
+  if (plan && plan.digest !== message.plan.digest) startAnew();
   plan = message.plan;
   scene.trail.count = 0;
   invited = false;
   panel.hello(message);
+  const begins = message.replay && $('replay').hidden;
   replay.show(message.replay);
+  if (begins) {  // the time bar takes room: the floor is fitted into what is left
+    view.resize($('map').clientWidth, $('map').clientHeight);
+    fitted = false;
+  }
   $('here').hidden = $('sheet-here').hidden = message.replay;
+  taps.reconnected();
   await showLevel(Math.min(scene.level, plan.levels.length - 1));
+}
+
+// Another run on another plan answers at this address: what was chosen on the old plan means nothing on it.
+function startAnew() {
+  Object.assign(scene, { frame: null, cloud: null, level: 0 });
+  fitted = false;
+  taps.drop();
+  replay.forget();
 }
 
 async function showLevel(level) {
   wantedLevel = level;
-  const walls = await fetch(new URL(`walls/${level}`, document.baseURI)).then((answer) => answer.arrayBuffer());
+  const answer = await fetch(new URL(`walls/${level}`, document.baseURI)).catch(() => null);
+  if (!answer) return;  // the server is away; when it is back, its hello shows the level again
+  if (!answer.ok) return panel.fault(await answer.text());
+  const walls = await answer.arrayBuffer();
   if (level !== wantedLevel) return;
   scene.level = level;
   planView.show(new Float32Array(walls), plan.levels[level].rooms);
@@ -62,21 +86,21 @@ function frame(received) {
   dirty = true;
 }
 
-function extend(trail, { from, count, points }) {
-  const total = from + count;
+function extend(trail, { first, count, points }) {
+  const total = first + count;
   if (3 * total > trail.points.length) {
     const more = new Float32Array(6 * total);
-    more.set(trail.points.subarray(0, 3 * from));
+    more.set(trail.points.subarray(0, 3 * first));
     trail.points = more;
   }
-  trail.points.set(points, 3 * from);
+  trail.points.set(points, 3 * first);
   trail.count = total;
 }
 
 function draw() {
   requestAnimationFrame(draw);
   const { told: estimate } = scene.frame ?? {};
-  if (dirty && estimate && follows && !mode) {
+  if (dirty && estimate && follows && !mode && !taps.ghost) {
     if (!view.shows(planView.box)) view.keep(estimate.x_m, estimate.y_m);
     if (estimate.level !== scene.level && estimate.level !== wantedLevel) showLevel(estimate.level);
   }
@@ -87,10 +111,12 @@ function draw() {
     panel.scale(view);
     drawnStamp = view.stamp;
   }
-  if (mode && $('cross').hidden === false) posing(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
+  if (mode && !$('cross').hidden) aim(view.toMap(view.width / 2, view.height / 2), mode === 'here' ? turned : null);
+  planView.names(view, estimate?.level === scene.level ? view.toScreen(estimate.x_m, estimate.y_m) : null);
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
-    panel.frame(scene.frame, plan.levels[scene.level].rooms);
+    panel.frame(scene.frame);
+    taps.undoable(scene.frame.undo);
     panel.floors(scene.level, estimate);
     replay.frame(scene.frame.play);
     if (!estimate && !invited && scene.frame.words.startsWith('tap')) { invited = true; enter('here'); }
@@ -106,12 +132,11 @@ function draw() {
 // Modes: null, 'here' (a tap gives the wearer's position, a drag the heading too), 'go' (a tap gives the destination).
 function enter(next, byKey = false) {
   mode = next;
-  closeSheet();
-  scene.tapped = null;
+  taps.drop();
   $('here').setAttribute('aria-pressed', String(mode === 'here'));
   $('map').classList.toggle('takes', mode !== null);
   $('cross').hidden = !(mode && byKey);
-  $('goal').value = mode === 'go' ? 'map' : scene.frame?.guidance?.own ? $('goal').value : '';
+  $('goal').value = mode === 'go' ? 'map' : scene.frame?.goal ? panel.optionOf(scene.frame.goal) : '';
   hint(mode === 'here' ? 'Stand still. Tap where you are, drag in the direction you face.' : mode === 'go' ? 'Tap where you want to go.' : '');
   view.changed();
 }
@@ -124,45 +149,26 @@ function hint(text, for_ms = 0) {
   if (for_ms) hintEnds = setTimeout(() => hint(''), for_ms);
 }
 
-function posing(position, heading_rad) {
-  scene.tapped = position && { x_m: position[0], y_m: position[1], heading_rad };
-  dirty = true;
-}
+const aim = (position, heading_rad) => taps.aim(position, heading_rad);
 
-function posed([x_m, y_m], heading_rad) {
+function posed(position, heading_rad) {
   const before = mode;
   enter(null);
-  if (before === 'go') {
-    link.send('go_to', { x_m, y_m, level: scene.level });
-    return;
-  }
-  const sd_m = Math.max(LEAST_SD_M, FINGER_PX / view.scale);
-  link.send('check_in', { x_m, y_m, heading_rad, sd_m, level: scene.level });
-  posing([x_m, y_m], heading_rad);
-  hint(heading_rad === null ? 'Sent. Your direction is found while you walk.' : 'Sent.', 2500);
-  setTimeout(() => { if (!mode) posing(null, null); }, 1500);
+  if (before === 'go') return go(position, scene.level);
+  taps.put(position, heading_rad, scene.level, false);
+  $('sheet-here').focus({ preventScroll: true });
 }
 
-function tapped(position, [sx, sy]) {
-  sheetPosition = position;
-  posing(position, null);
-  const sheet = $('sheet');
-  sheet.hidden = false;
-  sheet.style.left = `${Math.min(Math.max(sx - sheet.offsetWidth / 2, 4), view.width - sheet.offsetWidth - 4)}px`;
-  sheet.style.top = `${Math.min(sy + 18, view.height - sheet.offsetHeight - 4)}px`;
-}
+function tapped(position) { taps.put(position, null, scene.level, true); }
 
-function closeSheet() {
-  $('sheet').hidden = true;
-  sheetPosition = null;
-}
+function go([x_m, y_m], level) { link.send('go_to', { x_m, y_m, level }); }
 
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
   const actions = {
     n: () => view.rotate(-view.turn), w: () => { setFollows(false); view.fit(planView.box); }, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
-    Escape: () => { enter(null); posing(null, null); },
+    Escape: () => enter(null),
     Enter: () => mode && posed(middle, mode === 'here' ? turned : null),
     ',': () => { turned += Math.PI / 12; dirty = true; }, '.': () => { turned -= Math.PI / 12; dirty = true; },
   };
@@ -182,26 +188,30 @@ function toggleFollow() {
   if (follows && estimate && !view.shows(planView.box)) view.centre(estimate.x_m, estimate.y_m);
 }
 
-new Gestures($('map'), view, { takesPose: () => mode !== null, tapped, posing, posed, key, moved: () => { setFollows(false); closeSheet(); } });
+new Gestures($('map'), view, { takesPose: () => mode !== null, tapped, posing: aim, posed, key, moved: () => { setFollows(false); taps.moved(); } });
 $('here').onclick = (e) => enter(mode === 'here' ? null : 'here', e.detail === 0);
 $('follow').onclick = () => toggleFollow();
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = () => { setFollows(false); view.fit(planView.box); };
 $('north').onclick = () => view.rotate(-view.turn);
-$('end-guidance').onclick = () => { link.send('go_nowhere'); $('goal').value = ''; };
+$('end-guidance').onclick = () => link.send('go_nowhere');
 $('goal').onchange = () => {
   const { value } = $('goal');
   if (value === 'map') return enter('go', true);
   enter(null);
   if (!value) return link.send('go_nowhere');
-  const [level, room] = value.split(' ').map(Number), [x_m, y_m] = plan.levels[level].rooms[room].at_m;
+  const [level, room] = value.split(' ').map(Number);
   $('goal').value = value;
-  return link.send('go_to', { x_m, y_m, level });
+  return go(plan.levels[level].rooms[room].at_m, level);
 };
-$('sheet-here').onclick = () => { const position = sheetPosition; mode = 'here'; posed(position, null); };
-$('sheet-go').onclick = () => { const position = sheetPosition; mode = 'go'; posed(position, null); };
-$('sheet-close').onclick = () => { closeSheet(); posing(null, null); };
+$('sheet-go').onclick = () => {
+  const { x_m, y_m, level } = taps.ghost;
+  taps.drop();
+  go([x_m, y_m], level);
+};
+window.addEventListener('error', ({ message }) => panel.fault(`This page has a fault: ${message}. Reload it.`));
+window.addEventListener('unhandledrejection', ({ reason }) => panel.fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
 startTheme($('theme'), () => { painter.recolour(); dirty = true; view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));

@@ -1,7 +1,10 @@
+// SPDX-License-Identifier: MIT
 // Paints the moving things on a canvas: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
 
 const GRADES = 4;  // shades of the particles' weight
 const PARTICLE_PX = 2.5;
+const WIDEST_M = 30;  // protection radius that is still drawn
+const SD_95 = 2.45;  // half axis of a 95 % circle, in standard deviations per axis
 
 export class Painter {
   constructor(canvas) {
@@ -13,7 +16,7 @@ export class Painter {
   recolour() {
     const style = getComputedStyle(document.documentElement);
     this.colour = Object.fromEntries(
-      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink', 'good'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
   paint(view, scene) {
@@ -26,14 +29,35 @@ export class Painter {
     if (scene.cloud) this.particles(view, scene.cloud, scene.level);
     this.trail(view, scene.trail, scene.level);
     const { told: estimate } = scene.frame ?? {};
-    if (scene.frame?.guidance?.path.length && estimate?.level === scene.level) this.route(view, scene.frame.guidance.path);
+    const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.level === scene.level ? guidance.path : [];
+    if (path.length > 1) this.line(path.map(([x, y]) => view.toScreen(x, y)), this.colour.goal, 3, [8, 7]);
+    if (goal?.level === scene.level) this.flag(view, [goal.x_m, goal.y_m]);
+    else if (path.length && !guidance.own) this.flag(view, path.at(-1));
     this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
     if (estimate && estimate.level === scene.level) {
       for (const line of scene.frame.beams) this.echoLine(view, line);
+      this.protection(view, estimate);
       this.ellipse(view, estimate);
       this.wearer(view, estimate);
     }
+    for (const place of estimate?.hypotheses ?? []) if (place.level === scene.level) this.hypothesis(view, place);
+    const truth = scene.frame?.truth;
+    if (truth && truth.level === scene.level) this.truth(view, truth);
     if (scene.tapped) this.pose(view, scene.tapped);
+  }
+
+  // The true position of a simulation: a diamond with its name.
+  truth(view, { x_m, y_m }) {
+    const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this;
+    this.line([[sx, sy - 9], [sx + 9, sy], [sx, sy + 9], [sx - 9, sy], [sx, sy - 9]], this.colour.halo, 5);
+    this.line([[sx, sy - 9], [sx + 9, sy], [sx, sy + 9], [sx - 9, sy], [sx, sy - 9]], this.colour.good, 2.5);
+    pen.font = '600 12px system-ui, sans-serif';
+    pen.textAlign = 'left';
+    pen.lineWidth = 3;
+    pen.strokeStyle = this.colour.halo;
+    pen.fillStyle = this.colour.good;
+    pen.strokeText('truth', sx + 12, sy - 8);
+    pen.fillText('truth', sx + 12, sy - 8);
   }
 
   particles(view, { count, x0_m, y0_m, step_m, x, y, weight, level }, shownLevel) {
@@ -170,6 +194,39 @@ export class Painter {
     pen.stroke();
   }
 
+  // The circle beyond which the error is with a probability of 1 in 1,000.
+  protection(view, { x_m, y_m, protection_m }) {
+    if (protection_m === null || protection_m > WIDEST_M) return;
+    const { pen } = this;
+    pen.beginPath();
+    pen.arc(...view.toScreen(x_m, y_m), protection_m * view.scale, 0, 2 * Math.PI);
+    pen.setLineDash([6, 6]);
+    pen.strokeStyle = this.colour.here;
+    pen.lineWidth = 1.5;
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  // A place that fits: a ring with its probability.
+  hypothesis(view, { x_m, y_m, probability }) {
+    const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this, text = `${Math.round(100 * probability)} %`;
+    pen.beginPath();
+    pen.arc(sx, sy, 11, 0, 2 * Math.PI);
+    pen.lineWidth = 5;
+    pen.strokeStyle = this.colour.halo;
+    pen.stroke();
+    pen.lineWidth = 2.5;
+    pen.strokeStyle = this.colour.here;
+    pen.stroke();
+    pen.font = '600 13px system-ui, sans-serif';
+    pen.textAlign = 'left';
+    pen.lineWidth = 3;
+    pen.strokeStyle = this.colour.halo;
+    pen.fillStyle = this.colour.ink;
+    pen.strokeText(text, sx + 15, sy + 5);
+    pen.fillText(text, sx + 15, sy + 5);
+  }
+
   // An arrow along the heading; a circle when the heading is not known.
   wearer(view, { x_m, y_m, heading_rad, heading_known }) {
     const { pen } = this;
@@ -187,10 +244,8 @@ export class Painter {
     pen.restore();
   }
 
-  route(view, path) {
-    const points = path.map(([x, y]) => view.toScreen(x, y)), { pen } = this;
-    if (points.length > 1) this.line(points, this.colour.goal, 3, [8, 7]);
-    const [sx, sy] = points[points.length - 1];
+  flag(view, position) {
+    const { pen } = this, [sx, sy] = view.toScreen(...position);
     pen.beginPath();
     pen.arc(sx, sy - 16, 8, Math.PI * 0.85, Math.PI * 0.15);
     pen.lineTo(sx, sy);
@@ -199,17 +254,25 @@ export class Painter {
     pen.fill();
   }
 
-  pose(view, { x_m, y_m, heading_rad }) {
+  // The ghost of a position that is being entered: in the circle that would hold it; a broken arrow is a heading that would stay.
+  pose(view, { x_m, y_m, heading_rad, kept_rad = null, sd_m = 0 }) {
     const [sx, sy] = view.toScreen(x_m, y_m), { pen } = this;
     pen.beginPath();
-    pen.arc(sx, sy, 9, 0, 2 * Math.PI);
-    pen.strokeStyle = this.colour.goal;
+    pen.arc(sx, sy, Math.max(SD_95 * sd_m * view.scale, 9), 0, 2 * Math.PI);
+    pen.strokeStyle = pen.fillStyle = this.colour.goal;
+    pen.globalAlpha = 0.15;
+    pen.fill();
+    pen.globalAlpha = 1;
     pen.lineWidth = 3;
     pen.stroke();
-    if (heading_rad === null) return;
+    if (heading_rad === null && kept_rad === null) return;
+    this.heading([sx, sy], heading_rad ?? kept_rad, view, heading_rad === null ? [3, 7] : []);
+  }
+
+  heading([sx, sy], heading_rad, view, dash) {
     const u = heading_rad + view.turn, tip = [sx + 44 * Math.cos(u), sy - 44 * Math.sin(u)];
     const wing = (w) => [tip[0] - 14 * Math.cos(u + w), tip[1] + 14 * Math.sin(u + w)];
-    this.line([[sx + 9 * Math.cos(u), sy - 9 * Math.sin(u)], tip], this.colour.goal, 3);
+    this.line([[sx, sy], tip], this.colour.goal, 3, dash);
     this.line([wing(0.5), tip, wing(-0.5)], this.colour.goal, 3);
   }
 }

@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: MIT
 // Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
 
-const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕' };
+const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
 const FASTEST_RAD_S = Math.PI;  // of the guidance arrow's turn
+const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a list
 const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
 const $ = (id) => document.getElementById(id);
 const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
@@ -16,10 +18,17 @@ export class Panel {
   }
 
   hello({ title, plan }) {
+    this.plan = plan;
+    this.shownGoal = null;
+    this.fault('');
     $('title').textContent = `${title}: ${plan.name}`;
     document.title = title;
     $('goal').replaceChildren(new Option('Go to…', ''), new Option('a place on the map', 'map'),
       ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
+    $('floors').hidden = plan.levels.length < 2;
+    $('floors').classList.toggle('many', plan.levels.length > MOST_BUTTONS);
+    $('floor').replaceChildren(...plan.levels.map(({ name }, level) => new Option(name, level)).reverse());
+    $('floor').onchange = () => this.onFloor(Number($('floor').value));
     $('floors').replaceChildren(...plan.levels.map((level, k) => {
       const button = document.createElement('button'), share = document.createElement('span');
       button.type = 'button';
@@ -31,10 +40,12 @@ export class Panel {
     }));
   }
 
-  frame({ told: estimate, words, streams, guidance, beams, beacons }, rooms) {
-    const status = estimate?.status ?? 'waiting';
+  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended }) {
+    const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
     this.status(status, words);
-    put('place', estimate ? positionText(estimate, rooms) : '');
+    put('place', estimate ? positionText(estimate, this.plan.levels) : '');
+    put('places', estimate ? placesText(estimate, this.plan.levels) : '');
+    $('places').hidden = !estimate?.hypotheses.length;
     put('echoes', estimate ? echoText(beams) : '');
     put('health', streams ? rateText(streams) : 'no bytes yet');
     put('wrong', streams?.wrong ?? '');
@@ -42,7 +53,8 @@ export class Panel {
     put('beacons', beaconText(beacons));
     $('beacons').hidden = !beacons.length;
     this.guidance(guidance);
-    this.announce(`${status} ${streams?.wrong ?? ''}`, [words, estimate ? nearestRoom(estimate, rooms) : '', streams?.wrong].filter(Boolean).join('. '));
+    this.goal(goal);
+    this.announce(`${status} ${streams?.wrong ?? ''}`, [words, estimate?.where, streams?.wrong].filter(Boolean).join('. '));
   }
 
   // The arrow is relative to the heading: up is straight ahead.
@@ -51,7 +63,7 @@ export class Panel {
     if (!guidance) return;
     const { kind, text, arrow_rad, left_m, own } = guidance;
     $('guidance').dataset.kind = kind;
-    $('turn').dataset.sign = arrow_rad !== null ? 'arrow' : kind === 'arrived' ? 'there' : 'halt';
+    $('turn').dataset.sign = arrow_rad !== null ? 'arrow' : { arrived: 'there', looking: 'look' }[kind] ?? 'halt';
     const by = arrow_rad === null ? 0 : Math.atan2(Math.sin(-arrow_rad - this.turn), Math.cos(-arrow_rad - this.turn));
     if (Math.abs(by) > LEAST_RAD) {
       this.turn += by;
@@ -63,14 +75,38 @@ export class Panel {
     $('end-guidance').hidden = !own;
   }
 
+  // The list of places shows the destination of the run, whichever page chose it.
+  goal(goal) {
+    const text = JSON.stringify(goal);
+    if (text === this.shownGoal) return;
+    this.shownGoal = text;
+    $('goal').value = goal ? this.optionOf(goal) : '';
+  }
+
+  optionOf({ x_m, y_m, level }) {
+    const room = this.plan.levels[level].rooms.findIndex(({ at_m: [x, y] }) => x === x_m && y === y_m);
+    return room < 0 ? 'map' : `${level} ${room}`;
+  }
+
+  // A fault of the server or of this page, in words; empty: none.
+  fault(text) {
+    put('fault', text);
+    $('fault').hidden = !text;
+  }
+
   status(status, words) {
     $('words').dataset.status = status;
     $('mark').textContent = MARKS[status];
     put('status-text', words);
   }
 
-  // One button per level of the plan, with the level's share of the particles.
+  // One button per level of the plan, with the level's share of the particles; the same as a list.
   floors(shownLevel, estimate) {
+    $('floor').value = shownLevel;
+    for (const option of $('floor').options) {
+      const share = Math.round(100 * (estimate?.levels?.[option.value] ?? 0)), text = `${this.plan.levels[option.value].name}${share ? ` ${share} %` : ''}`;
+      if (option.text !== text) option.text = text;
+    }
     [...$('floors').children].forEach((button, level) => {
       const share = estimate?.levels?.[level] ?? 0;
       button.setAttribute('aria-pressed', String(level === shownLevel));
@@ -95,15 +131,22 @@ export class Panel {
   }
 }
 
-function nearestRoom({ x_m, y_m }, rooms) {
-  const away = rooms.map(({ name, at_m: [x, y] }) => [Math.hypot(x - x_m, y - y_m), name]).sort((a, b) => a[0] - b[0]);
-  return away.length ? `near ${away[0][1]}` : '';
+// The places that fit, the likeliest first.
+function placesText(estimate, levels) {
+  const texts = estimate.hypotheses.map(({ probability, where, level, x_m, y_m }) => {
+    const floor = levels.length > 1 ? levels[level].name : '', at = where || `x ${x_m.toFixed(0)}, y ${y_m.toFixed(0)} m`;
+    return `${Math.round(100 * probability)} % ${[at, floor].filter(Boolean).join(', ')}`;
+  });
+  return texts.length ? `places that fit: ${texts.join(' · ')}` : '';
 }
 
-function positionText(estimate, rooms) {
+function positionText(estimate, levels) {
+  if (estimate.status === 'lost' && estimate.hypotheses.length > 1) return 'no position yet';
   const degrees = ((estimate.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((estimate.heading_sd_rad * 180) / Math.PI);
   const heading = estimate.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
-  return [nearestRoom(estimate, rooms), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, heading].filter(Boolean).join(' · ');
+  const floor = levels.length > 1 ? levels[estimate.level].name : '';
+  const safe = estimate.protection_m === null ? '' : `within ${length(estimate.protection_m)}`;
+  return [[estimate.where, floor].filter(Boolean).join(', '), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, safe, heading].filter(Boolean).join(' · ');
 }
 
 function echoText(lines) {

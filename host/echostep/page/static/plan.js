@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: MIT
 // One level of the plan in SVG: walls as paths by tiles, of which only those on the screen are in the document; names of rooms, always upright.
 
 const SVG = 'http://www.w3.org/2000/svg';
 const TILE_M = 30;  // side of a tile
+const KEPT_PX = 22;  // distance of names from the wearer
 
 export class PlanView {
   constructor(wallsGroup, roomsGroup) {
-    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], box: [0, 0, 10, 10] });
+    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], kept: null, box: [0, 0, 10, 10] });
   }
 
   show(walls, rooms) {
@@ -27,16 +29,27 @@ export class PlanView {
       const seen = tile.box[0] < x + reach && tile.box[2] > x - reach && tile.box[1] < y + reach && tile.box[3] > y - reach;
       for (const part of tile.parts) setShown(part, seen && part.longest * view.scale > 1, this.wallsGroup);
     }
-    const taken = [];
+    this.names(view);
+  }
+
+  // Names of rooms that do not cover each other; one that would cover the pixel `kept` is moved aside.
+  names(view, kept = this.kept) {
+    this.kept = kept;
+    const taken = [], isFree = (sx, sy, half) => taken.every(([tx, ty, other]) => Math.abs(tx - sx) > other + half || Math.abs(ty - sy) > 18);
     for (const room of this.rooms) {
-      const [sx, sy] = view.toScreen(room.x, room.y);
-      const free = taken.every(([tx, ty, half]) => Math.abs(tx - sx) > half + room.half || Math.abs(ty - sy) > 18);
-      const shown = free && sx > -room.half && sx < view.width + room.half && sy > -10 && sy < view.height + 10;
+      const [sx, at] = view.toScreen(room.x, room.y), covers = kept && Math.abs(kept[0] - sx) < room.half + KEPT_PX && Math.abs(kept[1] - at) < KEPT_PX;
+      const places = covers ? [-KEPT_PX, KEPT_PX].map((by) => kept[1] + by).sort((a, b) => Math.abs(a - at) - Math.abs(b - at)) : [at];
+      const sy = places.find((place) => isFree(sx, place, room.half));
+      const shown = sy !== undefined && sx > -room.half && sx < view.width + room.half && sy > -10 && sy < view.height + 10;
       if (shown) taken.push([sx, sy, room.half]);
-      room.text.setAttribute('visibility', shown ? 'visible' : 'hidden');
-      if (shown) { room.text.setAttribute('x', sx.toFixed(1)); room.text.setAttribute('y', sy.toFixed(1)); }
+      setNew(room.text, 'visibility', shown ? 'visible' : 'hidden');
+      if (shown) { setNew(room.text, 'x', sx.toFixed(1)); setNew(room.text, 'y', sy.toFixed(1)); }
     }
   }
+}
+
+function setNew(element, name, value) {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
 // Put a part's path into the document, or remove it.

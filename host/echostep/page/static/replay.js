@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The time bar of a replay: play and pause, step, seek, speed.
 
 const $ = (id) => document.getElementById(id);
@@ -5,8 +6,7 @@ const $ = (id) => document.getElementById(id);
 export class Replay {
   // `send(kind, fields)`: sends a request to the server
   constructor(send) {
-    this.holding = false;
-    this.playing = true;
+    Object.assign(this, { send, holding: false, playing: true, last: null });
     $('play').onclick = () => send('play', { playing: !this.playing });
     $('back').onclick = () => send('skip', { by: -1 });
     $('on').onclick = () => send('skip', { by: 1 });
@@ -15,10 +15,21 @@ export class Replay {
     $('time').onchange = () => { this.holding = false; };
   }
 
-  show(replay) { $('replay').hidden = !replay; }
+  // After a new connection the server has forgotten where this page was.
+  show(replay) {
+    $('replay').hidden = !replay;
+    if (!replay || !this.last) return;
+    const { times, playing, t_s } = this.last;
+    this.send('speed', { times });
+    this.send('play', { playing });
+    this.send('seek', { t_s });
+  }
+
+  forget() { this.last = null; }
 
   frame(play) {
     if (!play) return;
+    this.last = play;
     const { t_s, begin_s, end_s, playing } = play, bar = $('time');
     this.playing = playing;
     [bar.min, bar.max] = [begin_s, end_s];

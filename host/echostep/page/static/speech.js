@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Speech: speaks the newest sentence of the guidance when switched on; a newer sentence replaces an older one. A screen reader gets it in any case.
 
 export class Speech {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Colours: bright, dark or high contrast; by default those of the system.
 
 const SYSTEM_QUERIES = { contrast: '(prefers-contrast: more)', dark: '(prefers-color-scheme: dark)' };

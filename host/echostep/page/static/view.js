@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The view: the part of the map on the screen. Converts map metres (x east, y north) to CSS pixels and back.
 
 export class View {

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A folder or a zip file with some JSON files, read within limits.
 
 In: a path. Out: texts by file name. Owns the limits; they hold for the unpacked bytes, whatever sizes the zip file states.
@@ -13,6 +14,10 @@ from echostep.errors import EchostepError
 from echostep.plan.importers.parsing import decode, read_text
 
 LARGEST_BYTES = 256 * 2**20
+MOST_RATIO, FREE_BYTES = (
+    100,
+    2**20,
+)  # unpacked size by packed size, beyond the first MiB; by reason: GeoJSON packs 5 to 30 times
 MOST_FILES = 1000
 
 
@@ -61,9 +66,13 @@ class Archive:
             raise EchostepError(f"{self.label(name)}: the archive has no such file: export it again")
         try:
             with self._zip.open(self._names[name]) as file:
-                raw = file.read(LARGEST_BYTES + 1)
+                packed = self._zip.getinfo(self._names[name]).compress_size
+                most = min(LARGEST_BYTES, MOST_RATIO * packed + FREE_BYTES)
+                raw = file.read(most + 1)
         except (OSError, zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, EOFError) as error:
             raise EchostepError(f"{self.label(name)}: cannot be read: {error}") from error
-        if len(raw) > LARGEST_BYTES:
-            raise EchostepError(f"{self.label(name)}: larger than {LARGEST_BYTES // 2**20} MiB when unpacked")
+        if len(raw) > most:
+            raise EchostepError(
+                f"{self.label(name)}: unpacks to more than {most // 2**20} MiB: too large, or not an exported building"
+            )
         return decode(raw, self.label(name))

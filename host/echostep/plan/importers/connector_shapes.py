@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Stairs, lifts and ramps that lie above each other -> connectors.
 
 In: the `ConnectorShape`s of all levels. Out: `Connector`s. Owns nothing. Stairs and ramps connect neighbouring levels; a lift may pass levels.

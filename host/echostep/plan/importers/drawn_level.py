@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The shapes of one level as they are drawn -> a `Level`.
 
 In: shapes of walls, windows, doors, obstacles, rooms and stairs, in map metres. Out: `Level`. Owns nothing. A wall with a thickness becomes both its

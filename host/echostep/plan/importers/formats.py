@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Recognises the format of a file and calls its importer.
 
 In: a path, and hints. Out: `Plan`. Owns the list of formats.
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.plan.importers.parsing import FORMATS
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.writer import plan_json
 
@@ -21,11 +23,12 @@ SNIFFED_BYTES = 4096  # read to recognise a format
 
 @dataclass(frozen=True, slots=True)
 class Hints:
-    """What a file may not state: the height of a storey (m), and the units and layers of drawings."""
+    """What a file may not state: the height of a storey (m), units and layers of drawings, the width of doors that are to be assumed (m)."""
 
     storey_height_m: float = STOREY_HEIGHT_M
     units: str | None = None
     layers: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    doors_m: float | None = None
 
 
 def import_plan(path: Path, hints: Hints | None = None, above: Sequence[Path] = ()) -> Plan:
@@ -33,16 +36,22 @@ def import_plan(path: Path, hints: Hints | None = None, above: Sequence[Path] = 
 
     Raises EchostepError that names the file and the position in it.
     """
-    plan = _imported(path, hints or Hints(), above)
+    hints = hints or Hints()
+    if hints.doors_m is not None and not _is_imdf(path):
+        raise EchostepError(f"{path}: --doors is for IMDF alone: draw doors with echostep plan edit")
+    plan = _imported(path, hints, above)
     return replace(plan, digest=hashlib.sha256(plan_json(plan).encode()).hexdigest())
 
 
 def open_plan(path: Path | str) -> Plan:
     """Read plan.json, or import another format without hints. Raises EchostepError that names the file and the position in it."""
     path = Path(path)
-    if path.is_dir() or path.suffix.casefold() in OTHERS or path.name in ("main.json", "core.txt"):
-        return import_plan(path)
-    return load_plan(path)
+    return import_plan(path) if is_foreign(path) else load_plan(path)
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file is of another format than plan.json, by its name."""
+    return path.is_dir() or path.suffix.casefold() in OTHERS or path.name in ("main.json", "core.txt")
 
 
 def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
@@ -66,19 +75,21 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
         from echostep.plan.importers.ifc import import_ifc
 
         return import_ifc(path)
-    if path.suffix.casefold() in (".zip", ".imdf") or (path / "manifest.json").exists():
+    if _is_imdf(path):
         from echostep.plan.importers.imdf import import_imdf
 
-        return import_imdf(path, hints.storey_height_m)
+        return import_imdf(path, hints.storey_height_m, hints.doors_m)
     if path.name == "core.txt" or (path / "core.txt").exists():
         from echostep.plan.importers.nodelink import import_nodelink
 
         return import_nodelink(path / "core.txt" if path.is_dir() else path)
     if not path.exists():
         raise EchostepError(f"{path}: no such file")
-    raise EchostepError(
-        f"{path}: no format of plans that echostep knows: give DXF, IFC, IMDF, OpenStreetMap, WRLD (main.json) or biba (core.txt)"
-    )
+    raise EchostepError(f"{path}: no format of plans that echostep knows: give {FORMATS}")
+
+
+def _is_imdf(path: Path) -> bool:
+    return path.suffix.casefold() in (".zip", ".imdf") or (path / "manifest.json").exists()
 
 
 def _begins_with(path: Path, text: str) -> bool:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """GeoJSON features -> shapes in map metres.
 
 In: a parsed FeatureCollection [RFC 7946]. Out: features with their path in the file, properties, shapes. Owns nothing. Errors are ValueErrors that

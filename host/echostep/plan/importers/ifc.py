@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Building models (IFC; needs `pip install echostep[ifc]`) -> `Plan`.
 
 In: an .ifc file. Out: `Plan`. Owns nothing. Each storey is cut by a horizontal plane one metre above its floor: the sections of walls, columns and

@@ -1,8 +1,10 @@
+# SPDX-License-Identifier: MIT
 """Indoor Mapping Data Format (zip or folder) -> `Plan`.
 
 In: an archive [OGC 20-094]. Out: `Plan`. Owns nothing. IMDF has no walls: the boundaries of enclosed units become walls, with gaps at the `opening`s;
 units of brick, concrete or glass become walls with a thickness. Walkways and unenclosed areas get no walls, nor do stairs, lifts and ramps without an
-opening. Levels are `storey_height_m` apart, by their ordinals.
+opening. Levels are `storey_height_m` apart, by their ordinals. Files end in .geojson or .json. With `doors_m`, openings drawn as points and rooms
+without an opening get doors of this width.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from shapely.geometry.base import BaseGeometry
 from echostep.errors import EchostepError
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.archive import Archive
+from echostep.plan.importers.assumed_doors import doors_at, doors_of_rooms
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, pieces, room
 from echostep.plan.importers.geojson import features, label, properties, shape
@@ -87,20 +90,22 @@ class Feature:
         )[:80]
 
 
-def import_imdf(path: Path, storey_height_m: float) -> Plan:
+def import_imdf(path: Path, storey_height_m: float, doors_m: float | None = None) -> Plan:
     """Import the venue of an archive; raises EchostepError that names the file in it and the feature."""
     with Archive(path) as archive:
         if not archive.has("manifest.json"):
             raise EchostepError(f"{path}: no manifest.json in it: give a folder or zip file of IMDF")
-        return _venue(archive, path, storey_height_m)
+        return _venue(archive, path, storey_height_m, doors_m)
 
 
-def _venue(archive: Archive, path: Path, storey_height_m: float) -> Plan:
+def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float | None) -> Plan:
     georeference = _origin(archive)
     earth = EarthTransform(georeference)
     levels = sorted(_features(archive, "level", earth), key=_ordinal)
     if not levels:
-        raise EchostepError(f"{path}: level.geojson: it has no levels: export the archive again with its levels")
+        raise EchostepError(
+            f"{path}: {_file(archive, 'level')}: it has no levels: export the archive again with its levels"
+        )
     drawn_levels = {
         level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
         for level in levels
@@ -113,6 +118,8 @@ def _venue(archive: Archive, path: Path, storey_height_m: float) -> Plan:
         _outline(drawn, next(level for level in levels if level.key == key))
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
+        if doors_m is not None:
+            _assume_doors(drawn, units[key], openings[key], doors_m)
     fixtures = _by_level(_features(archive, "fixture", earth) + _features(archive, "kiosk", earth), drawn_levels)
     for key, drawn in drawn_levels.items():
         for fixture in fixtures[key]:
@@ -135,9 +142,14 @@ def _venue(archive: Archive, path: Path, storey_height_m: float) -> Plan:
     )
 
 
+def _file(archive: Archive, kind: str) -> str:
+    """The file of a kind of feature: .geojson as the standard names it, or .json."""
+    return f"{kind}.json" if archive.has(f"{kind}.json") and not archive.has(f"{kind}.geojson") else f"{kind}.geojson"
+
+
 def _origin(archive: Archive) -> Georeference:
     """The plan's origin: the first corner of the first level, rounded to 1e-5 degrees (about 1 m)."""
-    name = "level.geojson"
+    name = _file(archive, "level")
     tree = parse_json(archive.text(name), archive.label(name))
     found: Any = tree
     try:
@@ -156,7 +168,7 @@ def _origin(archive: Archive) -> Georeference:
 
 def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Feature]:
     """All features of a kind; an empty list when the archive has no file of this kind."""
-    name = f"{kind}.geojson"
+    name = _file(archive, kind)
     if not archive.has(name):
         return []
     found = []
@@ -232,6 +244,23 @@ def _unit(drawn: DrawnLevel, unit: Feature, openings: list[BaseGeometry]) -> Non
             drawn.connectors.append(ConnectorShape(way, unit.name, area))
         elif unit.name or (kind not in OPEN and kind != "unspecified"):
             drawn.rooms.append(room(unit.name or kind, area))
+
+
+def _assume_doors(drawn: DrawnLevel, units: list[Feature], openings: list[Feature], width_m: float) -> None:
+    """Doors of openings without a width, and of enclosed units without an opening."""
+    enclosed: list[Polygon] = []
+    ways: list[Polygon] = []
+    for unit in units:
+        if unit.category not in FILLED:
+            lift_or_stairs = unit.category.split(".")[0] in CONNECTOR_KINDS
+            (ways if unit.category in OPEN or lift_or_stairs else enclosed).extend(areas([unit.shape]))
+    walls = [area.exterior for area in enclosed]
+    for one in openings:
+        points = [part for part in pieces([one.shape]) if isinstance(part, Point)]
+        drawn.doors += [door for point in points for door in doors_at(point, walls, width_m, ON_M)]
+    opened = [area for area in enclosed if any(_opens(area, one.shape) for one in openings)]
+    closed = [area for area in enclosed if all(area is not other for other in opened)]
+    drawn.doors += doors_of_rooms(closed, ways, opened, width_m)
 
 
 def _opens(area: Polygon, one: BaseGeometry) -> bool:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Node and link text (`biba`): core.txt, node.txt, link.txt, arrow.txt, polygon.txt -> `Plan`.
 
 In: core.txt. Out: `Plan`. Owns nothing. Nodes are pixels of a picture, y down, `scale` metres each; links are walls; an arrow is a flight of stairs

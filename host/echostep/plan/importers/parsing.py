@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reads untrusted files within limits.
 
 In: a path. Out: bytes, text, or parsed JSON; every error is an EchostepError that names the file. Owns the limits.
@@ -11,6 +12,9 @@ from typing import Any
 
 from echostep.errors import EchostepError
 
+FORMATS = (
+    "DXF, IFC, IMDF (zip or folder), OpenStreetMap (.osm, .xml, JSON of Overpass), WRLD (main.json) or biba (core.txt)"
+)
 LARGEST_BYTES = 512 * 2**20
 
 

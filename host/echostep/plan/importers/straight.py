@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Merges the pieces of a straight wall into one segment.
 
 In: segments (n, 4) in metres, in any order, overlapping or repeated. Out: fewer segments that cover the same points. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Indoor maps of WRLD (as `westport-house`): main.json and one GeoJSON file per level -> `Plan`.
 
 In: main.json. Out: `Plan`. Owns nothing. Walls, windows and doors are areas; stairs and elevators become connectors where levels have them at the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated beacons and their gateway: a walk among beacons -> the bytes that the gateway sends.
 
 In: where the walker is over time, the walls, the beacons. Out: chunks of the gateway's port, or frames. Owns the sequence number. Every 200 ms all

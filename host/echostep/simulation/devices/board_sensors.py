@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The board's own sensors: gyros, barometer, compass.
 
 In: what is true, a seeded generator for each sensor. Out: counts as the device would give them. Owns each sensor's constant errors and drift.

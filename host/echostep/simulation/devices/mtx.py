@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """An Xsens MTx on the foot: what it feels, as the bytes that it would send.
 
 In: a walk, a seeded generator. Out: samples at its own rate: when taken, and the MTData frames. Owns the sensor's constant errors.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A simulated MTx that answers: its states, its settings, and its measurements in whatever output format it is set to.
 
 In: bytes from the host, and samples. Out: bytes to the host. Owns the settings, as the device's memory does.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """From a serial line to the host: when bytes arrive, and in which portions.
 
 In: frames and when the device begins to send each. Out: portions as the driver of an FTDI adapter hands them over. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The two SRF02 of the Python board: when they fire, and what they hear.
 
 In: rows of one millisecond. Out: pings, with the time at which each is read. Owns the schedule, which is the firmware's (firmware/ranger.h).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Attitudes as matrices and quaternions.
 
 In: roll, pitch, yaw, or rotation matrices. Out: the other form. Owns nothing.

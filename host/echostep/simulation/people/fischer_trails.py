@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trails of [Fischer 2008, section 3.2] as walks past machines.
 
 In: a seed. Out: a walk and what an MTx on the foot measures. Owns the trails' geometry.

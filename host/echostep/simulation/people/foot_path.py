@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The right foot between two footprints: flat and still, rolling over its ball, swinging, landing on its heel.
 
 In: when and where it stands. Out: the path and the attitude of the sensor on its instep. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated gait from joint angle curves: the motion of the hips follows from feet that roll on the floor without slip.
 
 In: a gait (slow, natural, fast), a person drawn from a seed, how long. Out: `SimulatedGait`: rates of thigh and shank, and where the hips are. Owns

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Thigh, calf and pelvis over the gait cycle.
 
 In: phase (0 at heel strike of the right foot) and effort (length of the stride against a usual one). Out: angles and sway. Owns the curves.

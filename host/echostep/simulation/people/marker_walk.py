@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A careful walk from floor marker to floor marker, as in [Girard 2011, 3.4]: steps, headings and echoes without the electronics.
 
 In: a route, the walls that are really there, a seed. Out: `MarkerWalk`: what foot, compass and rangers measured, and the truth. Owns nothing.

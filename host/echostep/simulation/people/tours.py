@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Waypoints along a way through a building, stairs and lifts included.
 
 In: a plan and places, one after the other. Out: waypoints for `walker`. Owns nothing. The ways between are the shortest that a person can walk.
@@ -6,17 +7,22 @@ Stairs are walked as two flights and a landing a storey, along the longer side o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from shapely import Polygon
 
 from echostep.arrays import Floats
+from echostep.errors import EchostepError
 from echostep.plan.model import Connector, Plan
 from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.simulation.people.walker import Waypoint
 
 TURN_M = 0.9  # room to turn at the ends of a flight
+MOST_ROOMS = 8  # of `room_tour`; by reason: two minutes of walking in an office
+MOST_TOUR_M = 300.0  # after which `room_tour` visits no further room, by reason
+SHORTEST_LEG_M = 2.0  # of `room_tour`: the next room is farther away, by reason
 SHORTEST_M = 0.05  # a waypoint nearer to the one before it is left out
 
 
@@ -27,6 +33,53 @@ def tour(plan: Plan, places: Sequence[RoutePlace]) -> list[Waypoint]:
     for start, end in zip(places, places[1:], strict=False):
         way += waypoints(plan, routes.way(start, end))[1 if way else 0 :]
     return _spaced(way)
+
+
+def room_tour(plan: Plan) -> list[Waypoint]:
+    """From the plan's start, or its first room, through rooms of each level that stairs or lifts reach; raises EchostepError without two places.
+
+    On a level without named rooms its doors are visited. The nearest places come first, at most `MOST_ROOMS` on all levels together but one on
+    each, and no more after `MOST_TOUR_M`.
+    """
+    routes, way, walked_m = Routes(plan), list[Waypoint](), 0.0
+    here = _first_place(plan)
+    first, most = here.level, max(1, MOST_ROOMS // len(plan.levels))
+    for level in sorted(range(len(plan.levels)), key=lambda k: abs(k - first)):
+        rooms = _places(plan, level)
+        visited = 0
+        while rooms and visited < most and walked_m < MOST_TOUR_M:
+            goal = _nearest(rooms, here)
+            rooms.remove(goal)
+            try:
+                route = routes.way(here, goal)
+            except EchostepError:  # no way leads there
+                continue
+            if route.length_m < SHORTEST_LEG_M:
+                continue
+            way += waypoints(plan, route)[1 if way else 0 :]
+            here, visited, walked_m = goal, visited + 1, walked_m + route.length_m
+    if len(way) < 2:
+        raise EchostepError(f"plan {plan.name}: a tour needs two places with a way between them: name some rooms in it")
+    return _spaced(way)
+
+
+def _nearest(rooms: Sequence[RoutePlace], here: RoutePlace) -> RoutePlace:
+    return min(rooms, key=lambda room: math.hypot(room.x_m - here.x_m, room.y_m - here.y_m))
+
+
+def _first_place(plan: Plan) -> RoutePlace:
+    """The plan's start, else its first room; the origin of a plan without rooms, from which no tour begins."""
+    if plan.start is not None and plan.start.level >= 0:
+        return RoutePlace(plan.start.x_m, plan.start.y_m, plan.start.level)
+    places = [place for k in range(len(plan.levels)) for place in _places(plan, k)]
+    return places[0] if places else RoutePlace(0.0, 0.0)
+
+
+def _places(plan: Plan, level: int) -> list[RoutePlace]:
+    """The rooms of a level; the middles of its doors when it names none."""
+    rooms = [RoutePlace(*room.at_m, level) for room in plan.levels[level].rooms]
+    doors = [door.line for door in plan.levels[level].doors]
+    return rooms or [RoutePlace(0.5 * (x0 + x1), 0.5 * (y0 + y1), level) for x0, y0, x1, y1 in doors]
 
 
 def waypoints(plan: Plan, route: Route) -> list[Waypoint]:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A simulated day in one dimension: corridors, stairs with landings, lifts with doors.
 
 In: the building's storeys, stairs, lift or both, a seeded generator. Out: times, true heights, gait, when in a stairwell or lift shaft. Owns the

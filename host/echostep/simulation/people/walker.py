@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A simulated walk: trunk, right foot, thigh and calf at 1 kHz.
 
 In: waypoints on the plan, a seeded generator. Out: `Walk`: arrays at 1 kHz, map frame. Owns nothing.

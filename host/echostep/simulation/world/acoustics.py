@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """How loud an echo is, in dB against a wall straight ahead at one metre, and whether an SRF02 notices.
 
 In: the geometry of one echo. Out: its level. Owns the one table of acoustic constants, `Acoustics`; the tracker's likelihood shares nothing with it.

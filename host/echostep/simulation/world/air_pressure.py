@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The air of a building: what a barometer is carried through.
 
 In: times, true heights of the wearer, when in a stairwell or lift shaft, a seeded generator. Out: true pressures and the temperature that a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The world of a guided return [Fischer 2008, 4]: a trail on open ground, beacons dropped along it, magnetic sources beside it.
 
 In: settings and a random generator. Out: a `BeaconGround` of plain arrays, and kernels for what happens on it: how a source turns the measured

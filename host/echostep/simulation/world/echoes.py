@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated ultrasonic echoes: times of flight from the walls of a plan.
 
 In: walls, positions and headings of the trunk, a seeded generator. Out: times of flight of each pose, for each ranger's own ping and for

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plane geometry of sound rays: mirror images, crossings, what stands in the way.
 
 In: points and wall segments (4,) x0 y0 x1 y1, metres. Out: numbers. Owns nothing.

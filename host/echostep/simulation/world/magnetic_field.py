@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The magnetic field inside a building: the earth's, disturbed from place to place.
 
 In: places, a seeded generator, machines. Out: field vectors in the map frame, in units of the earth's field. Owns the disturbance.

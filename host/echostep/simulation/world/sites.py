@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Buildings to walk through: the paper's, and those that it could not handle.
 
 In: a seed where a building has something random. Out: `SimulatedSite`: the plan, what is really built, and a route. Owns nothing.

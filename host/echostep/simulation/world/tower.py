@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A building of several storeys to walk through: a corridor with rooms on each, a stairwell at one end, a lift at the other.
 
 In: how many storeys. Out: the plan, and waypoints through it. Owns nothing.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Doors of a drawing: the line from jamb to jamb, derived from the door's symbol.
 
 In: blocks, arcs and lines on the layers of doors; walls. Out: `Door`s. Owns nothing. A swing is an arc about the hinge: the door goes from the hinge

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Drawings (DXF, one file per level) -> `Plan`.
 
 In: files, patterns of layer names, units. Out: `Plan`. Owns the default patterns. Lines, polylines, arcs, circles, ellipses and splines on a layer of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Entities of a DXF drawing with blocks expanded, and their lines in metres.
 
 In: a file. Out: entities with their effective layers; polylines. Owns the limits for untrusted drawings.
@@ -23,6 +24,8 @@ from echostep.plan.json_fields import LIMIT_M
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
 FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
+STRAY_M = 1e8  # a line beyond is no building, in whatever grid; by reason: twice around the Earth
+STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16
 
@@ -49,12 +52,19 @@ class DrawingFrame:
         return float(point.x) * self.scale_m - self.x0_m, float(point.y) * self.scale_m - self.y0_m
 
     def raw(self, entity: Any) -> LineString | None:
-        """The entity as a polyline in metres; None for an entity without a line."""
+        """The entity as a polyline in metres, `STRAY` for one that no building has; None for an entity without a line."""
         from ezdxf import path
+        from ezdxf.lldxf.const import DXFError
 
         try:
-            points = [self.metres(p) for p in path.make_path(entity).flattening(FLAT_M / self.scale_m)]
-        except (TypeError, ValueError, ArithmeticError, IndexError):
+            if not abs(float(getattr(entity.dxf, "radius", 0.0))) * self.scale_m <= STRAY_M:
+                return STRAY
+            drawn = path.make_path(entity)
+            ends = np.array([self.metres(p) for p in drawn.control_vertices()])
+            if len(ends) and not np.abs(ends).max() <= STRAY_M:  # its pieces could not be counted
+                return STRAY
+            points = [self.metres(p) for p in drawn.flattening(FLAT_M / self.scale_m)]
+        except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, DXFError):
             return None
         return LineString(points) if len(set(points)) > 1 and np.isfinite(points).all() else None
 
@@ -94,12 +104,23 @@ def entities(space: Any, file: Path, whole: Callable[[str], bool]) -> Iterator[t
         count += depth > 0
         if count > MOST_PARTS:
             raise EchostepError(f"{file}: its blocks have more than {MOST_PARTS} parts")
-        layer = outer if entity.dxf.layer == "0" else str(entity.dxf.layer)
+        own = _layer_of(entity)
+        layer = outer if own == "0" else own
         yield entity, layer
         if entity.dxftype() == "INSERT":
             stack += [(attribute, layer, depth + 1) for attribute in entity.attribs]
         if entity.dxftype() == "INSERT" and depth < DEEPEST_BLOCK and not whole(layer):
             stack += [(part, layer, depth + 1) for part in parts(entity, file)]
+
+
+def _layer_of(entity: Any) -> str:
+    """The layer of an entity; "0" for one of an unknown kind, which ezdxf keeps without attributes."""
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        return str(entity.dxf.layer)
+    except (AttributeError, DXFError):
+        return "0"
 
 
 def parts(insert: Any, file: Path) -> list[Any]:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """OpenStreetMap Simple Indoor Tagging (XML, or JSON of Overpass) -> `Plan`.
 
 In: an .osm, .xml or .json file. Out: `Plan`. Owns nothing. Rooms have walls, corridors and areas have none, `indoor=wall` is a wall, a building's

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Nodes, ways and multipolygons of an OpenStreetMap file.
 
 In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`). Out: `Elements`. Owns nothing. XML with an entity or a DTD is refused.
@@ -17,7 +18,7 @@ from shapely.geometry import LineString
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.plan.importers.parsing import parse_json, read_text
+from echostep.plan.importers.parsing import FORMATS, parse_json, read_text
 from echostep.plan.json_fields import number, typed
 
 Tags = dict[str, str]
@@ -91,7 +92,7 @@ def _xml_rows(text: str) -> list[dict[str, Any]]:
     except ET.ParseError as error:
         raise ValueError(f"not XML: {error}") from error
     if root.tag != "osm":
-        raise ValueError(f"<{root.tag[:40]}> is not <osm>: is this an OpenStreetMap file?")
+        raise ValueError(f"this XML is <{root.tag[-40:]}>, not <osm>: plans are read as {FORMATS}")
     return [_xml_row(element) for element in root if element.tag in ("node", "way", "relation")]
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Level tags of OpenStreetMap -> numbers.
 
 In: tags (`level=0;1`, `level=-1-2`, `repeat_on=3-5`). Out: level numbers, ascending. Owns nothing.

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""The ports of the board and the MTx, found by what comes from them.
+
+In: the USB serial ports of this computer. Out: the ports' paths; EchostepError that lists what each port is. Owns the ports while it listens;
+it writes nothing to them. A port that is silent counts by its USB identifiers.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from echostep.commissioning.probe import BAUD
+from echostep.commissioning.serial_ports import PortSeen, Role, list_seen
+from echostep.errors import EchostepError
+from echostep.ports.chunks import BOARD, MTX
+from echostep.ports.serial_ports import SerialPorts
+from echostep.recording.device import LISTENED_BYTES, sender
+
+SEARCH_S = 2.0  # longest time to listen; by reason: an MTx that has just been plugged in wakes up in 0.5 s
+ROLES = {Role.BOARD: BOARD, Role.MTX: MTX}
+
+
+@dataclass(frozen=True, slots=True)
+class FoundPorts:
+    """Paths; `mtx` None: there is none."""
+
+    board: str
+    mtx: str | None
+
+
+def find_ports(mtx: str | None = None) -> FoundPorts:
+    """Both ports, or the board's when the MTx's is given; raises EchostepError when there is no board, or more than one of a kind."""
+    seen = [port for port in list_seen() if port.path != mtx]
+    found, notes = _listen([port.path for port in seen])
+    for port in seen:
+        if port.path not in found and port.path not in notes and port.role in ROLES:
+            found[port.path] = ROLES[port.role]
+    boards, others = ([path for path, device in found.items() if device == kind] for kind in (BOARD, MTX))
+    if len(boards) != 1:
+        what = "several boards are plugged in" if boards else "no sensor board was found"
+        raise EchostepError(f"{what}{_listed(seen, found, notes)}: name its port with --board; see echostep doctor")
+    if len(others) > 1 and mtx is None:
+        raise EchostepError(f"several MTx{_listed(seen, found, notes)}: name its port with --mtx")
+    return FoundPorts(boards[0], mtx or (others[0] if others else None))
+
+
+def _listen(paths: list[str]) -> tuple[dict[str, str], dict[str, str]]:
+    """Which device each port has, by its bytes; and why a port could not be opened."""
+    opened: list[SerialPorts] = []
+    found: dict[str, str] = {}
+    notes: dict[str, str] = {}
+    try:
+        for path in paths:
+            try:
+                opened.append(SerialPorts({path: path}, {path: BAUD[BOARD]}))
+            except EchostepError as error:
+                notes[path] = str(error)
+        received = {path: b"" for path in paths if path not in notes}
+        end_s = time.monotonic() + SEARCH_S
+        while time.monotonic() < end_s and len(found) < len(received):
+            for ports in opened:
+                chunk = next(ports.chunks())
+                if chunk is None or chunk.port in found or len(received[chunk.port]) > LISTENED_BYTES:
+                    continue
+                received[chunk.port] += chunk.data
+                if device := sender(received[chunk.port]):
+                    found[chunk.port] = device
+    finally:
+        for ports in opened:
+            ports.close()
+    return found, notes
+
+
+def _listed(seen: list[PortSeen], found: dict[str, str], notes: dict[str, str]) -> str:
+    """What each port is, in brackets."""
+    if not seen:
+        return " (no USB serial port is plugged in)"
+    words = {BOARD: "a board", MTX: "an MTx"}
+    listed = [
+        f"{port.name}: {notes.get(port.path) or words.get(found.get(port.path, ''), 'something else')}" for port in seen
+    ]
+    return f" ({'; '.join(listed)})"

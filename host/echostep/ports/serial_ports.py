@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""The serial ports of a live run.
+
+In: URLs of ports (pyserial, or udp://). Out: `Chunk`s in order of arrival. Owns the open ports, which are locked for this process, their threads.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+import serial
+
+from echostep.errors import EchostepError
+from echostep.ports.access import holders, refusal
+from echostep.ports.arrival_clock import now_ns
+from echostep.ports.chunk_queue import ChunkQueue
+from echostep.ports.chunks import Chunk
+from echostep.ports.udp import UdpPort
+
+# All by reason.
+IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time
+READ_TIMEOUT_S = 0.1
+WRITE_TIMEOUT_S = 0.5
+REOPEN_S = 0.5  # between two attempts to open a lost port
+JOIN_S = 2.0  # longest wait for the end of a reading thread
+MOST_NOTICES = 8  # kept; the oldest is dropped
+
+
+class SerialPorts:
+    """Ports (pyserial URLs, udp://HOST:PORT[?key=FILE]), each read by its own thread. A port that is lost is opened again.
+
+    Raises EchostepError when a port cannot be opened at the start, or is given twice. `notices` holds messages about lost and reopened ports.
+    """
+
+    def __init__(self, urls: Mapping[str, str], baud: Mapping[str, int]) -> None:
+        """`urls` and `baud` by port name; only the ports named are opened."""
+        self._queue = ChunkQueue()
+        self._stop = threading.Event()
+        self._told: Counter[str] = Counter()  # dropped chunks by port that a notice has told of
+        self.urls = dict(urls)
+        self._ports: dict[str, serial.SerialBase | UdpPort] = {}
+        check_different(urls)
+        try:
+            for name, url in urls.items():
+                self._ports[name] = _open(url, baud[name])
+        except EchostepError:
+            for port in self._ports.values():
+                port.close()
+            raise
+        self.notices: deque[str] = deque(maxlen=MOST_NOTICES)
+        self._threads = [
+            threading.Thread(target=self._read, args=(name, url, baud[name]), daemon=True) for name, url in urls.items()
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the open ports."""
+        return tuple(self._ports)
+
+    def chunks(self) -> Iterator[Chunk | None]:
+        """Chunks in order of arrival until `close`; None after `IDLE_S` without a chunk."""
+        while not self._stop.is_set():
+            yield self._queue.get(IDLE_S)
+            for port in [port for port, count in self._queue.dropped.items() if count > self._told[port]]:
+                if not self._told[port]:
+                    self.notices.append(f"{port}: its bytes come faster than they are used; some are dropped")
+                self._told[port] = self._queue.dropped[port]
+
+    def send(self, port: str, sent: bytes) -> None:
+        """Write to a port, for at most `WRITE_TIMEOUT_S`; a failure becomes a notice."""
+        try:
+            self._ports[port].write(sent)
+        except (serial.SerialException, OSError) as error:
+            self.notices.append(f"{port}: cannot write: {error}")
+
+    def close(self) -> None:
+        """Stop the threads and close the ports."""
+        self._stop.set()
+        for thread in self._threads:
+            thread.join(timeout=JOIN_S)
+        for port in self._ports.values():
+            port.close()
+
+    def _read(self, name: str, url: str, baud: int) -> None:
+        """The thread of one port: put its chunks into the queue until `close`."""
+        while not self._stop.is_set():
+            port = self._ports[name]
+            try:
+                received = port.read(max(1, port.in_waiting))
+            except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under a blocking read
+                self._reopen(name, url, baud, error)
+                continue
+            if isinstance(port, UdpPort) and (news := port.news()):
+                self.notices.append(f"{name}: {news}")
+            if received:
+                self._queue.put(Chunk(name, now_ns(), received))
+
+    def _reopen(self, name: str, url: str, baud: int, error: Exception) -> None:
+        """Close a lost port and try to open it until that succeeds or `close` is called."""
+        if self._stop.is_set():
+            return
+        self.notices.append(f"{name}: {url} went away ({error}); trying again")
+        self._ports[name].close()
+        while not self._stop.wait(REOPEN_S):
+            try:
+                self._ports[name] = _open(url, baud)
+            except EchostepError:
+                continue
+            self.notices.append(f"{name}: {url} is back")
+            return
+
+
+def check_different(urls: Mapping[str, str]) -> None:
+    """Raise EchostepError when two names have the same port."""
+    for (name, url), (other, again) in combinations(urls.items(), 2):
+        if os.path.realpath(url) == os.path.realpath(again):
+            raise EchostepError(f"{url} is given twice, for {name} and {other}: each has a port of its own")
+
+
+def _open(url: str, baud: int) -> serial.SerialBase | UdpPort:
+    """The port, locked for this process; raises EchostepError that names the program which has it."""
+    if refused := refusal(url):
+        raise EchostepError(str(refused))
+    try:
+        if url.startswith("udp://"):
+            return UdpPort(url)
+        return serial.serial_for_url(
+            url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True
+        )
+    except (serial.SerialException, OSError, ValueError) as error:
+        if getattr(error, "errno", None) in (errno.EWOULDBLOCK, errno.EBUSY):
+            held = ", ".join(holders(url)) or "a program of another user"
+            raise EchostepError(f"{url} is in use by {held}: end that program, or give another port") from error
+        raise EchostepError(
+            f"{url}: cannot open the port: {error}; see which ports there are: ls /dev/serial/by-id"
+        ) from error

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""How much of a walk was lost, and why: for the last lines of a run.
+
+In: the tracker's estimates as they are published. Out: a sentence. Owns the time spent in each condition.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.map_filter import DOUBTED
+from echostep.path import MeasuredSegment
+from echostep.tracker import Tracker, TrackerState
+
+ECHOLESS_S = 5.0  # without a ping for so long there are no echoes; by reason: ten pings of each ranger at the slowest
+LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long. By reason: estimates come twice a second
+SILENT = "nothing came from the foot"
+UNFITTING = "the echoes did not fit the plan"
+ECHOLESS = "there were no echoes"
+SPREAD = "several places fitted"
+
+
+class Losses:
+    """Watches a tracker from its first estimate on."""
+
+    def __init__(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+        self._walk_s = 0.0
+        self._spent_s: dict[TrackStatus, Counter[str]] = {status: Counter() for status in TrackStatus}
+        self._last: Estimate | None = None
+        self._ping_s = 0.0  # time of the newest ping
+        self._check_ins: dict[int, float] = {}  # number of a check-in: time of the estimate that it gave
+        tracker.watchers.append(self._watch)
+
+    def _watch(self, measured: MeasuredSegment | None, e: Estimate) -> None:
+        """Add the time since the last estimate to the condition of the new one."""
+        last, self._last = self._last, e
+        state = self._tracker.state
+        if state.check_ins and state.check_ins not in self._check_ins:
+            self._check_ins[state.check_ins] = e.t_s
+        if measured is not None and len(measured.t_s):
+            self._ping_s = float(measured.t_s[-1])
+        if last is None:
+            self._ping_s = max(self._ping_s, e.t_s)
+            return
+        span_s = min(max(e.t_s - last.t_s, 0.0), LONGEST_S)
+        self._walk_s += span_s
+        self._spent_s[e.status][self._reason(measured, e, state)] += span_s  # type: ignore[assignment]
+
+    def _reason(self, measured: MeasuredSegment | None, e: Estimate, state: TrackerState) -> str:
+        """Why an estimate would not be sure."""
+        if measured is None:
+            return SILENT
+        if state.right < DOUBTED:
+            since = [t_s for t_s in self._check_ins.values() if t_s < e.t_s]
+            return f"{UNFITTING} after the position was set by hand at {since[-1]:.0f} s" if since else UNFITTING
+        return ECHOLESS if e.t_s - self._ping_s > ECHOLESS_S else SPREAD
+
+    def describe(self) -> str:
+        """The whole walk in a sentence: how long it was lost and uncertain, and the reasons with their times."""
+        if self._last is None:
+            return ""
+        lost, uncertain = self._spent_s[TrackStatus.LOST], self._spent_s[TrackStatus.UNCERTAIN]
+        walk = f"{self._walk_s:.0f} s"
+        by_hand = _by_hand(self._tracker.state)
+        if lost.total() < 0.5 and uncertain.total() < 0.5:
+            return f"never lost in {walk}{by_hand}"
+        parts = [f"lost for {lost.total():.0f} s of {walk}", f"uncertain for {uncertain.total():.0f} s"]
+        reasons = (lost + uncertain).most_common()
+        why = ", ".join(f"{reason} ({seconds:.0f} s)" for reason, seconds in reasons if seconds >= 0.5)
+        return f"{', '.join(parts)}: {why}{by_hand}"
+
+
+def _by_hand(state: TrackerState) -> str:
+    """How often a position was set by hand and undone, as the end of a sentence."""
+    if not state.check_ins:
+        return ""
+    undone = f", {state.undone} of them undone" if state.undone else ""
+    times = "once" if state.check_ins == 1 else f"{state.check_ins} times"
+    return f"; position set by hand {times}{undone}"

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""Progress on the terminal, wherever a command takes longer than a moment.
+
+In: what is done; how far it is. Out: a line that is redrawn on a terminal and vanishes at the end, or one plain line elsewhere. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from threading import Timer
+from typing import TypeVar
+
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from echostep.session.console import console
+
+SHOWN_AFTER_S = 2.0  # elsewhere than on a terminal; by reason: what ends before needs no line
+Item = TypeVar("Item")
+
+
+@contextmanager
+def progress_line(text: str) -> Iterator[None]:
+    """Say what is done while the block runs."""
+    if not console.is_terminal:
+        timer = Timer(SHOWN_AFTER_S, console.print, [f"{text} ..."])
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+        return
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True
+    ) as bars:
+        bars.add_task(text, total=None)
+        yield
+
+
+def with_bar(items: Iterable[Item], text: str, fraction: Callable[[], float | None]) -> Iterator[Item]:
+    """The same items, with a bar on a terminal; `fraction`, 0 to 1, is asked at each item; None: it is not known."""
+    if not console.is_terminal:
+        yield from items
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bars:
+        task = bars.add_task(text, total=None)
+        for item in items:
+            yield item
+            if (done := fraction()) is not None:
+                bars.update(task, total=1.0, completed=done)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""Which output format the MTData of a capture have, as the messages do not contain it.
+
+In: frames of a capture's beginning, and what the caller knows. Out: the format by bus and length, and how it was found. Owns the formats found.
+
+It is, in this order: given; told by a Configuration message or by the answers to ReqOutputMode and ReqOutputSettings in the capture; or the simplest
+format of that length with which the values are possible.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Bools, Octets
+from echostep.xsens.frames import BUS_ID, CONFIGURATION, MTDATA, OUTPUT_MODE, OUTPUT_SETTINGS, Frame
+from echostep.xsens.mtdata import (
+    ACCEL,
+    ATTITUDE,
+    AUXILIARY,
+    CALIBRATED,
+    CELSIUS,
+    EULER,
+    FIXED_12_20,
+    FLOAT,
+    GYRO,
+    MAG,
+    MATRIX,
+    NO_ACCEL,
+    NO_ANALOG_1,
+    NO_ANALOG_2,
+    NO_GYRO,
+    NO_MAG,
+    ORIENTATION,
+    QUATERNION,
+    RAW,
+    SAMPLE_COUNTER,
+    STATUS,
+    TEMPERATURE,
+    Decoded,
+    OutputFormat,
+    decode_mtdata,
+)  # fmt: skip
+
+# Of a Configuration message, in bytes: the number of devices, the first device's block, the length of a block [CMT].
+_DEVICES, _BLOCKS, _BLOCK = 96, 98, 20
+_BLOCK_FORMAT = struct.Struct(">IHHI")  # of a block: device, length of its data, output mode, output settings
+MOST_ROWS = 500  # messages by which a format is judged; by reason
+POSSIBLE = 0.9  # least share of messages with possible values; by reason: some are damaged
+# Possible values, by reason: magnitudes of a sensor on a body, m/s2, rad/s, earth's fields; mean acceleration with gravity in it; air, degC.
+MOST = ((ACCEL, 200.0), (GYRO, 40.0), (MAG, 20.0))
+STRONGEST_FIELD = 4.0  # median; by reason: some iron, no magnet
+MEAN_ACCEL = (5.0, 20.0)  # m/s2
+AIR_C = (-40.0, 85.0)  # [MTx data sheet, operating temperature]
+UNIT_ERROR = 0.01  # of |q| = 1
+GIVEN, CONFIGURED, BY_LENGTH = "given", "by a configuration message of the capture", "by the length and the values"
+
+
+class Found(NamedTuple):
+    """A format and how it was found."""
+
+    output: OutputFormat
+    how: str
+
+
+@dataclass(slots=True)
+class OutputFormats:
+    """Formats by bus and length of the payload. `mode`, `settings`: given by the caller, None where not known."""
+
+    mode: int | None = None
+    settings: int | None = None
+    found: dict[tuple[int, int], Found | None] = field(default_factory=dict)  # None: no format fits
+    _told: dict[int, list[int | None]] = field(default_factory=dict)  # mode and settings by bus
+
+    def learn(self, frames: list[Frame]) -> None:
+        """Find the formats of these frames' MTData, where they are not found yet."""
+        found: dict[tuple[int, int], list[bytes]] = {}
+        for frame in frames:
+            self._listen(frame)
+            key = frame.bus, len(frame.payload)
+            if frame.mid == MTDATA and key not in self.found and len(found.setdefault(key, [])) < MOST_ROWS:
+                found[key].append(frame.payload)
+        for key, payloads in found.items():
+            rows = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), key[1])
+            self.found[key] = self._find(key[0], rows)
+
+    def of(self, bus: int, length: int) -> OutputFormat | None:
+        """The format of MTData of this length; None where it is not known."""
+        found = self.found.get((bus, length))
+        return None if found is None else found.output
+
+    def _listen(self, frame: Frame) -> None:
+        """Keep mode and settings from a configuration message."""
+        if frame.mid == CONFIGURATION:
+            for bus, (_, _, mode, settings) in enumerate(configured_devices(frame.payload), 1):
+                self._told[bus] = [mode, settings]
+                self._told.setdefault(BUS_ID, [mode, settings])
+        elif frame.mid == OUTPUT_MODE and len(frame.payload) == 2:
+            self._told.setdefault(frame.bus, [None, None])[0] = int.from_bytes(frame.payload, "big")
+        elif frame.mid == OUTPUT_SETTINGS and len(frame.payload) == 4:
+            self._told.setdefault(frame.bus, [None, None])[1] = int.from_bytes(frame.payload, "big")
+
+    def _find(self, bus: int, rows: Octets) -> Found | None:
+        """The format of this device's payloads (n, length)."""
+        if self.mode is not None or self.settings is not None:
+            return _first(self.mode, self.settings, rows, GIVEN)
+        told_mode, told_settings = self._told.get(bus, (None, None))
+        told = None if told_mode is None else _first(told_mode, told_settings, rows, CONFIGURED)
+        return told or _first(None, None, rows, BY_LENGTH)
+
+
+def configured_devices(payload: bytes) -> list[tuple[int, int, int, int]]:
+    """Device identifier, length of its data, output mode and settings of each device of a Configuration message."""
+    if len(payload) < _BLOCKS:
+        return []
+    count = int.from_bytes(payload[_DEVICES:_BLOCKS], "big")
+    whole = min(count, (len(payload) - _BLOCKS) // _BLOCK)
+    return [_BLOCK_FORMAT.unpack_from(payload, _BLOCKS + _BLOCK * k) for k in range(whole)]
+
+
+def _first(mode: int | None, settings: int | None, rows: Octets, how: str) -> Found | None:
+    """The simplest format of this length, with this mode and these settings if they are known. One that is known whole needs no possible values."""
+    formats = _formats(rows.shape[1])
+    if mode is not None and settings is not None:
+        formats = _known_formats(mode, settings, rows.shape[1])
+    for output in formats:
+        if (mode is None or output.mode == mode) and (settings is None or output.settings == settings):
+            whole = mode is not None and settings is not None
+            if whole or _is_possible(decode_mtdata(rows, output), output):
+                return Found(output, how)
+    return None
+
+
+def _known_formats(mode: int, settings: int, length: int) -> tuple[OutputFormat, ...]:
+    """The format with this mode and these settings, if an MTx has it and its payloads have this length."""
+    try:
+        output = OutputFormat(mode, settings)
+    except ValueError:
+        return ()
+    return (output,) if output.length == length else ()
+
+
+@cache
+def _formats(length: int) -> tuple[OutputFormat, ...]:
+    """All formats whose payloads have this length, the simplest first: with fewer bits set; floats before fixed point, raw data last."""
+    absent = (0, NO_MAG, NO_ACCEL, NO_GYRO, NO_ACCEL | NO_MAG, NO_GYRO | NO_MAG, NO_ACCEL | NO_GYRO)
+    modes = [
+        sum(bits)
+        for bits in product((0, CALIBRATED), (0, ORIENTATION), (0, TEMPERATURE), (0, STATUS), (0, AUXILIARY))
+        if bits[0] or bits[1]  # with neither, nothing in the values tells
+    ]
+    choices = product(
+        modes,
+        (FLOAT, FIXED_12_20),
+        (SAMPLE_COUNTER, 0),
+        (QUATERNION, EULER, MATRIX),
+        absent,
+        (0, NO_ANALOG_1, NO_ANALOG_2),
+    )
+    found = set()
+    for mode, form, counter, orientation, missing, analog in choices:
+        used = ((orientation, ORIENTATION), (missing, CALIBRATED), (analog, AUXILIARY))
+        found.add(OutputFormat(mode, form | counter | sum(bits for bits, sent in used if mode & sent)))
+    found |= {OutputFormat(RAW, counter) for counter in (SAMPLE_COUNTER, 0)}
+    fits = [output for output in found if output.length == length]
+    return tuple(sorted(fits, key=_complexity))
+
+
+def _complexity(output: OutputFormat) -> tuple[int, ...]:
+    """Order of the formats of one length: raw last, fixed point later, few bits besides calibrated data and the counter first."""
+    rare = (output.mode & ~(CALIBRATED | ORIENTATION)).bit_count() + (
+        output.settings & ~(SAMPLE_COUNTER | FIXED_12_20)
+    ).bit_count()
+    no_calibrated = not output.mode & CALIBRATED
+    missing = output.settings & NO_ACCEL, output.settings & NO_GYRO  # rarer than a missing magnetometer
+    return (
+        output.mode & RAW,
+        output.settings & FIXED_12_20,
+        rare + no_calibrated,
+        no_calibrated,
+        *missing,
+        output.mode,
+        output.settings,
+    )
+
+
+def _is_possible(decoded: Decoded, output: OutputFormat) -> bool:
+    """Whether most messages have possible values."""
+    values, _, sent = decoded
+    good: Bools = np.ones(len(values), np.bool_)
+    with np.errstate(all="ignore"):
+        for group, (columns, most) in enumerate(MOST):
+            if sent[0, group]:
+                good &= np.isfinite(values[:, columns]).all(axis=1) & (np.abs(values[:, columns]) <= most).all(axis=1)
+        if sent[0, len(MOST)]:
+            good &= np.abs(np.linalg.norm(values[:, ATTITUDE], axis=1) - 1.0) <= UNIT_ERROR
+        if output.mode & TEMPERATURE:
+            good &= (values[:, CELSIUS] >= AIR_C[0]) & (values[:, CELSIUS] <= AIR_C[1])
+    if good.mean() < POSSIBLE:
+        return False
+    force = np.linalg.norm(values[good][:, ACCEL], axis=1).mean() if sent[0, 0] else np.mean(MEAN_ACCEL)
+    strength = np.median(np.linalg.norm(values[good][:, MAG], axis=1)) if sent[0, 2] else 0.0
+    return bool(MEAN_ACCEL[0] <= force <= MEAN_ACCEL[1] and strength <= STRONGEST_FIELD)
