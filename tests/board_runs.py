@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs of the real firmware in the twin, for the tests: a board, what the host decodes, and the truth about the buses."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The command line in this process: the same entry point, arguments and exit status as a program of its own, without starting Python anew."""
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def echostep(
         stack.enter_context(mock.patch.dict(os.environ, env or {}, clear=env is not None))
         if cwd is not None:
             stack.enter_context(chdir(cwd))
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             stack.callback(signal.signal, number, signal.getsignal(number))
         try:
             main()

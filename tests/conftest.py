@@ -1,6 +1,44 @@
-"""Property tests draw the same examples everywhere and know no deadline, for the first one may compile a kernel."""
+# SPDX-License-Identifier: MIT
+"""Property tests draw the same examples everywhere and know no deadline, for the first one may compile a kernel.
 
+One Chromium for all tests of a module.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
 from hypothesis import settings
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+COMPILER = Path(__file__).with_name("compile_kernels.py")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile the kernels before the workers of a parallel run start, not in each of them; a failure is left to the tests."""
+    if not config.getoption("numprocesses", None) or hasattr(config, "workerinput"):
+        return
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    parts = [subprocess.Popen([sys.executable, COMPILER, part], env=environment) for part in ("front-end", "filter")]
+    for part in parts:
+        part.wait()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, driven by Playwright; skips where one of them is missing."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no page is looked at")
+    if CHROMIUM is None:
+        pytest.skip("no chromium on this machine: no page is looked at")
+    with playwright.sync_playwright() as running:
+        chromium = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()

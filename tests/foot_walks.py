@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Walks of a rigid foot whose every move is known, and what a sensor on it feels.
 
 In: a manner of walking. Out: `Course`: truth at 1 kHz; samples at any rate, in any mounting. The foot rolls without sliding about the point of
@@ -7,9 +8,7 @@ contact below the sensor, at heel rise and after heel strike.
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -140,8 +139,3 @@ def any_rotation(rng: np.random.Generator) -> Floats:
     """A random rotation matrix (3, 3)."""
     q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     return np.asarray(q * np.sign(np.linalg.det(q)))
-
-
-def data_folder() -> Path:
-    """Where the public recordings are, if they are."""
-    return Path(os.environ.get("ECHOSTEP_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Boards on pseudo terminals for the tests: the Python board at the pace of the wall clock, or the real firmware in the twin."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The whole pipeline on a simulated walk: accuracy, honest uncertainty, and what happens when streams fail."""
 
 from __future__ import annotations
@@ -181,14 +182,14 @@ def test_strange_ports_and_pure_noise_are_counted() -> None:
 def test_faults_of_the_real_board_in_mid_walk(fault: str) -> None:
     board = BoardProcess([str(TWIN), "--elf", str(ELF)])
     scenario = Scenario(PLAN, WAYPOINTS, 5, board)
-    tracker = Tracker(PLAN, scenario.start)
-    found, thrown = [], False
+    chunks: list[Chunk] = []
     for chunk in scenario.chunks():
-        if not thrown and chunk.t_arrival_ns > 9e9:
+        if chunk.t_arrival_ns > 9e9 and chunks[-1].t_arrival_ns <= 9e9:
             board.fault(fault)
-            thrown = True
-        found += tracker.feed(chunk)
+        chunks.append(chunk)
     scenario.close()
+    tracker = Tracker(PLAN, scenario.start)
+    found = tracker.take(portion_of(chunks))
     off = errors(found, TRUTH)
     assert off is not None
     assert off.max_m < 0.8

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The first seconds of the simulated demo walk, once for all tests that need a recording with steps in it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Recorded barometers as phones have them: coarse steps, sensors that filter, silences, rows that repeat, storeys that nobody told."""
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.barometer.altitude import Altitude, BarometerSettings, Pressures, noise_of
-from echostep.barometer.floor_record import find_storeys, noise_of_record, thinned
+from echostep.barometer.floor_record import climbed_m, describe, find_storeys, noise_of_record, thinned, visits
 from echostep.commands.floors import record_floors
 from echostep.errors import EchostepError
 from echostep.offline.pressure_csv import load_pressures
@@ -172,3 +173,32 @@ def test_rows_with_the_time_of_the_row_before_are_skipped(tmp_path: Path) -> Non
     found = load_pressures(source)
     assert len(found.samples.t_s) == len(lines)
     assert f"{2 * len(lines)} rows with the t_s of the row before" in found.notes[0]
+
+
+BRIEF_VISIT = [
+    (0.0, 40.0), (3.5, 11.0), (3.5, 2.0), (0.0, 11.0), (0.0, 40.0), (10.5, 33.0), (10.5, 30.0), (0.0, 33.0), (0.0, 2.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("way", "storeys", "floors", "climbed"),
+    [
+        (BRIEF_VISIT, 4, [0, 1, 0, 3, 0], 14.0),
+        (UP_AND_DOWN, 3, [0, 1, 2, 0], 7.0),
+        ([(0.0, 20.0), (10.5, 35.0), (0.0, 35.0)], 4, [0, 3, 0], 10.5),
+    ],
+)
+@pytest.mark.parametrize("rate_hz", [1.0, 5.0])
+def test_what_is_printed_agrees_with_the_rows(
+    way: list[tuple[float, float]], storeys: int, floors: list[int], climbed: float, rate_hz: float
+) -> None:
+    """A visit of two seconds is no stay, but the way turned there; each printed span has one floor in every row, and the climbs add up."""
+    found = record_floors(record(walk(way, rate_hz), rate_hz), np.arange(0.0, 3.5 * storeys, 3.5))
+    visited = visits(found)
+    for visit in visited:
+        rows = (found.t_s >= visit.from_s) & (found.t_s <= visit.to_s)
+        assert set(found.floor[rows].tolist()) == {visit.floor}
+    assert [visit.floor for visit in visited] == floors
+    assert climbed_m(found.heights_m, visited) == (climbed, climbed)
+    lines = describe(found).splitlines()
+    assert f"climbed {climbed:.1f} m up, {climbed:.1f} m down" in lines[len(floors)]

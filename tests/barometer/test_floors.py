@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Heights and floors from pressure: the filter, the record's file, the command, real climbs."""
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ from echostep.offline.pressure_csv import load_pressures
 from echostep.simulation.devices.board_sensors import Scp1000Model
 from echostep.simulation.people.vertical_day import climb
 from echostep.simulation.world.air_pressure import Weather, device_temperatures, pressures
+from needs_data import needs_data
+from recordings import DATA
 
 STOREYS = np.array([0.0, 3.5, 7.0])
-BARO = Path(__file__).parents[3] / "shared/data/baro"
 PA_PER_M = 101_325.0 * 9.80665 / (287.053 * 293.15)
 
 
@@ -389,10 +391,10 @@ def climbed(path: Path) -> float:
     return float(found.height_m[-1] - found.height_m[0])
 
 
-@pytest.mark.skipif(not BARO.exists(), reason=f"{BARO}: the stair climbs of loruro/Barometer_STM32 are not here")
+@needs_data("baro")  # loruro/Barometer_STM32
 @pytest.mark.parametrize(("place", "about_m"), [("kapitol", 41.2), ("b5", 31.15)])
 def test_real_stairs_are_as_high_up_as_down(place: str, about_m: float) -> None:
-    up, down = climbed(BARO / f"up_{place}.log"), climbed(BARO / f"down_{place}.log")
+    up, down = (climbed(DATA / f"baro/{way}_{place}.log") for way in ("up", "down"))
     print(f"{place}: {up:.2f} m up, {down:.2f} m down")
     assert -down == pytest.approx(up, rel=0.03)
     assert up == pytest.approx(about_m, rel=0.03)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Board frames: golden vectors, any split of any stream, damage that stays local, a stale firmware."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The board's words in plain words: every fault of the twin, and what a host that listens may conclude."""
 
 from __future__ import annotations

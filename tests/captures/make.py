@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Make the small captures in this folder with the twin (real firmware, simulated sensors), and their golden decodes.
 
     .venv/bin/python tests/captures/make.py
@@ -48,6 +49,7 @@ def main() -> None:
     half = len(board) // 2
     (HERE / "board.bin").write_bytes(board[:half] + board[half + 40 :])
     (HERE / "mtx.bin").write_bytes(b"".join(c.data for c in found if c.port != BOARD))
+    (HERE / "walk.mcap").unlink()
     with Recorder(HERE / "walk.mcap", {"note": "simulated walk, real firmware in the twin"}) as recorder:
         for chunk in found:
             recorder.write(chunk)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Live from two ports, recorded, replayed: the same estimates, bit for bit."""
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import pytest
 
 from board_runs import ROOT, needs_twin
 from command_line import PROGRAM, echostep
-from echostep.ports.chunks import SerialPorts
-from echostep.recording.recorder import open_recording
+from echostep.ports.serial_ports import SerialPorts
+from echostep.recording.reading import open_recording
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 
@@ -84,7 +85,7 @@ def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     port = os.ttyname(theirs)
     live = subprocess.Popen(
-        [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--mtx", port, "--out", tmp_path, "--headless"],
+        [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--out", tmp_path, "--headless"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The real foot on the plan drawn around its path: the figure that `make real` prints."""
 
 from __future__ import annotations
@@ -6,16 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import real_walk
 from board_runs import ROOT
-from echostep.recording.recorder import open_recording
+from echostep.recording.reading import open_recording
+from needs_data import needs_data
+from recordings import DATA
 
-pytestmark = pytest.mark.skipif(
-    not (real_walk.data_folder() / "gx5_gcp").is_dir(),
-    reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)",
-)
+pytestmark = needs_data("gx5_gcp")
 
 
 def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
@@ -28,7 +26,7 @@ def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
 
 
 def test_the_footprints_are_the_surveyed_ones() -> None:
-    walk = real_walk.read_walk(real_walk.data_folder())
+    walk = real_walk.read_walk(DATA)
     assert len(walk.print_m) == 48
     stride = ((walk.print_m[1:] - walk.print_m[:-1]) ** 2).sum(1) ** 0.5
     assert 60.0 < stride.sum() < 66.0

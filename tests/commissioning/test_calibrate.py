@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep calibrate`: known biases and turns come out again, and what was done wrong is said."""
 
 from __future__ import annotations
@@ -6,22 +7,29 @@ import math
 import re
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from board_runs import ROOT
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.calibration import GyroSettings, gyro_rates
+from echostep.commissioning.calibrate import STILL_S, TURN_S, WALK_S
 from echostep.commissioning.fitting import fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
-from echostep.commissioning.probe import ProbeResult
+from echostep.commissioning.probe import ProbeResult, _Probe
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
+from echostep.plan.model import load_plan
+from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import parse_settings
+from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.devices.board_sensors import Adis16100Model
 from echostep.simulation.people.walker import Person, walk
+from echostep.simulation.rehearsal import Act, Rehearsal
 from players import pseudo_terminal, python_board
 
 COUNT_RAD_S = math.radians(0.2439)
@@ -189,3 +197,22 @@ def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
             assert words in done.stderr
             assert done.stderr.count("\n") == 1
     assert not (tmp_path / "x.toml").exists()
+
+
+def test_the_rehearsal_of_the_twin_calibrates_everything() -> None:
+    """What the wearer of `make twin STILL=1` does, as the Python board reports it, without waiting for it."""
+    board = PythonBoard()
+    acts = Rehearsal(load_plan(ROOT / "host/echostep/plans/demo.json"), 1, board)
+    heard_in: dict[Act, ProbeResult] = {}
+    for act, seconds in ((Act.STAND, STILL_S), (Act.TURN, TURN_S), (Act.WALK, WALK_S)):
+        running = _Probe(SimpleNamespace(notices=[]), {BOARD: "x"}, check_gyros=False)  # type: ignore[arg-type]
+        for begin_ms in range(0, int(seconds * 1e3), 10):
+            for t_ns, sent in board.advance(acts.rows(act, begin_ms, 10)):
+                running._receive(Chunk(BOARD, t_ns, sent))
+        heard_in[act] = running.result
+    biases: dict[str, Any] = dict(fit_gyros(heard_in[Act.STAND])[0]["gyro"])
+    gyros = GyroSettings(**biases)
+    assert fit_mounting(heard_in[Act.TURN], gyros)[0] == {"gyro": {"belt_reversed": False}}
+    assert math.degrees(fit_compass(heard_in[Act.TURN], gyros)[0]["compass"]["rms_rad"]) < 3.0
+    scale = fit_legs(heard_in[Act.WALK], gyros, LegLengths(), 10.0)[0]["wearer"]["leg_scale"]
+    assert scale == pytest.approx(1.0, abs=0.08)

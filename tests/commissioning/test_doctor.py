@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep doctor`: against boards on pseudo terminals, ports that are none, and what the system says of ports."""
 
 from __future__ import annotations
@@ -5,20 +6,24 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from board_runs import needs_twin
+from board_runs import Bench, needs_twin, quiet_rows
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.health import Severity
 from echostep.commissioning import serial_ports as ports
+from echostep.commissioning.diagnosis import Diagnosis, judge_board
 from echostep.commissioning.doctor import examine
-from echostep.commissioning.probe import ProbeResult, drift_of
+from echostep.commissioning.probe import ProbeResult, _Probe, drift_of
 from echostep.commissioning.serial_ports import PortSeen, Role
-from players import babbling_port, pseudo_terminal, python_board, twin_board
+from echostep.ports.chunks import BOARD, Chunk
+from players import babbling_port, pseudo_terminal, python_board, some_noise, twin_board
 
 
 def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -50,7 +55,7 @@ def test_what_is_wrong_is_said_in_words() -> None:
         "compass: does not answer at I2C address 0x60",
         "calf gyro: failed its self-test",
         "belt gyro: does not answer",
-        "firmware 1.1.0",
+        "firmware 1.2.0",
         "thigh gyro: answers, 20 degC, self-test passed",
         "belt gyro: FAILS",
     ):
@@ -64,6 +69,49 @@ def test_the_real_firmware_is_well() -> None:
     said = [str(finding) for finding in report.findings if finding.severity > Severity.NOTE]
     assert not [text for text in said if "clock" not in text and "gives" not in text], said  # quiet rows have no noise
     assert any("self-test passed" in line for line in report.lines)
+    assert any(line.startswith("supply    5.") and "1 start since it got power" in line for line in report.lines)
+
+
+@needs_twin
+@pytest.mark.parametrize("heard_ms", [300, 600, 1000, 1700, 2500])
+def test_a_board_that_has_just_started_is_not_called_faulty(heard_ms: int) -> None:
+    """From its power-up on, however little of it was heard."""
+    bench = Bench()
+    ports = SimpleNamespace(notices=[], send=lambda _, sent: bench.board.send(sent))
+    running = _Probe(ports, {BOARD: "x"}, check_gyros=True)  # type: ignore[arg-type]
+    try:
+        for begin_ms in range(0, heard_ms, 50):
+            running._query_board(begin_ms * 1e-3)
+            rows = quiet_rows(50)
+            some_noise(rows, begin_ms)
+            for t_ns, part in bench.board.advance(rows):
+                running._receive(Chunk(BOARD, t_ns, part))
+    finally:
+        bench.board.close()
+    report = Diagnosis()
+    judge_board(report, running.result, "x")
+    clock = [
+        finding for finding in report.findings if "clock" in finding.what
+    ]  # compares the simulated with this computer's
+    assert [str(f) for f in report.findings if f.severity > Severity.NOTE and f not in clock] == []
+
+
+def test_a_board_that_starts_late_is_heard_for_three_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first message comes in the last moment of the listening."""
+    now_s = 0.0
+    first = encode(m.Identity(0, m.SCHEMA_HASH, 1, 1, 0, 0), 0)
+
+    def chunks() -> Iterator[Chunk | None]:
+        nonlocal now_s
+        while now_s < 60.0:
+            now_s += 0.1
+            yield Chunk(BOARD, int(now_s * 1e9), first) if now_s > 3.9 else None
+
+    monkeypatch.setattr("echostep.commissioning.probe.clock_s", lambda: now_s)
+    ports = SimpleNamespace(notices=[], send=lambda *_: None, chunks=chunks)
+    running = _Probe(ports, {BOARD: "x"}, check_gyros=True)  # type: ignore[arg-type]
+    running.run(4.0)
+    assert 6.8 < now_s < 7.2
 
 
 @pytest.mark.parametrize(
@@ -112,6 +160,14 @@ def test_a_board_in_its_bootloader_is_known(monkeypatch: pytest.MonkeyPatch) -> 
     assert "echostep flash --port /dev/ttyACM9" in str(report.findings[0])
 
 
+def test_two_boards_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = [PortSeen(f"/dev/none{k}", Role.BOARD, "sensor board", f"00{k}D") for k in range(2)]
+    monkeypatch.setattr("echostep.commissioning.doctor.list_seen", lambda: seen)
+    report = examine(None, None, 0.1)
+    assert any("/dev/none0, number 000D; /dev/none1, number 001D" in str(finding) for finding in report.findings)
+    assert any(line.startswith("port      /dev/none1, number 001D: sensor board") for line in report.lines)
+
+
 def test_a_port_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pseudo_terminal() as (_, port):
@@ -143,7 +199,7 @@ def test_a_program_that_holds_the_port_is_named(tmp_path: Path) -> None:
 def test_the_udev_rules_are_printed_and_recognised(tmp_path: Path) -> None:
     done = doctor("--udev")
     assert done.returncode == 0
-    for part in ('SYMLINK+="echostep"', 'SYMLINK+="echostep-mtx"', 'ATTR{latency_timer}="1"'):
+    for part in ('SYMLINK+="echostep echostep-$attr{serial}"', 'SYMLINK+="echostep-mtx"', 'ATTR{latency_timer}="1"'):
         assert part in done.stdout
     assert len(ports.rules_findings((tmp_path,))) == 1
     (tmp_path / ports.RULES).write_text(done.stdout)

@@ -1,9 +1,11 @@
+# SPDX-License-Identifier: MIT
 """`echostep flash`: a fake avrdude and a board on a pseudo terminal that obeys the 1200 Bd touch, and everything that may be missing."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
 import subprocess
 import termios
 import threading
@@ -120,6 +122,42 @@ def test_a_board_that_does_not_react_is_told_after_ten_seconds(tmp_path: Path) -
     assert done.returncode == 2
     assert "did not enter its bootloader in 10 s" in done.stderr
     assert not log.exists()
+
+
+def make_flash(port: object, path: str, *more: object) -> subprocess.CompletedProcess[str]:
+    """`make flash` without make: the script that it runs, with these programs alone."""
+    command = list(map(str, ["/bin/sh", ROOT / "tools/flash.sh", port, *more]))
+    return subprocess.run(command, env={"PATH": path}, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_make_flash_writes_without_an_environment(tmp_path: Path) -> None:
+    path, log = fake_avrdude(tmp_path, GOOD)
+    with board(tmp_path / "port", log):
+        done = make_flash(tmp_path / "port", path, SHIPPED)
+    assert done.returncode == 0, done.stderr
+    assert "Next: echostep doctor" in done.stdout
+    assert f"-P {tmp_path / 'port'} -b 57600 -D -U flash:w:{SHIPPED}:i" in log.read_text()
+    assert "$(READY)" not in re.findall(r"^flash:.*", (ROOT / "Makefile").read_text(), flags=re.M)[0]
+
+
+def test_make_flash_checks_port_and_avrdude_before_it_builds(tmp_path: Path) -> None:
+    """On a PATH with the programs of a shell, and with a compiler that would leave a trace."""
+    built = tmp_path / "built"
+    for name in ("make", "avr-gcc"):
+        (tmp_path / name).write_text(f"#!/bin/sh\ntouch {built}\n")
+        (tmp_path / name).chmod(0o755)
+    (tmp_path / "dirname").symlink_to("/usr/bin/dirname")
+    with pseudo_terminal() as (_, port):
+        for at, words in (
+            ("", "say which port"),
+            ("/dev/no-such-port", "there is no such port"),
+            (__file__, "is no serial port"),
+            (port, "avrdude is not installed"),
+        ):
+            done = make_flash(at, str(tmp_path))
+            assert done.returncode == 2
+            assert words in done.stderr.splitlines()[-1]
+    assert not built.exists()
 
 
 def test_no_board_and_no_avrdude_are_named(tmp_path: Path) -> None:

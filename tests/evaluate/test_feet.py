@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep evaluate feet`: the foot on real recordings against its targets, and what is said of folders that are not as they should be."""
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from echostep.evaluate.feet.datasets import FootRecording
 from echostep.evaluate.feet.metrics import Figure, align, places, rmse
 from echostep.evaluate.feet.study import recordings_in, track_of
 from echostep.foot.ins import Noise
-from foot_walks import any_rotation, data_folder
+from foot_walks import any_rotation
+from needs_data import needs_data
+from recordings import DATA
 
 Row = dict[str, Any]
-needs_recordings = pytest.mark.skipif(
-    not data_folder().is_dir(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)"
-)
+needs_recordings = needs_data()
 
 
 def run(*options: object) -> subprocess.CompletedProcess[str]:
@@ -36,7 +37,7 @@ def run(*options: object) -> subprocess.CompletedProcess[str]:
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
     """What the command writes about the recordings that are here."""
     folder = tmp_path_factory.mktemp("feet")
-    done = run("--data", data_folder(), "--json", folder / "feet.json", "--out", folder)
+    done = run("--data", DATA, "--json", folder / "feet.json", "--out", folder)
     assert done.returncode == 0, done.stderr
     assert (folder / "feet.png").stat().st_size > 10_000
     written = json.loads((folder / "feet.json").read_text())
@@ -104,7 +105,7 @@ def test_a_folder_without_recordings_is_named(tmp_path: Path) -> None:
 
 @needs_recordings
 def test_sets_and_files_that_cannot_be_read_are_named_and_skipped(tmp_path: Path) -> None:
-    (tmp_path / "xio_ngimu").symlink_to(data_folder() / "xio_ngimu")
+    (tmp_path / "xio_ngimu").symlink_to(DATA / "xio_ngimu")
     (tmp_path / "vicon_pyshoe").mkdir()
     (tmp_path / "vicon_pyshoe" / "broken.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     done = run("--data", tmp_path, "--json", tmp_path / "feet.json")
@@ -181,7 +182,7 @@ def test_motion_capture_holds_under_what_other_recordings_may_bring(
     vary: Callable[[FootRecording], FootRecording], worst: float
 ) -> None:
     errors = []
-    for recording in recordings_in(data_folder()):
+    for recording in recordings_in(DATA):
         if recording.group != "vicon":
             continue
         varied = vary(recording)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The guided returns of [Fischer 2008, 4]: magnetic sources, measurements, the paper's fusion, intervals, the success of each system."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The study of Girard's experiment: its walks, its rows, its journal; a small run of the command."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trails of [Fischer 2008]: the field of machines, the walks, the judgement, the study; our heading by machinery is a regression case."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The real firmware in the simulator."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Feeds bytes to the firmware's codec: as a USB stream into link_receive, as a payload through COBS and back, and as a message into a send
  * buffer of any size. With libFuzzer (clang -fsanitize=fuzzer -DLIBFUZZER), or alone: ./fuzz SEED COUNT. */
 #include <stdbool.h>

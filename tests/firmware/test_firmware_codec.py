@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The firmware's own C, compiled for this machine with its sanitizers: every golden vector, and hostile bytes.
 
 In: firmware/*.c, protocol/vectors.jsonl, tests/firmware/fuzz_codec.c. Out: pass or fail; skipped without a C compiler.
@@ -13,15 +14,14 @@ from typing import Any
 
 import pytest
 
-from echostep.board.frames import encode
-from echostep.board.messages import ClockQuery, Configure, Identify, Message
+import fuzz_codec
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
 FUZZ = [Path(__file__).parent / "fuzz_codec.c", *CODEC, FIRMWARE / "link.c", FIRMWARE / "status.c"]
 FLAGS = ["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE}", "-fno-sanitize-recover=all"]
-HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros")
+HOST_MESSAGES = ("identify", "clock_query", "configure", "check_gyros", "subscribe")
 TIMEOUT_S = 60
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -120,11 +120,9 @@ def test_seeded_hostile_bytes(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("clang") is None, reason="no clang, so no libFuzzer")
 def test_coverage_guided_hostile_bytes(tmp_path: Path) -> None:
-    program = build(tmp_path / "fuzz", "clang", FUZZ, "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined")
-    corpus = tmp_path / "corpus"
-    corpus.mkdir()
-    messages: list[Message] = [Identify(), ClockQuery(0x1234), Configure(0xFF, 1, 200, 10, 0)]
-    for number, message in enumerate(messages):
-        (corpus / str(number)).write_bytes(encode(message, number))
-    done = run(program, "-seed=1", "-max_total_time=5", "-max_len=600", f"-artifact_prefix={tmp_path}/", corpus)
+    """A small shard of `make fuzz`, from its corpus."""
+    program = fuzz_codec.build(tmp_path / "fuzz")
+    corpus = fuzz_codec.unpack(tmp_path / "corpus")
+    done = fuzz_codec.fuzz(program, corpus, 1, "-runs=50000", f"-artifact_prefix={tmp_path}/")
     assert done.returncode == 0, done.stderr[-2000:]
+    assert fuzz_codec.executions(done.stderr) >= 50_000

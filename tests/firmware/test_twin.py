@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The real firmware in the twin: what it sends, every fault switch, and that equal input gives equal bytes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The real firmware in the simulator: sensors and buses that fail."""
 
 from __future__ import annotations
@@ -132,16 +133,8 @@ def test_a_self_test_in_motion_is_not_judged(bench: Bench) -> None:
 def test_a_reset_in_the_middle_of_a_self_test_is_borne(bench: Bench) -> None:
     bench.run(300)
     bench.fault("reset=external")
-    bench.run(2_000)
+    bench.run(10_000)  # most of it in the bootloader
     assert {g.self_test for g in gyro_health(bench.messages).values()} == {m.SelfTest.PASSED}
-
-
-def test_a_watchdog_reset_costs_no_self_test(bench: Bench) -> None:
-    bench.run(1_000)
-    bench.fault("reset=watchdog")
-    found = [g for g in bench.run(2_000) if isinstance(g, m.Gyros)]
-    assert not any(-32768 in g[1:] for g in found)
-    assert {g.self_test for g in gyro_health(bench.messages).values()} == {m.SelfTest.NOT_RUN}
 
 
 @pytest.mark.parametrize(
@@ -224,7 +217,7 @@ def test_every_fault_that_is_documented_exists(bench: Bench) -> None:
         for name in re.findall(r"`(\w+)`", names)
         for value in re.findall(r"`(\w+)`", values)
     ]
-    assert len(switches) > 45
+    assert len(switches) > 65
     for switch in switches:
         bench.fault(switch)
     bench.run(10)

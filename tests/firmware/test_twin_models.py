@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The models of the twin: a probe program with faults, mistakes of the caller, the pseudo terminal."""
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ def words(board: BoardProcess) -> list[str]:
 
 def test_a_watchdog_reset_in_a_transfer_leaves_the_bus_idle(tmp_path: Path) -> None:
     board = probe(tmp_path, TWI_AFTER_RESET)
+    board.fault("bootloader=none")  # the program reads MCUSR
     board.advance(quiet_rows(50))
     board.close()
     assert words(board) == ["reset power", "reset watchdog", "trigger left"]

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A program for the tests of the twin, with faults that the real firmware does not have. MODE chooses the case. The result is a trigger on
  * the bus: of the left ranger for yes, of the right one for no. */
 #include <avr/io.h>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Walks and comparisons for tests of the foot."""
 
 from __future__ import annotations

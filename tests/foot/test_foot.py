@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The foot: kernels against textbook twins, walks whose truth is known, hostile samples, real recordings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Samples that are missing, repeated, late, clipped or nonsense."""
 
 from __future__ import annotations

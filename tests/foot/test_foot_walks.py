@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Walks whose truth is known: one setting for every manner, rate and mounting."""
 
 from __future__ import annotations

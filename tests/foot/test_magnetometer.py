@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The magnetometer: trusted in a clean field, where it holds the heading; not trusted in a disturbed one, where it changes nothing."""
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.evaluate.feet.datasets import read_recordings
 from echostep.foot.steps import Foot, walk_track
+from needs_data import needs_data
+from recordings import DATA
 
 EARTH = np.array([0.2, 0.05, -0.43])  # gauss, walk frame
 IRON = np.array([0.05, -0.08, 0.03])  # of the shoe
@@ -85,11 +88,11 @@ def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> 
         foot.feed(t, accel, gyro, mag[1:])
 
 
-@pytest.mark.skipif(not fw.data_folder().is_dir(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)")
+@needs_data()
 def test_on_the_hallways_headings_are_never_worse_than_without() -> None:
     """Stride headings against the survey's, with and without."""
     seen = 0
-    for recording in read_recordings(fw.data_folder())[0]:
+    for recording in read_recordings(DATA)[0]:
         if recording.group != "hallway" or recording.mag is None:
             continue
         seen += 1

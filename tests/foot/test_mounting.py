@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Any mounting: the toe's direction is found from how the foot tips, and the track does not depend on how the sensor sits."""
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
 from echostep.localization.metrics import Truth, errors
 from echostep.plan.model import Plan, load_plan
-from echostep.ports.chunks import MTX, Chunk
+from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
+from needs_data import needs_data
+from recordings import DATA
 
 
 def axis_mountings() -> list[Floats]:
@@ -95,7 +98,7 @@ def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]
     """The same bytes with the sensor's axes turned: as good a track."""
     plan, scenario, chunks = live
     mounting = axis_mountings()[which]
-    tracker, frames, found = Tracker(plan, scenario.start, seed=0), MtxReader(), []
+    frames, turned = MtxReader(), []
     for chunk in chunks:
         if chunk.port == MTX:
             samples = [
@@ -103,7 +106,8 @@ def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]
                 for s in frames.feed(chunk.data)
             ]
             chunk = replace(chunk, data=b"".join(encode_frame(MTDATA, pack_mtdata(s)) for s in samples))
-        found += tracker.feed(chunk)
+        turned.append(chunk)
+    found = Tracker(plan, scenario.start, seed=0).take(portion_of(turned))
     off = errors(found, Truth(scenario.walk.t_s, scenario.walk.trunk_m))
     assert off is not None
     assert off.mean_m < 0.2
@@ -132,10 +136,10 @@ def test_nobody_who_stops_after_one_step_is_kept_waiting() -> None:
     assert alignment.feed([], 6.0) == [step]
 
 
-@pytest.mark.skipif(not fw.data_folder().is_dir(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)")
+@needs_data()
 def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
     """Thirty feet, mounted as their owners liked, turned once more: long steps go within a toe-out angle of the toe's direction."""
-    for k, recording in enumerate(read_recordings(fw.data_folder())[0]):
+    for k, recording in enumerate(read_recordings(DATA)[0]):
         turn = fw.any_rotation(np.random.default_rng(k))
         track = aligned(walk_track(recording.t_s, recording.accel @ turn.T, recording.gyro @ turn.T))
         assert track.toe_known, recording.name

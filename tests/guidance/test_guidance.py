@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Guidance: one cue at a time, a smooth arrow, no guidance without knowledge; ways around walls and over stairs."""
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
-from echostep.guidance.cues import CueKind, GuidanceSettings, Guide, arrow_sign, describe_cue
+from echostep.guidance.cues import NEVER_KNOWN, CueKind, GuidanceSettings, Guide, arrow_sign, describe_cue
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.model import Connector, Level, Plan, load_plan
 from echostep.plan.polyline import along, nearest, way_m
@@ -59,30 +60,83 @@ def test_return_to_the_last_known_place_when_lost() -> None:
     cue = g.cue(at(3, 8.0, 0.0, status=TrackStatus.LOST))
     assert cue.kind is CueKind.RETURN
     assert abs(cue.arrow_rad or 0.0) == pytest.approx(math.pi, abs=0.3)
-    assert g.cue(at(6, 5.2, 0.0, 180, status=TrackStatus.LOST)).kind is CueKind.STOP
+    there = g.cue(at(6, 5.2, 0.0, 180, status=TrackStatus.LOST))
+    assert (there.kind, there.text) == (CueKind.OFF, "Your place is not known. Go on")
+    assert there.arrow_rad is not None
 
 
-def test_warns_when_leaving_the_range_of_the_last_beacon_then_sends_back() -> None:
+def test_a_place_that_was_never_known_asks_for_a_walk() -> None:
+    cue = guide().cue(at(0, 5.0, 0.0, status=TrackStatus.LOST))
+    assert (cue.kind, cue.text, cue.arrow_rad) == (CueKind.STOP, NEVER_KNOWN, None)
+
+
+def test_sends_back_after_three_seconds_without_a_beacon() -> None:
     g = guide()
     kinds = [g.cue(at(t, 1.0 + t, 0.0), heard_s=0.0).kind for t in range(9)]
-    assert kinds == [CueKind.AHEAD] * 3 + [CueKind.OFF] * 3 + [CueKind.RETURN] * 3
+    assert kinds == [CueKind.AHEAD] * 4 + [CueKind.RETURN] * 5
+
+
+def test_an_end_that_is_reached_is_told_although_no_beacon_measures_there() -> None:
+    g = guide()
+    g.cue(at(0, 9.0, 5.0, 90), heard_s=0.0)
+    assert g.cue(at(9, 10.0, 9.5, 90), heard_s=0.0).kind is CueKind.ARRIVED
+
+
+def test_silence_is_told_once_and_not_at_every_estimate() -> None:
+    g = guide()
+    g.cue(at(0, 1.0, 0.0), heard_s=0.0)
+    spoken = [g.cue(at(3.5 + 0.1 * k, 1.1, 0.0), heard_s=0.0).spoken for k in range(5)]
+    assert [bool(sentence) for sentence in spoken] == [True, True, False, False, False]  # to go back, on again
+
+
+def test_rare_measurements_are_no_silence() -> None:
+    g = guide()
+    told = [g.cue(at(t, 1.0, 0.0), heard_s=float(t - t % 5)).kind for t in range(60)]
+    assert CueKind.RETURN in told[:10]  # that they are rare must be learnt
+    assert set(told[10:]) == {CueKind.AHEAD}
+
+
+def test_at_the_last_known_place_the_way_leads_on_for_twice_as_long_and_never_stops() -> None:
+    """The wearer obeys, and no beacon measures any more: each attempt goes twice as far as the last one."""
+    g, x = guide(), 0.0
+    told: list[CueKind] = []
+    far: list[float] = []
+    line = np.array([[0.0, 0.0], [400.0, 0.0]])
+    g.route = Route((Stretch(0, line),))
+    for t in range(200):
+        cue = g.cue(at(t, x, 0.0), heard_s=0.0)
+        if cue.kind is CueKind.RETURN and told and told[-1] is not CueKind.RETURN:
+            far.append(x)
+        told.append(cue.kind)
+        x += -1.0 if cue.kind is CueKind.RETURN else 1.0
+    assert CueKind.STOP not in told
+    assert far == pytest.approx([4.0, 7.0, 13.0, 25.0, 49.0], abs=2.0)
+
+
+def test_on_another_level_than_the_last_known_place_the_way_leads_on() -> None:
+    g = Guide(Routes(two_storeys("stairs")).way(RoutePlace(2.0, 5.0, 0), RoutePlace(2.0, 2.0, 1)))
+    g.cue(at(0, 14.0, 5.0), heard_s=0.0)
+    cue = g.cue(at(30, 15.0, 5.0, 180, level=1), heard_s=0.0)
+    assert (cue.kind, cue.text) == (CueKind.OFF, "No beacon hears you. Go on")
+    assert cue.arrow_rad == pytest.approx(0.0, abs=0.5)
 
 
 def test_who_was_sent_back_may_go_twice_as_far_until_he_is_heard_for_long() -> None:
     """Three dead beacons in a row are a gap that nobody would ever cross if he were always sent back as early."""
     g = guide()
 
-    def sent_back_at(heard_s: float) -> int:
-        """Seconds of silence until he is sent back, after one more second."""
-        times = range(1, 60)
-        found = [t for t in times if g.cue(at(heard_s + t, 5.0, 0.0), heard_s=heard_s).kind is CueKind.STOP]
-        return found[0]
+    def sent_back_after(heard_s: float) -> int:
+        """Last second of silence in which the way leads on; the wearer walks, then is heard 2 m from the last known place."""
+        for k in range(20):
+            g.cue(at(heard_s + 0.1 * k, 5.0, 0.0), heard_s=heard_s + 0.1 * k)
+        last_s = heard_s + 1.9
+        found = [t for t in range(60) if g.cue(at(last_s + t, 7.0, 0.0), heard_s=last_s).kind is CueKind.RETURN]
+        return found[0] - 1
 
-    g.cue(at(0, 5.0, 0.0), heard_s=0.0)
-    assert [sent_back_at(100.0 * k) for k in range(1, 4)] == [6, 12, 24]
+    assert [sent_back_after(100.0 * k) for k in range(3)] == [3, 6, 12]
     for t in range(400, 420):
         g.cue(at(t, 5.0, 0.0), heard_s=float(t))
-    assert sent_back_at(500.0) == 6
+    assert sent_back_after(420.0) == 3
 
 
 def test_warns_when_leaving_the_path_and_leads_back_to_it() -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tops that a gyro's range has cut off."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Heading by a drifting gyro and a disturbed compass."""
 
 from __future__ import annotations
@@ -96,3 +97,14 @@ def test_without_compass_it_counts_from_zero_and_says_how_well() -> None:
     found = Heading(HeadingSettings()).feed(t, np.full_like(t, 0.1), np.full_like(t, np.nan))
     assert found[-1, 0] == pytest.approx(0.1 * 59.99, rel=1e-6)
     assert found[-1, 1] > math.radians(45)
+
+
+def test_a_second_pass_knows_the_bias_from_the_beginning() -> None:
+    rng, t = np.random.default_rng(3), np.arange(0.0, 90.0, 0.02)
+    compass = np.where(np.arange(len(t)) % 5 == 0, math.radians(3.0) * rng.standard_normal(len(t)), np.nan)
+    rate, settings = np.full_like(t, math.radians(0.4)), HeadingSettings(disturbance_rad=math.radians(3.0), same_s=0.1)
+    first, second = (Heading(settings, 0.0, math.radians(1.0)) for _ in range(2))
+    once = first.feed(t, rate, compass)
+    second.adopt_errors(first)
+    assert second.bias_sd_rad_s == first.bias_sd_rad_s
+    assert np.abs(second.feed(t, rate, compass)[:, 0]).max() < 0.7 * np.abs(once[:, 0]).max()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Strides of simulated people, whose legs know nothing of the estimator: by placed feet (`walker`) and by joint curves (`gaits`)."""
 
 from __future__ import annotations
@@ -260,6 +261,26 @@ def test_a_header_in_degrees_and_other_files(tmp_path: Path) -> None:
         load_legs(tmp_path / "none.csv")
 
 
+def test_three_axes_give_the_track_of_one(tmp_path: Path) -> None:
+    t, thigh, shank = _walked([(0.0, 0.0), (10.0, 0.0)])
+    axis = np.array([0.48, 0.6, 0.64])
+    rows = np.column_stack([t, np.outer(thigh, axis), np.outer(-shank, axis[::-1])])
+    header = "t_s,thigh_x,thigh_y,thigh_z,shank_x,shank_y,shank_z"
+    found = load_legs(_write(tmp_path / "three.csv", header, rows))
+    one = load_legs(_write(tmp_path / "one.csv", HEADER, np.column_stack([t, thigh, shank])))
+    distance = [track_default(samples, StrideSettings(STANDARD)).distance_m for samples in (found, one)]
+    assert distance[0] == pytest.approx(distance[1], abs=0.02)
+    assert any("thigh: the axis of walking is 50 degrees from the sensor's z" in note for note in found.notes)
+    with pytest.raises(EchostepError, match="no column thigh_rad_s"):
+        load_legs(_write(tmp_path / "two.csv", header.replace("thigh_z", "thigh_w"), rows))
+    circle = [np.sin(6.0 * t), np.cos(6.0 * t), 0.1 * np.sin(t)]
+    round_ = np.column_stack([t, *circle, *circle[::-1]])
+    assert any("no axis of walking" in note for note in load_legs(_write(tmp_path / "round.csv", header, round_)).notes)
+    round_[:-5, 1] = np.nan
+    with pytest.raises(EchostepError, match="number"):
+        load_legs(_write(tmp_path / "holes.csv", header, round_))
+
+
 def test_the_command_and_its_calibration(tmp_path: Path) -> None:
     rows = np.column_stack(_walked([(0.0, 0.0), (10.0, 0.0)]))
     path, out = _write(tmp_path / "legs.csv", HEADER, rows), tmp_path / "track.csv"
@@ -267,7 +288,10 @@ def test_the_command_and_its_calibration(tmp_path: Path) -> None:
     shown = CliRunner().invoke(app, [*base, "--walked", "10"])
     assert shown.exit_code == 0
     scale = shown.output.split("--scale ")[1].split()[0]
-    again = CliRunner().invoke(app, [*base, "--scale", scale])
+    again = CliRunner().invoke(app, [*base, "--scale", scale, "--plot"])
+    assert out.with_suffix(".png").read_bytes()[:4] == b"\x89PNG"
+    assert "stride 1: " in again.output
+    assert "beginning or end of a walk" in again.output
     assert "10.00 m" in again.output
     assert out.read_text().splitlines()[0] == "t_s,distance_m,speed_m_s,heading_rad,x,y"
     assert CliRunner().invoke(app, [*base, "--profile", "lee2010"]).exit_code == 0

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beacons in the tracker: a simulated walk with a gateway is tracked, live and replayed alike, and floods of nonsense change nothing."""
 
 from __future__ import annotations

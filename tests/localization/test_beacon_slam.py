@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beacons in the cloud: what a measurement does to particles and to what they believe of the beacon; moved beacons are noticed."""
 
 from __future__ import annotations
@@ -5,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,12 +21,14 @@ from echostep.localization.beacon_beliefs import (
 from echostep.localization.beacon_model import BeaconSettings, beacon_model
 from echostep.localization.beacon_slam import (
     CLOUD_FIT,
+    SUSPECT,
     TIMES_MOVED,
     initial_health,
     propose_heading_jumps,
     reweight,
     update_by_measurement,
 )
+from echostep.localization.beacon_step import Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
@@ -133,7 +137,7 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
     assert health.each[:2, TIMES_MOVED].tolist() == [0.0, 0.0]
     assert health.each[2, TIMES_MOVED] >= 1.0
     assert health.all[CLOUD_FIT] > 0.5
-    assert beliefs.doubt[:, 2].min() > 3.0
+    assert beliefs.doubt[:, 2].min() > math.exp(3.0)
     assert np.abs(beliefs.mean[:, 2, 0] + 4.0).max() < 0.1  # nobody learns from it
     assert np.hypot(x.mean(), y.mean()) < 0.1
 
@@ -179,7 +183,7 @@ def test_beacon_that_was_moved_costs_no_more_than_a_moved_one_and_is_trusted_aga
     trust = [weigh(*at, weight, beliefs, 8.0, math.nan)[0] for _ in range(20)]
     assert trust[0] > 0.8
     assert trust[-1] < 0.05
-    assert beliefs.doubt[0, 0] < 8.0
+    assert beliefs.doubt[0, 0] < math.exp(8.0)
     trust = [weigh(*at, weight, beliefs, 4.0, math.nan)[0] for _ in range(10)]
     assert trust[-1] > 0.95
 
@@ -196,3 +200,45 @@ def test_first_bearing_ties_the_axis_to_the_place() -> None:
     assert abs(beliefs.mean[0, 0, 1] - 0.9) < 0.2
     seen = math.atan2(-beliefs.mean[0, 0, 1], 5.0)
     assert abs(beliefs.mean[0, 0, 2] - (seen - 0.3)) < 0.06
+
+
+def found_moved(plan_supports: bool) -> tuple[Beacons, Floats]:
+    """Beacons after a walk of 24 m past three of them, of which the last lies at (6, 3) instead of (6, -6); and the places that particles believe."""
+    rng, n = np.random.default_rng(4), 50
+    true = np.array([(2.0, 2.0), (12.0, 2.0), (6.0, 3.0)])
+    beacons = Beacons(empty_beliefs(n, 3), initial_health(3), no_waiting(3))
+    for k, (x, y) in enumerate([(2.0, 2.0), (12.0, 2.0), (6.0, -6.0)]):
+        set_beliefs(beacons.beliefs, k, x, y, 0.0, 0.01, 0.01)
+    beacons.health.known[:] = True
+    for s in np.arange(0.0, 24.0, 0.15):
+        at = min(s, 24.0 - s)
+        particles = ParticleArrays(np.full(n, at), np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n))
+        for k, (x, y) in enumerate(true):
+            reading = BeaconMeasurement(k, math.hypot(x - at, y), wrap_angle(math.atan2(-y, at - x)))
+            update_by_reading(particles, beacons, reading, MODEL, OPEN, plan_supports, rng)
+    return beacons, beacons.beliefs.mean[:, 2, :2]
+
+
+def test_moved_beacon_is_doubted_until_the_plan_supports_the_cloud() -> None:
+    alone, places = found_moved(False)
+    assert alone.health.each[2, SUSPECT] == 1.0
+    assert alone.health.known[2]
+    assert np.abs(places - (6.0, -6.0)).max() < 0.5  # nothing is learnt from it
+    assert alone.beliefs.doubt[:, 2].min() > 3.0
+    supported, places = found_moved(True)
+    assert supported.health.each[:, SUSPECT].tolist() == [0.0, 0.0, 0.0]
+    assert supported.health.each[2, TIMES_MOVED] == 1.0
+    assert np.abs(places - (6.0, 3.0)).max() < 0.5
+
+
+@pytest.mark.parametrize(("from_afar", "placed"), [(1, True), (6, False)])
+def test_a_near_reading_places_a_beacon_that_was_just_dropped_and_no_other(from_afar: int, placed: bool) -> None:
+    """After one wrong range it was just dropped; after six it was not, and the near one leaves open on which side it lies."""
+    particles = ParticleArrays(np.arange(5.0), np.zeros(5), np.zeros(5), np.ones(5), np.zeros(5))
+    beacons = Beacons(empty_beliefs(5, 1), initial_health(1), no_waiting(1))
+    rng = np.random.default_rng(1)
+    for range_m in (*np.linspace(5.0, 3.4, from_afar), 0.4):
+        assert not beacons.health.known[0]
+        update_by_reading(particles, beacons, BeaconMeasurement(0, range_m, 0.0), MODEL, OPEN, False, rng)
+    assert beacons.health.known[0] == placed
+    assert (beacons.beliefs.mean[:, 0, 0].tolist() == particles.x_m.tolist()) == placed

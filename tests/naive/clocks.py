@@ -1,11 +1,12 @@
+# SPDX-License-Identifier: MIT
 """Slow, obviously right twins of the clocks: one value at a time, in plain Python."""
 
 from __future__ import annotations
 
 from collections import Counter, deque
 
-from echostep.timing.arrival_envelope import BUCKET_S, DRIFT_SD, KEPT_BUCKETS, LEAST_DELAY_S
-from echostep.timing.device_clock import AHEAD_S, BEHIND_S, JUMPS_TO_RESTART
+from echostep.timing.arrival_envelope import BUCKET_S, CONFIRMING, DRIFT_SD, EARLY_S, KEPT_BUCKETS, LEAST_DELAY_S
+from echostep.timing.device_clock import AHEAD_S, BACKLOG_S, BEHIND_S, RATE_ERROR, SMOOTH_S
 from echostep.timing.timeline import BOARD_LATENCY_S, TICK_S, MtxTiming
 
 Point = tuple[float, float]
@@ -17,6 +18,7 @@ class ArrivalClock:
     def __init__(self) -> None:
         self._buckets: deque[tuple[int, Point]] = deque(maxlen=KEPT_BUCKETS)
         self._origin_ns: int | None = None
+        self._early: list[tuple[int, int, float]] = []  # bucket, arrival, lag
         self._offset_s = 0.0
         self._drift = 0.0
         self._pivot_s = 0.0
@@ -27,13 +29,39 @@ class ArrivalClock:
             self._origin_ns = t_arrival_ns
         late = (t_arrival_ns - self._origin_ns) * 1e-9 - device_s
         bucket = int(device_s // BUCKET_S)
+        if self._buckets and late < self.line(device_s) - EARLY_S:
+            if self._early and bucket - self._early[0][0] > KEPT_BUCKETS:
+                self._early = []
+            self._early.append((bucket, t_arrival_ns, late))
+            arrivals = [arrival for _, arrival, _ in self._early]
+            if 1 + sum(a != b for a, b in zip(arrivals, arrivals[1:], strict=False)) < CONFIRMING:
+                return
+            late = max(lag for _, _, lag in self._early)
+            self._early = []
         if not self._buckets or bucket > self._buckets[-1][0]:
             self._buckets.append((bucket, (device_s, late)))
             self._fit()
         elif bucket == self._buckets[-1][0] and late < self._buckets[-1][1][1]:
             self._buckets[-1] = (bucket, (device_s, late))
-            if late < self._offset_s + self._drift * (device_s - self._pivot_s):
+            if late < self.line(device_s):
                 self._fit()
+
+    def line(self, device_s: float) -> float:
+        """Lag of undelayed bytes."""
+        return self._offset_s + self._drift * (device_s - self._pivot_s)
+
+    def elapsed_s(self, device_s: float, t_arrival_ns: int) -> float:
+        """From the undelayed arrival of a device time to an arrival."""
+        return (t_arrival_ns - (self._origin_ns or 0)) * 1e-9 - device_s - self.line(device_s)
+
+    def shift(self, late_s: float) -> None:
+        """The host's clock stepped."""
+        self._origin_ns = (self._origin_ns or 0) + round(late_s * 1e9)
+
+    @property
+    def young(self) -> bool:
+        """Less than two buckets."""
+        return len(self._buckets) < 2
 
     def _fit(self) -> None:
         """The most probable line under all points: exponential delays, and a drift that is a crystal's."""
@@ -97,55 +125,71 @@ class DeviceClock:
         self._unit_s = unit_s
         self._modulus = modulus
         self._newest: int | None = None  # unwrapped
-        self._newest_arrival_ns = 0
         self._epoch_s = 0.0
         self._arrival = ArrivalClock()
-        self._jumps = 0
-        self.restarts = 0
-        self.jumps = 0
+        self._run: list[tuple[int, float]] = []  # arrival and lateness of what contradicts
+        self.restarts = self.jumps = self.steps = self.contradicted = 0
 
     @property
     def newest_s(self) -> float | None:
         """Device time of the newest value."""
         return None if self._newest is None else self._epoch_s + self._newest * self._unit_s
 
-    def at(self, value: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
+    def at(self, value: int, t_arrival_ns: int, *, restarted: bool = False, leads: bool = True) -> float | None:
         """Device seconds of a counter value; None when it cannot be true (a jump, counted)."""
-        if self._newest is None:
+        if self._newest is None or self.newest_s is None:
             return self._begin(value, t_arrival_ns, value * self._unit_s)
-        delta = self._delta(value, t_arrival_ns)
-        if delta is None:
-            self._jumps += 1
-            if not restarted and self._jumps < JUMPS_TO_RESTART:
-                self.jumps += 1
-                return None
+        back = min(int(BEHIND_S / self._unit_s), self._modulus // 2)
+        delta = (value - self._newest + back) % self._modulus - back
+        ahead_s, smooth = delta * self._unit_s, delta * self._unit_s <= SMOOTH_S
+        elapsed_s = self._arrival.elapsed_s(self.newest_s, t_arrival_ns)
+        late_s, limit_s = elapsed_s - ahead_s, AHEAD_S + RATE_ERROR * abs(elapsed_s - ahead_s + ahead_s)
+        wraps = max(round(late_s / (self._modulus * self._unit_s)), 0)
+        beside_s = abs(late_s - wraps * self._modulus * self._unit_s)
+        if not (smooth and wraps) and beside_s <= limit_s:
+            self._run = []
+            return self._advance(delta + wraps * self._modulus, t_arrival_ns)
+        self.contradicted += 1
+        if self._run and abs(late_s - self._run[0][1]) > AHEAD_S:
+            self._run = []
+        if not self._run or t_arrival_ns != self._run[-1][0]:
+            self._run.append((t_arrival_ns, late_s))
+        backlog = not self._arrival.young and t_arrival_ns - self._run[0][0] < BACKLOG_S * 1e9
+        if (len(self._run) < CONFIRMING or (smooth and late_s > 0.0 and backlog)) and (smooth or not restarted):
+            if smooth:
+                return self._advance(delta, None)
+            self.jumps += 1
+            return None
+        if not leads or (not smooth and value * self._unit_s <= elapsed_s + AHEAD_S):
             self.restarts += 1
-            return self._begin(value, t_arrival_ns, self.to_device_s(t_arrival_ns))
-        self._jumps = 0
+            return self._begin(value, t_arrival_ns, max(self.to_device_s(t_arrival_ns), self.newest_s))
+        self._run = []
+        if beside_s > AHEAD_S + RATE_ERROR * abs(elapsed_s):
+            self.steps += 1
+            self._arrival.shift(late_s)
+            wraps = 0
+        return self._advance(delta + wraps * self._modulus, t_arrival_ns)
+
+    def _advance(self, delta: int, t_arrival_ns: int | None) -> float:
+        assert self._newest is not None
         unwrapped = self._newest + delta
         seconds = self._epoch_s + unwrapped * self._unit_s
         if delta > 0:
-            self._newest, self._newest_arrival_ns = unwrapped, t_arrival_ns
-            self._arrival.update(seconds, t_arrival_ns)
+            self._newest = unwrapped
+            if t_arrival_ns is not None:
+                self._arrival.update(seconds, t_arrival_ns)
         return seconds
 
-    def _delta(self, value: int, t_arrival_ns: int) -> int | None:
-        """Counts since the newest value, or None when no true count can explain the value."""
-        assert self._newest is not None
-        back = int(BEHIND_S / self._unit_s)
-        back = min(back, self._modulus // 2)
-        delta = (value - self._newest + back) % self._modulus - back
-        elapsed_s = (t_arrival_ns - self._newest_arrival_ns) * 1e-9
-        wraps = round((elapsed_s - delta * self._unit_s) / (self._modulus * self._unit_s))
-        delta += max(wraps, 0) * self._modulus
-        return delta if delta * self._unit_s <= elapsed_s + AHEAD_S else None
-
     def _begin(self, value: int, t_arrival_ns: int, seconds: float) -> float:
-        self._newest, self._newest_arrival_ns, self._jumps = value, t_arrival_ns, 0
+        self._newest, self._run = value, []
         self._epoch_s = seconds - value * self._unit_s
         self._arrival = ArrivalClock()
         self._arrival.update(seconds, t_arrival_ns)
         return seconds
+
+    def forget(self) -> None:
+        """Begin anew with the next value."""
+        self._newest = None
 
     def to_arrival_s(self, device_s: float) -> float:
         """When bytes of that device time would have arrived at best, seconds of the host's clock."""
@@ -165,6 +209,7 @@ class Timeline:
         self.mtx = DeviceClock(1.0 / timing.rate_hz, 1 << 16)
         self._edges = SyncEdges(1.0 / timing.rate_hz)
         self._mtx_newest_s: float | None = None
+        self._behind = 0
 
     @property
     def board_newest_s(self) -> float | None:
@@ -183,10 +228,12 @@ class Timeline:
 
     def board_time(self, ticks: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
         """`t_s` of a board message; None when its ticks cannot be true. `restarted`: it is the board's first word."""
-        restarts = self.board.restarts
+        restarts, steps = self.board.restarts, self.board.steps
         t_s = self.board.at(ticks, t_arrival_ns, restarted=restarted)
         if self.board.restarts != restarts:
             self._edges.forget()
+        if self.board.steps != steps:
+            self.mtx.forget()
         return t_s
 
     def sync_edge(self, edge: int, t_s: float) -> None:
@@ -196,14 +243,19 @@ class Timeline:
     def mtx_time(self, counter: int, t_arrival_ns: int) -> float | None:
         """`t_s` of an MTx sample, always later than the one before; None for a counter that cannot be true."""
         restarts = self.mtx.restarts
-        device_s = self.mtx.at(counter, t_arrival_ns)
+        device_s = self.mtx.at(counter, t_arrival_ns, leads=self.board.newest_s is None)
         if device_s is None:
             return None
         if self.mtx.restarts != restarts:
             self._edges.forget()
         t_s = self._on_board_clock(device_s, counter)
-        if self._mtx_newest_s is not None and t_s <= self._mtx_newest_s:
+        if self._mtx_newest_s is not None and t_s < self._mtx_newest_s - BEHIND_S:
+            self._behind += 1
+            if self._behind < CONFIRMING:
+                return None
+        elif self._mtx_newest_s is not None and t_s <= self._mtx_newest_s:
             t_s = self._mtx_newest_s + 1e-6
+        self._behind = 0
         self._mtx_newest_s = t_s
         return t_s
 
@@ -248,7 +300,7 @@ class SyncEdges:
 
     def add(self, edge: int, t_s: float) -> None:
         """Keep an edge (u16 count) and its time."""
-        if self._newest is None:
+        if self._newest is None or t_s - self._newest[1] > self.KEPT * self._nominal_s:
             unwrapped = edge
             self._first = (unwrapped, t_s)
         else:
@@ -272,7 +324,8 @@ class SyncEdges:
         if edge in self._times and abs(self._times[edge] - by_arrival_s) < 100 * self._nominal_s:
             return self._times[edge]
         ahead = ((edge - self._newest[0] + 0x8000) & 0xFFFF) - 0x8000
-        return self._newest[1] + ahead * self._period_s
+        t_s = self._newest[1] + ahead * self._period_s
+        return t_s if abs(t_s - by_arrival_s) < 100 * self._nominal_s else None
 
     def _vote(self, counter: int, by_arrival_s: float) -> None:
         assert self._newest is not None

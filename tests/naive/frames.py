@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Slow, obviously right twin of the board's frame reader: one frame at a time, by the cobs library and Python's CRC."""
 
 from __future__ import annotations
@@ -6,7 +7,7 @@ from dataclasses import dataclass, field
 
 from cobs import cobs
 
-from echostep.board.frames import MAX_ENCODED, FrameCounts, StaleFirmwareError, crc
+from echostep.board.frames import GAP_TICKS, MAX_ENCODED, OLDEST_TICKS, FrameCounts, StaleFirmwareError, crc
 from echostep.board.messages import BY_ID, SCHEMA_HASH, Identify, Identity, Message
 
 
@@ -17,6 +18,7 @@ class BoardReader:
     counts: FrameCounts = field(default_factory=FrameCounts)
     _rest: bytes = b""
     _sequence: int | None = None
+    _ticks: int | None = None
 
     def feed(self, received: bytes) -> list[Message]:
         """Messages completed by these bytes; raises StaleFirmwareError when the board has another schema."""
@@ -63,7 +65,13 @@ class BoardReader:
 
     def _count_sequence(self, sequence: int, message: Message) -> None:
         self.counts.good += 1
-        if self._sequence is not None and not isinstance(message, Identify):
+        ticks, passed = getattr(message, "ticks", None), 0
+        if ticks is not None:
+            if self._ticks is not None:
+                passed = (ticks - self._ticks + OLDEST_TICKS) % (1 << 32) - OLDEST_TICKS
+            if self._ticks is None or passed > 0:
+                self._ticks = ticks
+        if self._sequence is not None and not isinstance(message, Identify) and passed <= GAP_TICKS:
             gap = (sequence - self._sequence - 1) & 0xFFFF
-            self.counts.lost += gap if gap < 0x8000 else 0  # a step back is a board that restarted
+            self.counts.lost += gap if gap < 0x8000 else 0
         self._sequence = sequence

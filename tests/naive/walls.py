@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Slow, obviously right twins of the kernels."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Foot and legs together: either falls silent, the track goes on."""
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.localization.estimate import Estimate, TrackStatus, digest
-from echostep.odometry.foot_legs_handover import KEPT_S, FootLegsHandover
+from echostep.odometry.foot_legs_handover import ALIGNED_SD, KEPT_S, FootLegsHandover
 from echostep.path import PathSegment
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
@@ -80,6 +81,27 @@ def test_a_foot_alone_is_left_as_it_is() -> None:
     legs = [leg(float(k), k + 1.0) for k in range(100)]
     assert [gone for one in legs for gone in handover.add_foot_segments([one])] == legs
     assert len(handover._kept_segments) <= KEPT_S + 2
+
+
+def test_twenty_metres_of_both_give_the_scale_of_the_legs() -> None:
+    class Path:
+        remembered_s = 0.0
+
+        def heading_rad(self, _t_s: float) -> float:
+            return 0.0
+
+    handover = FootLegsHandover(WearerSettings())
+    handover._kept_segments.extend(leg(float(k), k + 1.0) for k in range(20))
+    legs = [replace(leg(float(k), k + 1.0, 0.9), scale_sd=0.078) for k in range(20)]
+    assert handover._align_legs(Path(), legs)  # type: ignore[arg-type]
+    assert handover._as_common(legs[0]).dx_m == pytest.approx(1.0, abs=0.005)
+    assert handover._as_common(legs[0]).scale_sd == ALIGNED_SD
+    first = handover._leg_scale
+    handover._kept_segments.clear()
+    handover._kept_segments.extend(leg(float(k), k + 1.0, 1.1) for k in range(20))
+    assert handover._align_legs(Path(), legs)  # type: ignore[arg-type]
+    assert first < handover._leg_scale < 1.1 / 0.9  # both dropouts count
+    assert FootLegsHandover(WearerSettings())._as_common(legs[0]) == legs[0]
 
 
 def test_nobody_who_lies_still_is_believed_to_stand() -> None:

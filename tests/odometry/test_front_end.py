@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The front end: the chunks alone decide what comes out; what is late, lost or silent is counted or told."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep foot`: a recorded IMU in, a track out; wrong input is named, never tracked."""
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from echostep.errors import EchostepError
 from echostep.offline.imu_csv import load_imu
 from echostep.simulation.devices.mtx import specific_force_and_rate
 from echostep.simulation.people.walker import Person, walk
-from foot_walks import data_folder
+from needs_data import needs_data
+from recordings import DATA
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
 Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]
@@ -234,9 +236,9 @@ def test_what_is_no_table_is_named(tmp_path: Path, content: str) -> None:
         load_imu(tmp_path / "x.csv")
 
 
-@pytest.mark.skipif(not data_folder().is_dir(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)")
+@needs_data("xio_ngimu")
 def test_a_real_walk_ends_where_it_began(tmp_path: Path) -> None:
-    raw = np.loadtxt(data_folder() / "xio_ngimu/short_walk.csv", delimiter=",", skiprows=1)
+    raw = np.loadtxt(DATA / "xio_ngimu/short_walk.csv", delimiter=",", skiprows=1)
     done = run(write(tmp_path, np.column_stack([raw[:, 0], raw[:, 4:7] * 9.80665, np.radians(raw[:, 1:4])])))
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "track.csv").read_text().splitlines()))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Derived messages: viewers can read them, and the tracker does not notice that they are written."""
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from echostep.output.derived import TOPICS, Derived, east_north
 from echostep.output.foxglove import FRAME, LOCATION, POSE, SCENE
 from echostep.plan.model import Georeference, Plan, load_plan
 from echostep.ports.chunks import portion_of
-from echostep.recording.recorder import Recorder, open_recording
+from echostep.recording.reading import open_recording
+from echostep.recording.recorder import Recorder
 from echostep.tracker import Tracker
 from walks import DEMO, walk_chunks
 

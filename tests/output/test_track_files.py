@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tracks for other programs: read again by others' libraries, they are what was estimated."""
 
 from __future__ import annotations
@@ -6,6 +7,7 @@ import csv
 import dataclasses
 import json
 import xml.etree.ElementTree as ET
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +21,10 @@ from echostep.localization.estimate import Estimate
 from echostep.output.track_files import export as write
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import load_plan
+from echostep.recording.clock import clock_of
 from echostep.recording.contents import info
-from echostep.recording.recorder import Recorder, open_recording
+from echostep.recording.reading import open_recording
+from echostep.recording.recorder import Recorder
 from echostep.session.options import TrackingOptions
 from echostep.session.replay import tracker_of
 from walks import DEMO, walk_chunks
@@ -100,12 +104,18 @@ def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> 
 
 @pytest.mark.parametrize(
     ("name", "plan", "said"),
-    [("track.kml", DEMO, "georeference"), ("track.xls", DEMO, "unknown kind"), ("walk.mcap", DEMO, "another name")],
+    [
+        ("track.kml", "nowhere.json", "georeference"),
+        ("track.xls", DEMO, "unknown kind"),
+        ("walk.mcap", DEMO, "another name"),
+    ],
 )
-def test_what_cannot_be_written_is_named(folder: Path, name: str, plan: Path, said: str) -> None:
+def test_what_cannot_be_written_is_named(folder: Path, name: str, plan: Path | str, said: str) -> None:
+    tree = {key: value for key, value in json.loads(DEMO.read_text()).items() if key != "georeference"}
+    (folder / "nowhere.json").write_text(json.dumps(tree))
     before = (folder / "walk.mcap").read_bytes()
     with pytest.raises(EchostepError, match=said):
-        export(folder, name, plan)
+        export(folder, name, folder / plan)
     assert (folder / "walk.mcap").read_bytes() == before
 
 
@@ -113,3 +123,36 @@ def test_the_command_says_what_it_wrote(folder: Path) -> None:
     done = echostep("export", folder / "walk.mcap", "--plan", DEMO, "-o", folder / "by_command.csv")
     assert (done.returncode, done.stderr) == (0, "")
     assert "by_command.csv" in done.stdout.splitlines()[-1]
+
+
+def moments(kml: Path) -> list[str]:
+    return [when.text or "" for when in ET.parse(kml).getroot().iterfind(".//{*}TimeStamp/{*}when")]
+
+
+def test_a_track_on_a_map_has_times(folder: Path, estimates: list[Estimate]) -> None:
+    """The time of day of a recording that knows it; else seconds since the beginning, and a word about it."""
+    simulated = export(folder, "simulated.kml")
+    assert "No time of day" in simulated.read_text()
+    assert moments(simulated)[0].startswith("1970-01-01T00:00:0")
+    clock = {"started_utc": "2026-11-21T10:00:00.000+00:00", "started_ns": "1000000000"}
+    with Recorder(folder / "live.mcap", {"seed": "3"} | clock) as recorder:
+        for chunk in walk_chunks():
+            recorder.write(chunk)
+    write(
+        folder / "live.mcap",
+        folder / "plan.json",
+        folder / "live.kml",
+        lambda recording, on: tracker_of(recording, on, TrackingOptions(DEMO)),
+    )
+    times = moments(folder / "live.kml")
+    assert len(times) == len(estimates)
+    assert times == sorted(times)
+    seconds = [datetime.fromisoformat(time).timestamp() for time in times]
+    began_s = datetime.fromisoformat(clock["started_utc"]).timestamp()
+    assert np.abs(np.diff(seconds) - np.diff([e.t_s for e in estimates])).max() < 0.02
+    assert abs(seconds[0] - began_s - estimates[0].t_s) < 0.1
+
+
+@pytest.mark.parametrize("damaged", [{}, {"started_utc": "soon", "started_ns": "1"}, {"started_utc": "2026-11-21"}])
+def test_a_recording_without_a_usable_clock_has_none(damaged: dict[str, str]) -> None:
+    assert clock_of(damaged) is None

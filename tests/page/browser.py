@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A browser on the live page of the demo's walk, tracked in a thread at any multiple of real time.
 
 With ECHOSTEP_PICTURES=1 the pictures of the manual are made anew.
@@ -8,7 +9,6 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from board_runs import ROOT
 from echostep.foot.steps import Step
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate
+from echostep.localization.start import Start
 from echostep.page.live import LivePage
 from echostep.page.server import Address
 from echostep.path import PathSegment
@@ -27,10 +28,14 @@ from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import START_NS, demo_scenario
 from echostep.tracker import Tracker
+from waiting import until
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 LOCAL = Address(port=0)
+SKIPPED = 500  # chunks in a portion before the page is opened
+SHOWN = "[echostep.scene.frame && { ...echostep.scene.frame, beams: 0, trail: 0, cloud: 0 }, document.body.innerText]"  # for the error of a test
+NAMES = "[...document.querySelectorAll('#rooms text')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => e.textContent)"
 PHONE = {"viewport": {"width": 360, "height": 640}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
 DESK = {"viewport": {"width": 1100, "height": 640}}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -48,12 +53,17 @@ def demo_walk(*, beacons: bool) -> tuple[Pose, list[Chunk]]:
 
 
 class Walk:
-    """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it; `guide`: with beacons, to a place."""
+    """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it; `guide`: with beacons, to a place.
 
-    def __init__(self, begin_s: float, pace: float, guide: RoutePlace | None = None) -> None:
-        start, self._chunks = demo_walk(beacons=guide is not None)
+    `start`: what the tracker is told of the start, where it is not the true one.
+    """
+
+    def __init__(
+        self, begin_s: float, pace: float, guide: RoutePlace | None = None, start: Start | None = None
+    ) -> None:
+        true_start, self._chunks = demo_walk(beacons=guide is not None)
         self._first_ns = self._chunks[0].t_arrival_ns
-        self._tracker = Tracker(PLAN, start, seed=1)
+        self._tracker = Tracker(PLAN, start or true_start, seed=1)
         self._pace = pace
         self._stop = threading.Event()
         guided = GuidedRun(self._tracker, guide) if guide else None
@@ -72,8 +82,9 @@ class Walk:
 
     def __enter__(self) -> Walk:
         self.page.__enter__()
-        for chunk in self._chunks[: self._begin]:
-            self._take(chunk)
+        for begin in range(0, self._begin, SKIPPED):
+            self._take(self._chunks[begin : min(begin + SKIPPED, self._begin)])
+        self.told_s.clear()
         self._thread.start()
         return self
 
@@ -89,12 +100,12 @@ class Walk:
             if self._stop.wait(max(ahead_s, 0.0)):
                 return
             for said in self.page.pop_check_ins():
-                self.checked_in += self._take(Chunk("person", chunk.t_arrival_ns, said))
-            self._take(chunk)
+                self.checked_in += self._take([Chunk("person", chunk.t_arrival_ns, said)])
+            self._take([chunk])
 
-    def _take(self, chunk: Chunk) -> list[Estimate]:
-        self._now_s = (chunk.t_arrival_ns - START_NS) * 1e-9
-        portion = portion_of([chunk])
+    def _take(self, chunks: list[Chunk]) -> list[Estimate]:
+        self._now_s = (chunks[-1].t_arrival_ns - START_NS) * 1e-9
+        portion = portion_of(chunks)
         self.page.note_arrival()
         estimates = self._tracker.take(portion)
         self.page.publish(portion)
@@ -111,18 +122,9 @@ def looking(browser: Any, url: str, look: str) -> Any:
     return page
 
 
-def until(holds: Callable[[], bool], timeout_s: float = 60.0) -> bool:
-    deadline = time.monotonic() + timeout_s
-    while not holds():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
-
-
 def wait_for(page: Any, holds: str) -> None:
     """Until an expression holds (the page's own policy forbids Playwright's waiting)."""
-    assert until(lambda: bool(page.evaluate(holds))), holds
+    assert until(lambda: bool(page.evaluate(holds))), f"{holds}: {page.evaluate(SHOWN)}"
 
 
 def picture(page: Any, name: str, tmp_path: Path) -> None:

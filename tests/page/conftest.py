@@ -1,10 +1,7 @@
-"""One Chromium, and one short walk, for all tests of a module."""
+# SPDX-License-Identifier: MIT
+"""One short walk for all tests of a module."""
 
 from __future__ import annotations
-
-import shutil
-from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
@@ -12,20 +9,6 @@ from echostep.ports.chunks import Chunk
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from page.frames import PLAN
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Chromium, driven by Playwright; skips where one of them is missing."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no page is looked at")
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine: no page is looked at")
-    with playwright.sync_playwright() as running:
-        chromium = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

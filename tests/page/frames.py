@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Frames of the page for tests: a scene, a server, a client that reads the socket."""
 
 from __future__ import annotations
@@ -5,8 +6,11 @@ from __future__ import annotations
 import contextlib
 import json
 import time
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
-from typing import Any
+from email.message import Message
+from typing import Any, NamedTuple
 
 import numpy as np
 from websockets.sync.client import ClientConnection, connect
@@ -45,6 +49,22 @@ def scene(t_s: float = 1.0, trail_count: int = 0, particles: int = 300) -> PageS
         trail_count,
         "",
     )
+
+
+class Answer(NamedTuple):
+    status: int
+    headers: Message
+    body: bytes
+
+
+def fetched(url: str) -> Answer:
+    """What the server answers, an error's body too; the connection is closed (an `HTTPError` would hold it)."""
+    try:
+        with urllib.request.urlopen(url, timeout=5) as answer:
+            return Answer(answer.status, answer.headers, answer.read())
+    except urllib.error.HTTPError as error:
+        with error:
+            return Answer(error.code, error.headers, error.read())
 
 
 def opened_url(url: str) -> ClientConnection:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`plan edit`: hostile posts, a file that is whole at any time, and drawing in Chromium."""
 
 from __future__ import annotations
@@ -227,6 +228,42 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None
     assert not level.doors
     assert sorted(level.walls.tolist()) == [[3.0, 7.0, 8.0, 7.0], [8.0, 7.0, 8.0, 11.0]]
     assert not page.wrong
+    page.context.close()
+
+
+def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:
+    page.mouse.move(*spot(page, *begin))
+    page.mouse.down(button=button)
+    page.mouse.move(*spot(page, *end), steps=4)
+    page.mouse.up(button=button)
+
+
+def test_drawing_does_not_move_the_sheet_and_moving_it_draws_nothing(browser: Any, drawn: EditServer) -> None:
+    page = opened(browser, drawn)
+    view, walls = "[echostep.view.x, echostep.view.y, echostep.view.scale]", "echostep.sheet.level.walls"
+    begin, count = page.evaluate(view), page.evaluate(f"{walls}.length")
+    page.click('[data-tool="wall"]')
+    drag(page, (2.0, 4.0), (6.0, 4.0))
+    drag(page, (2.0, 6.0), (6.0, 6.0))
+    assert page.evaluate(f"{walls}.slice({count})") == [[2, 4, 6, 4], [2, 6, 6, 6]]
+    assert page.evaluate(view) == begin
+    for tool in ("door", "erase", "scale"):
+        page.click(f'[data-tool="{tool}"]')
+        drag(page, (4.0, 5.0), (4.0, 4.0))
+    assert page.evaluate(f"{walls}.length") == count + 2
+    assert page.evaluate(view) == begin
+    page.click('[data-tool="wall"]')
+    click(page, 8.0, 4.0)
+    drag(page, (9.0, 4.0), (8.0, 5.0), "right")
+    assert page.evaluate(view) != begin
+    click(page, 8.0, 6.0)  # the wall that was begun goes on
+    assert page.evaluate(f"{walls}.at(-1)") == [8, 4, 8, 6]
+    page.keyboard.press("Escape")
+    moved = page.evaluate(view)
+    page.click('[data-tool="select"]')
+    drag(page, (4.0, 5.0), (4.5, 5.5))
+    assert page.evaluate(view) != moved
+    assert page.evaluate(f"{walls}.length") == count + 3
     page.context.close()
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Guidance from end to end: board, MTx and beacon gateway on real ports, `live` in a process of its own, a page that looks; then its replay."""
 
 from __future__ import annotations

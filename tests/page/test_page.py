@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The page's server: hostile sockets, slow pages, check-ins that replay bit for bit."""
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, digest
-from echostep.page import protocol
+from echostep.localization.map_filter import BELIEVED, DOUBTED
+from echostep.page import requests
 from echostep.page.live import LivePage
 from echostep.plan.model import Pose
-from echostep.ports.check_in import PERSON, CheckIn, parse_check_in
+from echostep.ports.check_in import PERSON, CheckIn, Undo, parse_person
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from page.frames import LOCAL, PLAN, next_frame, opened_url
@@ -29,33 +30,37 @@ json_like = st.recursive(
 )
 
 
-fields = st.sampled_from(["x_m", "y_m", "sd_m", "heading_rad", "level", "seq", "playing", "times", "t_s", "by"])
+fields = st.sampled_from(["x_m", "y_m", "sd_m", "heading_rad", "level", "seq", "playing", "times", "t_s", "by", "undo"])
 
 
-kinds = st.sampled_from(["check_in", "go_to", "go_nowhere", "drawn", "play", "speed", "seek", "skip", "?"])
+kinds = st.sampled_from(
+    ["check_in", "undo", "consider", "go_to", "go_nowhere", "drawn", "play", "speed", "seek", "skip", "?"]
+)
 
 
 @given(kinds, st.dictionaries(fields, json_like, max_size=6))
 def test_no_request_breaks_the_parser(kind: str, rest: dict[str, object]) -> None:
-    protocol.parse_request(json.dumps({"kind": kind, **rest}))
+    requests.parse_request(json.dumps({"kind": kind, **rest}))
 
 
 @given(st.text() | st.just("[" * 2000) | st.just("9" * 2000) | json_like.map(json.dumps))
 def test_no_text_breaks_the_parser(text: str) -> None:
-    assert protocol.parse_request(text) is None or '"kind"' in text
+    assert requests.parse_request(text) is None or '"kind"' in text
 
 
 @given(
     st.binary(max_size=600) | st.dictionaries(fields, json_like, max_size=6).map(lambda tree: json.dumps(tree).encode())
 )
 def test_no_chunk_of_a_person_breaks_the_tracker(payload: bytes) -> None:
-    said = parse_check_in(payload)
-    assert said is None or (math.isfinite(said.x_m + said.y_m + said.sd_m) and said.level >= 0)
+    said = parse_person(payload)
+    assert (
+        said is None or isinstance(said, Undo) or (math.isfinite(said.x_m + said.y_m + said.sd_m) and said.level >= 0)
+    )
 
 
 def test_a_check_in_comes_back_from_its_bytes() -> None:
-    for said in (CheckIn(1.25, -3.5, None, 0.5), CheckIn(0.1, 0.2, 0.3, 0.4, 2)):
-        assert parse_check_in(said.encode()) == said
+    for said in (CheckIn(1.25, -3.5, None, 0.5), CheckIn(0.1, 0.2, 0.3, 0.4, 2), Undo(3)):
+        assert parse_person(said.encode()) == said
 
 
 @pytest.mark.parametrize(
@@ -63,11 +68,11 @@ def test_a_check_in_comes_back_from_its_bytes() -> None:
     [
         {"x_m": 1, "y_m": 2}, {"x_m": 1, "y_m": 2, "sd_m": "1"}, {"x_m": 1e9, "y_m": 2, "sd_m": 1}, {"x_m": True, "y_m": 2, "sd_m": 1},
         {"x_m": 1, "y_m": 2, "sd_m": 1, "heading_rad": "east"}, {"x_m": 1, "y_m": 2, "sd_m": 1, "level": -1},
-        {"x_m": 1, "y_m": 2, "sd_m": 1, "level": 0.5}, [1],
+        {"x_m": 1, "y_m": 2, "sd_m": 1, "level": 0.5}, [1], {"undo": 0}, {"undo": True}, {"undo": 1.0}, {"undo": 1 << 40},
     ],
 )  # fmt: skip
 def test_half_a_check_in_is_none(tree: object) -> None:
-    assert parse_check_in(json.dumps(tree).encode()) is None
+    assert parse_person(json.dumps(tree).encode()) is None
 
 
 def with_check_ins(chunks: list[Chunk]) -> list[Chunk]:
@@ -103,8 +108,7 @@ def test_check_ins_give_the_same_estimates_in_whatever_portions(chunks: list[Chu
 
 def test_a_check_in_draws_the_cloud_anew(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
-    for chunk in chunks[: len(chunks) // 3]:
-        tracker.feed(chunk)
+    tracker.take(portion_of(chunks[: len(chunks) // 3]))
     (after,) = tracker.feed(Chunk(PERSON, 0, CheckIn(20.0, 2.0, 1.0, 0.5).encode()))
     assert math.hypot(after.x_m - 20.0, after.y_m - 2.0) < 0.2
     assert abs(after.heading_rad - 1.0) < 0.1
@@ -113,21 +117,42 @@ def test_a_check_in_draws_the_cloud_anew(chunks: list[Chunk]) -> None:
 
 def test_a_check_in_without_heading_keeps_the_heading_that_is_known(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
-    before = [estimate for chunk in chunks[: len(chunks) // 3] for estimate in tracker.feed(chunk)][-1]
+    before = tracker.take(portion_of(chunks[: len(chunks) // 3]))[-1]
     (after,) = tracker.feed(Chunk(PERSON, 0, CheckIn(before.x_m, before.y_m, None, 0.3).encode()))
     assert abs(after.heading_rad - before.heading_rad) < 0.1
+
+
+@pytest.mark.parametrize("start", [Pose(2.0, 7.5, 0.0), None], ids=["known start", "start by tap"])
+def test_a_wrong_tap_that_is_undone_leaves_no_trace(chunks: list[Chunk], start: Pose | None) -> None:
+    """The estimates after the undoing are those of a run that never was tapped, bit for bit; in whatever portions."""
+    plan, early = replace(PLAN, start=None), [] if start else [Chunk(PERSON, 0, CheckIn(2.0, 7.5, 0.0, 0.3).encode())]
+    clean = [*early, *chunks]
+    at, back = len(clean) // 2, len(clean) * 5 // 8
+    wrong = Chunk(PERSON, 0, CheckIn(20.0, 2.0, None, 0.2).encode())
+    undo = Chunk(PERSON, 0, Undo(1 + len(early)).encode())
+    tapped = [*clean[:at], wrong, *clean[at:back], undo, undo, *clean[back:]]
+    never, once = (Tracker(plan, start, seed=1, waits=True) for _ in range(2))
+    never.take(portion_of(clean[:back]))
+    expected = never.take(portion_of(clean[back:]))
+    once.take(portion_of(tapped[: at + 1]))
+    assert once.state.undoable == 1 + len(early)
+    shown = [e for k in range(at + 1, len(tapped), 100) for e in once.take(portion_of(tapped[k : k + 100]))]
+    assert len(expected) > 4
+    assert digest(shown[-len(expected) :]) == digest(expected)
+    assert (once.state.undone, once.state.bad_check_ins) == (1, 1)
+    assert once.state.undoable is None
+    assert shown[0].x_m > 19.0
+    assert math.hypot(shown[-1].x_m - 9.5, shown[-1].y_m - 10.8) < 0.5
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, None])
 def test_a_tap_starts_the_walk_where_nobody_knew(chunks: list[Chunk], heading_rad: float | None) -> None:
     nowhere = replace(PLAN, start=None)
-    with pytest.raises(EchostepError, match="--start"):
-        Tracker(nowhere)
     tracker = Tracker(nowhere, seed=1, waits=True)
     assert tracker.state.waits_for_start
-    early = [estimate for chunk in chunks[:400] for estimate in tracker.feed(chunk)]
+    early = tracker.take(portion_of(chunks[:400]))
     tracker.feed(Chunk(PERSON, 0, CheckIn(2.0, 7.5, heading_rad, 0.5).encode()))
-    late = [estimate for chunk in chunks[400:] for estimate in tracker.feed(chunk)]
+    late = tracker.take(portion_of(chunks[400:]))
     assert not early
     assert not tracker.state.waits_for_start
     assert math.hypot(late[-1].x_m - 9.5, late[-1].y_m - 10.8) < 1.0
@@ -135,7 +160,7 @@ def test_a_tap_starts_the_walk_where_nobody_knew(chunks: list[Chunk], heading_ra
 
 def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     alone, watched = (Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1) for _ in range(2))
-    expected = [estimate for chunk in chunks for estimate in alone.feed(chunk)]
+    expected = alone.take(portion_of(chunks))
     found = []
     with LivePage(watched, "test", LOCAL) as page:
         for chunk in chunks:
@@ -158,11 +183,8 @@ def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
     with LivePage(tracker, "test", LOCAL) as page, opened_url(page.url) as looking:
         begin_ns = time.monotonic_ns() - chunks[-1].t_arrival_ns
-        for chunk in [
-            *(replace(chunk, t_arrival_ns=chunk.t_arrival_ns + begin_ns - 3_000_000_000) for chunk in chunks),
-            None,
-        ]:
-            portion = portion_of([chunk] if chunk else [])
+        earlier = [replace(chunk, t_arrival_ns=chunk.t_arrival_ns + begin_ns - 3_000_000_000) for chunk in chunks]
+        for portion in (portion_of(earlier), portion_of([])):
             tracker.take(portion)
             page.publish(portion)
         looking.recv(timeout=5)
@@ -174,3 +196,19 @@ def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
     assert frame["told"]["status"] == "lost"
     assert not frame["told"]["heading_known"]
     assert frame["told"]["major_m"] > 5.0
+
+
+@pytest.mark.parametrize(("at", "fits"), [((0.0, 0.0), True), ((14.0, 4.0), False)])
+def test_echoes_speak_for_a_right_tap_and_against_a_wrong_one(
+    chunks: list[Chunk], at: tuple[float, float], fits: bool
+) -> None:
+    """The wearer walks in the corridor; the wrong tap is in Office 4."""
+    tracker, begin = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1), len(chunks) * 2 // 5
+    here = tracker.take(portion_of(chunks[:begin]))[-1]
+    tracker.feed(Chunk(PERSON, 0, CheckIn(here.x_m + at[0], here.y_m + at[1], None, 0.2).encode()))
+    for k in range(begin, len(chunks), 100):
+        tracker.take(portion_of(chunks[k : k + 100]))
+        if (not fits and tracker.state.right < DOUBTED) or k > begin + len(chunks) // 4:
+            break
+    assert (tracker.state.right > BELIEVED) == fits
+    assert (tracker.state.right < DOUBTED) == (not fits)

@@ -1,25 +1,32 @@
+# SPDX-License-Identifier: MIT
 """Elements of the page: replay cursor, status text, guidance, extrapolation."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from echostep.errors import EchostepError
 from echostep.localization.estimate import TrackStatus
-from echostep.page import protocol
-from echostep.page.elements.guidance import Destination, RouteFinder, straight_line
+from echostep.page import requests
+from echostep.page.elements.guidance import Destination, RouteFinder
 from echostep.page.elements.lookahead import extrapolate
 from echostep.page.elements.scene import status_text
+from echostep.page.elements.taps import Taps
+from echostep.page.elements.undo_offer import UndoClock, UndoOffer
 from echostep.page.mailbox import SceneHistory
 from echostep.page.replay_cursor import ReplayCursor
-from echostep.plan.model import Pose
+from echostep.plan.model import Plan, Pose
 from echostep.plan.routing import RoutePlace
+from echostep.ports.check_in import CheckIn
 from echostep.ports.chunks import Chunk
 from echostep.tracker import Tracker
+from imported_plans import seven_floors
 from page.frames import PLAN, scene, told
 
 
@@ -37,17 +44,17 @@ def test_a_cursor_plays_stops_seeks_and_steps() -> None:
 
     assert at(100.0) == 10.0
     assert at(101.5) == 11.0
-    cursor.handle(protocol.SetSpeed(4.0))
+    cursor.handle(requests.SetSpeed(4.0))
     assert at(101.9) == 13.0
     assert at(500.0) == 13.0
-    cursor.handle(protocol.StepBy(-2))
+    cursor.handle(requests.StepBy(-2))
     assert (at(501.0), cursor.playing) == (11.0, False)
     assert at(502.0) == 11.0
-    cursor.handle(protocol.Seek(12.4))
+    cursor.handle(requests.Seek(12.4))
     assert at(503.0) == 12.0
-    cursor.handle(protocol.Seek(1e9))
+    cursor.handle(requests.Seek(1e9))
     assert at(504.0) == 13.0
-    cursor.handle(protocol.SetPlaying(True))  # at the end: from the beginning
+    cursor.handle(requests.SetPlaying(True))  # at the end: from the beginning
     assert at(504.0) == 10.0
 
 
@@ -60,7 +67,10 @@ def test_status_in_words() -> None:
 
 def test_an_errand_finds_its_way_around_walls() -> None:
     destination, here, goal = Destination(RoutePlace(13.0, 4.5)), told(9.0, 7.5), RoutePlace(13.0, 4.5)
-    assert "straight line" in destination.guidance_at(here).text
+    looking = destination.guidance_at(here)
+    assert (looking.kind, looking.text, looking.arrow_rad, looking.path) == ("looking", "Looking for a way", None, ())
+    upstairs = Destination(RoutePlace(13.0, 4.5, 2)).guidance_at(here)
+    assert upstairs.text == "Looking for a way, 2 floors up"
     assert destination.needs_route(here)
     destination.set_route(RouteFinder(PLAN).find(here, goal), "", here)
     way = destination.guidance_at(here)
@@ -71,7 +81,9 @@ def test_an_errand_finds_its_way_around_walls() -> None:
     with pytest.raises(EchostepError) as outside:
         RouteFinder(PLAN).find(here, RoutePlace(500.0, 500.0))
     destination.set_route(None, str(outside.value), here)
-    assert "outside the plan" in destination.guidance_at(here).text
+    none = destination.guidance_at(here)
+    assert "No way was found: the destination (500.0, 500.0) is outside the plan" in none.text
+    assert (none.kind, none.arrow_rad, none.path) == ("none", None, ())
     assert not destination.needs_route(here)
     assert destination.needs_route(told(9.0, 7.5, t_s=10.0))
 
@@ -94,13 +106,57 @@ def test_a_step_leads_ahead_of_its_echoes(chunks: list[Chunk]) -> None:
     assert np.median(off_m) < 0.1
 
 
-def test_guidance_points_and_arrives() -> None:
-    way = straight_line(told(), RoutePlace(2.0, 17.5, 0))
-    assert (way.left_m or 0.0) == 10.0
-    assert way.arrow_rad == pytest.approx(math.pi / 2)
-    assert straight_line(told(), RoutePlace(2.3, 7.5, 0)).text == "You have arrived"
-    assert "1 floor up" in straight_line(told(), RoutePlace(2.3, 7.5, 1)).text
-    looks_north = replace(told(), heading_rad=math.pi / 2)
-    assert straight_line(looks_north, RoutePlace(2.0, 17.5, 0)).arrow_rad == pytest.approx(0.0)
-    unknown = straight_line(replace(told(), heading_sd_rad=2.0), RoutePlace(2.0, 17.5, 0))
-    assert (unknown.kind, unknown.arrow_rad) == ("stop", None)
+def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) -> bool:
+    walls = shapely.STRtree(shapely.linestrings(plan.levels[level].solid.reshape(-1, 2, 2)))
+    return bool(len(walls.query(shapely.LineString(line_m), predicate="intersects")))
+
+
+@pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
+def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
+    """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""
+    rng, finder, found = np.random.default_rng(1), RouteFinder(plan), 0
+    for _ in range(60):
+        x, y, u, v = (float(rng.uniform(0.3, most)) for most in (24.0, 13.0, 24.0, 13.0))
+        level, goal = (int(k) for k in rng.integers(0, len(plan.levels), 2))
+        try:
+            route = finder.find(replace(told(x, y), level=level), RoutePlace(u, v, goal))
+        except EchostepError:
+            continue
+        found += 1
+        for stretch in route.stretches:
+            if len(stretch.line_m) > 1:
+                assert not crosses_a_wall(plan, stretch.level, stretch.line_m.tolist()), (x, y, u, v)
+    assert found > 40
+
+
+def test_what_a_tap_would_do_is_said_before() -> None:
+    taps, there = Taps(PLAN), replace(scene(), estimate=told(2.0, 7.5, sd_m=0.1), echoes_fit=True)
+    plain = taps.consider(CheckIn(2.2, 7.5, None, 0.3), there)
+    assert plain.text == "In North corridor. 0.2 m from the estimate. Your direction stays: drag to change it."
+    aimed = taps.consider(CheckIn(2.2, 7.5, 1.0, 0.3), None)
+    assert (aimed.text, aimed.heading_rad) == ("In North corridor. You face the arrow.", 1.0)
+    far = taps.consider(CheckIn(13.0, 4.5, None, 0.3), there)
+    assert "11 m from the estimate. The echoes fit the estimate: are you sure?" in far.text
+    assert "sure" not in taps.consider(CheckIn(13.0, 4.5, None, 0.3), replace(there, echoes_fit=False)).text
+    wall = taps.consider(CheckIn(9.7, 4.0, None, 0.3), there)
+    assert wall.text.startswith(
+        "Nobody can stand there: it is inside a wall. The nearest possible place is 0.3 m away. In S"
+    )
+    assert wall.possible
+    assert abs(wall.x_m - 9.7) == pytest.approx(0.3)
+    assert taps.refusal(CheckIn(9.7, 4.0, None, 0.3)) == "Not accepted: it is inside a wall."
+    assert not taps.refusal(CheckIn(9.4, 4.0, None, 0.3))
+    upstairs = Taps(seven_floors()).consider(CheckIn(4.0, 10.0, None, 0.3, 3), None)
+    assert upstairs.text.startswith("In Office 301, Second floor.")
+
+
+def test_an_undoing_is_offered_for_ten_seconds_and_again_when_echoes_contradict() -> None:
+    clock, state = UndoClock(), replace(Tracker(PLAN).state, undoable=1, right=0.999)
+    seconds = 1_000_000_000
+    assert clock.offer(replace(state, undoable=None), 0) is None
+    assert clock.offer(state, 5 * seconds) == UndoOffer(1, 10.0, False)
+    assert clock.offer(state, 12 * seconds) == UndoOffer(1, 3.0, False)
+    assert clock.offer(state, 15 * seconds) is None
+    assert clock.offer(replace(state, right=0.2), 20 * seconds) == UndoOffer(1, 10.0, True)
+    assert clock.offer(replace(state, right=0.2), 30 * seconds) is None
+    assert clock.offer(replace(state, undoable=2), 31 * seconds) == UndoOffer(2, 10.0, False)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The guidance of a run and its beacons on the page: the run's cue unless a page has a destination of its own, each at its moment."""
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def test_who_turns_and_who_falls_silent() -> None:
     assert stopped.turned(0.3) == stopped
 
 
-def test_every_page_is_guided_by_the_run_but_for_one_with_a_destination_of_its_own() -> None:
+def test_all_pages_are_guided_by_the_run_until_one_of_them_chooses_a_destination() -> None:
     guide = guidance_of_cue(AHEAD, WAY, 0, None)
     mark = BeaconMark(7, 3.0, 4.0, 0.5, 0, "moved", heard=True)
     with served() as (server, mailbox):
@@ -111,13 +112,21 @@ def test_every_page_is_guided_by_the_run_but_for_one_with_a_destination_of_its_o
                 assert not frame["guidance"]["own"]
                 assert frame["beacons"][0]["number"] == 7
             one.send('{"kind":"go_to","x_m":13.0,"y_m":4.5}')
-            own = until(one, lambda frame: frame["guidance"]["own"] and frame["guidance"]["kind"] != "straight")
+            own = until(one, lambda frame: frame["guidance"]["own"] and frame["guidance"]["kind"] != "looking")
             assert own["guidance"]["spoken"]
             assert own["guidance"]["path"][-1] == [13.0, 4.5]
             mailbox.publish(replace(scene(), guidance=guide))
-            assert not until(other, lambda frame: not frame["beacons"])["guidance"]["own"]
-            one.send('{"kind":"go_nowhere"}')
-            assert until(one, lambda frame: not frame["guidance"]["own"])["guidance"]["text"] == "Straight ahead"
+            there = until(other, lambda frame: not frame["beacons"] and frame["guidance"]["kind"] != "looking")
+            assert there["guidance"]["own"]
+            assert there["goal"] == own["goal"] == {"x_m": 13.0, "y_m": 4.5, "level": 0}
+            other.send('{"kind":"go_nowhere"}')
+            for page in (one, other):
+                end = until(page, lambda frame: not frame["guidance"]["own"])
+                assert (end["guidance"]["text"], end["goal"]) == ("Straight ahead", None)
+        with opened(server) as late:
+            mailbox.set_goal(RoutePlace(13.0, 4.5))
+            late.recv(timeout=5)
+            assert until(late, lambda frame: bool(frame["goal"]))["guidance"]["own"]
 
 
 def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk]) -> None:
@@ -152,10 +161,9 @@ def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
     early = chunks[: len(chunks) // 2]
     shift_ns = time.monotonic_ns() - 3_000_000_000 - early[-1].t_arrival_ns
     with LivePage(tracker, "test", LOCAL, guided) as live:
-        for chunk in early:
-            portion = portion_of([replace(chunk, t_arrival_ns=chunk.t_arrival_ns + shift_ns)])
-            tracker.take(portion)
-            live.publish(portion)
+        portion = portion_of([replace(chunk, t_arrival_ns=chunk.t_arrival_ns + shift_ns) for chunk in early])
+        tracker.take(portion)
+        live.publish(portion)
         live.publish(portion_of([]))
         with opened_url(live.url) as page:
             page.recv(timeout=5)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The page's server: frames to many pages, slow pages, access, noise."""
 
 from __future__ import annotations
@@ -6,8 +7,6 @@ import contextlib
 import json
 import socket
 import time
-import urllib.error
-import urllib.request
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +22,7 @@ from echostep.page.mailbox import MOST_CHECK_INS, Mailbox
 from echostep.page.server import MOST_PAGES, Address, PageServer
 from echostep.page.session import MOST_UNDRAWN
 from echostep.ports.check_in import CheckIn
-from page.frames import PLAN, header, next_frame, opened, scene, served
+from page.frames import PLAN, fetched, header, next_frame, opened, scene, served
 
 
 def test_a_page_gets_plan_walls_and_frames() -> None:
@@ -33,10 +32,10 @@ def test_a_page_gets_plan_walls_and_frames() -> None:
         with opened(server) as page:
             hello = json.loads(page.recv(timeout=5))
             frame = next_frame(page)
-        walls = urllib.request.urlopen(f"{server.url}walls/0", timeout=5).read()
+        walls = fetched(f"{server.url}walls/0").body
     assert hello["plan"]["levels"][0]["rooms"][0]["name"] == "Office 1"
     assert np.array_equal(np.frombuffer(walls, "<f4").reshape(-1, 4), PLAN.levels[0].solid.astype("<f4"))
-    assert frame["trail"] == {"from": 0, "count": 1}
+    assert frame["trail"] == {"first": 0, "count": 1}
     assert frame["cloud"]["count"] == 300
 
 
@@ -45,12 +44,7 @@ def test_the_cloud_is_quantised_to_a_millimetre() -> None:
     x, y = (rng.uniform(-20.0, 20.0, 999).astype(np.float32) for _ in range(2))
     sent = protocol.frame(
         replace(scene(), particles=None),
-        1,
-        b"",
-        0,
-        ParticleSample(x, y, np.zeros(999, np.uint8), np.zeros(999, np.uint8)),
-        None,
-        None,
+        protocol.FrameParts(1, particles=ParticleSample(x, y, np.zeros(999, np.uint8), np.zeros(999, np.uint8))),
     )
     head = header(sent)["cloud"]
     at = 4 + int.from_bytes(sent[:4], "little")
@@ -78,7 +72,7 @@ def test_a_page_that_sleeps_is_sent_nothing_and_catches_up() -> None:
             frame = next_frame(page)
     assert frame["t_s"] == 99.0
     trail = frame["trail"]
-    assert trail["from"] + trail["count"] == 100
+    assert trail["first"] + trail["count"] == 100
 
 
 def test_the_tracker_never_waits_for_ten_pages_that_are_stuck() -> None:
@@ -128,13 +122,11 @@ def test_without_the_token_nothing_answers() -> None:
         local = f"http://127.0.0.1:{port}"
         assert len(token) >= 20
         for path in ("", "static/main.js", "walls/0", f"{token[:-1]}/", "../"):
-            with pytest.raises(urllib.error.HTTPError) as refused:
-                urllib.request.urlopen(f"{local}/{path}", timeout=5)
-            assert refused.value.code == 404
+            assert fetched(f"{local}/{path}").status == 404
         with pytest.raises(InvalidStatus):
             connect(f"ws{local[4:]}/socket", origin=Origin(local))
-        page = urllib.request.urlopen(f"{local}/{token}/", timeout=5)
-        assert b"echostep" in page.read()
+        page = fetched(f"{local}/{token}/")
+        assert b"echostep" in page.body
         assert "script-src 'self'" in page.headers["content-security-policy"]
         with connect(f"ws{local[4:]}/{token}/socket", origin=Origin(local)) as page_socket:
             assert json.loads(page_socket.recv(timeout=5))["kind"] == "hello"
@@ -163,7 +155,8 @@ def test_noise_is_counted_and_the_page_goes_on() -> None:
             page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
             while frame["guidance"] is None and time.monotonic() < deadline:
                 frame = next_frame(page)
-        assert frame["guidance"]["left_m"] == pytest.approx(3.0)
+        assert frame["guidance"]["own"]
+        assert frame["goal"] == {"x_m": 5.0, "y_m": 7.5, "level": 0}
         assert server.counts.unknown == len(noise)
 
 
@@ -195,13 +188,21 @@ def test_so_many_pages_and_no_more() -> None:
 
 
 def test_check_ins_that_nobody_takes_are_refused() -> None:
-    said = '{"kind":"check_in","x_m":1,"y_m":2,"heading_rad":null,"sd_m":0.5}'
+    said = '{"kind":"check_in","x_m":2,"y_m":7.5,"heading_rad":null,"sd_m":0.5}'
     with served() as (server, mailbox), opened(server) as page:
         page.recv(timeout=5)
         for _ in range(MOST_CHECK_INS + 1):
             page.send(said)
-        assert json.loads(page.recv(timeout=5)) == {"kind": "refused", "what": "check_in"}
-        assert list(mailbox.pop_check_ins()) == [CheckIn(1.0, 2.0, None, 0.5)] * MOST_CHECK_INS
+        busy = "Not accepted: this is a replay, or the tracker is too busy."
+        assert json.loads(page.recv(timeout=5)) == {"kind": "refused", "reason": busy}
+        assert list(mailbox.pop_check_ins()) == [CheckIn(2.0, 7.5, None, 0.5)] * MOST_CHECK_INS
+        page.send(said.replace("7.5", "8.5"))
+        assert json.loads(page.recv(timeout=5))["reason"] == "Not accepted: it is inside a wall."
+        page.send('{"kind":"undo","undo":1}')
+        assert json.loads(page.recv(timeout=5))["reason"] == "It is too late to undo this."
+        page.send(said.replace("check_in", "consider"))
+        assert json.loads(page.recv(timeout=5))["text"].startswith("In North corridor.")
+        assert not list(mailbox.pop_check_ins())
     with served(Mailbox(PLAN, "a replay", replay=True)) as (server, mailbox), opened(server) as page:
         assert json.loads(page.recv(timeout=5))["replay"]
         page.send(said)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Measurements of the live page in Chromium (`make page-speed`): printed, not judged, since they depend on the machine's load."""
 
 from __future__ import annotations

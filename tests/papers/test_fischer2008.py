@@ -1,10 +1,10 @@
+# SPDX-License-Identifier: MIT
 """The paper's dead reckoning against slow twins, against motion that is known, and on real recordings."""
 
 from __future__ import annotations
 
 import csv
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,10 @@ from echostep.papers import fischer2008
 from echostep.papers.fischer2008 import Fischer2008
 from echostep.xsens import onboard_filter as onboard
 from foot_walks import MANNERS, any_rotation, course, felt
+from needs_data import needs_data
+from recordings import DATA
 
-DATA = Path(os.environ.get("ECHOSTEP_DATA", Path(__file__).parents[3] / "shared" / "data"))
-needs_recordings = pytest.mark.skipif(
-    not (DATA / "xsens_mtw_voisard").is_dir(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)"
-)
+needs_recordings = needs_data("xsens_mtw_voisard")
 
 
 def walked(manner: str = "walking", steps: int = 8, every: int = 10) -> tuple[Floats, Floats, Floats, Floats, Floats]:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The filter of Girard et al. 2011: each printed formula against a naive twin, and whole steps."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The equations of Lee and Lee 2010 against numbers, differences and drawn errors."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the check finds, that it finds nothing in sound plans, and the pictures."""
 
 from __future__ import annotations
@@ -14,14 +15,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from typer.testing import CliRunner
 
 from echostep.cli import app
 from echostep.errors import EchostepError
-from echostep.plan.check import PlanFinding, check_plan
+from echostep.plan.check import check_plan
 from echostep.plan.cropping import within
 from echostep.plan.drawing import draw_plan
+from echostep.plan.findings import PlanFinding
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 
 DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
@@ -118,7 +121,7 @@ def test_rooms_that_no_door_joins() -> None:
 def test_reached_from_the_start() -> None:
     levels = [{"name": "g", "walls": [*box(), [1, 0, 2, 0]], "rooms": [ROOM]}]
     assert kinds(house(levels, start={"x": 3, "y": 2, "heading_deg": 0})) == []
-    assert kinds(house(levels, start={"x": 9, "y": 2, "heading_deg": 0})) == ["unreachable"]
+    assert kinds(house(levels, start={"x": 9, "y": 2, "heading_deg": 0})) == ["unreachable", "start"]  # outside
 
 
 def test_doors_without_walls() -> None:
@@ -259,3 +262,36 @@ def test_commands(tmp_path: Path) -> None:
     for wrong in (["--level", "7"], ["--bounds", "1,2,3"], ["--bounds", "1,2,0,3"], ["--bounds", "1,2,nan,3"]):
         failed = run(app, ["plan", "show", str(DEMO), "-o", str(tmp_path / "x.png"), *wrong])
         assert isinstance(failed.exception, EchostepError)
+
+
+def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rooms too close for their names, findings on one spot: what is drawn is apart, and the title counts the names left out."""
+    rooms = [{"name": f"a long name of a room {k}", "at": [4 + 0.3 * (k % 5), 4 + 0.2 * (k // 5)]} for k in range(40)]
+    plan = flat([[0, 0, 10, 0], [10, 0, 10, 10], [10, 10, 0, 10], [0, 10, 0, 0]], rooms=rooms)
+    findings = [PlanFinding("gap", 0, (2.0, 2.0), "x", (), k) for k in range(1, 5)]
+    figures: list[Figure] = []
+    save = Figure.savefig
+
+    def kept(figure: Figure, *arguments: Any, **options: Any) -> None:
+        figures.append(figure)
+        save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    draw_plan(plan, tmp_path / "plan.png", [0], None, findings)
+    (axes,) = figures[0].axes
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert {"1", "2", "3", "4"} < {text.get_text() for text in axes.texts}
+    assert len(boxes) < 4 + 40
+    assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[:k] if a.overlaps(b)]
+    assert f"({44 - len(boxes)} names do not fit" in axes.get_title()
+
+
+def test_many_rooms_without_a_door_are_one_finding() -> None:
+    """Six closed rooms beside one that has a door."""
+    closed = [[[x, 0, x + 4, 0], [x + 4, 0, x + 4, 3], [x + 4, 3, x, 3], [x, 3, x, 0]] for x in range(10, 70, 10)]
+    walls = [*box(), *(wall for one in closed for wall in one)]
+    rooms = [ROOM, *({"name": f"C{k}", "at": [12 + 10 * k, 1]} for k in range(6))]
+    start = {"x": 2, "y": 1, "heading_deg": 0}
+    (finding,) = check_plan(house([{"name": "ground", "walls": walls, "doors": [door()], "rooms": rooms}], start=start))
+    assert finding.kind == "no door"
+    assert finding.text.startswith("6 rooms have no door, as 'C0': ")

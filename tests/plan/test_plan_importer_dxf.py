@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Importing drawings: what each entity becomes, units, layers, doors, and what a damaged one gets."""
 
 from __future__ import annotations

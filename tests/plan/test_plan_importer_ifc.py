@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Importing building models: two storeys with walls, a door, a window, a room and stairs, and what is no model."""
 
 from __future__ import annotations
@@ -74,8 +75,7 @@ class Model:
         geometry.edit_object_placement(self.file, product=product, matrix=matrix)
 
 
-@pytest.fixture(scope="module")
-def house(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+def write_house(folder: Path) -> Path:
     """6 m by 4 m, walls of 0.3 m, on two floors 3 m apart; a door in the south, a window in the north of the ground floor."""
     model = Model()
     model.site.RefLatitude, model.site.RefLongitude = (53, 6, 36), (8, 51, 0)
@@ -93,9 +93,14 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Plan:
             model.box("IfcWindow", (2, 3.8, 0.8), (2, 0.1, 1.2))
     model.box("IfcSpace", (0.3, 0.3, 0), (5.4, 3.4, 2.8), name="Hall")
     model.box("IfcStairFlight", (0.5, 0.5, 0), (1, 2.5, 3.0), name="Stairs")
-    path = tmp_path_factory.mktemp("ifc") / "house.ifc"
+    path = folder / "house.ifc"
     model.file.write(str(path))
-    return import_plan(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    return import_plan(write_house(tmp_path_factory.mktemp("ifc")))
 
 
 def test_storeys_and_their_walls(house: Plan) -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Importing IMDF: folder and zip give the same plan; units, openings, stairs; what a damaged or hostile archive gets."""
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import command_line
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
 from echostep.plan.importers import archive
-from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.formats import Hints, import_plan
 from echostep.plan.model import Plan
 
 LON, LAT = -2.978, 56.46
@@ -168,10 +170,100 @@ def test_hostile_zips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         import_plan(tmp_path / "none.zip")
     monkeypatch.setattr(archive, "LARGEST_BYTES", 1_000_000)
     bomb = zipped(tmp_path / "b.zip", files() | {"level.geojson": " " * 2_000_000})
-    with pytest.raises(EchostepError, match=r"level.geojson: larger than 0 MiB when unpacked"):
+    with pytest.raises(EchostepError, match=r"level.geojson: unpacks to more than 0 MiB"):
         import_plan(bomb)
     raw = bytearray(zipped(tmp_path / "c.zip", files()).read_bytes())
     raw[200:400] = bytes(200)
     (tmp_path / "c.zip").write_bytes(raw)
     with pytest.raises(EchostepError, match=r"c\.zip"):
         import_plan(tmp_path / "c.zip")
+
+
+def without_openings(rooms: int = 8) -> dict[str, Any]:
+    """One level: a corridor of 40 m, rooms of 5 m on one side, and a store behind the first room that only this room touches."""
+    on = {"level_id": "L0"}
+    units = [feature("unit", "way", box(0, 0, 5 * rooms, 2), category="walkway", **on)]
+    units += [
+        feature("unit", f"u{k}", box(5 * k, 2, 5 * k + 5, 6), category="office", name={"en": f"R{k}"}, **on)
+        for k in range(rooms)
+    ]
+    units.append(feature("unit", "store", box(0, 6, 4, 9), category="storage", name={"en": "Store"}, **on))
+    tree = files(1)
+    tree["level.geojson"]["features"] = [feature("level", "L0", box(0, 0, 5 * rooms, 9), ordinal=0, name={"en": "G"})]
+    tree["unit.geojson"]["features"] = units
+    tree["opening.geojson"]["features"] = tree["fixture.geojson"]["features"] = []
+    return tree
+
+
+def test_files_may_end_in_json(mall: Plan, tmp_path: Path) -> None:
+    renamed = {name.replace(".geojson", ".json"): content for name, content in files().items()}
+    assert import_plan(folder(tmp_path / "a", renamed)).digest == mall.digest
+    assert import_plan(zipped(tmp_path / "mall.zip", renamed)).digest == mall.digest
+    renamed["level.json"]["features"] = []
+    with pytest.raises(EchostepError, match=r"level\.json: it has no levels"):
+        import_plan(folder(tmp_path / "c", renamed))
+
+
+def test_rooms_without_openings_are_one_cause(tmp_path: Path) -> None:
+    plan = import_plan(folder(tmp_path / "a", without_openings()))
+    (finding,) = check_plan(plan)
+    assert finding.kind == "no door"
+    assert finding.text.startswith("9 rooms have no door, as 'R0'; the level has none at all")
+
+
+def test_assumed_doors_reach_every_room(tmp_path: Path) -> None:
+    plan = import_plan(folder(tmp_path / "a", without_openings()), Hints(doors_m=0.9))
+    doors = plan.levels[0].doors
+    assert [(door.name, round(door.width_m, 3), door.state) for door in doors] == [("assumed", 0.9, "unknown")] * 9
+    assert all(door.line[1] == door.line[3] == pytest.approx(2.0, abs=0.01) for door in doors[:8])  # on the corridor
+    assert doors[8].line[1] == pytest.approx(6.0, abs=0.01)  # the store's, to the room beside it
+    assert check_plan(plan) == []
+
+
+def test_assumed_doors_pass_walls_drawn_with_a_thickness(tmp_path: Path) -> None:
+    """Rooms 0.2 m apart have a wall each: a door in both."""
+    tree = without_openings(1)
+    tree["unit.geojson"]["features"][2] = feature(
+        "unit", "store", box(0, 6.2, 4, 9), category="storage", name={"en": "Store"}, level_id="L0"
+    )
+    plan = import_plan(folder(tmp_path / "a", tree), Hints(doors_m=0.8))
+    assert sorted(round(door.line[1], 1) for door in plan.levels[0].doors) == [2.0, 6.0, 6.2]
+    assert [finding.kind for finding in check_plan(plan)] == []
+
+
+def test_an_opening_drawn_as_a_point_gets_the_width(tmp_path: Path) -> None:
+    tree = without_openings(2)
+    opening = feature(
+        "opening", "o", {"type": "Point", "coordinates": at(1.5, 2.0)}, category="pedestrian", level_id="L0"
+    )
+    tree["opening.geojson"]["features"] = [opening]
+    plan = import_plan(folder(tmp_path / "a", tree), Hints(doors_m=0.9))
+    assert plan.levels[0].doors[0].line == pytest.approx((1.05, 2.0, 1.95, 2.0), abs=0.01)
+    assert len(plan.levels[0].doors) == 3  # and one each of the other room and the store
+
+
+def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> None:
+    assert import_plan(folder(tmp_path / "a", files()), Hints(doors_m=0.9)).levels[0].doors == mall.levels[0].doors
+
+
+def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
+    source, out = folder(tmp_path / "a", without_openings()), tmp_path / "plan.json"
+    done = command_line.echostep("plan", "import", source, "-o", out)
+    assert "has no door openings, so nobody can enter the rooms: --doors 0.9" in done.stdout
+    done = command_line.echostep("plan", "import", source, "-o", out, "--doors", "0.9")
+    assert "9 doors are assumed" in done.stdout
+    assert "no door openings" not in done.stdout
+
+
+@pytest.mark.parametrize("name", ["plan.xml", "plan.osm"])
+def test_an_unknown_xml_is_answered_with_the_formats(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(
+        '<?xml version="1.0"?><IndoorFeatures xmlns="http://www.opengis.net/indoorgml/1.0/core"/>'
+    )
+    with pytest.raises(EchostepError, match=r"IndoorFeatures.*DXF, IFC, IMDF.*OpenStreetMap.*WRLD"):
+        import_plan(tmp_path / name)
+
+
+def test_doors_are_for_imdf(tmp_path: Path) -> None:
+    with pytest.raises(EchostepError, match="--doors is for IMDF alone"):
+        import_plan(tmp_path / "plan.osm", Hints(doors_m=0.9))

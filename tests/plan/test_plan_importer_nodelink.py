@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Importing node and link text: biba, a small building, and what a damaged one gets."""
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.plan.importers.formats import import_plan
+from needs_data import needs_data
+from recordings import DATA
 
-BIBA = Path(__file__).parents[3] / "shared/data/maps/biba"
 SMALL = {
     "core.txt": "byProgram\nfloor,2,0.jpg,1.jpg\nheight,4.5\nstart,1\nscale,0.5\nnode,node.txt\n",
     "node.txt": "id,layer,x,y\n0,0,0,0\n1,0,10,0\n2,0,10,8\n3,0,20,0\n4,0,14,6\n5,0,14,2\n",
@@ -36,10 +38,9 @@ def test_a_small_building(tmp_path: Path) -> None:
     assert plan.start is None
 
 
+@needs_data("maps/biba")
 def test_biba() -> None:
-    if not BIBA.exists():
-        pytest.skip(f"{BIBA} is absent")
-    plan = import_plan(BIBA / "core.txt")
+    plan = import_plan(DATA / "maps/biba" / "core.txt")
     assert [level.height_m for level in plan.levels] == [0, 4.5, 9, 13.5]
     assert [len(level.walls) for level in plan.levels] == [183, 194, 93, 52]
     assert sum(np.hypot(*(level.walls[:, 2:] - level.walls[:, :2]).T).sum() for level in plan.levels) > 5000

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Importing OpenStreetMap indoor data: XML and Overpass JSON give the same plan; tags; what a damaged file gets."""
 
 from __future__ import annotations
@@ -150,7 +151,7 @@ def test_wrong_json(tmp_path: Path, text: str, named: str) -> None:
     [
         ("", "not XML"),
         ("<osm>", "not XML"),
-        ("<html/>", "<html> is not <osm>"),
+        ("<html/>", "this XML is <html>, not <osm>: plans are read as DXF, IFC, IMDF"),
         ('<!DOCTYPE x [<!ENTITY a "aaaa">]><osm>&a;</osm>', "DTD"),
         ('<osm><node id="x" lon="1" lat="1"/></osm>', "node 'x'"),
         ('<osm><node id="1" lon="nan" lat="1"/></osm>', "node 1: lon"),

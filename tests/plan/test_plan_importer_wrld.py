@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Importing WRLD indoor maps: westport-house, and what a damaged one gets."""
 
 from __future__ import annotations
@@ -14,15 +15,12 @@ from echostep.errors import EchostepError
 from echostep.plan.importers.formats import Hints, import_plan
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.writer import save_plan
-
-WESTPORT = Path(__file__).parents[3] / "shared/data/maps/westport-house"
+from needs_data import data_or_skip
 
 
 @pytest.fixture(scope="module")
 def westport() -> Plan:
-    if not WESTPORT.exists():
-        pytest.skip(f"{WESTPORT} is absent")
-    return import_plan(WESTPORT)
+    return import_plan(data_or_skip("maps/westport-house"))
 
 
 def test_westport_has_seven_floors(westport: Plan) -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plans: what is read, and the one line that a wrong file gets."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The published schema says what the reader does; the page of fields says what the schema does."""
 
 from __future__ import annotations

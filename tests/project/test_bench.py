@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The benchmark runs and says what it measured; how fast is not a test's business."""
 
 from __future__ import annotations

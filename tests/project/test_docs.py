@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The pages are true: generated ones are fresh, links lead somewhere, commands run or exist, examples work."""
 
 from __future__ import annotations
@@ -7,6 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -21,7 +23,17 @@ from team.team_broker import Broker, needs_broker
 
 MANUAL = sorted((ROOT / "host/docs").glob("*.md"))
 PAGES = [
-    *(ROOT / name for name in ("README.md", "host/README.md", "host/DESIGN.md", "host/CHANGELOG.md")),
+    *(
+        ROOT / name
+        for name in (
+            "README.md",
+            "host/README.md",
+            "host/DESIGN.md",
+            "host/CHANGELOG.md",
+            "host/CONTRIBUTING.md",
+            "host/SECURITY.md",
+        )
+    ),
     *(ROOT / name for name in ("protocol/README.md", "firmware/README.md", "tools/twin/README.md")),
     *MANUAL,
 ]
@@ -192,3 +204,26 @@ def test_what_needs_hardware_can_be_typed_as_it_stands(page: Path) -> None:
                 assert f"`{option}`" in section, line
         else:
             assert program in PROGRAMS, line
+
+
+def test_the_readme_says_what_it_is_before_its_commands() -> None:
+    first = (ROOT / "README.md").read_text().partition("## Two commands")[0]
+    project = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
+    for words in (
+        f"`version {project['version']}`",
+        f"Python {project['requires-python'].removeprefix('>=')} or newer",
+        f"`{project['license']}`",
+    ):
+        assert words in first, words
+    for words in ("**For** ", "**Not built in hardware yet.**", "host/pictures/walk.webp"):
+        assert words in first, words
+    table = re.findall(r"^\|.*\|$", first, flags=re.M)
+    assert len(table) <= 8
+    for other in ("AMCL", "OpenShoe", "PyShoe", "FootSLAM", "UWB"):
+        assert any(other in row for row in table), other
+
+
+def test_the_readme_links_every_page_of_the_manual() -> None:
+    text = (ROOT / "README.md").read_text()
+    for page in MANUAL:
+        assert f"(host/docs/{page.name})" in text, page.name

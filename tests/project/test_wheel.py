@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The wheel works on its own: nothing of the clone is needed. `make wheel` goes the whole way, with dependencies fetched and a demo."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Captured logs: the twin's own captures decode to their golden text, from Python and from the command line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Recordings looked into, cut and mended: whatever is wrong with the file, one clear error or all that can be saved."""
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from echostep.ports.chunks import Chunk
 from echostep.recording.contents import info
 from echostep.recording.edit import cut, repair
 from echostep.recording.mcap_records import RAW_ENCODING
-from echostep.recording.recorder import DerivedMessage, Recorder, open_recording
+from echostep.recording.reading import open_recording
+from echostep.recording.recorder import DerivedMessage, Recorder
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
 FIXTURE = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One walk for all tests of the simulation."""
 
 from __future__ import annotations

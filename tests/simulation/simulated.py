@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What several tests of the simulation use."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The Python board, and a board in a child process."""
 
 from __future__ import annotations

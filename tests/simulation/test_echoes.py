@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The simulated echoes of an SRF02."""
 
 from __future__ import annotations

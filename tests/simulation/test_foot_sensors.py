@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The simulated foot's specific force and rate."""
 
 from __future__ import annotations

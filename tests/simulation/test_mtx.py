@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The simulated MTx and its serial delivery."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rows of one millisecond for a board."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The whole simulated scenario: equal seeds, equal chunks."""
 
 from __future__ import annotations

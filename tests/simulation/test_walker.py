@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The simulation against hand-computed cases: a foot that integrates back to its path, echoes of simple walls, rows, MTx bytes, the Python board."""
 
 from __future__ import annotations

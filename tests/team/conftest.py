@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Certificates for TLS, made once a module."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reports as a roster receives them."""
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
+# SPDX-License-Identifier: MIT
 """Outboxes on a real network."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import replace
 
 from echostep.team.endpoint import parse_endpoint
@@ -11,13 +10,6 @@ from echostep.team.mqtt import MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.report import Report
 from team.team_reports import POSITION, report
-
-
-def until(true: Callable[[], object], seconds: float = 15.0) -> None:
-    end_s = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.01)
 
 
 def at(t_s: float, name: str = "anna") -> Report:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A Mosquitto broker on a free loopback port, for the tests of the team."""
 
 from __future__ import annotations

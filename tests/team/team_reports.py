@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reports for the tests of the team: one that is right, and its parts."""
 
 from __future__ import annotations

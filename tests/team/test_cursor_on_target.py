@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cursor on Target over UDP, TCP and TLS, and a whole demo published and commanded."""
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from echostep.team.cot import StreamTransport, UdpTransport
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.outbox import Outbox
 from echostep.team.report import Presence, encode
-from team.network import at, box_to, until
+from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker
 from team.team_reports import PLAN, report
+from waiting import until
 
 ECHOSTEP = [sys.executable, "-m", "echostep"]
 
@@ -128,16 +130,16 @@ def test_events_go_out_on_a_stream_through_a_restart_of_the_server() -> None:
     server, words = Server(greeting=b"<event/>" * 20_000), list[str]()
     box = Outbox(StreamTransport(parse_endpoint(f"cot+tcp://127.0.0.1:{server.port}")), "tcp", words.append)
     box.offer(report("first"))
-    until(lambda: server.lines)
+    assert until(lambda: server.lines)
     server.stop()
     while not words:
         box.offer(report("between"))
         time.sleep(0.01)
     again = Server(port=server.port)
-    until(lambda: "tcp: connected again" in words)
+    assert until(lambda: "tcp: connected again" in words)
     for k in range(20):
         box.offer(report(f"n{k}"))
-    until(lambda: any(b"echostep-red-n19" in line for line in again.lines))
+    assert until(lambda: any(b"echostep-red-n19" in line for line in again.lines))
     box.close()
     again.stop()
     names = [ElementTree.fromstring(line).get("uid") for line in again.lines]
@@ -156,7 +158,7 @@ def test_a_stream_server_that_stops_reading_does_not_hold_old_positions() -> Non
             began = time.perf_counter()
             box.offer(at(float(k)))
             slowest = max(slowest, time.perf_counter() - began)
-        until(lambda: words, 12.0)
+        assert until(lambda: words, 12.0)
         assert "timed out" in words[0]
         assert slowest < 1.0  # a queue that waits for the line would need seconds
         assert box.counts.sent < 500
@@ -172,12 +174,12 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
     url = f"cot+tls://127.0.0.1:{server.port}"
     box = Outbox(StreamTransport(parse_endpoint(url + c.query(c.client))), "tls", print)
     box.offer(report())
-    until(lambda: server.lines)
+    assert until(lambda: server.lines)
     box.close()
     words: list[str] = []
     distrusting = Outbox(StreamTransport(parse_endpoint(url)), "tls", words.append)
     distrusting.offer(report())
-    until(lambda: words)
+    assert until(lambda: words)
     distrusting.close()
     server.stop()
     assert ElementTree.fromstring(server.lines[0]).get("uid") == "echostep-red-anna"
@@ -241,7 +243,8 @@ def _replays_alike(folder: Path) -> None:
     assert float(point.get("lat", "0")) == pytest.approx(48.2, abs=3e-4)
     assert float(point.get("lon", "0")) == pytest.approx(16.37, abs=4e-4)
     assert 0.0 < float(point.get("ce", "0")) < 1.0
-    assert "replay" in (top.findtext("detail/remarks") or "")
+    assert top.get("how") == "m-s", "the recording is of a simulation"
+    assert "simulated" in (top.findtext("detail/remarks") or "")
 
 
 @pytest.mark.parametrize(
@@ -253,11 +256,14 @@ def _replays_alike(folder: Path) -> None:
         (["command", "--plan", PLAN, "mqtt://x", "--team", "a/b"], "--team"),
         (["demo", "--headless", "--publish", "mqtt://x"], "--name"),
         (["demo", "--headless", "--publish", "mqtt://x", "--name", "a#"], "--name"),
-        (["demo", "--headless", "--publish", "cot+udp://x", "--name", "a"], "georeference"),
+        (["demo", "--headless", "--publish", "cot+udp://x", "--name", "a", "--plan", "nowhere.json"], "georeference"),
     ],
 )
 def test_a_mistake_is_named_in_one_line(tmp_path: Path, arguments: list[object], named: str) -> None:
     more = ["--out", tmp_path] if arguments[0] == "demo" else []
+    tree = {key: value for key, value in json.loads(PLAN.read_text()).items() if key != "georeference"}
+    (tmp_path / "nowhere.json").write_text(json.dumps(tree))
+    arguments = [tmp_path / name if name == "nowhere.json" else name for name in arguments]
     with pytest.raises(EchostepError, match=named) as found:
         app([*map(str, arguments), *map(str, more)], standalone_mode=False)
     assert "\n" not in str(found.value)

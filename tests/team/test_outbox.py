@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The outbox: the newest report first, broken lines, heartbeats; motion, places, events and addresses."""
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from echostep.team.publish import ReportHistory
 from echostep.team.report import BadReportError, Report, check_name, decode, encode
 from team.letters import NOW, UNIX, heard, said
 from team.team_reports import PLACE, PLAN, POSITION, report
+from waiting import until
 
 
 class Recorded:
@@ -52,14 +54,6 @@ class Recorded:
         pass
 
 
-def until(true: object, seconds: float = 8.0) -> None:
-    assert callable(true)
-    end_s = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.01)
-
-
 def test_every_report_goes_out_when_the_line_is_quick() -> None:
     line = Recorded()
     box = Outbox(line, "line", print)
@@ -82,7 +76,7 @@ def test_a_slow_line_sends_the_newest_and_counts_the_rest(monkeypatch: pytest.Mo
         slowest = max(slowest, time.perf_counter() - began)
     time.sleep(0.1)
     line.hold.set()
-    until(lambda: line.sent and line.sent[-1].position and line.sent[-1].position.t_s == 2999.0)
+    assert until(lambda: line.sent and line.sent[-1].position and line.sent[-1].position.t_s == 2999.0)
     box.close()
     assert len(line.sent) < 1200
     assert box.counts.sent + box.counts.overtaken == box.counts.offered == 3000
@@ -95,13 +89,13 @@ def test_a_broken_line_is_opened_again_and_no_later_report_is_lost(monkeypatch: 
     line, words = Recorded(), list[str]()
     box = Outbox(line, "line", words.append)
     box.offer(report())
-    until(lambda: line.sent)
+    assert until(lambda: line.sent)
     line.broken = True
     for k in range(5):
         box.offer(report(position=replace(POSITION, t_s=100.0 + k)))
         time.sleep(0.03)
     line.broken = False
-    until(lambda: line.sent[-1].position and line.sent[-1].position.t_s == 104.0)
+    assert until(lambda: line.sent[-1].position and line.sent[-1].position.t_s == 104.0)
     for k in range(50):
         box.offer(report(position=replace(POSITION, t_s=200.0 + k)))
     summary = box.close()
@@ -143,7 +137,7 @@ def test_a_heartbeat_repeats_the_last_report(monkeypatch: pytest.MonkeyPatch) ->
     line = Recorded()
     box = Outbox(line, "line", print)
     box.offer(report())
-    until(lambda: len(line.sent) > 3)
+    assert until(lambda: len(line.sent) > 3)
     box.close()
     assert [r.sequence for r in line.sent] == list(range(1, len(line.sent) + 1))
     assert line.sent[3].position
@@ -174,6 +168,16 @@ def test_a_place_on_earth() -> None:
     west = GroundPlane(turned).place(0.0, 100.0, 0.3, 0.5 * math.pi)
     assert west.lon_deg == pytest.approx(16.0 - 100.0 / 74_630.0, abs=1e-6)
     assert west.course_deg == pytest.approx(270.0)
+
+
+def test_a_replay_says_that_it_is_one_and_when_it_was_recorded() -> None:
+    recorded = "2026-11-21T10:00:00.000Z"
+    made = {source: event(report(source=source, recorded=recorded, place=PLACE)) for source in ("replay", "simulated")}
+    replayed, simulated = (ElementTree.fromstring(made[source] or b"") for source in ("replay", "simulated"))
+    assert (replayed.get("how"), simulated.get("how")) == ("m-p", "m-s")
+    assert replayed.get("start") == recorded < str(replayed.get("time"))
+    assert f"recorded {recorded}" in (replayed.findtext("detail/remarks") or "")
+    assert decode(encode(report(recorded=recorded))).recorded == recorded
 
 
 def test_an_event_of_cursor_on_target() -> None:

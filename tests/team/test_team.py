@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reports, rosters and outboxes: what is told, what is believed, what is overtaken."""
 
 from __future__ import annotations

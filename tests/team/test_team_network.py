@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reports on real sockets: a Mosquitto broker that dies and returns, TLS, datagrams and streams of Cursor on Target."""
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from echostep.team.inbox import Inbox, Receiver
 from echostep.team.mqtt import Listener, MqttTransport
 from echostep.team.report import encode
 from echostep.team.roster import Member, MemberState, Roster
-from team.network import at, box_to, until
+from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker
 from team.team_reports import report
+from waiting import until
 
 
 @pytest.fixture(autouse=True)
@@ -60,7 +62,7 @@ class Ear:
 def listening(url: str) -> Iterator[Ear]:
     ear = Ear(url)
     try:
-        until(lambda: ear.reception.connected)
+        assert until(lambda: ear.reception.connected)
         yield ear
     finally:
         ear.reception.close()
@@ -73,20 +75,20 @@ def test_a_broker_that_dies_and_returns_loses_no_later_report(tmp_path: Path) ->
         box = box_to(broker.url, words)
         for k in range(20):
             box.offer(at(float(k)))
-        until(lambda: 19.0 in ear.times)
+        assert until(lambda: 19.0 in ear.times)
         broker.stop()
-        until(lambda: words)
+        assert until(lambda: words)
         for k in range(100, 105):
             box.offer(at(float(k)))
         broker.start()
-        until(lambda: 104.0 in ear.times)
+        assert until(lambda: 104.0 in ear.times)
         for k in range(200, 250):
             box.offer(at(float(k)))
-        until(lambda: 249.0 in ear.times)
+        assert until(lambda: 249.0 in ear.times)
         assert [t for t in ear.times if t >= 200.0] == [float(k) for k in range(200, 250)]
         assert ear.only().state(time.monotonic()) is MemberState.TRACKING
         summary = box.close()
-        until(lambda: ear.only().state(time.monotonic()) is MemberState.ENDED)
+        assert until(lambda: ear.only().state(time.monotonic()) is MemberState.ENDED)
     assert "broken 1 times" in summary
     assert words[-1].endswith("connected again")
 
@@ -99,7 +101,7 @@ def test_a_frozen_broker_neither_slows_the_tracker_nor_keeps_old_reports(
     with Broker(tmp_path) as broker, listening(broker.url) as ear:
         box = box_to(broker.url)
         box.offer(at(0.0))
-        until(lambda: 0.0 in ear.times)
+        assert until(lambda: 0.0 in ear.times)
         broker.freeze()
         slowest = 0.0
         for k in range(100):
@@ -108,7 +110,7 @@ def test_a_frozen_broker_neither_slows_the_tracker_nor_keeps_old_reports(
             slowest = max(slowest, time.perf_counter() - began)
             time.sleep(0.01)
         broker.thaw()
-        until(lambda: 100.0 in ear.times)
+        assert until(lambda: 100.0 in ear.times)
         box.close()
     assert slowest < 1.0  # a queue that waits for the line would need seconds
     assert len(ear.times) < 80
@@ -123,7 +125,7 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
         line.send(at(7.0))
         line.close(ended=False)
         with listening(broker.url) as ear:
-            until(lambda: ear.members() and ear.only().presence == "broken")
+            assert until(lambda: ear.members() and ear.only().presence == "broken")
             member = ear.only()
             assert (member.retained, member.state(time.monotonic())) == (True, MemberState.STALE)
             assert member.report.position
@@ -139,7 +141,7 @@ def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
                 box.offer(replace(at(float(n), f"n{k:02d}"), run=f"{k:08x}", status="lost" if k == 7 else "tracking"))
             ear.members()
             time.sleep(0.05)
-        until(lambda: [m.report.position.t_s for m in ear.members() if m.report.position] == [19.0] * 20)
+        assert until(lambda: [m.report.position.t_s for m in ear.members() if m.report.position] == [19.0] * 20)
         first = ear.members()[0]
         assert (first.report.name, first.state(time.monotonic())) == ("n07", MemberState.LOST)
         assert sum(m.missed for m in ear.members()) == 0
@@ -156,7 +158,7 @@ def test_two_trackers_of_one_name_do_not_throw_each_other_out(tmp_path: Path) ->
         for k in range(5):
             for box, run in zip(boxes, ("11111111", "22222222"), strict=True):
                 box.offer(replace(at(float(k)), run=run))
-        until(lambda: len(ear.members()) == 2)
+        assert until(lambda: len(ear.members()) == 2)
         assert ear.roster.duplicates(time.monotonic()) == {("red", "anna")}
         assert [box.counts.breaks for box in boxes] == [0, 0]
         for box in boxes:
@@ -175,19 +177,19 @@ def test_tls_with_client_certificates(tmp_path: Path, certificates: Certificates
         with listening(url + c.query(c.client)) as ear:
             box = box_to(url + c.query(c.client))
             box.offer(at(3.0))
-            until(lambda: 3.0 in ear.times)
+            assert until(lambda: 3.0 in ear.times)
             box.close()
         for query in (c.query(), c.query(c.stranger)):
             words: list[str] = []
             box = box_to(url + query, words)
             box.offer(at(3.0))
-            until(words.__len__)
+            assert until(words.__len__)
             assert "trying again" in words[0]
             box.close()
             assert box.counts.sent == 0
         words = []
         box = box_to(url, words)
-        until(lambda: words)
+        assert until(lambda: words)
         assert "certificate verify failed" in words[0].lower()
         box.close()
     with pytest.raises(EchostepError, match="no such file"):
@@ -203,7 +205,7 @@ def test_a_wrong_password_is_said(tmp_path: Path) -> None:
     with Broker(tmp_path, f"password_file {tmp_path / 'passwords'}") as broker:
         words: list[str] = []
         box = box_to(f"mqtt://me:wrong@127.0.0.1:{broker.port}", words)
-        until(lambda: words)
+        assert until(lambda: words)
         box.close()
     assert "uthori" in words[0]
     assert "wrong" not in words[0]
@@ -223,7 +225,7 @@ def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_pat
         enemy.publish("echostep/red/\u202eeve/estimate", right)
         enemy.publish("echostep/red/bob/estimate", right)
         enemy.publish("echostep/red/eve/presence", b"{}")
-        until(lambda: ear.members() is not None and sum(ear.roster.rejected.values()) >= 5)
+        assert until(lambda: ear.members() is not None and sum(ear.roster.rejected.values()) >= 5)
         assert {"not JSON", "too long", "name and topic contradict each other"} <= set(ear.roster.rejected)
         box = box_to(broker.url)
         began = time.monotonic()
@@ -231,16 +233,16 @@ def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_pat
             enemy.publish("echostep/red/eve/estimate", rng.randbytes(40))
             if k % 500 == 0:
                 box.offer(at(float(k)))
-        until(lambda: ear.members() is not None and ear.roster.received > 10_000)
+        assert until(lambda: ear.members() is not None and ear.roster.received > 10_000)
         assert time.monotonic() - began < 15.0
-        until(lambda: 9500.0 in ear.times)
+        assert until(lambda: 9500.0 in ear.times)
         assert ear.only().report.name == "anna"
         broker.stop()
-        until(lambda: not ear.reception.connected)
+        assert until(lambda: not ear.reception.connected)
         broker.start()
-        until(lambda: ear.reception.connected)
+        assert until(lambda: ear.reception.connected)
         box.offer(at(20_000.0))
-        until(lambda: 20_000.0 in ear.times)
+        assert until(lambda: 20_000.0 in ear.times)
         enemy.loop_stop()
         enemy.disconnect()
         box.close()
@@ -282,7 +284,7 @@ def test_a_broker_that_speaks_nonsense_stops_nobody(nonsense: bytes) -> None:
         box, ear = box_to(url, words), Ear(url)
         try:
             box.offer(at(1.0))
-            until(lambda: words and ear.words)
+            assert until(lambda: words and ear.words)
         finally:
             ear.reception.close()
             box.close()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The arrival clock: offset and drift through latency, bursts and stalls."""
 
 from __future__ import annotations

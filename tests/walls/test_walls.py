@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The wall index and the reflectors against slow twins, and by hand."""
 
 from __future__ import annotations

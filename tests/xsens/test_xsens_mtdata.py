@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """MTx frames and samples: any split, damage, gates, the counter's wrap."""
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def test_the_frame_is_the_one_of_the_manual() -> None:
 @pytest.mark.parametrize("length", [0, 1, 253, 254, 255, 256, 2048])
 def test_lengths_normal_and_extended(length: int) -> None:
     payload = bytes(k % 251 for k in range(length))
-    assert FrameReader().feed(encode_frame(0x12, payload)) == [(0x12, payload)]
+    assert FrameReader().feed(encode_frame(0x12, payload)) == [(0x12, payload, 0xFF)]
 
 
 def test_a_payload_that_is_too_long_is_refused() -> None:
@@ -207,8 +208,34 @@ def test_a_sample_without_accel_or_gyro_is_none(missing: int) -> None:
 def test_a_jump_of_the_counter_is_believed_when_the_next_one_follows_it() -> None:
     reader = MtxReader()
     found = [s.counter for n in (10, 11, 40_000, 12, 13, 3_000, 3_001, 3_002, 5, 6) for s in reader.feed(frame(n))]
-    assert found == [10, 11, 12, 13, 3_001, 3_002, 6]
-    assert (reader.counts.bad_counter, reader.counts.lost) == (3, 3_001 - 13 - 1)
+    assert found == [10, 11, 12, 13, 3_000, 3_001, 3_002, 5, 6]
+    assert (reader.counts.bad_counter, reader.counts.lost) == (1, 3_000 - 13 - 1)
+
+
+def test_a_counter_that_jumps_back_a_little_is_not_confirmed_by_the_old_count() -> None:
+    reader = MtxReader()
+    assert [s.counter for s in reader.feed(b"".join(map(frame, (699, 700, 300, 701, 702))))] == [699, 700, 701, 702]
+    assert (reader.counts.bad_counter, reader.counts.lost) == (1, 0)
+
+
+def test_messages_that_share_the_counter_are_not_lost_samples() -> None:
+    """Counters 2 and 5 are of satellite messages; 4 never came; a satellite message with the counter of its sample, 6, costs none."""
+    satellites = {
+        k: encode_frame(MTDATA2, b"\x10\x20\x02" + k.to_bytes(2, "big") + b"\x30\x10\x04\0\1\2\3") for k in (2, 5, 6)
+    }
+    stream = [frame(1), satellites[2], frame(3), satellites[5], satellites[6], frame(6), frame(7)]
+    reader = MtxReader()
+    assert [s.counter for s in reader.feed(b"".join(stream))] == [1, 3, 6, 7]
+    assert (reader.counts.lost, reader.counts.incomplete) == (1, 3)
+
+
+def test_one_device_behind_a_master_is_followed() -> None:
+    stream = b"".join(
+        encode_frame(MTDATA, pack_mtdata(sample(n + 1_000 * bus)), bus) for n in range(5) for bus in (1, 2, 3, 4)
+    )
+    reader = MtxReader()
+    assert [s.counter for s in reader.feed(stream)] == [1_000, 1_001, 1_002, 1_003, 1_004]
+    assert (reader.counts.other_device, reader.counts.lost, reader.counts.skipped_bytes) == (15, 0, 0)
 
 
 def test_euler_angles_and_matrices_agree_with_the_quaternion() -> None:

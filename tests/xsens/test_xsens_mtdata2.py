@@ -1,9 +1,9 @@
+# SPDX-License-Identifier: MIT
 """MTData2: real captures decode to their golden values, batches agree with packets, every number format and world."""
 
 from __future__ import annotations
 
 import math
-import os
 import struct
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,15 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_runs import ROOT
 from echostep.xsens import MTDATA2, FrameReader, MtxReader, axes, encode_frame
 from echostep.xsens.packets import Packet, read_packets
+from needs_data import needs_data
+from recordings import DATA
 
-MTB = Path(os.environ.get("ECHOSTEP_DATA", ROOT.parent / "shared/data")) / "mtb"
+MTB = DATA / "mtb"
 CAPTURES = [f"einride_{k}" for k in (1, 2, 3, 5)]
-needs_captures = pytest.mark.skipif(
-    not MTB.exists(), reason="skipped: no recordings (../shared/data or $ECHOSTEP_DATA)"
-)
+needs_captures = needs_data("mtb")
 FORMS = ("Float32", "FP1220", "FP1632", "Float64")
 Golden = list[tuple[str, list[str]]]
 

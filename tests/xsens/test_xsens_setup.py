@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Configuration: from any state of the device to the project's mode, over lines that lose and damage, and what is said when it fails."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`echostep live` and `record` with a simulated MTx on a pseudo terminal: set up from any state, explained when it cannot be."""
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from echostep.recording.recorder import open_recording
+from echostep.recording.reading import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT, MtSample, MtxReader, OutputFormat
 

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""The ten most likely mistakes: each is provoked, and what is printed stands in host/docs/mistakes.md, with names in capitals for what differs."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from board_runs import ROOT
+from command_line import echostep
+from echostep.board import messages as m
+from echostep.board.frames import encode
+from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
+from players import babbling_port, pseudo_terminal, python_board
+from xsens.test_xsens_startup import on_a_terminal
+
+PLAN = ROOT / "host/echostep/plans/demo.json"
+PAGE = ROOT / "host/docs/mistakes.md"
+Mistake = Callable[
+    [Path, pytest.MonkeyPatch], dict[str, str]
+]  # {"said": what is printed, and what to put capitals for}
+
+
+def live(folder: Path, *arguments: object, plan: object = PLAN) -> str:
+    """What `live` prints as its error, which is one line."""
+    done = echostep("live", "--plan", plan, "--headless", "--out", folder / "out", "--seconds", 20, *arguments)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stdout + done.stderr
+    return done.stderr.removeprefix("echostep: ").strip()
+
+
+def wrong_port(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    return {"said": live(folder, "--board", "/dev/ttyACM7"), "PORT": "/dev/ttyACM7"}
+
+
+def swapped_ports(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    with python_board() as board, on_a_terminal(MtxDevice(FACTORY, deaf=True)) as mtx:
+        return {"said": live(folder, "--board", mtx, "--mtx", board), "PORT1": mtx, "PORT2": board}
+
+
+def no_plan(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    path = folder / "plan.json"
+    return {"said": live(folder, "--board", "x", plan=path), "PLAN": str(path)}
+
+
+def another_format(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    path = folder / "plan.pdf"
+    path.write_bytes(b"%PDF-1.7 a drawing")
+    return {"said": live(folder, "--board", "x", plan=path), "PLAN": str(path)}
+
+
+def start_outside(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    return {"said": live(folder, "--board", "x", "--start", "75,7.5,0")}
+
+
+def start_in_a_wall(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    return {"said": live(folder, "--board", "x", "--start", "7,3,0")}
+
+
+def wrong_firmware(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    with babbling_port(b"\0" + encode(m.Identity(0, 0x12345678, 1, 0, 0, 0), 0)) as port:
+        return {"said": live(folder, "--board", port), "HASH": f"0x{m.SCHEMA_HASH:08X}"}
+
+
+def no_rights(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
+    access = os.access
+    patch.setattr(os, "access", lambda path, mode: "/pts/" not in str(path) and access(path, mode))
+    with pseudo_terminal() as (_, port):
+        owner = f"{Path(port).owner()}:{Path(port).group()}"
+        return {"said": live(folder, "--board", port), "PORT": port, "OWNER:GROUP": owner, "GROUP": Path(port).group()}
+
+
+def no_broker(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+    url = "mqtt://127.0.0.1:9"
+    with pseudo_terminal() as (_, port):
+        done = echostep(
+            "live", "--plan", PLAN, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",
+            "--seconds", 1,
+        )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return {"said": next(line for line in done.stdout.splitlines() if "tracking goes on" in line), "URL": url}
+
+
+def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
+    write = os.write
+
+    def refused(file: int, data: bytes) -> int:
+        if Path(f"/proc/self/fd/{file}").readlink().suffix == ".mcap" and os.fstat(file).st_size > 1_000:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data)
+
+    patch.setattr(os, "write", refused)
+    patch.setattr("echostep.recording.background_writer.CLOSE_S", 0.5)
+    with python_board() as port:
+        done = echostep("record", "--board", port, "--out", folder / "walk.mcap", "--seconds", 1)
+    said = next(line for line in done.stdout.splitlines() if "tracking goes on" in line)
+    return {"said": re.sub(r"\S+\.mcap", "FILE", said)}
+
+
+MISTAKES: dict[str, Mistake] = {
+    "a port that does not exist": wrong_port,
+    "the ports are swapped": swapped_ports,
+    "there is no plan": no_plan,
+    "the plan has a format that cannot be read": another_format,
+    "the start is outside of the building": start_outside,
+    "the start is in a wall": start_in_a_wall,
+    "the board has another firmware": wrong_firmware,
+    "no right to open the port": no_rights,
+    "the broker is not there": no_broker,
+    "the disk is full": disk_full,
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_what_a_mistake_prints_stands_in_the_manual(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mistake: str
+) -> None:
+    values = MISTAKES[mistake](tmp_path, monkeypatch)
+    said = values.pop("said")
+    for name, value in values.items():
+        said = said.replace(value, name)
+    rows = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M))
+    assert rows.get(mistake) == said

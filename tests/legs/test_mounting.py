@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Sensors that are strapped on anyhow: the axis of walking, what leaks from turns, signs from motion that was no walk."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.arrays import Floats
+from echostep.legs.edges import Swing, leaving_share
+from echostep.legs.gyro_bias import GyroBias
+from echostep.legs.level import Level
+from echostep.legs.mounting import walking_axis
+from echostep.legs.stride import Flag, Stride, StrideSettings
+from echostep.legs.strides import StrideEstimator
+from echostep.legs.walking_bout import stairs_flag
+from echostep.offline.leg_csv import LegSamples
+from echostep.offline.leg_track import about_trunk, leg_left_m, track_default
+from echostep.simulation.people.walker import Person, Walk, Waypoint, walk
+from foot_walks import any_rotation
+
+CORNER: list[Waypoint] = [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)]
+
+
+@pytest.fixture(scope="module")
+def walked() -> Walk:
+    return walk(CORNER, Person(), np.random.default_rng(4))
+
+
+def _strides(t_s: Floats, thigh: Floats, shank: Floats, belt: Floats | None) -> list[Stride]:
+    legs = StrideEstimator()
+    return [*legs.feed(t_s, thigh, shank, belt), *legs.finish()]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_axis_of_walking_is_found_from_three_axes(walked: Walk, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t_s, pitch, yaw = walked.t_s[::10], walked.thigh_rad_s[::10], walked.belt_rad_s[::10]
+    impacts = 3.0 * np.sin(2.0 * math.pi * 13.0 * t_s) * (np.sin(2.0 * math.pi * 0.9 * t_s) > 0.9)
+    body = np.column_stack([0.05 * rng.standard_normal(len(t_s)), pitch, yaw + impacts])
+    mounted = any_rotation(rng)
+    found = walking_axis(t_s, body @ mounted.T)
+    assert abs(float(found.axis @ mounted[:, 1])) > math.cos(math.radians(8.0))
+    assert found.clear
+    assert not walking_axis(t_s, rng.standard_normal((len(t_s), 3))).clear
+
+
+def test_turns_that_leak_into_the_pitch_cost_no_length_and_make_no_stairs(walked: Walk) -> None:
+    t_s, thigh, shank, belt = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s, walked.belt_rad_s))
+    level = sum(s.length_m for s in _strides(t_s, thigh, shank, belt))
+    leaking = thigh + 0.3 * belt, shank - 0.2 * belt
+    found = _strides(t_s, *leaking, belt)
+    assert not any(s.flags & (Flag.STAIRS_UP | Flag.STAIRS_DOWN) for s in found)
+    assert sum(s.length_m for s in found) == pytest.approx(level, abs=0.25)
+    assert abs(sum(s.length_m for s in _strides(t_s, *leaking, None)) - level) > 0.0
+
+
+def test_bias_and_leak_are_told_apart() -> None:
+    bias = GyroBias()
+    for turn in (0.0, 0.0, 1.2, -0.8, 0.0):
+        bias.learn(0.03 + 0.25 * turn, math.radians(1.0), turn)
+    assert bias.value == pytest.approx(0.03, abs=0.01)
+    assert bias.leak == pytest.approx(0.25, abs=0.03)
+    before = bias.value, bias.variance
+    bias.learn(2.0, math.radians(1.0))  # no rest, or no stride
+    assert (bias.value, bias.variance) == before
+
+
+def test_a_brief_rest_says_less_about_the_level() -> None:
+    known = Level(math.radians(15.0), math.radians(-20.0), 0, math.radians(3.0) ** 2)
+    assert known.standing(3.0).thigh < known.standing(0.4).thigh < known.thigh
+    assert Level().standing(3.0).thigh == pytest.approx(0.0, abs=0.01)
+
+
+def test_stairs_need_a_knee_that_moves_and_hips_that_rise() -> None:
+    up, half = math.radians(60.0), math.radians(12.0)
+    assert stairs_flag(up, half, 0.15) is Flag.STAIRS_UP
+    assert stairs_flag(half, up, -0.15) is Flag.STAIRS_DOWN
+    assert stairs_flag(up, half, -0.05) is Flag.NONE  # the hips sink
+    assert stairs_flag(math.radians(45.0), math.radians(41.0), 0.15) is Flag.NONE  # drift bends the knee all the time
+
+
+def test_the_hips_are_slow_in_the_first_and_in_the_closing_swing() -> None:
+    steady, closing = Swing(1.2, 1.2, 0.2, 0.2), Swing(1.2, 0.1, 0.2, 0.2)
+    assert steady.first_half_m() + steady.second_half_m() == pytest.approx(0.48)
+    assert 0.04 < closing.second_half_m() < 0.09  # what real bodies have to go at mid swing
+    assert leaving_share(0.0, 0.4) < 0.3 < leaving_share(0.4, 0.4) == 1.0
+    assert leaving_share(0.1, 0.0) < 0.3
+
+
+def test_motion_before_the_walk_does_not_fix_the_signs(walked: Walk) -> None:
+    t_s, thigh, shank = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s))
+    before_s = np.arange(0.0, 6.0, 0.01)
+    lifts = np.clip(np.minimum(before_s - 1.0, 4.5 - before_s), 0.0, 0.3) * np.sin(2.0 * math.pi * 0.8 * before_s)
+    joined = [
+        np.concatenate([k * lifts, c]) for c, k in ((thigh, -6.0), (shank, 9.0))
+    ]  # the foot drawn back, knee bent
+    times = np.arange(0.0, len(joined[0])) * 0.01
+    nothing = np.full(len(times), np.nan)
+    live = StrideEstimator()
+    live.feed(times, joined[0], joined[1])
+    assert live.revised
+    strides = track_default(LegSamples(times, joined[0], joined[1], nothing, nothing), StrideSettings()).strides
+    later = sum(s.length_m for s in strides if s.t_start_s > 5.5)
+    assert later == pytest.approx(sum(s.length_m for s in _strides(t_s, thigh, shank, None)), abs=0.4)
+
+
+def test_the_side_of_the_leg_is_found_by_the_pelvis_and_counts_in_turns(walked: Walk) -> None:
+    t_s, thigh, shank = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s))
+    strides, heading = tuple(_strides(t_s, thigh, shank, None)), walked.heading_rad[::10]  # of the right leg
+    assert leg_left_m(strides, t_s, heading) == -leg_left_m(strides, t_s, -heading) == -0.09
+    assert leg_left_m(strides, t_s, np.zeros_like(t_s)) == 0.0
+    trunk = about_trunk(strides, t_s, heading)  # a turn to the left: the right leg is outside
+    assert sum(s.length_m for s in strides) - sum(s.length_m for s in trunk) == pytest.approx(
+        0.09 * math.pi / 2, abs=0.03
+    )
+    assert about_trunk(strides, t_s, np.zeros_like(t_s)) is strides

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+"""Tests on public recordings are skipped, with one message, where these are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from recordings import DATA
+
+
+def needs_data(folder: str = "") -> pytest.MarkDecorator:
+    """Skip unless this folder of the recordings is there."""
+    return pytest.mark.skipif(not (DATA / folder).is_dir(), reason=_absent(folder))
+
+
+def data_or_skip(folder: str) -> Path:
+    """The same for fixtures: the folder."""
+    if not (DATA / folder).is_dir():
+        pytest.skip(_absent(folder))
+    return DATA / folder
+
+
+def _absent(folder: str) -> str:
+    return f"skipped: no recordings in {DATA / folder} (../shared/data or $ECHOSTEP_DATA)"

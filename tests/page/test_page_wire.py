@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""What goes to a page is JSON whatever the plan is; what fails on the server is said, in the log and to the page."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echostep.page import protocol
+from echostep.page.elements.echo_lines import EchoLine
+from echostep.page.mailbox import Mailbox
+from echostep.plan.model import Plan
+from imported_plans import seven_floors
+from page.frames import PLAN, fetched, next_frame, opened, scene, served
+
+
+@pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
+def test_a_page_of_any_plan_gets_hello_walls_and_frames(plan: Plan) -> None:
+    """An outline is an array, and an array is no JSON: the imported plan's page stayed dark."""
+    with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
+        mailbox.publish(scene())
+        with opened(server) as page:
+            hello = json.loads(page.recv(timeout=5))
+            frame = next_frame(page)
+        for k, level in enumerate(plan.levels):
+            walls = fetched(f"{server.url}walls/{k}").body
+            assert len(walls) == 16 * len(level.solid) == 16 * hello["plan"]["levels"][k]["walls"]
+        assert not server.shared.faults.notices
+    rooms = [[room["name"] for room in level["rooms"]] for level in hello["plan"]["levels"]]
+    assert rooms == [[room.name for room in level.rooms] for level in plan.levels]
+    assert frame["told"]["where"]
+
+
+def test_numbers_of_numpy_and_numbers_that_are_none() -> None:
+    line = EchoLine(1.0, 0, float(np.float64(2.0)), np.float32(0.5), math.nan, math.inf, None)  # type: ignore[arg-type]
+    sent = protocol.frame(replace(scene(), echo_lines=(line,)), protocol.FrameParts(1))
+    length = int.from_bytes(sent[:4], "little")
+
+    def never(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    header = json.loads(sent[4 : 4 + length], parse_constant=never)
+    assert header["beams"] == [
+        {"t_s": 1.0, "ranger": 0, "x_m": 2.0, "y_m": 0.5, "axis_rad": None, "measured_m": None, "expected_m": None}
+    ]
+
+
+def test_an_array_is_refused_where_it_is_encoded() -> None:
+    with pytest.raises(TypeError, match="ndarray in a message to the page"):
+        protocol.encode(protocol.Refused(np.zeros(2)))  # type: ignore[arg-type]
+
+
+def test_a_fault_reaches_the_log_once_and_every_page_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    with served() as (server, mailbox):
+        monkeypatch.setattr(protocol, "hello", broken)
+        for _ in range(3):
+            with opened(server) as page:
+                told = json.loads(page.recv(timeout=5))
+                assert told["kind"] == "failed"
+                assert "ZeroDivisionError: division by zero" in told["reason"]
+        assert len(server.shared.faults.notices) == 1
+        assert "ZeroDivisionError" in server.shared.faults.notices[0]
+        assert "test_page_wire.py, line" in server.shared.faults.notices[0]
+        monkeypatch.undo()
+        mailbox.publish(scene())
+        with opened(server) as page:
+            assert json.loads(page.recv(timeout=5))["kind"] == "hello"
+
+
+def broken(*_: object, **__: object) -> None:
+    1 / 0  # noqa: B018
+
+
+def test_a_fault_in_a_frame_and_in_the_walls(monkeypatch: pytest.MonkeyPatch) -> None:
+    with served() as (server, mailbox):
+        monkeypatch.setattr(protocol, "frame", broken)
+        monkeypatch.setattr(protocol, "walls", broken)
+        mailbox.publish(scene())
+        with opened(server) as page:
+            assert json.loads(page.recv(timeout=5))["kind"] == "hello"
+            assert json.loads(page.recv(timeout=5))["kind"] == "failed"
+        refused = fetched(f"{server.url}walls/0")
+        assert refused.status == 500
+        assert b"ZeroDivisionError" in refused.body
+        assert len(server.shared.faults.notices) == 1  # the same line of code

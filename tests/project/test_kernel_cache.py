@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""An update in place: kernels compiled from older sources are never used, and never fail to load."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import echostep
+from echostep.jit import kernel
+from echostep.kernel_cache import PACKAGE, cache_folder
+
+SHAPES = """
+from typing import NamedTuple
+from echostep.jit import kernel
+UNIT = {unit}
+class {name}(NamedTuple):
+    width: float
+@kernel
+def area(shape):
+    return UNIT * shape.width * shape.width
+"""
+MAIN = """
+from echostep import shapes
+from echostep.jit import kernel
+@kernel
+def twice(shape):
+    return 2.0 * shapes.area(shape)
+print(twice(shapes.{name}(3.0)))
+"""
+
+
+def run(package: Path, name: str, unit: float) -> str:
+    """What the small package prints with this class and constant in one of its files."""
+    (package / "shapes.py").write_text(SHAPES.format(name=name, unit=unit))
+    command = [sys.executable, "-c", "import echostep.main"]
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_an_update_in_place_is_compiled_anew_and_the_old_kernels_go(tmp_path: Path) -> None:
+    package = tmp_path / "echostep"
+    package.mkdir()
+    for name in ("jit", "kernel_cache"):
+        shutil.copy(f"{PACKAGE}/{name}.py", package)
+    (package / "__init__.py").touch()
+    (package / "main.py").write_text(MAIN.format(name="Square"))
+    assert run(package, "Square", 1.0) == "18.0\n"
+    assert run(package, "Square", 2.0) == "36.0\n"  # a constant of another file
+    (kept,) = package.glob("__pycache__/main-*/*/*.nbi")
+    (package / "main.py").write_text(MAIN.format(name="Quadrat"))
+    assert run(package, "Quadrat", 2.0) == "36.0\n"  # a class of another file, by another name
+    (new,) = package.glob("__pycache__/main-*/*/*.nbi")
+    assert new != kept
+
+
+def test_folders_stand_beside_the_sources_or_where_numba_is_told_to_put_them() -> None:
+    source = f"{PACKAGE}/walls/index.py"
+    folder = cache_folder(source)
+    assert folder is not None
+    assert folder.name.startswith("index-")
+    assert cache_folder(__file__) is None
+    assert cache_folder(f"{PACKAGE}/nowhere.py") is None
+    assert echostep.__file__.startswith(PACKAGE)
+
+
+def test_a_kernel_of_another_package_stays_where_numba_puts_it() -> None:
+    @kernel
+    def here(x: float) -> float:
+        return x
+
+    assert str(PACKAGE) not in str(here._cache.cache_path)  # type: ignore[attr-defined]

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""A report says in words where the wearer is; a report of an older tracker says nothing there."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from echostep.plan.model import load_plan
+from echostep.team import report as reports
+from echostep.team.commander import table
+from echostep.team.cot import remarks
+from echostep.team.endpoint import Outlet
+from echostep.team.publish import Publishing
+from echostep.team.report import BadReportError, Report, decode, encode
+from echostep.team.roster import Roster
+from echostep.tracker import Tracker
+from page.frames import told
+from team.team_reports import PLAN, POSITION, report
+
+
+def test_a_published_estimate_names_the_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    offered: list[Report] = []
+    publishing = Publishing(Outlet((), "anna", "red"), Tracker(load_plan(PLAN)), "live", print)
+    monkeypatch.setattr(publishing, "_offer", offered.append)
+    publishing.publish([told(6.0, 9.0), told(6.3, 7.5)])
+    assert [made.position.where for made in offered if made.position] == ["in Office 1", "in North corridor"]
+
+
+def test_the_commander_and_tak_see_it() -> None:
+    made = report(position=replace(POSITION, where="in Office 1"))
+    assert "; in Office 1, Ground floor; " in remarks(decode(encode(made)))
+    roster = Roster()
+    roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
+    (grid, *_) = table(roster, load_plan(PLAN), 0.0, connected=True).renderables
+    assert "where" in [column.header for column in grid.columns]  # type: ignore[union-attr]
+    (narrow, *_) = table(roster, load_plan(PLAN), 0.0, connected=True, columns=120).renderables
+    assert "where" not in [column.header for column in narrow.columns]  # type: ignore[union-attr]
+
+
+def test_an_older_report_has_no_place_in_words_and_a_hostile_one_is_refused() -> None:
+    tree = json.loads(encode(report()))
+    del tree["position"]["where"]
+    position = decode(json.dumps(tree).encode()).position
+    assert position is not None
+    assert position.where == ""
+    with pytest.raises(BadReportError, match="unprintable"):
+        decode(reports.encode(report(position=replace(POSITION, where="in \x1b[2J"))))
