@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # echostep: firmware to map. `make help` lists the targets.
 PYTHON ?= python3
 VENV := .venv
@@ -17,18 +18,20 @@ setup: $(READY) ## make .venv with the host package, its tests and its tools
 $(READY): host/pyproject.toml
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || tools/apt.sh python3-venv
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]'
+	$(BIN)/pip install --quiet --disable-pip-version-check -c host/tested-versions.txt -e 'host[dev]' || { \
+		echo "The package index lacks some tested version: installing the newest ones."; \
+		$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]'; }
 	touch $@
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
 	$(MAKE) -C firmware
 	cp firmware/build/echostep.hex $(SHIPPED)
 
-twin: $(READY) ## play the board and the MTx on two pseudo terminals, in real time, until Ctrl-C
+twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL=1: a wearer who does what calibrate asks
 	@tools/apt.sh $(APT_PACKAGES)
 	$(MAKE) -C firmware
 	$(MAKE) -C tools/twin
-	$(BIN)/python tools/twin/run.py
+	$(BIN)/python tools/twin/run.py $(if $(STILL),--still)
 
 demo: $(READY) ## track a simulated walk through the real firmware in the simulator
 	@if tools/apt.sh $(APT_PACKAGES); then \
@@ -76,22 +79,47 @@ $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
-wheel: $(READY) ## build the wheel, install it in a fresh environment without compiler, run the demo in there, and pipx
-	$(BIN)/python tools/wheel.py
+wheel: $(READY) ## build the wheel, install it in a fresh environment, run the demo in there; URL=https://... is the public address in it
+	ECHOSTEP_URL=$(URL) $(BIN)/python tools/wheel.py
+
+site: $(READY) ## the manual as a site with search in out/site (open out/site/index.html); a dead link fails
+	$(BIN)/sphinx-build -q -n -W --keep-going -c tools/manual -d out/site-cache . out/site
+	@echo "out/site/index.html"
+
+lock: $(READY) ## write the installed versions to host/tested-versions.txt, after the tests have passed
+	$(BIN)/python tools/tested_versions.py
+
+audit: $(READY) ## known faults of the tested versions (pip-audit; needs the network)
+	@[ -x $(VENV)/audit/bin/pip-audit ] || { $(PYTHON) -m venv $(VENV)/audit && $(VENV)/audit/bin/pip install --quiet --disable-pip-version-check pip-audit; }
+	$(VENV)/audit/bin/pip-audit --strict --requirement host/tested-versions.txt --no-deps --disable-pip
+
+licences: $(READY) ## the licence of every dependency
+	$(BIN)/python tools/licences.py
 
 docs: $(READY) ## make the pages anew that come from the code
 	$(BIN)/python protocol/generate.py
 	$(BIN)/python tools/docs.py
 
+fuzz: $(READY) ## fuzz the firmware's codec for a minute from its kept corpus, on from where the last minute stopped
+	@tools/apt.sh clang libclang-rt-14-dev
+	$(BIN)/python tools/fuzz_codec.py
+
+fuzz-host: $(READY) ## mutated inputs on every way into the host for a minute, on from where the last minute stopped
+	PYTHONPATH=tests $(BIN)/python tools/fuzz_host.py
+
+faults: $(READY) ## each fault of the twin during one walk: what was lost, how long, what the tracker claimed; on from where it stopped
+	$(MAKE) --quiet -C firmware
+	$(MAKE) --quiet -C tools/twin
+	$(BIN)/python tools/faults.py --page
+
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
 	$(BIN)/python tools/kill_recorder.py
 
-flash: $(READY) ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
-	@[ -n "$(PORT)" ] || { echo "say which port the board is at: make flash PORT=/dev/ttyACM0"; exit 2; }
-	@[ -e "$(PORT)" ] || { echo "$(PORT): there is no such port; see ls /dev/serial/by-id"; exit 2; }
-	@tools/apt.sh avrdude || { echo "avrdude is not installed and this user may not install it: apt install avrdude"; exit 2; }
-	@if command -v avr-gcc >/dev/null || tools/apt.sh $(APT_PACKAGES); then $(MAKE) -C firmware && $(BIN)/echostep flash --port $(PORT) --hex firmware/build/echostep.hex; \
-	else echo "avr-gcc is not installed: the firmware that comes with the package is written"; $(BIN)/echostep flash --port $(PORT); fi
+flips: $(READY) ## flip 314 random bits of a recording, one at a time: what becomes of the track, and what the replay says
+	PYTHONPATH=tests $(BIN)/python tools/flip_recording.py
+
+flash: ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
+	@tools/flash.sh "$(PORT)"
 
 clean: ## remove everything that was built
 	$(MAKE) -C firmware clean
@@ -99,4 +127,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup firmware twin demo real test check size measure bench page-speed wheel kill docs flash clean
+.PHONY: help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults kill flips docs site licences lock audit flash clean
