@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""A run ends with whole files, whatever ends it: SIGTERM, SIGHUP, a terminal that is closed."""
+"""A run ends with whole files, whatever ends it: SIGTERM, SIGHUP, a terminal that is closed; with SIGHUP ignored it goes on."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import pty
+import select
 import signal
 import subprocess
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,7 @@ from echostep.recording.reading import open_recording
 from players import python_board
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
+COST_BYTES = 200_000  # of a recording: some five seconds of a board alone
 
 
 def until(holds: Callable[[], bool]) -> None:
@@ -29,40 +32,105 @@ def until(holds: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
+@contextlib.contextmanager
+def live_on_a_terminal(
+    out: Path, hangup: signal.Handlers
+) -> Iterator[tuple[subprocess.Popen[bytes], Callable[[], None]]]:
+    """A live run, recording already, whose terminal is read all the time, and a function that closes the terminal; `hangup`: what SIGHUP does."""
+    terminal, theirs = pty.openpty()
+
+    def begin() -> None:
+        signal.signal(signal.SIGHUP, hangup)
+        os.close(os.open(os.ttyname(0), os.O_RDWR))  # makes it the controlling terminal
+
+    with python_board() as port:
+        live = subprocess.Popen(
+            [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--out", out, "--no-page"],
+            stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True, preexec_fn=begin,  # noqa: PLW1509
+        )  # fmt: skip
+        os.close(theirs)
+        with terminal_read(terminal) as close:
+            try:
+                until(lambda: _recorded(out) > 10_000)
+                yield live, close
+            finally:
+                live.kill()
+                live.wait()
+
+
+@contextlib.contextmanager
+def terminal_read(terminal: int) -> Iterator[Callable[[], None]]:
+    """Reads what the program prints, so that it does not wait for the terminal, until the function is called that closes it."""
+    over = threading.Event()
+
+    def read() -> None:
+        while not over.is_set():
+            if select.select([terminal], [], [], 0.05)[0]:
+                with contextlib.suppress(OSError):  # EIO: the program has ended
+                    os.read(terminal, 1 << 16)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+
+    def close() -> None:
+        if not over.is_set():
+            over.set()
+            reader.join()
+            os.close(terminal)
+
+    try:
+        yield close
+    finally:
+        close()
+
+
 @pytest.mark.parametrize("end", ["SIGTERM", "closed"])
 def test_a_live_run_ends_with_a_whole_recording(tmp_path: Path, end: str) -> None:
     """A terminal that is closed sends SIGHUP."""
-    terminal, theirs = pty.openpty()
-    with python_board() as port:
-        live = subprocess.Popen(
-            [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--out", tmp_path, "--no-page"],
-            stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
-            preexec_fn=lambda: os.close(os.open(os.ttyname(0), os.O_RDWR)),  # noqa: PLW1509  # makes it the controlling terminal
-        )  # fmt: skip
-        os.close(theirs)
-        os.set_blocking(terminal, False)
-        try:
-            until(lambda: _drain(terminal) and (tmp_path / "walk.mcap").exists())
-            until(lambda: _drain(terminal) and (tmp_path / "walk.mcap").stat().st_size > 10_000)
-            if end == "closed":
-                os.close(terminal)
-            else:
-                live.send_signal(getattr(signal, end))
-                until(lambda: _drain(terminal) and live.poll() is not None)
-            live.wait(timeout=120)
-        finally:
-            live.kill()
-            if end != "closed":
-                os.close(terminal)
+    with live_on_a_terminal(tmp_path, signal.SIG_DFL) as (live, close):
+        if end == "closed":
+            close()
+        else:
+            live.send_signal(getattr(signal, end))
+        live.wait(timeout=120)
+        check_files(tmp_path, live)
+
+
+def test_a_run_that_ignores_sighup_records_on_without_its_terminal(tmp_path: Path) -> None:
+    """As nohup asks; a loop that spins on the closed terminal would cost a whole core beside the run's own work. SIGTERM ends it."""
+    with live_on_a_terminal(tmp_path, signal.SIG_IGN) as (live, close):
+        with_terminal = _cost(tmp_path, live.pid)
+        close()
+        without = _cost(tmp_path, live.pid)
+        assert live.poll() is None
+        live.send_signal(signal.SIGTERM)
+        live.wait(timeout=120)
+        check_files(tmp_path, live)
+    assert without < 1.5 * with_terminal
+
+
+def check_files(out: Path, live: subprocess.Popen[bytes]) -> None:
     assert live.returncode == 0
-    recording = open_recording(tmp_path / "walk.mcap")
+    recording = open_recording(out / "walk.mcap")
     assert sum(len(chunk.data) for chunk in recording.chunks()) > 1_000
     assert not recording.truncated
-    assert (tmp_path / "track.csv").exists()
+    assert (out / "track.csv").exists()
 
 
-def _drain(terminal: int) -> bool:
-    """Read what the program prints, so that it does not wait for the terminal."""
-    with contextlib.suppress(OSError):
-        os.read(terminal, 1 << 16)
-    return True
+def _recorded(out: Path) -> int:
+    """Bytes of the recording so far."""
+    path = out / "walk.mcap"
+    return path.stat().st_size if path.exists() else 0
+
+
+def _cost(out: Path, pid: int) -> float:
+    """Processor time (s) that the program takes to record a byte, over COST_BYTES."""
+    began, cpu_s = _recorded(out), _cpu_s(pid)
+    until(lambda: _recorded(out) > began + COST_BYTES)
+    return (_cpu_s(pid) - cpu_s) / (_recorded(out) - began)
+
+
+def _cpu_s(pid: int) -> float:
+    """Processor time of a process, all its threads: utime and stime [proc(5)]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import groupby
+from operator import itemgetter
 from types import TracebackType
 from typing import Self
 
@@ -73,19 +75,24 @@ class Canvas:
         return column, 4 * self._rows - 1 - round((y - self._low[1]) * self._scale)
 
     def render(self, here: Estimate | None) -> Text:
-        """The canvas as text: walls grey, track blue, the wearer a yellow dot at `here`."""
+        """The canvas as text: walls grey, track blue, the wearer a yellow dot at `here`; a style is given once for all its neighbours in a row."""
         mark = (-1, -1) if here is None else self._dot_of(here.x_m, here.y_m)
         text = Text()
         for r in range(self._rows):
-            for c in range(self._columns):
-                if (mark[1] // 4, mark[0] // 2) == (r, c):
-                    text.append("●", style="bold bright_yellow")
-                elif self._track[r, c]:
-                    text.append(chr(BRAILLE + int(self._track[r, c] | self._walls[r, c])), style="bright_blue")
-                else:
-                    text.append(chr(BRAILLE + int(self._walls[r, c])), style="grey62")
+            for style, cells in groupby(self._row(r, mark), key=itemgetter(0)):
+                text.append("".join(cell for _, cell in cells), style=style)
             text.append("\n")
         return text
+
+    def _row(self, r: int, mark: tuple[int, int]) -> Iterator[tuple[str, str]]:
+        """Style and character of each cell of a row."""
+        for c in range(self._columns):
+            if (mark[1] // 4, mark[0] // 2) == (r, c):
+                yield "bold bright_yellow", "●"
+            elif self._track[r, c]:
+                yield "bright_blue", chr(BRAILLE + int(self._track[r, c] | self._walls[r, c]))
+            else:
+                yield "grey62", chr(BRAILLE + int(self._walls[r, c]))
 
 
 class TerminalView:
@@ -125,7 +132,7 @@ class TerminalView:
         return f"   level {levels[here.level].name} ({100 * here.levels[here.level]:.0f} %), {here.z_m:.1f} m"
 
     def show(self, estimates: list[Estimate], notice: str = "", *, final: bool = False) -> None:
-        """Add new estimates; redraw when REFRESH_S has passed since the last time, or when `final`."""
+        """Add new estimates; redraw when REFRESH_S has passed since the last time, or when `final`; not on a terminal that was closed."""
         for e in estimates:
             if e.level != self._level:
                 self._level, self._canvas = e.level, Canvas(self._tracker.plan.levels[e.level])
@@ -135,6 +142,8 @@ class TerminalView:
         if not final and now - self._drawn_s < REFRESH_S:
             return
         self._drawn_s = now
+        if not self._live.console.is_terminal:
+            return
         if self._fraction:
             self._progress.update(self._bar, completed=self._fraction())
         parts = [
