@@ -230,7 +230,8 @@ def test_the_command_tracks_every_log_of_a_folder(log_file: Path, tmp_path: Path
 
 def test_unknown_starts_lie_where_the_log_goes_on(log_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def at_the_origin(segments: Sequence[MeasuredSegment], _plan: Plan, start: Start, _seed: int) -> FilterRun:
-        assert start.is_anywhere
+        assert start.pose is None
+        assert start.room_m is None
         claims = [Claim(s.segment.t1_s, 0.0, 0.0, 0, 0.0, TrackStatus.LOST, math.inf) for s in segments]
         return FilterRun(tuple(claims), 1, 1.0)
 

@@ -17,9 +17,10 @@ import pytest
 
 from command_line import echostep
 from echostep.evaluate.feet import leave_one_out
-from echostep.evaluate.feet.datasets import FootRecording
+from echostep.evaluate.feet.datasets import SETS, FootRecording
 from echostep.evaluate.feet.metrics import Figure, align, places, rmse
-from echostep.evaluate.feet.study import recordings_in, track_of
+from echostep.evaluate.feet.study import track_of
+from echostep.evaluate.recordings import recordings_in
 from echostep.foot.ins import Noise
 from foot_walks import any_rotation
 from needs_data import needs_data
@@ -182,7 +183,7 @@ def test_motion_capture_holds_under_what_other_recordings_may_bring(
     vary: Callable[[FootRecording], FootRecording], worst: float
 ) -> None:
     errors = []
-    for recording in recordings_in(DATA):
+    for recording in recordings_in(DATA, SETS):
         if recording.group != "vicon":
             continue
         varied = vary(recording)

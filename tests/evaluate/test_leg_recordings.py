@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.evaluate.legs.datasets import LegRecording, read_leg_recordings
+from echostep.evaluate.legs.datasets import SETS, LegRecording
 from echostep.evaluate.legs.recordings import SCALE, means, recordings_study, rows_of, strides_of
+from echostep.evaluate.recordings import read_sets
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, StrideSettings
 from echostep.simulation.people.walker import Person, walk
@@ -20,7 +21,7 @@ from recordings import DATA
 
 @pytest.fixture(scope="module")
 def recordings() -> list[LegRecording]:
-    return read_leg_recordings(DATA)[0]
+    return read_sets(DATA, SETS)[0]
 
 
 def simulated() -> LegRecording:
@@ -54,7 +55,7 @@ def test_folders_without_recordings_are_named(tmp_path: Path) -> None:
         recordings_study(tmp_path)
     (tmp_path / "legs_qmt").mkdir()
     (tmp_path / "legs_qmt" / "broken.mat").write_bytes(b"not a MAT file")
-    assert any("broken.mat skipped, cannot read it" in line for line in read_leg_recordings(tmp_path)[1])
+    assert any("broken.mat skipped, cannot read it" in line for line in read_sets(tmp_path, SETS)[1])
 
 
 @needs_data("legs_gaittoolbox")

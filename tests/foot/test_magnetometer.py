@@ -8,7 +8,8 @@ import pytest
 
 import foot_walks as fw
 from echostep.arrays import Floats
-from echostep.evaluate.feet.datasets import read_recordings
+from echostep.evaluate.feet.datasets import SETS
+from echostep.evaluate.recordings import read_sets
 from echostep.foot.steps import Foot, walk_track
 from needs_data import needs_data
 from recordings import DATA
@@ -92,7 +93,7 @@ def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> 
 def test_on_the_hallways_headings_are_never_worse_than_without() -> None:
     """Stride headings against the survey's, with and without."""
     seen = 0
-    for recording in read_recordings(DATA)[0]:
+    for recording in read_sets(DATA, SETS)[0]:
         if recording.group != "hallway" or recording.mag is None:
             continue
         seen += 1

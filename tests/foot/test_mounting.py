@@ -13,7 +13,8 @@ import pytest
 import foot_walks as fw
 from board_runs import ROOT
 from echostep.arrays import Floats
-from echostep.evaluate.feet.datasets import read_recordings
+from echostep.evaluate.feet.datasets import SETS
+from echostep.evaluate.recordings import read_sets
 from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
 from echostep.localization.metrics import Truth, errors
@@ -139,7 +140,7 @@ def test_nobody_who_stops_after_one_step_is_kept_waiting() -> None:
 @needs_data()
 def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
     """Thirty feet, mounted as their owners liked, turned once more: long steps go within a toe-out angle of the toe's direction."""
-    for k, recording in enumerate(read_recordings(DATA)[0]):
+    for k, recording in enumerate(read_sets(DATA, SETS)[0]):
         turn = fw.any_rotation(np.random.default_rng(k))
         track = aligned(walk_track(recording.t_s, recording.accel @ turn.T, recording.gyro @ turn.T))
         assert track.toe_known, recording.name

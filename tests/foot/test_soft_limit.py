@@ -10,8 +10,9 @@ import pytest
 
 import foot_walks as fw
 from echostep.arrays import Floats
-from echostep.evaluate.feet.datasets import FootRecording
-from echostep.evaluate.feet.study import recordings_in, track_of
+from echostep.evaluate.feet.datasets import SETS, FootRecording
+from echostep.evaluate.feet.study import track_of
+from echostep.evaluate.recordings import recordings_in
 from echostep.foot.steps import walk_track
 from needs_data import needs_data
 from recordings import DATA
@@ -55,7 +56,7 @@ def outbound_m(recording: FootRecording) -> float:
 @needs_data()
 def test_real_walks_with_a_lower_limit_keep_their_length() -> None:
     """MTw gyros reach 1200 deg/s. Bent off at 480 deg/s, the way out changes by 0.12 m on average; by 0.39 m without the correction."""
-    recordings = [recording for recording in recordings_in(DATA) if recording.group == "mtw"]
+    recordings = [recording for recording in recordings_in(DATA, SETS) if recording.group == "mtw"]
     limited = [replace(r, gyro=bent(r.gyro, np.radians(480.0))) for r in recordings]
     errors = [abs(outbound_m(a) - outbound_m(b)) for a, b in zip(recordings, limited, strict=True)]
     assert np.mean(errors) < 0.2

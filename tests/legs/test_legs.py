@@ -152,7 +152,7 @@ def test_a_gap_is_bridged_and_said() -> None:
     assert _total(strides) == pytest.approx(20.0, rel=0.1)
 
 
-def test_nobody_knows_what_was_done_in_a_long_gap() -> None:
+def test_a_long_gap_is_unobserved() -> None:
     t, thigh, shank = _walked([(0.0, 0.0), (20.0, 0.0)])
     later = np.where(t > 9.0, t + 1e6, t)
     strides = _strides(later, thigh, shank)

@@ -146,7 +146,7 @@ def test_a_wrong_tap_that_is_undone_leaves_no_trace(chunks: list[Chunk], start: 
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, None])
-def test_a_tap_starts_the_walk_where_nobody_knew(chunks: list[Chunk], heading_rad: float | None) -> None:
+def test_a_tap_starts_the_walk_from_an_unknown_place(chunks: list[Chunk], heading_rad: float | None) -> None:
     nowhere = replace(PLAN, start=None)
     tracker = Tracker(nowhere, seed=1, waits=True)
     assert tracker.state.waits_for_start

@@ -257,7 +257,7 @@ def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
 SENTENCES = ((1.0, "Turn left"), (2.0, "Turn right"), (3.0, "Turn left"))
 
 
-def test_the_arrow_turns_the_short_way_and_is_gone_when_nobody_knows(browser: Any) -> None:
+def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(browser: Any) -> None:
     mailbox = Mailbox(PLAN, "test", replay=False)
     turn = "document.querySelector('#arrow').style.transform"
     with PageServer(mailbox, LOCAL) as server:

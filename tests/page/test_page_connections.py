@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connections that say nothing, or little, keep nobody out and are closed."""
+"""Connections that say nothing, or little, block no other connection and are closed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def is_closed(one: socket.socket) -> bool:
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-a: "])
-def test_idle_connections_keep_nobody_out(sent: bytes) -> None:
+def test_idle_connections_block_no_other(sent: bytes) -> None:
     with served() as (server, mailbox):
         mailbox.publish(scene())
         with idle(server, IDLE, sent) as sockets:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A wearer who may be in several places, on the page: rings, words, what to do, and the protection radius."""
+"""Several possible places on the page: rings, words, what to do, and the protection radius."""
 
 from __future__ import annotations
 

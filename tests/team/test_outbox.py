@@ -41,7 +41,7 @@ class Recorded:
 
     def open(self) -> None:
         if self.broken:
-            raise ConnectionRefusedError("nobody there")
+            raise ConnectionRefusedError("refused")
         self.opened += 1
 
     def send(self, report: Report) -> None:

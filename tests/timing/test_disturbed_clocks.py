@@ -16,26 +16,12 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.model import load_plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
-from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, Arrivals, MtxTiming, Timeline
+from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, MtxTiming, Timeline
 from echostep.tracker import Tracker
+from timing.messages import MS, Message, times_of
 from walks import DEMO, walk_chunks
 
-MS = 1_000_000
 SECOND = 1_000 * MS
-Message = tuple[str, int, int, int]  # port, ticks or counter, arrival, kind
-
-
-def tell(timeline: Timeline, messages: list[Message]) -> np.ndarray:
-    """Times of messages in order of arrival, NaN for those dropped; as one portion."""
-
-    def of(port: str) -> Arrivals:
-        rows = [(value, row, t_ns, kind) for row, (p, value, t_ns, kind) in enumerate(messages) if p == port]
-        return Arrivals(*np.array(rows, np.int64).reshape(-1, 4).T.copy())
-
-    times = timeline.times(of(BOARD), of(MTX))
-    found = np.empty(len(messages))
-    found[times.board_message_index], found[times.mtx_message_index] = times.board_s, times.mtx_s
-    return found
 
 
 def ticks(t_s: float) -> int:
@@ -64,7 +50,7 @@ def test_sleep_is_a_gap(asleep_s: float, counted: bool) -> None:
     before = [m for t in moments(0.0, 20.0) for m in both(t, 50.0 + t)]
     host_s = 50.0 if counted else 50.0 - asleep_s
     after = [m for t in moments(20.0 + asleep_s, 40.0 + asleep_s) for m in both(t, host_s + t)]
-    found = tell(timeline, before + after)
+    found = times_of(timeline, before + after)
     assert never_back(found)
     assert np.abs(found[-1000:-1:2] - moments(35.0 + asleep_s, 40.0 + asleep_s)).max() < 1e-6  # the board
     assert np.abs(found[-999::2] - moments(35.0 + asleep_s, 40.0 + asleep_s)).max() < 2e-3  # the MTx
@@ -79,7 +65,7 @@ def test_a_stopped_process_reads_its_backlog_late_and_then_goes_on() -> None:
     before = [m for t in moments(0.0, 20.0) for m in both(t, t)]
     backlog = [(port, value, 620 * SECOND, kind) for t in moments(20.0, 20.7) for port, value, _, kind in both(t, t)]
     after = [m for t in moments(620.0, 640.0) for m in both(t, t)]
-    found = tell(timeline, before + backlog + after)
+    found = times_of(timeline, before + backlog + after)
     assert never_back(found)
     assert np.abs(found[len(before) : len(before + backlog) : 2] - moments(20.0, 20.7)).max() < 1e-6
     assert np.abs(found[-1000:-1:2] - moments(635.0, 640.0)).max() < 1e-6
@@ -92,7 +78,7 @@ def test_a_host_clock_that_steps_changes_no_time(step_s: float) -> None:
     timeline = Timeline(MtxTiming())
     first = [m for t in moments(0.0, 20.0) for m in both(t, 5000.0 + t)]
     second = [m for t in moments(20.0, 40.0) for m in both(t, 5000.0 + step_s + t)]
-    found = tell(timeline, first + second)
+    found = times_of(timeline, first + second)
     assert never_back(found)
     assert timeline.clock_steps == 1
     assert np.abs(found[0::2] - moments(0.0, 40.0)).max() < 1e-6
@@ -111,7 +97,7 @@ def test_a_board_that_restarts_goes_on_by_arrival(ran_s: float, away_s: float, k
     for k, t in enumerate(moments(0.0, 20.0)):
         board, mtx = both(t + ran_s + away_s, t + ran_s + away_s)
         after += [(BOARD, ticks(0.6 + t), board[2], PLAIN if k else kind), mtx]
-    found = tell(timeline, before + after)
+    found = times_of(timeline, before + after)
     assert never_back(found)
     assert timeline.board_restarts == 1
     assert np.isnan(found).sum() <= 6
@@ -141,7 +127,7 @@ def test_crystals_200_ppm_apart_that_drift_with_temperature(ppm: float, wired: b
         host_ns = round(t_s * (1.0 + 30e-6) * 1e9)
         messages.append((BOARD, ticks(t_s), host_ns + MS, n & 0xFFFF if wired else PLAIN))
         messages.append((MTX, n & 0xFFFF, host_ns + round((7.1 + rng.exponential(0.3)) * MS), PLAIN))
-    found = tell(timeline, messages)
+    found = times_of(timeline, messages)
     assert not np.isnan(found).any()
     assert never_back(found)
     assert np.abs(found[1::2] - t)[3_000:].max() < (1e-5 if wired else 1.5e-3)

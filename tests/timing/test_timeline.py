@@ -11,11 +11,9 @@ from hypothesis import strategies as st
 from echostep.ports.chunks import BOARD, LATEST_NS, MTX
 from echostep.timing import sync_edges as sync
 from echostep.timing.device_clock import new_clock, now_s, read
-from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline
+from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, MtxTiming, Timeline
 from naive import clocks as naive_clocks
-
-MS = 1_000_000
-Message = tuple[str, int, int, int]  # port, ticks or counter, arrival, kind
+from timing.messages import MS, Message, times_of
 
 
 class Clock:
@@ -30,16 +28,8 @@ class Clock:
 
 
 def tell(timeline: Timeline, messages: list[Message]) -> list[float | None]:
-    """Times of messages in order of arrival, as one portion."""
-
-    def of(port: str) -> Arrivals:
-        rows = [(value, row, t_ns, kind) for row, (p, value, t_ns, kind) in enumerate(messages) if p == port]
-        return Arrivals(*np.array(rows, np.int64).reshape(-1, 4).T.copy())
-
-    times = timeline.times(of(BOARD), of(MTX))
-    found = np.empty(len(messages))
-    found[times.board_message_index], found[times.mtx_message_index] = times.board_s, times.mtx_s
-    return [None if np.isnan(t) else t for t in found.tolist()]
+    """Times of messages in order of arrival, as one portion; None for those dropped."""
+    return [None if np.isnan(t) else t for t in times_of(timeline, messages).tolist()]
 
 
 def test_board_ticks_wrap() -> None:

@@ -148,10 +148,12 @@ def feet_command(
     ] = False,
 ) -> None:
     """The foot on real recordings, one setting for all, beside the peers' figures."""
-    from echostep.evaluate.feet.study import feet_study, recordings_in
+    from echostep.evaluate.feet.datasets import SETS
+    from echostep.evaluate.feet.study import feet_study
+    from echostep.evaluate.recordings import recordings_in
     from echostep.evaluate.study import StudyRequest, run_study
 
-    recordings = recordings_in(folder)
+    recordings = recordings_in(folder, SETS)
     run_study(feet_study(recordings, out, left_out=left_out), StudyRequest(len(recordings), 0, json, out or Path()))
 
 

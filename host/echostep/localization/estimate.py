@@ -25,9 +25,8 @@ TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter, by reason: a door, a room
 SURE = 0.95  # probability of an error below TRACKING_M while tracking, by reason
 UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, by reason
 RISK = 1e-3  # probability of an error beyond the protection radius
-TAIL = (
-    1.5  # of the protection radius of a normal distribution, by reason: errors of echoes and steps have heavier tails
-)
+# Of the protection radius of a normal distribution, by reason: errors of echoes and steps have heavier tails.
+TAIL = 1.5
 SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, by reason
 UNFIT = 0.5  # probability of the plan below which it is said not to fit, by reason
 SURE_OF_LEVEL = 0.9  # least probability of the likeliest level while tracking, by reason
@@ -48,7 +47,7 @@ class Estimate:
 
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
     `protection_m`: radius beyond which the error is with probability RISK, infinite where no radius within the building is that safe. `right`:
-    probability that the wearer is in this cloud at all; `plan_fits`: that the plan is the building's.
+    probability that the cloud is right; `plan_fits`: that the plan is the building's.
     `hypotheses`: the places of a cloud that has not gathered, the likeliest first.
     """
 
@@ -102,7 +101,7 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
 
 
 class Right(NamedTuple):
-    """Probability that the wearer is `here`, in the cloud, and at least `about`, within LOST_M of it, by a search of the building."""
+    """Probability that the cloud is right, `here`, and at least `about` that the trunk is within LOST_M of it, by a search of the building."""
 
     here: float
     about: float = 0.0
@@ -113,12 +112,12 @@ SURELY = Right(1.0)
 
 def estimate(
     cloud: Cloud, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
-    elsewhere: Elsewhere | None = None,
+    elsewhere: Elsewhere | None = None, search: Cloud | None = None,
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
-    `sd_m`: standard deviation per axis to be added; `right`: probability that the wearer is in the cloud, otherwise `elsewhere`. While tracking, the
-    covariance is the cloud's; otherwise that of the mixture of both about the cloud's mean.
+    `sd_m`: standard deviation per axis to be added; `right`: probability that the cloud is right, otherwise the trunk is `elsewhere`. While tracking,
+    the covariance is the cloud's; otherwise that of the mixture of both about its mean. The hypotheses are those of `search`, if there is one.
     """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
@@ -130,8 +129,8 @@ def estimate(
     east, north = float(weight @ np.cos(heading)), float(weight @ np.sin(heading))
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     places: tuple[Hypothesis, ...] = ()
-    if xx + yy > SPREAD_M**2:
-        places = hypotheses(map_x, cloud.y_m, cloud.level, heading, weight)
+    if search is not None or xx + yy > SPREAD_M**2:
+        places = _places(search or cloud, walk_heading_rad)
     status = _status(np.hypot(dx, dy), weight, right, max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
     protection_m = _protection_m(xx, xy, yy, right.here)
@@ -141,6 +140,10 @@ def estimate(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
         protection_m, right.here, places,
     )  # fmt: skip
+
+
+def _places(cloud: Cloud, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
+    return hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, cloud.weight)
 
 
 def _status(error_m: Floats, weight: Floats, right: Right, level: float) -> TrackStatus:
@@ -161,7 +164,7 @@ def _protection_m(xx_m2: float, xy_m2: float, yy_m2: float, right: float) -> flo
 
 
 class Elsewhere(NamedTuple):
-    """Mean (m) and covariance (m2) of the places in a building where a wearer may be who is not in the cloud."""
+    """Mean (m) and covariance (m2) of the places in a building where the trunk may be if the cloud is wrong."""
 
     x_m: float
     y_m: float

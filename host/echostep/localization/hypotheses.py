@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
 
 # All by reason.
@@ -61,5 +62,4 @@ def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weigh
 def _hypothesis(probability: float, x: Floats, y: Floats, level: int, heading: Floats, weight: Floats) -> Hypothesis:
     mean_x, mean_y = float(weight @ x), float(weight @ y)
     variance = float(weight @ ((x - mean_x) ** 2 + (y - mean_y) ** 2))
-    direction = math.atan2(float(weight @ np.sin(heading)), float(weight @ np.cos(heading)))
-    return Hypothesis(probability, mean_x, mean_y, level, math.sqrt(0.5 * variance), direction)
+    return Hypothesis(probability, mean_x, mean_y, level, math.sqrt(0.5 * variance), mean_angle(heading, weight))

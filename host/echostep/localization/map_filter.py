@@ -14,6 +14,7 @@ from statistics import median
 
 import numpy as np
 
+from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
@@ -21,11 +22,10 @@ from echostep.localization.beacon_model import BeaconSettings
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate
-from echostep.localization.hypotheses import Hypothesis, hypotheses
 from echostep.localization.level_changes import ClimbSettings, HeightChange
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, CloudSettings, Evidence
-from echostep.localization.plausibility import LEAST, STATED, Plausibility, log_odds, probability
+from echostep.localization.plausibility import STATED, Plausibility
 from echostep.localization.start import Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
@@ -97,7 +97,7 @@ class MapFilter:
         self.tracked = Hypothetical(cloud, Plausibility(STATED if stated else GATHERED), stated)
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
-        self._plan_log_odds = log_odds(PLAN_FITS)
+        self._plan = Plausibility(PLAN_FITS)
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
 
@@ -106,11 +106,6 @@ class MapFilter:
         """The cloud that is tracked."""
         return self.tracked.cloud
 
-    @property
-    def right(self) -> float:
-        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it."""
-        return min(self.tracked.plausibility.probability, self._search_within(TRACKING_M))
-
     def update(self, measured: MeasuredSegment, readings: Sequence[BeaconReading] = ()) -> Estimate:
         """Propagate along a segment, reweight by its pings, height change and beacon readings, and resample; returns the estimate at its end."""
         segment = measured.segment
@@ -118,9 +113,11 @@ class MapFilter:
             self._scatter(measured)
         else:
             self._follow(measured)
-        self.beacon_map.update(self.cloud, segment, readings, self._plan_supports)
-        self._choose(segment.heading1_rad)
-        return self._estimate(segment)
+        self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self._plan_supports)
+        right = self._right()
+        if self._choose(right.here, segment.heading1_rad):
+            right = self._right()
+        return self._estimate(segment, right)
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
@@ -134,7 +131,7 @@ class MapFilter:
     @property
     def _plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
-        return self.right > BELIEVED and self._pings.silent_m < SUPPORTED_M
+        return self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
 
     def _scatter(self, measured: MeasuredSegment) -> None:
         """Spread the cloud over an unobserved segment."""
@@ -181,44 +178,52 @@ class MapFilter:
     def _clouds(self) -> list[Hypothetical]:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
-    def _choose(self, walk_heading_rad: float) -> None:
-        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found."""
+    def _right(self) -> Right:
+        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, on its level."""
+        here = self.tracked.plausibility.probability
+        if self.search is None:
+            return Right(here)
+        cloud, mean = self.search.cloud, self._believed(0.0)
+        distance_m = np.hypot(cloud.map_x_m - mean.x_m, cloud.y_m - mean.y_m)
+        weight = np.where(cloud.level == mean.level, cloud.weight, 0.0)
+        near, about = (float(weight @ (distance_m < limit)) for limit in (TRACKING_M, LOST_M))
+        return Right(min(here, near), about)
+
+    def _choose(self, right: float, walk_heading_rad: float) -> bool:
+        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found.
+
+        `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
+        """
         tracked, search = self.tracked, self.search
         if tracked.cloud.is_coarse and self._pings.path_m - self._search_m > FOUND_WITHIN_M:
-            self._doubt_plan()
-            self.tracked = Hypothetical(self._new_cloud(Start(), walk_heading_rad), Plausibility(GATHERED))
+            self._plan.add(math.log(FAILS))
+            self.tracked = self._new_search(Start(), walk_heading_rad)
         elif search is None:
-            least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else REJECTED
-            doubted = tracked.plausibility.probability < least and not tracked.cloud.is_coarse
-            if tracked.has_contracted and tracked.plausibility.probability > BELIEVED:
-                self._plan_log_odds = log_odds(PLAN_FITS)
-            if doubted and len(self._building.floor.x_m):
-                self._begin_search(walk_heading_rad)
-        elif self.right > AGREED:
-            self.search, self._plan_log_odds = None, log_odds(PLAN_FITS)
-        elif search.plausibility.probability > FOUND and search.cloud.is_gathered and self.right < DOUBTED:
+            return self._doubt(tracked, walk_heading_rad)
+        elif right > AGREED:
+            self.search, self._plan = None, Plausibility(PLAN_FITS)
+        elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
             self.tracked, self.search = search, None
         elif self._has_failed(search):
-            self._doubt_plan()
-            self._begin_search(walk_heading_rad)
+            self._plan.add(math.log(FAILS))
+            self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
+        else:
+            return False
+        return True
 
-    def _search_within(self, distance_m: float) -> float:
-        """The search's weight so near to the tracked cloud's mean, on its level; 1 without a search."""
-        if self.search is None:
-            return 1.0
-        cloud, mean = self.search.cloud, self._believed(0.0)
-        near = np.hypot(cloud.map_x_m - mean.x_m, cloud.y_m - mean.y_m) < distance_m
-        return float(cloud.weight @ (near & (cloud.level == mean.level)))
+    def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
+        """Begin a search if the tracked cloud is improbable, believe the plan again if it is probable; returns whether a search began."""
+        if tracked.has_contracted and tracked.plausibility.probability > BELIEVED:
+            self._plan = Plausibility(PLAN_FITS)
+        least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else REJECTED
+        if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
+            return False
+        self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
+        return True
 
-    def _doubt_plan(self) -> None:
-        """A search of the whole building has failed."""
-        self._plan_log_odds = max(self._plan_log_odds + math.log(FAILS), LEAST)
+    def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m = self._pings.path_m
-
-    def _begin_search(self, walk_heading_rad: float) -> None:
-        start = Start(near=self._believed(walk_heading_rad))
-        self.search = Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
-        self._search_m = self._pings.path_m
+        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
@@ -226,8 +231,7 @@ class MapFilter:
         level = int(np.bincount(cloud.level, weight).argmax())
         on = cloud.level == level
         x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
-        turn = math.atan2(float(weight @ np.sin(cloud.turn_rad)), float(weight @ np.cos(cloud.turn_rad)))
-        return Pose(x, y, turn + walk_heading_rad, level)
+        return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)
 
     def _has_failed(self, search: Hypothetical) -> bool:
         """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing for long."""
@@ -235,24 +239,14 @@ class MapFilter:
             return True
         return self._pings.path_m - self._search_m > FOUND_WITHIN_M
 
-    def _estimate(self, segment: PathSegment) -> Estimate:
+    def _estimate(self, segment: PathSegment, right: Right) -> Estimate:
         """The estimate at the end of a segment."""
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
-        right = Right(self.right, self._search_within(LOST_M) if self.search else 0.0)
-        new = estimate(
-            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self._building.elsewhere
-        )
-        return replace(
-            new, plan_fits=probability(self._plan_log_odds), hypotheses=self._hypotheses(new, segment.heading1_rad)
-        )
-
-    def _hypotheses(self, new: Estimate, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
-        """The places of the search while there is one, otherwise those of the estimate."""
-        if self.search is None:
-            return new.hypotheses
-        cloud = self.search.cloud
-        return hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, cloud.weight)
+        search = self.search.cloud if self.search else None
+        elsewhere = self._building.elsewhere
+        new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
+        return replace(new, plan_fits=self._plan.probability)
 
 
 def _move(segment: PathSegment) -> Move:

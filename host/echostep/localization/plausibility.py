@@ -30,13 +30,8 @@ def log_odds(probability: float) -> float:
     return math.log(probability / (1.0 - probability))
 
 
-def probability(log_odds: float) -> float:
-    """Of log-odds."""
-    return 1.0 / (1.0 + math.exp(-log_odds))
-
-
 class Plausibility:
-    """Log-odds of right against wrong of one cloud."""
+    """Log-odds of right against wrong: of one cloud, or of the plan."""
 
     def __init__(self, prior: float) -> None:
         self.log_odds = log_odds(prior)
@@ -44,7 +39,11 @@ class Plausibility:
     @property
     def probability(self) -> float:
         """That the cloud is right."""
-        return probability(self.log_odds)
+        return 1.0 / (1.0 + math.exp(-self.log_odds))
+
+    def add(self, log_ratio: float) -> None:
+        """One observation: the log of its density if right over that if wrong."""
+        self.log_odds = min(max(self.log_odds + log_ratio, LEAST), MOST)
 
     def update(self, log_ratio: Floats, log_passed: float, path_m: float) -> None:
         """Pings on a path of this length, each with the log of its density under the cloud over its density without it, both to its power.
@@ -52,7 +51,7 @@ class Plausibility:
         `log_passed`: log of the share of the cloud that crossed no wall on it.
         """
         for value in [max(log_passed, UNPLANNED_DOOR), *log_ratio.tolist()]:
-            self.log_odds = min(max(self.log_odds + value, LEAST), MOST)
+            self.add(value)
         self._forget(WRONG_PER_M * path_m)
 
     def limit(self, most: float) -> None:

@@ -41,11 +41,6 @@ class Start:
     level: int = ANY_LEVEL
     near: Pose | None = None
 
-    @property
-    def is_anywhere(self) -> bool:
-        """Whether nothing is known but the building."""
-        return self.pose is None and self.room_m is None
-
 
 def draw_poses(
     start: Start, count: int, floor: Floor, sheet: LevelSheet | None, rng: np.random.Generator

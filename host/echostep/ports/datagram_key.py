@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Datagrams that only who has the key can make.
+"""Datagrams that can be made only with a key.
 
 In: bytes and a key; datagrams. Out: sealed datagrams; the bytes in authentic ones. Owns the greatest counter so far.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The walkable floor of a plan, on its sheet of levels: where a wearer can be who may be anywhere in the building.
+"""The walkable floor of a plan, on its sheet of levels: where an unknown start may be.
 
 In: walls (n, 4) on the sheet. Out: `Floor`: cells that no wall is too near to, inside the building. Owns nothing.
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.evaluate.feet.metrics import Figure, climb, closure, mocap, outbound, survey
+from echostep.evaluate.recordings import Sets
 from echostep.foot.steps import Track
 
 G_M_S2 = 9.80665
@@ -43,22 +44,6 @@ class FootRecording:
     mag: Floats | None = None
     truth_t_s: Floats | None = None
     truth_m: Floats | None = None
-
-
-def read_recordings(folder: Path) -> tuple[list[FootRecording], list[str]]:
-    """All recordings in the folder, and a line about each set or file that was skipped."""
-    found: list[FootRecording] = []
-    skipped: list[str] = []
-    for group, pattern, read in SETS:
-        paths = sorted(folder.glob(pattern))
-        if not paths:
-            skipped.append(f"{group}: skipped, no {pattern} in {folder}")
-        for path in paths:
-            try:
-                found += read(path)
-            except Exception as error:  # foreign files: a reader may raise any exception
-                skipped.append(f"{group}: {path} skipped, cannot read it: {error or type(error).__name__}")
-    return found, skipped
 
 
 def _mat(path: Path) -> dict[str, Any]:
@@ -150,7 +135,7 @@ VICON_PEERS: Peers = {
 HALLWAY_PEERS: Peers = {"31": ("authors", 0.297), "33": ("authors", 0.631), "34": ("authors", 0.183)}
 OPENSHOE_PEERS: Peers = {"2": ("openshoe", 0.67), "31": ("openshoe", 0.39), "44": ("openshoe", 0.05)}
 XIO_PEERS: Peers = {"short_walk": ("pyshoe", 0.035)}
-SETS: tuple[tuple[str, str, Callable[[Path], Iterator[FootRecording]]], ...] = (
+SETS: Sets[FootRecording] = (
     ("vicon", "vicon_pyshoe/*.mat", _vicon),
     ("hallway", "gx5_gcp/*_LLIO.mat", _hallway),
     ("openshoe", "openshoe/*.txt", _openshoe),

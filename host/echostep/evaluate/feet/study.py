@@ -10,8 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from statistics import median
 
-from echostep.errors import EchostepError
-from echostep.evaluate.feet.datasets import FootRecording, read_recordings
+from echostep.evaluate.feet.datasets import FootRecording
 from echostep.evaluate.feet.latency import LIVE, pace_rows
 from echostep.evaluate.feet.leave_one_out import add_left_out, describe, leave_one_out
 from echostep.evaluate.feet.metrics import Figure, way
@@ -70,18 +69,6 @@ def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> li
     """The rows of one set with other constants."""
     rows = [row for r in recordings if r.group == group for row in rows_of(r, track_of(r, noise))]
     return rows + medians(rows)
-
-
-def recordings_in(folder: Path) -> list[FootRecording]:
-    """The recordings of the folder; prints what is skipped."""
-    if not folder.is_dir():
-        raise EchostepError(f"{folder}: no such folder: say with --data where the recordings are")
-    recordings, skipped = read_recordings(folder)
-    for line in skipped:
-        console.print(line)
-    if not recordings:
-        raise EchostepError(f"{folder}: no recording of any known set in it")
-    return recordings
 
 
 def track_of(recording: FootRecording, noise: Noise | None = None) -> Track:

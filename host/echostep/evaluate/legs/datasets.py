@@ -7,7 +7,7 @@ of its own. The truth is what both feet have gone: by their inertial tracks (`fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.evaluate.recordings import Sets
 from echostep.foot.steps import Track, walk_track
 from echostep.legs.kinematics import LegLengths
 
@@ -55,22 +56,6 @@ class LegRecording:
         begin, end = max(edges.tolist(), key=lambda e: self.way_m[min(e[1], len(self.way_m) - 1)] - self.way_m[e[0]])
         last = len(self.way_s) - 1
         return float(self.way_s[begin]) - MARGIN_S, float(self.way_s[min(end, last)]) + MARGIN_S
-
-
-def read_leg_recordings(folder: Path) -> tuple[list[LegRecording], list[str]]:
-    """All recordings in the folder, and a line about each set or file that was skipped."""
-    found: list[LegRecording] = []
-    skipped: list[str] = []
-    for group, pattern, read in SETS:
-        paths = sorted(folder.glob(pattern))
-        if not paths:
-            skipped.append(f"{group}: skipped, no {pattern} in {folder}")
-        for path in paths:
-            try:
-                found += read(path)
-            except Exception as error:  # foreign files: a reader may raise any exception
-                skipped.append(f"{group}: {path} skipped, cannot read it: {error or type(error).__name__}")
-    return found, skipped
 
 
 def _qmt(path: Path) -> Iterator[LegRecording]:
@@ -140,7 +125,7 @@ def _mean_length(between: Floats) -> float:
     return float(np.linalg.norm(between, axis=1).mean())
 
 
-SETS: tuple[tuple[str, str, Callable[[Path], Iterator[LegRecording]]], ...] = (
+SETS: Sets[LegRecording] = (
     ("qmt", "legs_qmt/*.mat", _qmt),
     ("gaittoolbox", "legs_gaittoolbox/*-vicon.csv", _gait_toolbox),
 )

@@ -13,9 +13,9 @@ from statistics import fmean
 
 import numpy as np
 
-from echostep.errors import EchostepError
-from echostep.evaluate.legs.datasets import LegRecording, read_leg_recordings
-from echostep.evaluate.report import Row, Table, console
+from echostep.evaluate.legs.datasets import SETS, LegRecording
+from echostep.evaluate.recordings import recordings_in
+from echostep.evaluate.report import Row, Table
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.mounting import walking_axis
@@ -34,7 +34,7 @@ COLUMNS = {
 
 def recordings_study(folder: Path) -> Study:
     """The study of the recordings in this folder; raises EchostepError without any."""
-    recordings = leg_recordings_in(folder)
+    recordings = recordings_in(folder, SETS)
     return Study(
         "legs-recordings",
         lambda _seed: [row for recording in recordings for row in rows_of(recording)],
@@ -44,18 +44,6 @@ def recordings_study(folder: Path) -> Study:
         journal=False,
         parquet=None,
     )
-
-
-def leg_recordings_in(folder: Path) -> list[LegRecording]:
-    """The recordings of the folder; prints what is skipped."""
-    if not folder.is_dir():
-        raise EchostepError(f"{folder}: no such folder: say with --data where the recordings are")
-    recordings, skipped = read_leg_recordings(folder)
-    for line in skipped:
-        console.print(line)
-    if not recordings:
-        raise EchostepError(f"{folder}: no recording of any known set in it")
-    return recordings
 
 
 def rows_of(recording: LegRecording) -> list[Row]:
