@@ -14,6 +14,7 @@ from echostep.localization.echo_likelihood import EchoModel
 from echostep.localization.estimate import Elsewhere
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
+from echostep.walls.indoors import indoors
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 
@@ -24,6 +25,7 @@ class Building:
         self.walls = walls
         self.sheet = sheet
         self.floor = walkable_floor(walls.index.walls)
+        self.indoors = indoors(self.floor)
         self.elsewhere = _elsewhere(self.floor, sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
         self._fields: dict[EchoModel, CoarseField] = {}

@@ -29,6 +29,7 @@ RISK = 1e-3  # probability of an error beyond the protection radius
 TAIL = 1.5
 SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, by reason
 UNFIT = 0.5  # probability of the plan below which it is said not to fit, by reason
+OUTSIDE = 0.5  # probability of being outside of the building above which it is said, by reason
 SURE_OF_LEVEL = 0.9  # least probability of the likeliest level while tracking, by reason
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
 
@@ -47,7 +48,8 @@ class Estimate:
 
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
     `protection_m`: radius beyond which the error is with probability RISK, infinite where no radius within the building is that safe. `right`:
-    probability that the cloud is right; `plan_fits`: that the plan is the building's.
+    probability that the cloud is right; `plan_fits`: that the plan is the building's;
+    `outside`: that the trunk is outside of the building.
     `hypotheses`: the places of a cloud that has not gathered, the likeliest first.
     """
 
@@ -69,6 +71,7 @@ class Estimate:
     right: float = 1.0
     hypotheses: tuple[Hypothesis, ...] = ()
     plan_fits: float = 1.0
+    outside: float = 0.0
 
     @property
     def ellipse95(self) -> Ellipse:

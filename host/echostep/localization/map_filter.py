@@ -246,7 +246,12 @@ class MapFilter:
         search = self.search.cloud if self.search else None
         elsewhere = self._building.elsewhere
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
-        return replace(new, plan_fits=self._plan.probability)
+        return replace(new, plan_fits=self._plan.probability, outside=self._outside())
+
+    def _outside(self) -> float:
+        """Weight of the tracked cloud outside of the building; 0 where walls enclose no floor."""
+        indoors, cloud = self._building.indoors, self.cloud
+        return 0.0 if indoors is None else float(cloud.weight @ ~indoors.holds(cloud.x_m, cloud.y_m))
 
 
 def _move(segment: PathSegment) -> Move:

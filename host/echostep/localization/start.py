@@ -88,7 +88,7 @@ def _within(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
 
         map_x = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
         kept &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
-    return Floor(floor.x_m[kept], floor.y_m[kept]) if kept.any() else floor
+    return Floor(floor.x_m[kept], floor.y_m[kept], floor.enclosed[kept]) if kept.any() else floor
 
 
 def _on_floor(floor: Floor, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
 from echostep.plan.routing import mark_near_walls
 
@@ -21,6 +21,8 @@ from echostep.plan.routing import mark_near_walls
 CELL_M = 0.25  # side of a cell
 BODY_M = 0.25  # half a person's width
 DIRECTIONS = 32  # in which walls are looked for
+INSIDE = 0.5  # least share of the directions that meet a wall, for a cell of the floor
+ENCLOSED = 0.75  # the same for a cell that is certainly indoors: a doorway to the outside has half
 SIGHT_M = 40.0  # how far
 EDGE_M = 2.0  # of the grid around the walls
 HALL_M = 3.0  # distance from a wall up to which floor counts where no wall encloses any
@@ -29,10 +31,14 @@ MOST_CELLS = 40_000_000
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Free cells inside the building: their centres `x_m`, `y_m` (n,) on the sheet; empty for a plan without walls."""
+    """Free cells inside the building: their centres `x_m`, `y_m` (n,) on the sheet; empty for a plan without walls.
+
+    `enclosed` (n,): walls are in sight in nearly all directions; a cell before the front of the building has them in half of the directions.
+    """
 
     x_m: Floats
     y_m: Floats
+    enclosed: Bools
 
     @property
     def area_m2(self) -> float:
@@ -47,7 +53,7 @@ class Floor:
         return self.x_m[cell] + within[0], self.y_m[cell] + within[1]
 
 
-NO_FLOOR = Floor(np.zeros(0), np.zeros(0))
+NO_FLOOR = Floor(np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 
 def walkable_floor(walls: Floats) -> Floor:
@@ -63,18 +69,20 @@ def walkable_floor(walls: Floats) -> Floor:
     blocked, hall = np.zeros((2, rows, columns), np.bool_)
     mark_near_walls(cells, BODY_M / CELL_M, blocked)
     mark_near_walls(cells, HALL_M / CELL_M, hall)
-    inside = _enclosed(blocked, int(SIGHT_M / CELL_M))
+    in_sight = _walls_in_sight(blocked, int(SIGHT_M / CELL_M))
+    inside = in_sight >= INSIDE * DIRECTIONS
     if not inside.any():
         inside = hall & ~blocked
     row, column = np.nonzero(inside)
-    return Floor(low[0] + (column + 0.5) * CELL_M, low[1] + (row + 0.5) * CELL_M)
+    enclosed = in_sight[row, column] >= ENCLOSED * DIRECTIONS
+    return Floor(low[0] + (column + 0.5) * CELL_M, low[1] + (row + 0.5) * CELL_M, enclosed)
 
 
 @kernel
-def _enclosed(blocked: Bools, sight: int) -> Bools:
-    """Free cells from which at least half of the directions meet a blocked cell within so many cells."""
+def _walls_in_sight(blocked: Bools, sight: int) -> Ints:
+    """For each cell, in how many directions a blocked cell is met within so many cells; 0 for blocked cells."""
     rows, columns = blocked.shape
-    enclosed = np.zeros((rows, columns), np.bool_)
+    in_sight = np.zeros((rows, columns), np.int64)
     aside = np.full(
         columns, sight, np.int64
     )  # columns to the nearest one with a wall: others are between two levels of the sheet
@@ -85,12 +93,12 @@ def _enclosed(blocked: Bools, sight: int) -> Bools:
     for r in range(rows):
         for c in range(columns):
             if not blocked[r, c] and aside[c] < sight // 4:
-                enclosed[r, c] = 2 * _walls_in_sight(r, c, blocked, sight) >= DIRECTIONS
-    return enclosed
+                in_sight[r, c] = _directions_met(r, c, blocked, sight)
+    return in_sight
 
 
 @kernel
-def _walls_in_sight(r: int, c: int, blocked: Bools, sight: int) -> int:
+def _directions_met(r: int, c: int, blocked: Bools, sight: int) -> int:
     """In how many directions a blocked cell is met."""
     rows, columns = blocked.shape
     met = 0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Octets
-from echostep.localization.estimate import UNFIT, Estimate, TrackStatus
+from echostep.localization.estimate import OUTSIDE, UNFIT, Estimate, TrackStatus
 from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
@@ -85,7 +85,8 @@ def status_text(estimate: Estimate | None, *, needs_start: bool = False, accepts
         return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
-    return f"{estimate.status.value}, {format_metres(estimate.ellipse95.major_m)}"
+    where = ", outside the building" if estimate.outside > OUTSIDE else ""
+    return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"
 
 
 def format_metres(distance_m: float) -> str:
