@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from board_runs import ROOT, quiet_rows
 from echostep.simulation.devices.board import PythonBoard
+from waiting import PATIENCE_S
 
 sys.path.insert(0, str(ROOT / "tools/twin"))
 
@@ -49,7 +50,7 @@ def _playing(step: Callable[[], None]) -> Iterator[None]:
         yield
     finally:
         over.set()
-        thread.join(timeout=10)
+        thread.join(timeout=PATIENCE_S)
 
 
 @contextlib.contextmanager

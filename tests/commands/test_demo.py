@@ -29,6 +29,7 @@ from echostep.simulation.world.tower import tower
 from echostep.tracker import Tracker
 from page.browser import LOCAL
 from page.frames import header, opened_url
+from waiting import PATIENCE_S
 from walks import walk_chunks
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
@@ -65,7 +66,7 @@ def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: 
 def message(socket: ClientConnection, kind: str) -> dict[str, Any]:
     """The next message of a kind; frames on the way are reported as drawn."""
     while True:
-        received = socket.recv(timeout=20.0)
+        received = socket.recv(timeout=PATIENCE_S)
         tree = header(received) if isinstance(received, bytes) else json.loads(received)
         if tree["kind"] == "frame":
             socket.send(json.dumps({"kind": "drawn", "seq": tree["seq"]}))

@@ -17,8 +17,10 @@ import pytest
 
 from board_runs import ROOT, needs_twin
 from command_line import PROGRAM, echostep
+from echostep.errors import EchostepError
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.reading import open_recording
+from waiting import PATIENCE_S, until
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 
@@ -54,7 +56,7 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bo
         )
     finally:
         twin.send_signal(signal.SIGINT)
-        twin.wait(timeout=10)
+        twin.wait(timeout=PATIENCE_S)
         assert twin.stdout is not None
         twin.stdout.close()
     assert live.returncode == 0, live.stderr
@@ -81,6 +83,15 @@ def test_two_runs_of_one_seed_are_identical(tmp_path: Path) -> None:
     assert sha_of(replay.stdout) == first
 
 
+def records(path: Path) -> bool:
+    """Whether bytes of a port are in a recording: its run is under way."""
+    try:
+        open_recording(path)
+    except EchostepError:
+        return False
+    return True
+
+
 def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     port = os.ttyname(theirs)
@@ -89,12 +100,9 @@ def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        deadline = time.monotonic() + 30
-        while not (tmp_path / "walk.mcap").exists() and time.monotonic() < deadline:
-            time.sleep(0.1)
-        time.sleep(0.5)
+        assert until(lambda: os.write(ours, b"\0") and records(tmp_path / "walk.mcap"))
         live.send_signal(signal.SIGINT)
-        out, err = live.communicate(timeout=20)
+        out, err = live.communicate(timeout=PATIENCE_S)
     finally:
         live.kill()
         os.close(ours)
@@ -179,7 +187,7 @@ def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
             sent[k] += part
             os.write(ours, part)
         time.sleep(0.05)
-    out, err = recorder.communicate(timeout=20)
+    out, err = recorder.communicate(timeout=PATIENCE_S)
     for pair in pairs:
         for end in pair:
             os.close(end)
@@ -205,7 +213,7 @@ def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
         os.write(first, b"before")
         second, new = os.openpty()
         tty.setraw(new)
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + PATIENCE_S
         for chunk in ports.chunks():
             found += chunk.data if chunk else b""
             if found == b"before" and link.is_symlink() and link.readlink() == name:

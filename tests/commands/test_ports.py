@@ -102,7 +102,6 @@ def test_live_finds_both_ports_by_what_they_say(tmp_path: Path, monkeypatch: pyt
 
 
 def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(port_search, "SEARCH_S", 0.5)
     monkeypatch.setattr(port_search, "list_seen", list)
     assert "no USB serial port is plugged in" in echostep("live", "--plan", PLAN).stderr
     with on_a_terminal(MtxDevice(PROJECT)) as mtx, pseudo_terminal() as (_, silent):

@@ -12,13 +12,14 @@ from board_runs import ROOT
 from echostep.recording.reading import open_recording
 from needs_data import needs_data
 from recordings import DATA
+from waiting import PATIENCE_S
 
 pytestmark = needs_data("gx5_gcp")
 
 
 def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "tools/real_walk.py"), "--out", str(tmp_path), "--seed", "3"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)
     assert done.returncode == 0, done.stdout + done.stderr  # 1 when the RMSE is above 0.30 m
     assert "foot real" in done.stdout
     assert "echoes simulated" in open_recording(tmp_path / "walk.mcap").metadata["note"]

@@ -10,7 +10,6 @@ import select
 import signal
 import subprocess
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -20,16 +19,10 @@ from board_runs import ROOT
 from command_line import PROGRAM
 from echostep.recording.reading import open_recording
 from players import python_board
+from waiting import PATIENCE_S, until
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 COST_BYTES = 200_000  # of a recording: some five seconds of a board alone
-
-
-def until(holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 60.0
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 @contextlib.contextmanager
@@ -51,7 +44,7 @@ def live_on_a_terminal(
         os.close(theirs)
         with terminal_read(terminal) as close:
             try:
-                until(lambda: _recorded(out) > 10_000)
+                assert until(lambda: _recorded(out) > 10_000)
                 yield live, close
             finally:
                 live.kill()
@@ -92,7 +85,7 @@ def test_a_live_run_ends_with_a_whole_recording(tmp_path: Path, end: str) -> Non
             close()
         else:
             live.send_signal(getattr(signal, end))
-        live.wait(timeout=120)
+        live.wait(timeout=PATIENCE_S)
         check_files(tmp_path, live)
 
 
@@ -104,7 +97,7 @@ def test_a_run_that_ignores_sighup_records_on_without_its_terminal(tmp_path: Pat
         without = _cost(tmp_path, live.pid)
         assert live.poll() is None
         live.send_signal(signal.SIGTERM)
-        live.wait(timeout=120)
+        live.wait(timeout=PATIENCE_S)
         check_files(tmp_path, live)
     assert without < 1.5 * with_terminal
 
@@ -126,7 +119,7 @@ def _recorded(out: Path) -> int:
 def _cost(out: Path, pid: int) -> float:
     """Processor time (s) that the program takes to record a byte, over COST_BYTES."""
     began, cpu_s = _recorded(out), _cpu_s(pid)
-    until(lambda: _recorded(out) > began + COST_BYTES)
+    assert until(lambda: _recorded(out) > began + COST_BYTES)
     return (_cpu_s(pid) - cpu_s) / (_recorded(out) - began)
 
 

@@ -23,6 +23,7 @@ from echostep.board.frames import encode
 from echostep.commissioning.flash import check_hex
 from echostep.errors import EchostepError
 from players import pseudo_terminal
+from waiting import PATIENCE_S
 
 SHIPPED = ROOT / "host/echostep/firmware/echostep.hex"
 AVRDUDE = """#!/bin/sh
@@ -88,7 +89,7 @@ def board(link: Path, log: Path, obeys: bool = True) -> Iterator[None]:
         yield
     finally:
         over.set()
-        thread.join(timeout=10)
+        thread.join(timeout=PATIENCE_S)
 
 
 def test_a_board_is_touched_written_verified_and_answers(tmp_path: Path) -> None:
@@ -127,7 +128,7 @@ def test_a_board_that_does_not_react_is_told_after_ten_seconds(tmp_path: Path) -
 def make_flash(port: object, path: str, *more: object) -> subprocess.CompletedProcess[str]:
     """`make flash` without make: the script that it runs, with these programs alone."""
     command = list(map(str, ["/bin/sh", ROOT / "tools/flash.sh", port, *more]))
-    return subprocess.run(command, env={"PATH": path}, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, env={"PATH": path}, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
 
 
 def test_make_flash_writes_without_an_environment(tmp_path: Path) -> None:

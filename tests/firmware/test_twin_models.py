@@ -21,6 +21,7 @@ from echostep.board import messages as m
 from echostep.board.frames import BoardReader
 from echostep.errors import EchostepError
 from echostep.simulation.devices.board import BoardProcess
+from waiting import PATIENCE_S
 
 pytestmark = needs_twin
 PROBE = Path(__file__).parent / "twin_probe.c"
@@ -44,7 +45,7 @@ def probe(folder: Path, mode: int) -> BoardProcess:
         "-Os",
         f"-DMODE={mode}",
     ]
-    subprocess.run([*command, "-o", str(elf), str(PROBE)], check=True, timeout=60)
+    subprocess.run([*command, "-o", str(elf), str(PROBE)], check=True, timeout=PATIENCE_S)
     return BoardProcess([str(TWIN), "--elf", str(elf)])
 
 
@@ -113,7 +114,7 @@ def test_a_program_that_stops_ends_the_twin(tmp_path: Path, capfd: pytest.Captur
     ],
 )
 def test_mistakes_are_named(arguments: list[str], sent: bytes, reason: str) -> None:
-    found = subprocess.run([str(TWIN), *arguments], input=sent, capture_output=True, timeout=20, check=False)
+    found = subprocess.run([str(TWIN), *arguments], input=sent, capture_output=True, timeout=PATIENCE_S, check=False)
     lines = found.stderr.decode().splitlines()
     assert found.returncode == 2
     assert len(lines) == 1
@@ -170,7 +171,7 @@ class PtyTwin:
     def next_port(self) -> str:
         """The name that the twin prints when the board is plugged in."""
         assert self.child.stderr is not None
-        ready, _, _ = select.select([self.child.stderr], [], [], 10.0)
+        ready, _, _ = select.select([self.child.stderr], [], [], PATIENCE_S)
         assert ready
         found = re.fullmatch(r"board port: (\S+)\n", self.child.stderr.readline().decode())
         assert found
@@ -199,7 +200,7 @@ class PtyTwin:
         for _ in range(100):
             self.run(10)
             found += reader.feed(port.read(port.in_waiting))
-        port.timeout = 0.3  # the kernel hands over the last bytes in its own time
+        port.timeout = 1.0  # the kernel hands over the last bytes in its own time
         while part := port.read(4096):
             found += reader.feed(part)
         port.timeout = 0
@@ -207,8 +208,8 @@ class PtyTwin:
 
 
 def write_for_long(port: serial.Serial) -> None:
-    """Up to ten seconds, unless the port goes away."""
-    deadline = time.monotonic() + 10.0
+    """For as long as a test is patient, unless the port goes away."""
+    deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         os.write(port.fileno(), b"\0")
         port.read(1)
@@ -219,7 +220,7 @@ def pty_twin() -> Iterator[PtyTwin]:
     twin = PtyTwin()
     yield twin
     twin.child.kill()
-    twin.child.communicate(timeout=10)
+    twin.child.communicate(timeout=PATIENCE_S)
 
 
 def test_a_program_opens_closes_and_opens_the_pty(pty_twin: PtyTwin) -> None:

@@ -223,10 +223,10 @@ def test_a_gigabyte_of_garbage_ends_at_once_and_takes_no_memory(tmp_path: Path, 
                 file.write(garbage * 64)
         if head and garbage.startswith(b"1,2"):
             path.write_bytes(path.read_bytes()[: 1 << 20])  # these are rows: reading them takes what it takes
-        began = time.perf_counter()
+        began = time.process_time()
         with pytest.raises(EchostepError, match=r"imu\.csv"):
             load_imu(path)
-        assert time.perf_counter() - began < 20.0
+        assert time.process_time() - began < 20.0
 
 
 @pytest.mark.parametrize("content", ["", "a,b,c\n1,2,3\n", "\x00\x01\x02", HEADER + "\n", HEADER + "\nx,y\n"])

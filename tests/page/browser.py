@@ -28,14 +28,27 @@ from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import START_NS, demo_scenario
 from echostep.tracker import Tracker
-from waiting import until
+from waiting import PATIENCE_S, until
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 LOCAL = Address(port=0)
 SKIPPED = 500  # chunks in a portion before the page is opened
-SHOWN = "[echostep.scene.frame && { ...echostep.scene.frame, beams: 0, trail: 0, cloud: 0 }, document.body.innerText]"  # for the error of a test
+SHOWN = (  # for the error of a test
+    "[window.echostep?.scene?.frame && { ...echostep.scene.frame, beams: 0, trail: 0, cloud: 0 }, document.body.innerText]"
+)
 NAMES = "[...document.querySelectorAll('#rooms text')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => e.textContent)"
+SETTLED = """(() => {
+    const map = document.querySelector('#map'), { view } = echostep;
+    return Math.abs(view.width - map.clientWidth) < 1 && Math.abs(view.height - map.clientHeight) < 1;
+})()"""  # the view has the size of the map
+READY = (
+    f"echostep.last?.told && document.querySelector('#walls path') && {SETTLED}"  # an estimate and a floor are drawn
+)
+SPOT = f"""([x_m, y_m]) => {{
+    const {{ left, top }} = document.querySelector('#map').getBoundingClientRect(), [x, y] = echostep.view.toScreen(x_m, y_m);
+    return {SETTLED} && [left + x, top + y];
+}}"""
 PHONE = {"viewport": {"width": 360, "height": 640}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
 DESK = {"viewport": {"width": 1100, "height": 640}}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -55,17 +68,26 @@ def demo_walk(*, beacons: bool) -> tuple[Pose, list[Chunk]]:
 class Walk:
     """The demo's walk, tracked in a thread of its own at so many times real time, as a run does it; `guide`: with beacons, to a place.
 
-    `start`: what the tracker is told of the start, where it is not the true one.
+    `start`: what the tracker is told of the start, where it is not the true one. `stands`: the walk goes on with `go_on` only.
     """
 
     def __init__(
-        self, begin_s: float, pace: float, guide: RoutePlace | None = None, start: Start | None = None
+        self,
+        begin_s: float,
+        pace: float,
+        guide: RoutePlace | None = None,
+        start: Start | None = None,
+        *,
+        stands: bool = False,
     ) -> None:
         true_start, self._chunks = demo_walk(beacons=guide is not None)
         self._first_ns = self._chunks[0].t_arrival_ns
         self._tracker = Tracker(PLAN, start or true_start, seed=1)
         self._pace = pace
         self._stop = threading.Event()
+        self._goes = threading.Event()
+        if not stands:
+            self._goes.set()
         guided = GuidedRun(self._tracker, guide) if guide else None
         self.page = LivePage(self._tracker, "A simulated walk", LOCAL, guided)
         self._begin = sum(chunk.t_arrival_ns - self._first_ns < begin_s * 1e9 for chunk in self._chunks)
@@ -90,18 +112,32 @@ class Walk:
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
+        self._goes.set()
         self._thread.join()
         self.page.__exit__(None, None, None)
 
+    def go_on(self) -> None:
+        """Let a walk that stands go on."""
+        self._goes.set()
+
     def _run(self) -> None:
-        began, first_ns = time.monotonic(), self._chunks[self._begin].t_arrival_ns
+        """Take the chunks at the walk's pace, and the check-ins of the pages, these beyond the end of the walk too."""
+        self._goes.wait()
+        began, t_ns = time.monotonic(), self._chunks[self._begin].t_arrival_ns
+        first_ns = t_ns
         for chunk in self._chunks[self._begin :]:
-            ahead_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / self._pace - (time.monotonic() - began)
+            t_ns = chunk.t_arrival_ns
+            ahead_s = (t_ns - first_ns) * 1e-9 / self._pace - (time.monotonic() - began)
             if self._stop.wait(max(ahead_s, 0.0)):
                 return
-            for said in self.page.pop_check_ins():
-                self.checked_in += self._take([Chunk("person", chunk.t_arrival_ns, said)])
+            self._take_check_ins(t_ns)
             self._take([chunk])
+        while not self._stop.wait(0.01):
+            self._take_check_ins(t_ns)
+
+    def _take_check_ins(self, t_ns: int) -> None:
+        for said in self.page.pop_check_ins():
+            self.checked_in += self._take([Chunk("person", t_ns, said)])
 
     def _take(self, chunks: list[Chunk]) -> list[Estimate]:
         self._now_s = (chunks[-1].t_arrival_ns - START_NS) * 1e-9
@@ -113,13 +149,33 @@ class Walk:
 
 
 def looking(browser: Any, url: str, look: str) -> Any:
-    page = browser.new_context(**LOOKS[look]).new_page()
+    """A page with an estimate, a floor and names that are drawn."""
+    page = opened_page(browser, **LOOKS[look])
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
     page.goto(url)
-    wait_for(page, "echostep.scene.frame && echostep.scene.frame.told")
+    wait_for(page, READY)
     return page
+
+
+def opened_page(browser: Any, **how: Any) -> Any:
+    """A page of its own context, which is patient."""
+    page = browser.new_context(**how).new_page()
+    page.set_default_timeout(1e3 * PATIENCE_S)
+    return page
+
+
+def spot(page: Any, x_m: float, y_m: float) -> tuple[float, float]:
+    """The pixel of the page at a place, once the view has the size of the map."""
+    found: list[list[float]] = []
+
+    def is_settled() -> bool:
+        found.append(page.evaluate(SPOT, [x_m, y_m]))
+        return bool(found[-1])
+
+    assert until(is_settled), page.evaluate(SHOWN)
+    return found[-1][0], found[-1][1]
 
 
 def wait_for(page: Any, holds: str) -> None:

@@ -23,6 +23,7 @@ from echostep.page.elements.scene import PageScene, ParticleSample
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.plan.model import load_plan
+from waiting import PATIENCE_S
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 
@@ -60,7 +61,7 @@ class Answer(NamedTuple):
 def fetched(url: str) -> Answer:
     """What the server answers, an error's body too; the connection is closed (an `HTTPError` would hold it)."""
     try:
-        with urllib.request.urlopen(url, timeout=5) as answer:
+        with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer:
             return Answer(answer.status, answer.headers, answer.read())
     except urllib.error.HTTPError as error:
         with error:
@@ -68,7 +69,8 @@ def fetched(url: str) -> Answer:
 
 
 def opened_url(url: str) -> ClientConnection:
-    return connect(f"ws{url[4:]}socket", origin=Origin("/".join(url.split("/")[:3])), max_size=None)
+    origin = Origin("/".join(url.split("/")[:3]))
+    return connect(f"ws{url[4:]}socket", origin=origin, max_size=None, open_timeout=PATIENCE_S)
 
 
 def header(received: str | bytes) -> dict[str, Any]:
@@ -78,7 +80,7 @@ def header(received: str | bytes) -> dict[str, Any]:
 
 
 def next_frame(page: ClientConnection) -> dict[str, Any]:
-    return header(page.recv(timeout=5))
+    return header(page.recv(timeout=PATIENCE_S))
 
 
 @contextlib.contextmanager

@@ -21,6 +21,8 @@ from echostep.page import editor as plan_edit
 from echostep.page.editor import EditServer
 from echostep.plan.model import load_plan, parse_plan
 from echostep.plan.writer import plan_json, save_plan
+from page.browser import spot
+from waiting import PATIENCE_S, until
 
 DEMO = ROOT / "host/echostep/plans/demo.json"
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
@@ -41,7 +43,7 @@ def asked(
     server: EditServer, place: str, body: bytes | None = None, **headers: str
 ) -> tuple[int, bytes, http.client.HTTPMessage]:
     at = urlsplit(server.url)
-    line = http.client.HTTPConnection("127.0.0.1", at.port or 0, timeout=10)
+    line = http.client.HTTPConnection("127.0.0.1", at.port or 0, timeout=PATIENCE_S)
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     line.request("GET" if body is None else "POST", place if place.startswith("/") else at.path + place, body, named)
     try:
@@ -160,21 +162,13 @@ def drawn(tmp_path: Path) -> Iterator[EditServer]:
 
 def opened(browser: Any, server: EditServer, **context: Any) -> Any:
     page = browser.new_context(**({"viewport": {"width": 1200, "height": 760}} | context)).new_page()
-    page.set_default_timeout(5000)
+    page.set_default_timeout(1e3 * PATIENCE_S)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
     page.goto(server.url)
-    for _ in range(100):
-        if page.evaluate("Boolean(window.echostep)"):
-            return page
-        page.wait_for_timeout(50)
-    raise AssertionError(page.wrong)
-
-
-def spot(page: Any, x_m: float, y_m: float) -> tuple[float, float]:
-    box, (x, y) = page.locator("#map").bounding_box(), page.evaluate(f"echostep.view.toScreen({x_m}, {y_m})")
-    return box["x"] + x, box["y"] + y
+    assert until(lambda: page.evaluate("Boolean(window.echostep)")), page.wrong
+    return page
 
 
 def click(page: Any, x_m: float, y_m: float) -> None:
@@ -197,7 +191,6 @@ def test_two_walls_a_door_and_the_scale(browser: Any, drawn: EditServer) -> None
     picture = page.evaluate("echostep.sheet.picture")
     assert [picture["perPx"], picture["x"], picture["y"]] == pytest.approx([0.025, 1.25, 6.25], abs=0.02)
     page.click("#whole")
-    page.wait_for_timeout(50)
     page.click('[data-tool="wall"]')
     for place in ((3.01, 7.02), (8.02, 7.05), (8.04, 11.0)):
         click(page, *place)
@@ -285,7 +278,6 @@ def test_a_plan_is_traced_from_a_picture(browser: Any, tmp_path: Path) -> None:
         page.mouse.move(*spot(page, 3 + 3 / 13, 3 + 3 / 13), steps=4)  # the first point stayed where it was
         page.mouse.up()
         page.click("#whole")
-        page.wait_for_timeout(50)
         page.click('[data-tool="wall"]')
         for place in ((1, 1), (25, 1), (25, 13), (1, 13), (1, 1), (1, 8.5), (25, 8.5)):
             click(page, *place)

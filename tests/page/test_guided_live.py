@@ -31,6 +31,7 @@ from echostep.commands.beacon_player import simulate_gateway
 from echostep.plan.model import load_plan
 from echostep.simulation.devices.board import PythonBoard, Sent
 from echostep.simulation.scenario import Scenario
+from free_ports import free_port
 from page.frames import header
 from players import pseudo_terminal
 
@@ -68,12 +69,6 @@ class PortBoard:
         """Nothing to give back."""
 
 
-def free_udp_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plug:
-        plug.bind(("127.0.0.1", 0))
-        return int(plug.getsockname()[1])
-
-
 @contextlib.contextmanager
 def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
     """Ports of a board and an MTx whose wearer begins to walk when somebody opens them; a gateway tells what beacons hear of him."""
@@ -98,7 +93,7 @@ def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
 
 @pytest.fixture
 def live(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    beacons = f"udp://127.0.0.1:{free_udp_port()}"
+    beacons = f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
     with walking(beacons, tmp_path / "truth.csv") as (board, mtx):
         command = [
             *(sys.executable, "-m", "echostep", "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--port", "0"),
@@ -115,7 +110,7 @@ def live(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
 def frames(url: str) -> Generator[dict[str, Any], None, None]:
     """What a page gets that draws at once."""
     ends = time.monotonic() + PATIENCE_S
-    with connect(f"ws{url[4:]}socket", origin=Origin(url.rstrip("/")), max_size=None, open_timeout=30) as page:
+    with connect(f"ws{url[4:]}socket", origin=Origin(url.rstrip("/")), max_size=None, open_timeout=PATIENCE_S) as page:
         assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
         while time.monotonic() < ends:
             frame = header(page.recv(timeout=PATIENCE_S))

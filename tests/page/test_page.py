@@ -22,6 +22,7 @@ from echostep.ports.check_in import PERSON, CheckIn, Undo, parse_person
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from page.frames import LOCAL, PLAN, next_frame, opened_url
+from waiting import PATIENCE_S
 
 json_like = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
@@ -169,7 +170,7 @@ def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
             found += watched.take(portion)
             page.publish(portion)
         with opened_url(page.url) as looking:
-            assert json.loads(looking.recv(timeout=5))["kind"] == "hello"
+            assert json.loads(looking.recv(timeout=PATIENCE_S))["kind"] == "hello"
             frame = next_frame(looking)
     assert digest(found) == digest(expected)
     assert frame["told"]["x_m"] == expected[-1].x_m
@@ -187,7 +188,7 @@ def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
         for portion in (portion_of(earlier), portion_of([])):
             tracker.take(portion)
             page.publish(portion)
-        looking.recv(timeout=5)
+        looking.recv(timeout=PATIENCE_S)
         frame = next_frame(looking)
         while not frame["words"].startswith("lost"):
             looking.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))

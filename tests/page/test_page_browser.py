@@ -19,7 +19,7 @@ from echostep.page.server import PageServer
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
-from page.browser import LOCAL, LOOKS, PLAN, Walk, demo_walk, looking, picture, wait_for
+from page.browser import LOCAL, LOOKS, PLAN, Walk, demo_walk, looking, opened_page, picture, spot, wait_for
 from page.frames import scene
 from waiting import until
 
@@ -35,7 +35,7 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
         if look == "dark":
             page.evaluate("echostep.view.zoom(4)")
         wait_for(page, "document.querySelector('#left').textContent.includes('to go')")
-        page.wait_for_timeout(700)
+        wait_for(page, STILL)
         found = Axe().run(
             page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]}
         )
@@ -54,26 +54,27 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
 
 
 SHEET = "document.querySelector('#sheet-text').textContent"
+STILL = "!document.getAnimations().length"
 
 
 def test_a_tap_and_a_drag_check_in(browser: Any, tmp_path: Path) -> None:
-    with Walk(24.0, 2.0) as walk:
+    with Walk(24.0, 0.1) as walk:  # so slow that no line of text grows while the finger is on the map
         page = looking(browser, walk.page.url, "bright")
-        box = page.locator("#map").bounding_box()
         page.click("#here")
-        at = page.evaluate("echostep.view.toScreen(13.0, 2.0)")
-        page.mouse.move(box["x"] + at[0], box["y"] + at[1])
+        x_px, y_px = spot(page, 13.0, 2.0)
+        page.mouse.move(x_px, y_px)
         page.mouse.down()
-        page.mouse.move(box["x"] + at[0], box["y"] + at[1] - 50.0, steps=4)
+        page.mouse.move(x_px, y_px - 50.0, steps=4)
         page.mouse.up()
         assert not walk.checked_in  # it is said what it would do; only then it is done
         wait_for(page, f"{SHEET}.includes('In South corridor.') && {SHEET}.includes('You face the arrow.')")
         picture(page, "check-in", tmp_path)
         page.click("#sheet-here")
         assert until(lambda: len(walk.checked_in) == 1)
-        wait_for(page, "echostep.scene.frame.streams.check_ins === 1")
-        wait_for(page, "echostep.scene.frame.undo?.undo === 1")
-        wait_for(page, "!document.querySelector('#undo').hidden")
+        wait_for(
+            page,
+            "echostep.last.streams.check_ins === 1 && echostep.last.undo?.undo === 1 && !document.querySelector('#undo').hidden",
+        )
         page.context.close()
     (estimate,) = walk.checked_in
     assert np.hypot(estimate.x_m - 13.0, estimate.y_m - 2.0) < 0.5  # where the finger was; the walk goes on from there
@@ -83,7 +84,6 @@ def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
     with Walk(24.0, 1.0) as walk:
         page = looking(browser, walk.page.url, "dark")
         page.focus("#map")
-        wait_for(page, "document.querySelector('#walls path') !== null")
         before = page.evaluate("[echostep.view.x, echostep.view.scale, echostep.view.turn]")
         for key in ("ArrowRight", "+", "]"):
             page.keyboard.press(key)
@@ -97,7 +97,7 @@ def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
         page.keyboard.press("h")
         page.keyboard.press(",")
         page.keyboard.press("Enter")
-        wait_for(page, "document.activeElement.id === 'sheet-here' || !document.querySelector('#sheet-here').disabled")
+        wait_for(page, f"{SHEET} && !document.querySelector('#sheet-here').disabled")  # what it would do is said
         page.focus("#sheet-here")
         page.keyboard.press("Enter")
         assert until(lambda: len(walk.checked_in) == 1)
@@ -109,7 +109,6 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
     with PageServer(mailbox, LOCAL) as server:
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
-        wait_for(page, "document.querySelector('#walls path') !== null")  # the view fits the plan from then on
         before = page.evaluate("[echostep.view.scale, echostep.view.turn]")
         fingers, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
         for k in range(10):
@@ -140,10 +139,11 @@ def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
             replay_page.publish(portion)
         page = looking(browser, replay_page.url, "bright")
         assert page.is_hidden("#here")
-        page.select_option("#times", "16")
+        page.select_option("#times", "2")  # so that it is paused long before the end, however late the click comes
         wait_for(page, "echostep.scene.frame.play.t_s > 8")
         page.click("#play")
         wait_for(page, "!echostep.scene.frame.play.playing")
+        assert page.evaluate("echostep.scene.frame.play.times") == 2
         trail_count = page.evaluate("echostep.scene.trail.count")
         page.locator("#time").fill("60")
         wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 60) < 0.1")
@@ -175,10 +175,9 @@ def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp
 
     with Walk(25.0, 0.1, RoutePlace(19.6, 5.4)) as walk:  # so slow that nothing is over before it was looked at
         page = looking(browser, walk.page.url, look)
-        wait_for(page, "echostep.scene.frame.beacons.length > 5")
-        seen = page.evaluate(GUIDED)
-        path = page.evaluate("echostep.scene.frame.guidance.path")
-        page.wait_for_timeout(700)
+        wait_for(page, "echostep.last.beacons.length > 5 && echostep.last.guidance.path.length > 1")
+        wait_for(page, STILL)
+        seen, path = page.evaluate(f"[{GUIDED}, echostep.last.guidance.path]")
         colours = [ink_near(page, *place) for place in path[1:]]
         found = Axe().run(page)
         if look != "contrast":
@@ -228,13 +227,14 @@ def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
         guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES
     ]
     with PageServer(mailbox, LOCAL) as server:
-        page = browser.new_context(**LOOKS["bright"]).new_page()
+        page = opened_page(browser, **LOOKS["bright"])
         page.add_init_script(SPEECH)
         page.goto(server.url)
 
         def hears(shown: ShownGuidance) -> None:
             mailbox.publish(replace(scene(), guidance=shown))
             wait_for(page, f"document.querySelector('#sentence').textContent === '{shown.spoken}'")
+            wait_for(page, f"echostep.last?.guidance?.arrow_rad === {shown.arrow_rad}")
 
         hears(told[0])
         assert page.evaluate("said") == []  # off at first
@@ -278,17 +278,18 @@ def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(b
 
 
 def test_ten_pages_at_once_and_one_that_comes_back(browser: Any) -> None:
-    with Walk(10.0, 8.0) as walk:
+    with Walk(10.0, 2.0, stands=True) as walk:
         pages = [looking(browser, walk.page.url, "bright") for _ in range(10)]
-        assert walk.page.pages == 10
+        assert until(lambda: walk.page.pages == 10)
         pages[0].evaluate("echostep.link.wait = 1e6, echostep.link.socket.close()")  # away until it is told to return
         assert until(lambda: walk.page.pages == 9)
         missed = pages[0].evaluate("echostep.scene.trail.count")
+        walk.go_on()
         wait_for(pages[1], f"echostep.scene.trail.count > {missed + 5}")
         pages[0].evaluate("echostep.link.open()")
         assert until(lambda: walk.page.pages == 10)
         wait_for(pages[0], f"echostep.scene.trail.count > {missed + 5}")
-        counts = [page.evaluate("echostep.frames") for page in pages]
-        assert min(counts[1:]) > 5
+        for page in pages[1:]:
+            wait_for(page, "echostep.frames > 5")
         for page in pages:
             page.context.close()

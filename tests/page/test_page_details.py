@@ -11,7 +11,7 @@ import pytest
 from echostep.page import protocol
 from echostep.page.mailbox import Mailbox
 from imported_plans import seven_floors
-from page.browser import LOOKS, NAMES, looking, wait_for
+from page.browser import LOOKS, NAMES, looking, opened_page, wait_for
 from page.frames import PLAN, scene, served, told
 
 BOX = "(({ left, top, right, bottom }) => [left, top, right, bottom])(document.querySelector('%s').getBoundingClientRect())"
@@ -31,7 +31,8 @@ def test_names_lie_on_the_track_and_beside_the_wearer(browser: Any) -> None:
         assert page.evaluate(
             "canvas.compareDocumentPosition(labels) & Node.DOCUMENT_POSITION_FOLLOWING"
         )  # painted after it
-        wait_for(page, f"Math.min(...{OFF_PX % (18.5, 7.5)}) > 10")
+        wait_for(page, f"{NAMES}.includes('North corridor')")
+        wait_for(page, f"{OFF_PX % (18.5, 7.5)}.length && Math.min(...{OFF_PX % (18.5, 7.5)}) > 10")
         assert "North corridor" in page.evaluate(NAMES)
         page.context.close()
 
@@ -45,7 +46,7 @@ def test_one_floor_needs_no_button_and_seven_fit(browser: Any, look: str) -> Non
             assert (page.is_visible("#floors") or page.is_visible("#floor")) == (plan is not PLAN)
             if plan is not PLAN:
                 chosen = "#floor" if look == "bright" else "#floors"
-                control, area = page.evaluate(BOX % chosen), page.evaluate(BOX % "#map")
+                control, area = page.evaluate(f"[{BOX % chosen}, {BOX % '#map'}]")
                 assert all(a <= b for a, b in zip(area[:2], control[:2], strict=True))
                 assert all(a >= b for a, b in zip(area[2:], control[2:], strict=True))
                 assert control[3] - control[1] < 0.85 * (area[3] - area[1])
@@ -55,6 +56,20 @@ def test_one_floor_needs_no_button_and_seven_fit(browser: Any, look: str) -> Non
             page.context.close()
 
 
+def test_without_a_connection_nothing_stays_green(browser: Any) -> None:
+    status = "document.querySelector('#status-text').textContent"
+    with served() as (server, mailbox):
+        mailbox.publish(scene())
+        page = looking(browser, server.url, "bright")
+        page.evaluate("echostep.link.wait = 1e9, echostep.link.socket.close()")
+        wait_for(page, f"{status} === 'not connected'")
+        page.click("#follow")  # the last frame is drawn again
+        page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+        assert page.evaluate(status) == "not connected"
+        assert page.get_attribute("#words", "data-status") == "waiting"
+        page.context.close()
+
+
 def test_a_fault_of_the_server_is_said_and_goes_when_it_is_gone(browser: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise TypeError("ndarray")
@@ -62,7 +77,7 @@ def test_a_fault_of_the_server_is_said_and_goes_when_it_is_gone(browser: Any, mo
     with served() as (server, mailbox):
         mailbox.publish(scene())
         monkeypatch.setattr(protocol, "hello", broken)
-        page = browser.new_context(**LOOKS["bright"]).new_page()
+        page = opened_page(browser, **LOOKS["bright"])
         page.goto(server.url)
         wait_for(
             page,
@@ -70,8 +85,9 @@ def test_a_fault_of_the_server_is_said_and_goes_when_it_is_gone(browser: Any, mo
         )
         assert page.is_visible("#fault")
         monkeypatch.undo()
-        page.evaluate("echostep.link.open()")
-        wait_for(page, "echostep.scene.frame && document.querySelector('#fault').hidden")
+        wait_for(
+            page, "echostep.scene.frame && document.querySelector('#fault').hidden"
+        )  # the page tries again by itself
         assert len(server.shared.faults.notices) == 1
         page.evaluate("setTimeout(() => { throw new Error('of the page'); })")
         wait_for(

@@ -13,9 +13,12 @@ from echostep.page.elements.true_position import TruePath
 from echostep.page.live import LivePage
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
-from page.browser import LOCAL, PLAN, wait_for
+from page.browser import LOCAL, PLAN, SETTLED, opened_page, wait_for
 from walks import walk_chunks
 
+ENDED = "ended: mean error 0.06 m, at most 0.16 m. ▶ plays it again"
+FITS = "echostep.view.shows([1, 1, 25, 13])"
+STATUS = "document.getElementById('words').dataset.status"
 SIZES = {"desk": {"width": 1280, "height": 720}, "phone": {"width": 360, "height": 640}}
 
 
@@ -25,7 +28,7 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
     tracker, chunks = Tracker(PLAN, seed=1), walk_chunks()
     with LivePage(tracker, "echostep demo (simulated, 4 x real time)", LOCAL, keeps=True) as live:
         live.truth = TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]), np.array([0.0]))
-        page = browser.new_page(viewport=SIZES[size])
+        page = opened_page(browser, viewport=SIZES[size])
         page.goto(live.url)
         for k in range(0, len(chunks), 20):
             portion = portion_of(chunks[k : k + 20])
@@ -35,17 +38,16 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         assert "4 x real time" in page.inner_text("#title")
         assert page.is_hidden("#replay")
         live.end("mean error 0.06 m, at most 0.16 m")
-        wait_for(page, "document.getElementById('words').dataset.status === 'ended'")
+        wait_for(page, f"document.getElementById('status-text').textContent === '{ENDED}'")
+        wait_for(page, f"!document.getElementById('replay').hidden && {SETTLED} && {FITS}")  # beside the time bar
         page.screenshot(path=tmp_path / f"ended-{size}.png")
-        assert page.inner_text("#status-text") == "ended: mean error 0.06 m, at most 0.16 m. ▶ plays it again"
+        assert page.get_attribute("#words", "data-status") == "ended"
         green = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--good')")
         assert page.evaluate("getComputedStyle(document.getElementById('mark')).color") != rgb(green)
         assert page.is_hidden("#here")
-        assert page.evaluate("echostep.view.shows([1, 1, 25, 13])"), "the floor fits beside the time bar"
         page.click("#play")
-        wait_for(page, "document.getElementById('words').dataset.status === 'tracking'")
-        wait_for(page, "echostep.last.play.playing && !echostep.last.ended")
-        page.close()
+        wait_for(page, f"{STATUS} === 'tracking' && echostep.last.play.playing && !echostep.last.ended")
+        page.context.close()
 
 
 def rgb(colour: str) -> str:

@@ -29,6 +29,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from page.frames import LOCAL, PLAN, next_frame, opened, opened_url, scene, served
+from waiting import PATIENCE_S
 
 SEED = 5
 TO = RoutePlace(9.5, 10.8)
@@ -49,13 +50,13 @@ def guided_tracker() -> tuple[Tracker, GuidedRun]:
 
 def until(page: ClientConnection, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     """The first frame for which something holds; each is drawn."""
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         frame = next_frame(page)
         page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
         if holds(frame):
             return frame
-    raise AssertionError("no such frame in 30 s")
+    raise AssertionError(f"no such frame in {PATIENCE_S} s")
 
 
 def at(t_s: float) -> Callable[[dict[str, Any]], bool]:
@@ -106,7 +107,7 @@ def test_all_pages_are_guided_by_the_run_until_one_of_them_chooses_a_destination
         mailbox.publish(replace(scene(), guidance=guide, beacons=(mark,)))
         with opened(server) as one, opened(server) as other:
             for page in (one, other):
-                page.recv(timeout=5)
+                page.recv(timeout=PATIENCE_S)
                 frame = until(page, lambda frame: bool(frame["told"]))
                 assert frame["guidance"]["text"] == "Straight ahead"
                 assert not frame["guidance"]["own"]
@@ -125,7 +126,7 @@ def test_all_pages_are_guided_by_the_run_until_one_of_them_chooses_a_destination
                 assert (end["guidance"]["text"], end["goal"]) == ("Straight ahead", None)
         with opened(server) as late:
             mailbox.set_goal(RoutePlace(13.0, 4.5))
-            late.recv(timeout=5)
+            late.recv(timeout=PATIENCE_S)
             assert until(late, lambda frame: bool(frame["goal"]))["guidance"]["own"]
 
 
@@ -136,7 +137,7 @@ def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk
         tracker.take(portion)
         replay_page.publish(portion)
         with opened_url(replay_page.url) as page:
-            page.recv(timeout=5)
+            page.recv(timeout=PATIENCE_S)
             page.send('{"kind":"play","playing":false}')
             for t_s in (2.5, 15.2, 11.0, 7.0):
                 (*_, cue) = (cue for cue in guided.cues if cue.t_s <= t_s)
@@ -166,7 +167,7 @@ def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
         live.publish(portion)
         live.publish(portion_of([]))
         with opened_url(live.url) as page:
-            page.recv(timeout=5)
+            page.recv(timeout=PATIENCE_S)
             frame = until(page, lambda frame: frame["guidance"]["kind"] == "stop")
     assert frame["guidance"]["text"] == "Stop. There is nothing from the foot"
     assert frame["guidance"]["arrow_rad"] is None

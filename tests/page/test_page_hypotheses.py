@@ -45,7 +45,7 @@ def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> Non
 
 
 def test_from_nowhere_two_corridors_fit_until_the_wearer_turns(browser: Any, tmp_path: Path) -> None:
-    with Walk(SEARCHED_S, 1.0, start=Start()) as walk:
+    with Walk(SEARCHED_S, 0.1, start=Start()) as walk:  # so slow that the turn is far away however late the page is
         page = looking(browser, walk.page.url, "dark")
         wait_for(page, f"{DRAWN}.includes(' · ')")
         picture(page, "search", tmp_path)

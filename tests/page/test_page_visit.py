@@ -22,7 +22,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from imported_plans import seven_floors
-from page.browser import LOCAL, PHONE, PLAN, wait_for
+from page.browser import LOCAL, PHONE, PLAN, READY, opened_page, spot, wait_for
 from waiting import until
 
 SIZES: dict[str, dict[str, Any]] = {"desk": {"viewport": {"width": 1280, "height": 800}}, "phone": PHONE}
@@ -93,13 +93,12 @@ def pages(browser: Any, url: str) -> Iterator[dict[str, Any]]:
     with ExitStack() as opened:
         found = {}
         for size, how in SIZES.items():
-            context = browser.new_context(**how)
-            opened.callback(context.close)
-            page = found[size] = context.new_page()
+            page = found[size] = opened_page(browser, **how)
+            opened.callback(page.context.close)
             page.wrong = []
             page.on("pageerror", lambda error, page=page: page.wrong.append(str(error)))
             page.goto(url)
-            wait_for(page, "echostep.scene.frame?.told")
+            wait_for(page, READY)
         yield found
         for page in found.values():
             assert not page.wrong
@@ -107,8 +106,7 @@ def pages(browser: Any, url: str) -> Iterator[dict[str, Any]]:
 
 
 def tap(page: Any, place: tuple[float, float]) -> None:
-    box, (x, y) = page.locator("#map").bounding_box(), page.evaluate("([x, y]) => echostep.view.toScreen(x, y)", place)
-    page.mouse.click(box["x"] + x, box["y"] + y)
+    page.mouse.click(*spot(page, *place))
 
 
 def at(page: Any) -> tuple[float, float]:
@@ -149,15 +147,22 @@ def go_to_a_room(place: Place, actor: Any, other: Any, look: Any) -> None:
     """Chosen on one page, shown by both, and still there after the connection was lost."""
     actor.select_option("#goal", label=place.room)
     for page in (actor, other):
-        wait_for(page, "echostep.scene.frame.guidance?.own && echostep.scene.frame.guidance.kind !== 'looking'")
-        wait_for(page, "echostep.scene.frame.guidance.path.length > 1")
+        wait_for(page, "echostep.last.guidance?.own && echostep.last.guidance.kind !== 'looking'")
+        wait_for(page, "echostep.last.guidance.path.length > 1")
         assert page.evaluate("document.querySelector('#goal').selectedOptions[0].text") == place.room
     look("3-way")
     cue = actor.evaluate(CUE)
-    actor.evaluate("echostep.link.socket.close()")
-    wait_for(actor, "document.querySelector('#status-text').textContent === 'not connected'")
+    reconnected(actor)
     wait_for(actor, f"document.querySelector('#status-text').textContent !== 'not connected' && {CUE} === '{cue}'")
     assert actor.evaluate("document.querySelector('#goal').selectedOptions[0].text") == place.room
+
+
+def reconnected(page: Any) -> None:
+    """Lose the connection until the page has said so, then let it return."""
+    page.evaluate("echostep.link.wait = 1e9, echostep.link.socket.close()")
+    wait_for(page, "document.querySelector('#status-text').textContent === 'not connected'")
+    page.evaluate("echostep.last = null, echostep.link.open()")
+    wait_for(page, "echostep.last")
 
 
 def replay(browser: Any, visit: Visit, place: Place, acting: str, tmp_path: Path) -> None:
@@ -175,8 +180,8 @@ def replay(browser: Any, visit: Visit, place: Place, acting: str, tmp_path: Path
             wait_for(page, "!echostep.scene.frame.play.playing && echostep.scene.frame.play.times === 4")
             page.locator("#time").fill("6")
             wait_for(page, "Math.abs(echostep.last.play.t_s - 6) < 0.1")
-            page.evaluate("echostep.last = null, echostep.link.socket.close()")
-            wait_for(page, "echostep.last && Math.abs(echostep.last.play.t_s - 6) < 0.1")
+            reconnected(page)
+            wait_for(page, "Math.abs(echostep.last.play.t_s - 6) < 0.1")
             wait_for(page, "!echostep.last.play.playing && echostep.last.play.times === 4")
             page.screenshot(path=tmp_path / f"{acting}-4-replay.png")
 

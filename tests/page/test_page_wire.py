@@ -16,6 +16,7 @@ from echostep.page.mailbox import Mailbox
 from echostep.plan.model import Plan
 from imported_plans import seven_floors
 from page.frames import PLAN, fetched, next_frame, opened, scene, served
+from waiting import PATIENCE_S
 
 
 @pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
@@ -24,7 +25,7 @@ def test_a_page_of_any_plan_gets_hello_walls_and_frames(plan: Plan) -> None:
     with served(Mailbox(plan, "test", replay=False)) as (server, mailbox):
         mailbox.publish(scene())
         with opened(server) as page:
-            hello = json.loads(page.recv(timeout=5))
+            hello = json.loads(page.recv(timeout=PATIENCE_S))
             frame = next_frame(page)
         for k, level in enumerate(plan.levels):
             walls = fetched(f"{server.url}walls/{k}").body
@@ -59,7 +60,7 @@ def test_a_fault_reaches_the_log_once_and_every_page_in_words(monkeypatch: pytes
         monkeypatch.setattr(protocol, "hello", broken)
         for _ in range(3):
             with opened(server) as page:
-                told = json.loads(page.recv(timeout=5))
+                told = json.loads(page.recv(timeout=PATIENCE_S))
                 assert told["kind"] == "failed"
                 assert "ZeroDivisionError: division by zero" in told["reason"]
         assert len(server.shared.faults.notices) == 1
@@ -68,7 +69,7 @@ def test_a_fault_reaches_the_log_once_and_every_page_in_words(monkeypatch: pytes
         monkeypatch.undo()
         mailbox.publish(scene())
         with opened(server) as page:
-            assert json.loads(page.recv(timeout=5))["kind"] == "hello"
+            assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
 
 
 def broken(*_: object, **__: object) -> None:
@@ -81,8 +82,8 @@ def test_a_fault_in_a_frame_and_in_the_walls(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(protocol, "walls", broken)
         mailbox.publish(scene())
         with opened(server) as page:
-            assert json.loads(page.recv(timeout=5))["kind"] == "hello"
-            assert json.loads(page.recv(timeout=5))["kind"] == "failed"
+            assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
+            assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "failed"
         refused = fetched(f"{server.url}walls/0")
         assert refused.status == 500
         assert b"ZeroDivisionError" in refused.body

@@ -12,6 +12,7 @@ from pathlib import Path
 import echostep
 from echostep.jit import kernel
 from echostep.kernel_cache import PACKAGE, cache_folder
+from waiting import PATIENCE_S
 
 SHAPES = """
 from typing import NamedTuple
@@ -38,7 +39,9 @@ def run(package: Path, name: str, unit: float) -> str:
     (package / "shapes.py").write_text(SHAPES.format(name=name, unit=unit))
     command = [sys.executable, "-c", "import echostep.main"]
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False, env=environment)
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False, env=environment
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 

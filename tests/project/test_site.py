@@ -14,6 +14,7 @@ from urllib.parse import unquote
 import pytest
 
 from board_runs import ROOT
+from waiting import PATIENCE_S
 
 LOADED = re.compile(r"<(?:script|img|source|iframe|link(?! rel=\"canonical\"))\b[^>]*?\b(?:src|href)=\"([^\"]+)\"")
 
@@ -22,7 +23,7 @@ def build(source: Path, out: Path, *more: str) -> subprocess.CompletedProcess[st
     """`make site` with other folders."""
     options = ["-q", "-n", "-W", "--keep-going", "-c", str(ROOT / "tools/manual"), "-d", str(out.parent / "cache")]
     command = [sys.executable, "-m", "sphinx", *options, *more, str(source), str(out)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)
 
 
 @pytest.fixture(scope="module")

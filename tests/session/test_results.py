@@ -16,6 +16,7 @@ from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
 from echostep.session import results
 from page.frames import told
+from waiting import PATIENCE_S
 
 TRACKER: Any = SimpleNamespace(
     plan=load_plan(ROOT / "host/echostep/plans/demo.json"), beacon_places=lambda _: []
@@ -48,5 +49,5 @@ def test_a_picture_that_cannot_be_written_is_one_error_after_the_summary(
 
 def test_a_replay_without_a_page_loads_no_server() -> None:
     code = "import sys, echostep.session.replay; print({'uvicorn', 'starlette', 'pydantic', 'matplotlib'} & sys.modules.keys())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     assert done.stdout == "set()\n"

@@ -5,7 +5,16 @@ from __future__ import annotations
 
 import pytest
 
+from echostep.team import outbox
 from team.team_broker import Certificates
+from waiting import PATIENCE_S
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No report becomes too old to be sent, however long other programs have the cores."""
+    monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
+    monkeypatch.setattr(outbox, "CLOSING_S", PATIENCE_S)
 
 
 @pytest.fixture(scope="module")

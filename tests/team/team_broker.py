@@ -7,20 +7,17 @@ import shutil
 import signal
 import socket
 import subprocess
-import time
 from pathlib import Path
 from typing import Self
 
 import pytest
 import trustme
 
+from free_ports import free_port
+from waiting import PATIENCE_S, until
+
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
 needs_broker = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not installed (apt install mosquitto)")
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 class Certificates:
@@ -68,22 +65,22 @@ class Broker:
         assert MOSQUITTO
         with self._log.open("ab") as log:
             self._running = subprocess.Popen([MOSQUITTO, "-c", self._configuration], stdout=log, stderr=log)
-        end_s = time.monotonic() + 10.0
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", self.port), 1.0).close()
-            except OSError:
-                assert time.monotonic() < end_s, self._log.read_text()
-                assert self._running.poll() is None, self._log.read_text()
-                time.sleep(0.02)
-            else:
-                return
+        assert until(self._answers), self._log.read_text()
+
+    def _answers(self) -> bool:
+        assert self._running
+        assert self._running.poll() is None, self._log.read_text()
+        try:
+            socket.create_connection(("127.0.0.1", self.port), PATIENCE_S).close()
+        except OSError:
+            return False
+        return True
 
     def stop(self) -> None:
         if self._running is not None:
             self._running.send_signal(signal.SIGCONT)
             self._running.terminate()
-            self._running.wait(10.0)
+            self._running.wait(PATIENCE_S)
             self._running = None
 
     def freeze(self) -> None:

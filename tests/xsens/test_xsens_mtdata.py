@@ -309,9 +309,9 @@ def test_noise_full_of_preambles_costs_no_more() -> None:
     reader = FrameReader()
     reader.scan(b"")
     noise = b"\xfa\xff\x32\xff\x08\x00" * 350_000
-    began = time.perf_counter()
+    began = time.process_time()
     reader.scan(noise)
-    assert time.perf_counter() - began < 20.0  # a hang is found, not slowness
+    assert time.process_time() - began < 20.0  # a hang is found, not slowness
 
 
 def test_the_fuzzer_finds_nothing() -> None:

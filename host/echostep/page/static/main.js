@@ -17,7 +17,7 @@ const $ = (id) => document.getElementById(id);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
 const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, invited = false;
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, invited = false, connected = false;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
@@ -73,6 +73,7 @@ async function showLevel(level) {
 }
 
 function connection(open) {
+  connected = open;
   if (!open) panel.status('waiting', 'not connected');
 }
 
@@ -116,6 +117,7 @@ function draw() {
   painter.paint(view, scene);
   if (dirty && scene.frame && plan) {
     panel.frame(scene.frame);
+    connection(connected);  // the frame may be older than the end of the connection
     taps.undoable(scene.frame.undo);
     panel.floors(scene.level, estimate);
     replay.frame(scene.frame.play);
