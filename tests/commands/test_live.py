@@ -105,6 +105,7 @@ def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
         out, err = live.communicate(timeout=PATIENCE_S)
     finally:
         live.kill()
+        live.communicate()
         os.close(ours)
         os.close(theirs)
     assert live.returncode == 0, err

@@ -34,6 +34,7 @@ from echostep.simulation.scenario import Scenario
 from free_ports import free_port
 from page.frames import header
 from players import pseudo_terminal
+from walks import walk_chunks
 
 SEED = 3
 PLAN = ROOT / "host/echostep/plans/demo.json"
@@ -48,9 +49,11 @@ class PortBoard:
         self._ours = ours
         self._board = PythonBoard(seed=SEED)
         self.is_open = False
+        self.t_s = 0.0  # board time
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let the milliseconds of these rows pass."""
+        self.t_s += 1e-3 * len(rows)
         with contextlib.suppress(BlockingIOError):
             self._board.send(os.read(self._ours, 4096))
             self.is_open = True
@@ -76,11 +79,21 @@ def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
     with pseudo_terminal() as (ours, port):
         board, mtx = PortBoard(ours), run.PtyMtx()
         scenario = Scenario(load_plan(PLAN), WALK, SEED, board)
-        scenario.write_truth(truth)
-        gateway = threading.Thread(target=simulate_gateway, args=(PLAN, truth, beacons, 2.0, 1.0, SEED), daemon=True)
+        arguments = (
+            PLAN,
+            truth,
+            beacons,
+            2.0,
+            1.0,
+            SEED,
+            lambda: board.t_s,
+        )  # in step with the board, however late that is
+        gateway = threading.Thread(target=simulate_gateway, args=arguments, daemon=True)
+        walk_chunks(1.0)  # its kernels are compiled or loaded before the wearer walks
 
         def walk() -> None:
             run.wait_for_opening(board, mtx)
+            scenario.write_truth(truth, board.t_s)
             gateway.start()
             run.play(scenario, board, mtx)
 

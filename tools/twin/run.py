@@ -203,7 +203,7 @@ def main() -> int:
             truth = options.out / "truth.csv"
             scenario.write_truth(truth, board.t_s)
             if options.beacons:
-                arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed)
+                arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed, lambda: board.t_s)
                 threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
             play(scenario, board, mtx)
             if options.once:

@@ -27,23 +27,34 @@ from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chun
 BAUD = 115200
 DEFAULT_PORT = 9000  # UDP
 WRITE_TIMEOUT_S = 0.5
+LOOK_S = 0.02  # between two looks at the time of the walk
 
 
-def simulate_gateway(plan_path: Path, truth_path: Path, to: str, spacing_m: float, pace: float, seed: int) -> None:
-    """Send frames until the walk is over, `pace` times as fast as real time; raises EchostepError for files and ports that do not open."""
+def simulate_gateway(
+    plan_path: Path,
+    truth_path: Path,
+    to: str,
+    spacing_m: float,
+    pace: float,
+    seed: int,
+    walk_s: Callable[[], float] | None = None,
+) -> None:
+    """Send frames until the walk is over; raises EchostepError for files and ports that do not open.
+
+    `walk_s`: the time of a walk that is played elsewhere, with which the frames keep step; None: `pace` times as fast as real time.
+    """
     plan, truth = open_limited(plan_path), load_truth(truth_path)
     send, close = _open_sender(to)
     beacons_m = lay_beacons(truth.xy_m, spacing_m, np.random.default_rng([seed, 8]))
     arrival_ns = np.rint(truth.t_s * 1e9).astype(np.int64)
     duration_s = truth.t_s[-1] - truth.t_s[0]
     console.print(f"{len(beacons_m)} simulated beacons; their gateway sends to {to} for {duration_s:.0f} s of walk")
-    start_s, byte_count = time.monotonic(), 0
+    now_s, byte_count = walk_s or _clock(float(truth.t_s[0]), pace), 0
     try:
         world = BeaconWorld(beacons_m, plan.levels[0].walls)
         for chunk in gateway_chunks(world, truth.t_s, truth.xy_m, arrival_ns, seed):
-            early_s = (chunk.t_arrival_ns - int(arrival_ns[0])) * 1e-9 / pace - (time.monotonic() - start_s)
-            if early_s > 0.0:
-                time.sleep(early_s)
+            while (early_s := chunk.t_arrival_ns * 1e-9 - now_s()) > 0.0:
+                time.sleep(min(early_s / pace, LOOK_S))
             send(chunk.data)
             byte_count += len(chunk.data)
     except KeyboardInterrupt:
@@ -51,6 +62,12 @@ def simulate_gateway(plan_path: Path, truth_path: Path, to: str, spacing_m: floa
     finally:
         close()
     console.print(f"{byte_count} bytes sent")
+
+
+def _clock(start_s: float, pace: float) -> Callable[[], float]:
+    """A time that is `start_s` now and goes on `pace` times as fast as real time."""
+    began_s = time.monotonic()
+    return lambda: start_s + (time.monotonic() - began_s) * pace
 
 
 def _open_sender(to: str) -> tuple[Callable[[bytes], object], Callable[[], None]]:
