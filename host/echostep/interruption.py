@@ -2,7 +2,10 @@
 """What ends a run from outside: Ctrl-C, SIGTERM, and a terminal that is closed (SIGHUP).
 
 In: signals. Out: one KeyboardInterrupt, after which the run writes its files; an output that a closed terminal does not break.
-Owns the handlers. A second Ctrl-C ends at once.
+Owns the handlers, and whether a signal has come. A second Ctrl-C ends at once.
+
+A KeyboardInterrupt is lost where Python drops every exception: in finalizers, and in the callbacks of LLVM while a kernel is compiled or loaded. So
+the loop of a run calls `raise_lost`.
 """
 
 from __future__ import annotations
@@ -13,24 +16,34 @@ import os
 import signal
 import stat
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TextIO
 
+_asked = threading.Event()  # a signal has come since `end_by_signals`
 HANGUP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # missing on Windows
 
 
 def end_by_signals() -> None:
     """Handle the signals; a SIGHUP that this process was told to ignore (nohup) stays ignored."""
+    _asked.clear()
     signal.signal(signal.SIGINT, _end)
     signal.signal(signal.SIGTERM, _end)
     if HANGUP is not None and signal.getsignal(HANGUP) is not signal.SIG_IGN:
         signal.signal(HANGUP, _end)
 
 
+def raise_lost() -> None:
+    """Raise KeyboardInterrupt again when a signal has come; a run whose loop still calls this has not got it."""
+    if _asked.is_set():
+        raise KeyboardInterrupt
+
+
 def _end(number: int, _frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt; afterwards only Ctrl-C still interrupts."""
+    _asked.set()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     if HANGUP is not None:
         signal.signal(HANGUP, lambda *_: leave_terminal())

@@ -16,8 +16,10 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT
-from command_line import PROGRAM
+from command_line import PROGRAM, echostep
+from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
+from echostep.recording.recorder import Recorder
 from players import python_board
 from waiting import PATIENCE_S, until
 
@@ -100,6 +102,31 @@ def test_a_run_that_ignores_sighup_records_on_without_its_terminal(tmp_path: Pat
         live.wait(timeout=PATIENCE_S)
         check_files(tmp_path, live)
     assert without < 1.5 * with_terminal
+
+
+@pytest.mark.parametrize("command", ["live", "record"])
+def test_an_interrupt_that_is_dropped_ends_the_run_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """As by a callback of LLVM while a kernel is loaded."""
+    write, written = Recorder.write, list[Chunk]()
+
+    def dropping(recorder: Recorder, chunk: Chunk) -> None:
+        written.append(chunk)
+        if len(written) == 3:
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGTERM)
+        write(recorder, chunk)
+
+    monkeypatch.setattr(Recorder, "write", dropping)
+    more = ["--plan", PLAN, "--headless", "--out", tmp_path] if command == "live" else ["--out", tmp_path / "walk.mcap"]
+    with python_board() as port:
+        done = echostep(command, "--board", port, "--seconds", PATIENCE_S, *more)
+    assert done.returncode == 0, done.stderr
+    assert 3 <= len(written) < 10
+    recording = open_recording(tmp_path / "walk.mcap")
+    assert list(recording.chunks()) == written
+    assert not recording.truncated
 
 
 def check_files(out: Path, live: subprocess.Popen[bytes]) -> None:

@@ -17,6 +17,7 @@ from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.guidance.guided_run import destination
+from echostep.interruption import raise_lost
 from echostep.page.live import LivePage
 from echostep.plan.importers.limited import open_limited
 from echostep.ports.arrival_clock import SleepWatch, now_ns
@@ -75,6 +76,7 @@ def record(ports: PortOptions, out: Path) -> None:
         with start_recording(out, metadata, ports.keep) as recorder, suppress(KeyboardInterrupt):
             chunks = _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds)
             for chunk in with_bar(chunks, "recording; Ctrl-C ends it", _passed(ports.seconds)):
+                raise_lost()
                 if chunk is not None:
                     byte_count[chunk.port] += len(chunk.data)
         print_notices(recorder.notices)

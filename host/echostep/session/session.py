@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Self
 
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_run import GuidedRun
+from echostep.interruption import raise_lost
 from echostep.localization.estimate import Estimate
 from echostep.localization.metrics import Truth
 from echostep.output.derived import Derived
@@ -140,6 +141,7 @@ class Session:
         with view or nullcontext():
             try:
                 for portion in portions:
+                    raise_lost()
                     estimates = self._take(portion)
                     self._show(estimates, view)
                     if recorder and derived:
