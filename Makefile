@@ -107,10 +107,15 @@ fuzz: $(READY) ## fuzz the firmware's codec for a minute from its kept corpus, o
 fuzz-host: $(READY) ## mutated inputs on every way into the host for a minute, on from where the last minute stopped
 	PYTHONPATH=tests $(BIN)/python tools/fuzz_host.py
 
-faults: $(READY) ## each fault of the twin during one walk: what was lost, how long, what the tracker claimed; on from where it stopped
+faults: $(READY) ## each fault of the twin and of the host during one walk: what was lost, how long, what the tracker claimed; on from where it stopped
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
 	$(BIN)/python tools/faults.py --page
+
+soak: $(READY) ## eight simulated hours of the firmware through the live pipeline: memory, losses, the clock's wraps, replay; HOURS=0.05 for less
+	$(MAKE) --quiet -C firmware
+	$(MAKE) --quiet -C tools/twin
+	$(BIN)/python tools/soak.py $(if $(HOURS),--hours $(HOURS))
 
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
 	$(BIN)/python tools/kill_recorder.py
@@ -127,4 +132,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults kill flips docs site licences lock audit flash clean
+.PHONY: help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips docs site licences lock audit flash clean

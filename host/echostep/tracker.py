@@ -40,6 +40,7 @@ from echostep.walls.level_sheet import lay_out_levels
 from echostep.xsens.reader import MtxCounts
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
+LATE_S = 0.5  # behind a published time: an older estimate no longer says where the wearer is; by reason: half a stride, a third of the claimed 1 m
 KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over; by reason
 KNOWN = 0.9  # probability of the estimate whose heading it is; by reason: a tap where the wearer is not says that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
@@ -262,8 +263,13 @@ class Tracker:
         return ready
 
     def _publish(self, measured: MeasuredSegment | None, new: Estimate) -> Estimate:
-        """Call the watchers with a new estimate; its time is never before that of an earlier one."""
+        """Call the watchers with a new estimate; its time is never before that of an earlier one.
+
+        Bytes that come late, after a dropout, say where the wearer was: such an estimate is carried on to the time of the dropout.
+        """
         self._published_s = max(self._published_s, new.t_s)
+        if new.t_s < self._published_s - LATE_S:
+            new = unobserved(new, self._published_s)
         new = new if new.t_s == self._published_s else replace(new, t_s=self._published_s)
         for watch in self.watchers:
             watch(measured, new)

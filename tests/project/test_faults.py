@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""`make faults`: its list of faults exists in the twin, its judgement of gaps, its table."""
+"""`make faults`: its list of faults exists in the twin, its judgement of gaps, its table; two faults of the host in short."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import faults
 from board_runs import ROOT, Bench, needs_twin
+from echostep.ports.chunks import BOARD, MTX
+from echostep.recording.reading import open_recording
+from echostep.simulation.devices.board import PythonBoard
+from fault_outcomes import NORMAL_S, Outcome, judge_streams, table
+from twin.host_faults import kill, plug_mtx, unplug_mtx
+from twin.live_walk import HostFault, LiveWalk
 
 
 @needs_twin
@@ -35,17 +42,49 @@ def test_the_matrix_has_a_fault_of_each_switch() -> None:
 
 
 def test_gaps_are_judged() -> None:
-    begin_s, end_s = faults.BEGIN_S, faults.END_S
+    begin_s, end_s = 20.0, 50.0
     regular = [begin_s + 0.1 * k for k in range(round(10 * (end_s - begin_s)))]
-    times_s = {name: [t for t in regular if not begin_s + 2.0 < t < begin_s + 5.0] for name in faults.STREAMS}
-    outcome = faults.Outcome("x=y")
-    faults._judge_streams(outcome, times_s | dict.fromkeys(("thigh", "calf", "belt", "sync"), _dense(begin_s, end_s)))
+    times_s = {name: [t for t in regular if not begin_s + 2.0 < t < begin_s + 5.0] for name in NORMAL_S}
+    dense = dict.fromkeys(("thigh", "calf", "belt", "sync", "foot"), _dense(begin_s, end_s))
+    outcome = Outcome("x=y")
+    judge_streams(outcome, times_s | dense, begin_s, end_s)
     assert set(outcome.silent_s) == {"left", "right", "pressure", "compass"}
     assert outcome.whole_s is not None
     assert abs(outcome.whole_s - 5.0) < 0.11
-    faults._judge_streams(outcome, {name: [begin_s] for name in faults.STREAMS})
+    judge_streams(outcome, {name: [] for name in NORMAL_S}, begin_s, end_s)
     assert outcome.whole_s is None
-    assert "| `x=y` | 0 | all 30.0 s | never |" in faults.table([outcome])
+    assert "| `x=y` | 0 | all 30.0 s | never |" in table([outcome])
+
+
+def test_a_computer_that_sleeps_leaves_a_gap_and_no_false_claim() -> None:
+    asleep = faults.Fault((), (), 10.0, (BOARD, MTX), "the computer sleeps")
+    outcome = faults.run(asleep, PythonBoard(1))
+    assert all(9.9 < seconds < 10.5 for seconds in outcome.silent_s.values())
+    assert len(outcome.silent_s) == len(NORMAL_S)
+    assert outcome.whole_s is not None
+    assert outcome.whole_s < 10.5
+    assert outcome.wrongly_sure == 0
+
+
+@needs_twin
+def test_a_killed_run_is_started_again_while_the_mtx_is_unplugged(tmp_path: Path) -> None:
+    """In real time, through two live runs: each has its recording, and the ports are found again."""
+
+    def begin(walk: LiveWalk) -> None:
+        unplug_mtx(walk)
+        kill(walk)
+        plug_mtx(walk)
+        walk.start("--start", "?")
+
+    with LiveWalk(tmp_path / "walk", HostFault("kill -9", begin), 3.0, 10.0) as walk:
+        outcome = walk.play()
+        first, second = (open_recording(run / "walk.mcap") for run in walk.runs)
+    assert sum(len(chunk.data) for chunk in first.chunks()) > 10_000
+    assert first.truncated
+    assert {chunk.port for chunk in second.chunks()} == {BOARD, MTX}
+    assert not second.truncated
+    assert set(outcome.silent_s) == set(NORMAL_S)
+    assert outcome.wrongly_sure == 0
 
 
 def _dense(begin_s: float, end_s: float) -> list[float]:

@@ -19,6 +19,7 @@ import sys
 import threading
 import time
 import tty
+from collections.abc import Callable, Iterator
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import IO
@@ -52,12 +53,17 @@ class PtyBoard:
         assert self._child.stderr
         self._in: IO[bytes] = self._child.stdin
         self._out: IO[bytes] = self._child.stdout
-        found = re.match(rb"board port: (\S+)", self._child.stderr.readline())
-        if not found:
-            raise SystemExit("the twin did not start")
-        self.port = found[1].decode()
+        self._log: IO[bytes] = self._child.stderr
+        self.port = self._told_port()
         self.is_open = False
         self.t_s = 0.0  # board time
+
+    def _told_port(self) -> str:
+        """The name of the pseudo terminal, which the twin prints when it makes one."""
+        found = re.match(rb"board port: (\S+)", self._log.readline())
+        if not found:
+            raise SystemExit("the twin made no port")
+        return found[1].decode()
 
     def advance(self, rows: object) -> Sent:
         """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""
@@ -79,60 +85,80 @@ class PtyBoard:
         """Does nothing: the host writes to the port itself."""
 
     def fault(self, text: str) -> None:
-        """Set a fault switch, `name=value`."""
+        """Set a fault switch, `name=value`; after `usb=plug` the port has another name."""
         self._in.write(b"F" + len(text).to_bytes(4, "little") + text.encode())
+        self._in.flush()
+        if text == "usb=plug":
+            self.port = self._told_port()
 
     def close(self) -> None:
         """Stop the twin."""
         self._child.kill()
         self._child.wait()
-        for pipe in (self._in, self._out, self._child.stderr):
+        for pipe in (self._in, self._out, self._log):
             with contextlib.suppress(OSError):
-                if pipe:
-                    pipe.close()
+                pipe.close()
 
 
 class PtyMtx:
     """A simulated MTx on a pseudo terminal, which answers the host's requests."""
 
     def __init__(self) -> None:
-        self._ours, theirs = os.openpty()
-        tty.setraw(theirs)
-        os.set_blocking(self._ours, False)
-        self.port = os.ttyname(theirs)
+        self._ends: tuple[int, ...] = ()  # ours and theirs; none: unplugged
+        self.counter = self._counted = 0  # of the newest sample; of the one at its last start
         self.device = MtxDevice()
+        self.plug()
         warm_up()
+
+    def plug(self) -> None:
+        """Make the pseudo terminal, perhaps with another name than before."""
+        ours, theirs = self._ends = os.openpty()
+        tty.setraw(theirs)
+        os.set_blocking(ours, False)
+        self.port = os.ttyname(theirs)
+
+    def unplug(self) -> None:
+        """Remove the pseudo terminal."""
+        for end in self._ends:
+            os.close(end)
+        self._ends = ()
+
+    def power_on(self) -> None:
+        """The MTx had no power: it starts anew, with the settings that it was given [Xsens MT0101P], and counts its samples from 0."""
+        self._counted = self.counter
+        self._write(self.device.power_on(time.monotonic()))
 
     def answer_requests(self) -> None:
         """Read the host's requests and send the answers."""
         received = b""
         with contextlib.suppress(BlockingIOError):
-            received = os.read(self._ours, 4096)
+            received = os.read(self._ends[0], 4096) if self._ends else b""
         self._write(self.device.feed(received, time.monotonic()))
 
     def measure(self, frame: bytes) -> None:
         """Send a measurement, given as a frame in the project's format, in the format that the device is set to."""
         for sample in MtxReader().feed(frame):
-            self._write(self.device.measure(sample))
+            self.counter = sample.counter
+            self._write(self.device.measure(sample._replace(counter=(sample.counter - self._counted) & 0xFFFF)))
 
     def _write(self, sent: bytes) -> None:
         with contextlib.suppress(BlockingIOError):  # no program reads: the bytes are lost, as on a cable without a host
-            if sent:
-                os.write(self._ours, sent)
+            if sent and self._ends:
+                os.write(self._ends[0], sent)
 
 
-def wait_for_opening(board: PtyBoard, mtx: PtyMtx) -> None:
-    """Run the board with empty rows, in real time, until a program opens its port."""
+def wait_for_opening(board: PtyBoard, mtx: PtyMtx, expected: Callable[[], bool] = lambda: True) -> None:
+    """Run the board with empty rows, in real time, until a program opens its port, or is no longer `expected` to."""
     idle = np.zeros(IDLE_MS, ROW)
     idle["sync_us"] = NO_SYNC
-    while not board.is_open:
+    while not board.is_open and expected():
         board.advance(idle)
         mtx.answer_requests()
         time.sleep(IDLE_MS * 1e-3)
 
 
-def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
-    """Play one walk in real time."""
+def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]:
+    """Play one walk in real time; gives the time of the walk (s) after each block."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
     began = time.monotonic()
@@ -152,6 +178,7 @@ def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
         elif ahead < -LATE_S:
             print(f"the simulation is {-ahead:.1f} s behind real time", file=sys.stderr)
             began = time.monotonic() - now_s
+        yield now_s
 
 
 def rehearse(rehearsal: Rehearsal, board: PtyBoard, mtx: PtyMtx) -> None:
@@ -205,7 +232,8 @@ def main() -> int:
             if options.beacons:
                 arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed, lambda: board.t_s)
                 threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
-            play(scenario, board, mtx)
+            for _ in play(scenario, board, mtx):
+                pass
             if options.once:
                 break
     except KeyboardInterrupt:

@@ -94,6 +94,8 @@ class SerialPorts:
             port = self._ports[name]
             try:
                 received = port.read(max(1, port.in_waiting))
+                if waiting := port.in_waiting if received else 0:  # a read that has waited returns its first byte alone
+                    received += port.read(waiting)
             except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under a blocking read
                 self._reopen(name, url, baud, error)
                 continue

@@ -196,6 +196,11 @@ class BoardProcess:
         self._rest = b""
         self.trace: list[tuple[int, str]] = []  # truth about the buses, for tests and measurements
 
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._child.pid
+
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let n milliseconds pass."""
         self._write(b"R", np.ascontiguousarray(rows, ROW).tobytes())
