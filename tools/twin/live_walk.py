@@ -27,7 +27,7 @@ from echostep.ports.arrival_clock import now_ns
 from echostep.recording.reading import open_recording
 from echostep.simulation.scenario import demo_scenario
 from fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams
-from twin.run import PtyBoard, PtyMtx, play, wait_for_opening
+from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
 PLAN = Path(__file__).resolve().parents[2] / "host/echostep/plans/demo.json"
 SEED = 1
@@ -121,7 +121,7 @@ class LiveWalk:
         wait_for_opening(self.board, self.mtx, lambda: self.process.poll() is None)
         began_s, fault_s = self.board.t_s, np.inf
         due = [(self._begin_s, self.fault.begin), (self._begin_s + self.fault.seconds, self.fault.end)]
-        for now_s in play(scenario, self.board, self.mtx):
+        for now_s in playing(scenario, self.board, self.mtx):
             while due and now_s >= due[0][0]:
                 if len(due) == 2:
                     self._fault_ns, fault_s = now_ns(), self.board.t_s

@@ -157,7 +157,13 @@ def wait_for_opening(board: PtyBoard, mtx: PtyMtx, expected: Callable[[], bool] 
         time.sleep(IDLE_MS * 1e-3)
 
 
-def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]:
+def play(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> None:
+    """Play one walk in real time."""
+    for _ in playing(scenario, board, mtx):
+        pass
+
+
+def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]:
     """Play one walk in real time; gives the time of the walk (s) after each block."""
     frames = iter(zip(scenario.mtx.arrival_s.tolist(), scenario.mtx.frames, strict=True))
     waiting = next(frames, None)
@@ -232,8 +238,7 @@ def main() -> int:
             if options.beacons:
                 arguments = (path, truth, options.beacons, SPACING_M, 1.0, options.seed, lambda: board.t_s)
                 threading.Thread(target=simulate_gateway, args=arguments, daemon=True).start()
-            for _ in play(scenario, board, mtx):
-                pass
+            play(scenario, board, mtx)
             if options.once:
                 break
     except KeyboardInterrupt:
