@@ -36,8 +36,9 @@ def end_by_signals() -> None:
 
 
 def raise_lost() -> None:
-    """Raise KeyboardInterrupt again when a signal has come; a run whose loop still calls this has not got it."""
+    """Raise KeyboardInterrupt again, once, when a signal has come; a run whose loop still calls this has not got it."""
     if _asked.is_set():
+        _asked.clear()
         raise KeyboardInterrupt
 
 
