@@ -59,6 +59,13 @@ def options(
 
 
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
+OptionalPlan = Annotated[
+    Path | None,
+    typer.Option(
+        "--plan",
+        help="The building's plan (JSON, metres). Without it the map begins where the walk begins, and nothing is drawn on it.",
+    ),
+]
 Start = Annotated[
     str | None,
     typer.Option(
@@ -179,7 +186,7 @@ def demo(
 
 @app.command()
 def live(
-    plan: Plan,
+    plan: OptionalPlan = None,
     board: BoardPort = None,
     mtx: MtxPort = None,
     out: Out = Path("out/live"),
@@ -232,7 +239,7 @@ def record(
 @app.command()
 def replay(
     recording: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
-    plan: Plan,
+    plan: OptionalPlan = None,
     out: Out = Path("out/replay"),
     start: Start = None,
     start_sd: StartSd = None,

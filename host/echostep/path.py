@@ -65,6 +65,11 @@ class MeasuredSegment:
     range_m: Floats
     height_m: Floats = field(default_factory=lambda: np.zeros(0))
 
+    @property
+    def without_pings(self) -> MeasuredSegment:
+        """The same segment, heights and all, without its pings."""
+        return replace(self, t_s=np.zeros(0), ranger=np.zeros(0, np.int64), range_m=np.zeros(0))
+
     def after(self, t_s: float) -> MeasuredSegment:
         """The part of the segment after a time on it, with the pings triggered since."""
         s = self.segment

@@ -32,7 +32,7 @@ from echostep.localization.plausibility import STATED
 from echostep.localization.start import Start
 from echostep.odometry.front_end import FrontEnd, FrontEndCounts
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Plan, Pose
+from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, Undo, parse_person
 from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
 from echostep.settings import Settings
@@ -340,6 +340,8 @@ class Tracker:
 
     def _start_of(self, start: Pose | Start | None, waits: bool) -> Start | None:
         """The start as a distribution; raises EchostepError for a level that the plan does not have."""
+        if not self.plan.is_drawn and not (isinstance(start, Start) and start.pose):
+            return Start(start if isinstance(start, Pose) else NO_PLAN.start, 0.0, 0.0)  # the origin of the map
         if isinstance(start, Pose):
             cloud = self.settings.cloud
             start = Start(start, cloud.start_sd_m, math.radians(cloud.start_turn_sd_deg))

@@ -28,6 +28,7 @@ class Run:
 
     def __init__(self) -> None:
         self.state = SimpleNamespace(check_ins=0, undone=0, right=0.999)
+        self.plan = SimpleNamespace(is_drawn=True)
         self.watchers: list[Any] = []
         self.losses = Losses(self)  # type: ignore[arg-type]
         self.t_s = 0.0

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: MIT
 """A guided run: estimates of a tracker in, cues out, to show, to speak and to keep.
 
-In: a tracker, a destination. Out: a `Cue` for each estimate, when the tracker publishes it; cues.csv. Owns the guide. The time of the last beacon
+In: a tracker, a destination. Out: a `Cue` for each estimate, when the tracker publishes it. Owns the guide. The time of the last beacon
 contact is read at that moment, so a replay gives the same cues, in whatever portions its chunks come.
 """
 
 from __future__ import annotations
 
-import csv
 import math
-from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.guidance.cue_list import CueList
 from echostep.guidance.cues import Cue, CueKind, Guide
+from echostep.guidance.guided_return import GuidedReturn
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
@@ -21,7 +21,17 @@ from echostep.tracker import Tracker
 
 NO_WAY = "Stop. No way leads there from here"
 FAR_M = 9.0  # from a route: the first cue is to lead back to it, which compiles all kernels
-CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
+
+
+def guidance_of(tracker: Tracker, to: str | None) -> CueList | None:
+    """The guidance of a run to a destination as given; None without one. Without a plan there is one destination, the start."""
+    if to is None:
+        return None
+    if tracker.plan.is_drawn:
+        return GuidedRun(tracker, destination(to, tracker.plan))
+    if to != "start":
+        raise EchostepError(f"--guide {to}: without a plan the only destination is: start")
+    return GuidedReturn(tracker)
 
 
 def destination(text: str, plan: Plan) -> RoutePlace:
@@ -44,11 +54,12 @@ def destination(text: str, plan: Plan) -> RoutePlace:
     return RoutePlace(x, y, level_number)
 
 
-class GuidedRun:
+class GuidedRun(CueList):
     """Guides the wearer of one tracker to one place; the route begins at the first estimate."""
 
     def __init__(self, tracker: Tracker, to: RoutePlace) -> None:
         """Raises EchostepError for a place outside the plan."""
+        super().__init__()
         self._tracker = tracker
         self._to = to
         self._routes = Routes(tracker.plan)
@@ -57,31 +68,12 @@ class GuidedRun:
             Estimate(0.0, to.x_m + FAR_M, to.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, to.level)
         )  # compiles the kernels now, not during the run
         self._guide: Guide | None = None
-        self._returned = 0
-        self.cues: list[Cue] = []
         tracker.watchers.append(self._watch)
-
-    @property
-    def cue(self) -> Cue | None:
-        """The newest cue."""
-        return self.cues[-1] if self.cues else None
 
     @property
     def route(self) -> Route | None:
         """The present route."""
         return self._guide.route if self._guide else None
-
-    def news(self) -> list[Cue]:
-        """The cues since the last call."""
-        begin, self._returned = self._returned, len(self.cues)
-        return self.cues[begin:]
-
-    def write(self, path: Path) -> None:
-        """All cues as CSV."""
-        with path.open("w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(CUE_COLUMNS)
-            writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)
 
     def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
         """Add the cue of a new estimate."""

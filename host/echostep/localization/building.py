@@ -30,6 +30,11 @@ class Building:
         self._backgrounds: dict[EchoModel, Background] = {}
         self._fields: dict[EchoModel, CoarseField] = {}
 
+    @property
+    def has_walls(self) -> bool:
+        """Whether there is anything that echoes could tell."""
+        return len(self.walls.index.walls) > 0
+
     def background(self, model: EchoModel) -> Background:
         """Density of the echoes of a wearer anywhere on the floor."""
         if model not in self._backgrounds:

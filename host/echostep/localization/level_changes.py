@@ -23,6 +23,7 @@ from echostep.localization.particle_kernels import Move, ParticleArrays
 from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, level_on_sheet, nearest_level
 
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
+UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
 LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
 
 
@@ -89,6 +90,7 @@ def change_levels(
     has_foot, has_pressure = math.isfinite(change.felt_sd_m), math.isfinite(change.height_sd_m)
     variance = lag_variance + change.height_sd_m**2 if has_pressure else np.inf
     gain = lag_variance / variance if has_pressure else 0.0
+    knows_lag = has_pressure and lag_variance < UNKNOWN_LAG_M2
     flat_sd, top = math.hypot(model.flat_sd_m, change.felt_sd_m), -np.inf
     for i in range(len(x)):
         level = level_on_sheet(x[i], sheet)
@@ -101,7 +103,7 @@ def change_levels(
         if connector >= 0:
             if sheet.kind[connector] != LIFT and has_foot:
                 z[i] += change.felt_m + change.felt_sd_m * noise[i]
-            elif has_pressure:
+            elif knows_lag:
                 z[i] = change.height_m - lag[i]
             new_level = nearest_level(z[i], connector, sheet)
             x[i] += (new_level - level) * sheet.pitch_m

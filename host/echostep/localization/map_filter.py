@@ -22,10 +22,12 @@ from echostep.localization.beacon_model import BeaconSettings
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate
+from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.level_changes import ClimbSettings, HeightChange
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, CloudSettings, Evidence
 from echostep.localization.plausibility import STATED, Plausibility
+from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.start import Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
@@ -46,10 +48,14 @@ AGREED = 0.95  # of the tracked one and of the search about it, above which a se
 BELIEVED = 0.99  # of the tracked one, above which the plan supports it
 GATHERED = 0.3  # of a search's that has just gathered: what it found by the table has yet to foretell echoes
 FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
-REJECTED = 0.05  # of the search's, once it has gathered, below which it begins anew
-FOUND_WITHIN_M = 60.0  # path after which a search that has found nothing begins anew
+REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
+WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
+FOUND_WITHIN_M = 40.0  # path after which a search that has found nothing begins anew
 PLAN_FITS = 0.99  # prior probability that the plan is that of the building
-FAILS = 0.1  # probability that a search fails although the plan fits
+BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
+FAILS = 0.05  # probability that a search fails although the plan fits, over that if it does not: unknown starts are found within 40 m
+# The same of a stated start that is rejected on the first EARLY_M of the path: taps and plans are wrong about as often.
+STATED_FAILS, EARLY_M = 0.05, 20.0
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
 
 
@@ -94,10 +100,13 @@ class MapFilter:
         self._pings = UsablePings(building.background(self._model), self._settings.echo.correlation_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
-        self.tracked = Hypothetical(cloud, Plausibility(STATED if stated else GATHERED), stated)
+        prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
+        self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
         self._plan = Plausibility(PLAN_FITS)
+        self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
+        self._gaps = Gaps()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
 
@@ -109,9 +118,14 @@ class MapFilter:
     def update(self, measured: MeasuredSegment, readings: Sequence[BeaconReading] = ()) -> Estimate:
         """Propagate along a segment, reweight by its pings, height change and beacon readings, and resample; returns the estimate at its end."""
         segment = measured.segment
+        if self._height is not None:
+            self._height.update(_height_change(measured))
+        gap = self._gaps.ended(measured)
         if segment.unobserved:
             self._scatter(measured)
-        else:
+        if gap is not None:
+            self._search_after(gap, segment)
+        if not segment.unobserved:
             self._follow(measured)
         self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self._plan_supports)
         right = self._right()
@@ -131,7 +145,23 @@ class MapFilter:
     @property
     def _plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
-        return self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
+        return self._building.has_walls and self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
+
+    def _search_after(self, gap: Gap, segment: PathSegment) -> None:
+        """Doubt the tracked cloud after a gap, and search the whole building from where the path goes on: the tracked cloud stands for what is near.
+
+        Nothing of the pressure's level is kept after a pause.
+        """
+        cloud = self.tracked.cloud
+        if gap is Gap.PAUSE:
+            cloud.forget_lag()
+        if gap is not Gap.UNOBSERVED:
+            self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
+        if cloud.is_coarse or not len(self._building.floor.x_m):
+            return
+        self.search = self._new_search(Start(), segment.heading1_rad)
+        if gap is not Gap.PAUSE:
+            self.search.cloud.adopt_lag(cloud)
 
     def _scatter(self, measured: MeasuredSegment) -> None:
         """Spread the cloud over an unobserved segment."""
@@ -142,7 +172,7 @@ class MapFilter:
     def _follow(self, measured: MeasuredSegment) -> None:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
-        pings, unplanned = self._pings.take(measured)
+        pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         if segment.scale_sd > 0.0:
             self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
         for each in self._clouds():
@@ -162,7 +192,8 @@ class MapFilter:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
-            self._judge(each, evidence, unplanned, math.hypot(move.dx_m, move.dy_m))
+            if self._building.has_walls:
+                self._judge(each, evidence, unplanned, math.hypot(move.dx_m, move.dy_m))
         cloud.change_levels(move, _height_change(measured))
 
     def _judge(self, each: Hypothetical, evidence: Evidence, unplanned: UnplannedDensities, path_m: float) -> None:
@@ -215,9 +246,11 @@ class MapFilter:
         """Begin a search if the tracked cloud is improbable, believe the plan again if it is probable; returns whether a search began."""
         if tracked.has_contracted and tracked.plausibility.probability > BELIEVED:
             self._plan = Plausibility(PLAN_FITS)
-        least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else REJECTED
+        least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else WIDE_DOUBTED
         if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
             return False
+        if tracked.is_stated and self._pings.path_m < EARLY_M:
+            self._plan.add(math.log(STATED_FAILS))
         self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
         return True
 
@@ -246,6 +279,8 @@ class MapFilter:
         search = self.search.cloud if self.search else None
         elsewhere = self._building.elsewhere
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
+        if self._height is not None:
+            new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)
         return replace(new, plan_fits=self._plan.probability, outside=self._outside())
 
     def _outside(self) -> float:

@@ -21,6 +21,7 @@ from echostep.localization.beacon_beliefs import BeaconBeliefs, empty_beliefs
 from echostep.localization.coarse_field import CoarseField, CoarsePing, reweight_coarsely
 from echostep.localization.echo_likelihood import EchoModel
 from echostep.localization.level_changes import (
+    UNKNOWN_LAG_M2,
     ClimbSettings,
     HeightArrays,
     HeightChange,
@@ -45,7 +46,6 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
 # A cloud of more than so many times the usual size is roughened, by reason: only a scattered one is so large
 ROUGHENED = 10
 SMALL = 2  # times the least size, by reason: a cloud has contracted
@@ -257,6 +257,15 @@ class Cloud:
             self.arrays, heights, move, noise, change, self._lag_variance, self._level_changes, self.sheet
         )
         self.resample_if_needed()
+
+    def forget_lag(self) -> None:
+        """The height by pressure may have begun anew: nothing is known of its lag."""
+        self._lag_variance = UNKNOWN_LAG_M2
+
+    def adopt_lag(self, other: Cloud) -> None:
+        """Take over what another cloud knows of the lag of the height by pressure."""
+        self.lag_m[:] = float(other.weight @ other.lag_m)
+        self._lag_variance = other._lag_variance
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
         """Spread by an unobserved move: no wall is asked, the path to its end is not known. The level is that of the height by pressure, if any."""

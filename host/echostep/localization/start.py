@@ -49,7 +49,7 @@ def draw_poses(
     if start.pose is None:
         x, y, heading = _on_floor(_within(floor, start, sheet), count, rng)
         return (x, y, heading) if start.near is None else _drawn_near(start.near, x, y, heading, sheet, rng)
-    is_wide = rng.random(count) < WIDE_SHARE
+    is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
     sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_M), start.sd_m)
     sd_rad = np.where(is_wide, math.hypot(start.heading_sd_rad, WIDE_RAD), start.heading_sd_rad)
     pose, noise = start.pose, rng.standard_normal((3, count))

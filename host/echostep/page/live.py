@@ -16,7 +16,7 @@ from operator import attrgetter
 from types import TracebackType
 from typing import Self
 
-from echostep.guidance.guided_run import GuidedRun
+from echostep.guidance.cue_list import CueList
 from echostep.localization.echo_likelihood import echo_model
 from echostep.localization.estimate import Estimate, unobserved
 from echostep.page.elements.beacon_marks import beacon_marks
@@ -53,7 +53,7 @@ class LivePage:
         tracker: Tracker,
         title: str,
         address: Address,
-        guided: GuidedRun | None = None,
+        guided: CueList | None = None,
         *,
         replay: bool = False,
         keeps: bool = False,
@@ -185,7 +185,7 @@ class LivePage:
             t_s=moved.t_s,
             estimate=moved,
             particles=particles and particles.moved(moved.x_m - estimate.x_m, moved.y_m - estimate.y_m),
-            status_text=status_text(moved),
+            status_text=status_text(moved, no_plan=not self._tracker.plan.is_drawn),
             guidance=guidance and guidance.turned(moved.heading_rad - estimate.heading_rad),
             truth=self.truth.at(moved.t_s) if self.truth else None,
         )
@@ -221,7 +221,7 @@ class LivePage:
             t_s=estimate.t_s,
             estimate=estimate,
             trail_count=len(self._mailbox.trail),
-            status_text=status_text(estimate, accepts_taps=not self._replay),
+            status_text=status_text(estimate, accepts_taps=not self._replay, no_plan=not self._tracker.plan.is_drawn),
             particles=self._scene.particles if published is None else sample_of(published),
             echo_lines=self._echo_lines(measured, estimate),
             guidance=self._guidance(estimate),

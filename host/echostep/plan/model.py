@@ -114,6 +114,15 @@ class Plan:
     georeference: Georeference | None = None
     uncertainty_m: float | None = None
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it has anything that blocks people and echoes: NO_PLAN has not."""
+        return any(len(level.solid) for level in self.levels)
+
+
+# Where there is no plan, the map begins where the walk begins: x to the right of the first heading, y ahead.
+NO_PLAN = Plan("no plan", (Level("", 0.0, _no_segments()),), Pose(0.0, 0.0, 0.5 * math.pi), "")
+
 
 def sides(corners: Floats) -> Floats:
     """The sides of an outline: (n, 2) -> (n, 4)."""

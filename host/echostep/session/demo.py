@@ -18,7 +18,6 @@ from echostep.localization.metrics import load_truth
 from echostep.page.elements.true_position import TruePath
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
-from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import paced, portions_of, recorded, with_check_ins
@@ -87,7 +86,7 @@ def _track(
     tracker = Tracker(plan, start, seed=options.seed)
     speed = options.speed or (WATCHED_SPEED if console.is_terminal and output.watched else None)
     title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
-    end = RoutePlace(*waypoints[-1][:2], start_of(plan, waypoints[::-1]).level) if options.guide else None
+    end = _place_text(plan, waypoints) if options.guide else None
     with Session(tracker, title, "simulated", output, end) as session:
         session.prepare()
         with progress_line("Simulating the walk"):
@@ -103,6 +102,11 @@ def _track(
         print_notices(recorder.notices)
         session.finish("simulated walk", load_truth(output.folder / "truth.csv"))
         session.keep_page_open()
+
+
+def _place_text(plan: Plan, waypoints: Sequence[Waypoint]) -> str:
+    """X,Y,LEVEL of the end of the walk."""
+    return f"{waypoints[-1][0]!r},{waypoints[-1][1]!r},{start_of(plan, waypoints[::-1]).level}"
 
 
 def _portions(chunks: Iterator[Chunk], session: Session, recorder: Recorder, speed: float | None) -> Iterator[Portion]:

@@ -16,17 +16,15 @@ from pathlib import Path
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
-from echostep.guidance.guided_run import destination
 from echostep.interruption import raise_lost
 from echostep.page.live import LivePage
-from echostep.plan.importers.limited import open_limited
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_check_ins
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import clock_metadata, run_metadata, start_given, version_metadata
+from echostep.session.metadata import clock_metadata, plan_of, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep.session.port_roles import with_role_check
 from echostep.session.progress import with_bar
@@ -45,14 +43,13 @@ BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
 
 def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -> None:
     """Track a wearer and record everything."""
-    plan = open_limited(tracking.plan_path)
+    plan = plan_of(tracking)
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
     settings, seed = parse_settings(settings_toml, str(path)), tracking.seed or 0
     tracker = Tracker(plan, start_given(tracking, plan), settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None)
-    guide_to = destination(tracking.guide_to, plan) if tracking.guide_to else None
-    session = Session(tracker, "echostep live", "live", output, guide_to)
+    session = Session(tracker, "echostep live", "live", output, tracking.guide_to)
     session.prepare()
     folder = output_folder(output.folder)
     with closing(_open_ports(ports)) as opened:

@@ -19,6 +19,7 @@ SILENT = "nothing came from the foot"
 UNFITTING = "the echoes did not fit the plan"
 ECHOLESS = "there were no echoes"
 SPREAD = "several places fitted"
+DRIFTED = "without a plan nothing corrects the drift"
 
 
 class Losses:
@@ -52,6 +53,8 @@ class Losses:
         """Why an estimate would not be sure."""
         if measured is None:
             return SILENT
+        if not self._tracker.plan.is_drawn:
+            return DRIFTED
         if state.right < DOUBTED:
             since = [t_s for t_s in self._check_ins.values() if t_s < e.t_s]
             return f"{UNFITTING} after the position was set by hand at {since[-1]:.0f} s" if since else UNFITTING

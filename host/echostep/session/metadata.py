@@ -20,7 +20,8 @@ import numpy as np
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
 from echostep.localization.start import ANY_LEVEL, Start
-from echostep.plan.model import Plan, Pose
+from echostep.plan.importers.limited import open_limited
+from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.check_in import MOST_SD_M
 from echostep.session.options import TrackingOptions
@@ -109,6 +110,11 @@ def recorded_seed(metadata: Mapping[str, str], path: Path) -> int:
         return int(metadata.get("seed", "0"))
     except ValueError as error:
         raise EchostepError(f"{path}: its recorded seed is damaged: give one with --seed N") from error
+
+
+def plan_of(tracking: TrackingOptions) -> Plan:
+    """The plan of the command's options; NO_PLAN where none was given."""
+    return NO_PLAN if tracking.plan_path is None else open_limited(tracking.plan_path)
 
 
 def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:

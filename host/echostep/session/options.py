@@ -36,7 +36,7 @@ class OutputOptions:
 class TrackingOptions:
     """What the tracker is made from. A value of None is replaced by that of the plan, of the recording, or by the default."""
 
-    plan_path: Path
+    plan_path: Path | None  # None: tracked without a plan
     start: str | None = None  # as given: X,Y,DEG[,LEVEL], a room, or ?
     start_sd: str | None = None  # as given: M,DEG
     settings_path: Path | None = None

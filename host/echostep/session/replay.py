@@ -9,13 +9,11 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from echostep.guidance.guided_run import destination
 from echostep.localization.metrics import load_truth
-from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
-from echostep.session.metadata import CHECK_IN_START, SIMULATED, recorded_seed, recorded_start, start_given
+from echostep.session.metadata import CHECK_IN_START, SIMULATED, plan_of, recorded_seed, recorded_start, start_given
 from echostep.session.options import OutputOptions, TrackingOptions
 from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
@@ -28,8 +26,8 @@ from echostep.tracker import Tracker
 
 def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
     """Track a recording; start, settings and seed are the recorded ones unless `tracking` gives others."""
-    recording, plan = open_recording(path), open_limited(tracking.plan_path)
-    if recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
+    recording, plan = open_recording(path), plan_of(tracking)
+    if plan.is_drawn and recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
         console.print(f"Note: {tracking.plan_path} is not the plan that {path} was tracked on.")
     truth = load_truth(truth_path) if truth_path else None
     tracker = tracker_of(recording, plan, tracking)
@@ -37,10 +35,11 @@ def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, outpu
     output_folder(output.folder)
     if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
-    guide_to = destination(tracking.guide_to, plan) if tracking.guide_to else None
     simulated = recording.metadata.get("source") == SIMULATED
     title = f"echostep replay {path.name}{' (simulated)' if simulated else ''}"
-    with Session(tracker, title, "simulated" if simulated else "replay", output, guide_to, recording) as session:
+    with Session(
+        tracker, title, "simulated" if simulated else "replay", output, tracking.guide_to, recording
+    ) as session:
         session.prepare()
         start_s = time.perf_counter()
         portions = recording.portions()

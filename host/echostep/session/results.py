@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.guidance.guided_run import GuidedRun
+from echostep.guidance.cue_list import CueList
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.metrics import Errors, Truth, errors
 from echostep.output.track_plot import draw_track, write_track
@@ -41,7 +41,7 @@ def output_folder(path: Path) -> Path:
     return path
 
 
-def write_results(folder: Path, tracker: Tracker, guided: GuidedRun | None, result: Result) -> None:
+def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result: Result) -> None:
     """Write the tables, print the summary, draw the picture; raises EchostepError at the end when a file cannot be written.
 
     The picture comes last: drawing it takes longer than tracking a short walk.
@@ -62,7 +62,7 @@ def write_results(folder: Path, tracker: Tracker, guided: GuidedRun | None, resu
         raise failure
 
 
-def _write_tables(folder: Path, guided: GuidedRun | None, result: Result) -> EchostepError | None:
+def _write_tables(folder: Path, guided: CueList | None, result: Result) -> EchostepError | None:
     """Write track.csv and cues.csv; an error is returned, so that the summary is printed before it is raised."""
     try:
         write_track(folder / "track.csv", result.estimates)
@@ -74,7 +74,7 @@ def _write_tables(folder: Path, guided: GuidedRun | None, result: Result) -> Ech
 
 
 def _draw(
-    folder: Path, tracker: Tracker, guided: GuidedRun | None, result: Result, deviation: Errors | None
+    folder: Path, tracker: Tracker, guided: CueList | None, result: Result, deviation: Errors | None
 ) -> EchostepError | None:
     """Draw track.png; an error is returned."""
     title = f"{result.title}: mean error {deviation.mean_m:.2f} m" if deviation else result.title

@@ -17,14 +17,13 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
-from echostep.guidance.guided_run import GuidedRun
+from echostep.guidance.guided_run import guidance_of
 from echostep.interruption import raise_lost
 from echostep.localization.estimate import Estimate
 from echostep.localization.metrics import Truth
 from echostep.output.derived import Derived
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
-from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Portion
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
@@ -53,19 +52,19 @@ class Session:
         title: str,
         source: Source,
         output: OutputOptions,
-        guide_to: RoutePlace | None = None,
+        guide_to: str | None = None,
         recorded: Recording | None = None,
     ) -> None:
         """`source`: origin of the estimates, as a commander is told; `recorded`: what is replayed.
 
-        Raises EchostepError when no route leads to `guide_to`.
+        `guide_to`: the destination as given. Raises EchostepError for one that there is not.
         """
         self.tracker = tracker
         self.title = title
         self.source = source
         self.recorded = recorded
         self.output = output
-        self.guided = GuidedRun(tracker, guide_to) if guide_to else None
+        self.guided = guidance_of(tracker, guide_to)
         self.losses = Losses(tracker)
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []

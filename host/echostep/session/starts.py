@@ -18,8 +18,8 @@ from echostep.session.console import console
 def check_start(plan: Plan, start: Pose | Start | None, *, given: bool, recorded: bool = False) -> None:
     """Refuse an impossible start. `given`: on the command line; else it is the recording's if `recorded`, and only noted, or the plan's."""
     start = start.pose if isinstance(start, Start) else start
-    if start is None or start.level < 0:
-        return  # a check-in, a room, anywhere, on any level
+    if start is None or start.level < 0 or not plan.is_drawn:
+        return  # a check-in, a room, anywhere, on any level; no plan that could object
     shown = f"{start.x_m:g},{start.y_m:g},{math.degrees(start.heading_rad):.0f}"
     if recorded and not given:
         try:

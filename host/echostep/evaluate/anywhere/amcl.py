@@ -21,6 +21,7 @@ from echostep.evaluate.anywhere.filtering import WARM_UP, Claim, FilterRun
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.localization.estimate import TrackStatus
 from echostep.localization.level_changes import (
+    UNKNOWN_LAG_M2,
     ClimbSettings,
     HeightArrays,
     HeightChange,
@@ -28,7 +29,7 @@ from echostep.localization.level_changes import (
     level_change_model,
 )
 from echostep.localization.particle_kernels import Move, ParticleArrays, effective_size, propagate, systematic
-from echostep.localization.particles import UNKNOWN_LAG_M2, CloudSettings
+from echostep.localization.particles import CloudSettings
 from echostep.localization.start import Start, draw_poses
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan

@@ -25,6 +25,9 @@ KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle
 MOST_SHOWN = 10_000  # particles in a frame
 
 
+STOREY_M = 1.5  # least height against the start that is said, by reason: half a storey
+
+
 @dataclass(frozen=True, slots=True)
 class ParticleSample:
     """Particles to draw: `x_m`, `y_m` (n,) float32 in the map, `weight` (n,) uint8, 255 for the greatest, `level` (n,) uint8."""
@@ -71,10 +74,13 @@ def sample_of(particles: Particles) -> ParticleSample:
     return ParticleSample(x_m, y_m, shown, np.minimum(particles.level, 255).astype(np.uint8))
 
 
-def status_text(estimate: Estimate | None, *, needs_start: bool = False, accepts_taps: bool = True) -> str:
+def status_text(
+    estimate: Estimate | None, *, needs_start: bool = False, accepts_taps: bool = True, no_plan: bool = False
+) -> str:
     """Status and accuracy in words.
 
-    `needs_start`: the tracker waits for a check-in that gives the start. `accepts_taps`: the page takes check-ins (not so in a replay).
+    `no_plan`: the height against the start is said, there are no floors. `needs_start`: the tracker waits for a check-in that gives the start.
+    `accepts_taps`: the page takes check-ins (not so in a replay).
     """
     tap = " or tap where you are" if accepts_taps else ""
     if estimate is None:
@@ -85,8 +91,13 @@ def status_text(estimate: Estimate | None, *, needs_start: bool = False, accepts
         return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
-    where = ", outside the building" if estimate.outside > OUTSIDE else ""
+    where = ", outside the building" if estimate.outside > OUTSIDE else _height_words(estimate.z_m) if no_plan else ""
     return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"
+
+
+def _height_words(z_m: float) -> str:
+    """A height against the start, where it is about a storey."""
+    return "" if abs(z_m) < STOREY_M else f", {abs(z_m):.0f} m {'above' if z_m > 0.0 else 'below'} the start"
 
 
 def format_metres(distance_m: float) -> str:

@@ -168,7 +168,7 @@ function go([x_m, y_m], level) { link.send('go_to', { x_m, y_m, level }); }
 function key(name) {
   const middle = view.toMap(view.width / 2, view.height / 2);
   const actions = {
-    n: () => view.rotate(-view.turn), w: () => { setFollows(false); view.fit(planView.box); }, f: toggleFollow,
+    n: () => view.rotate(-view.turn), w: fitWhole, f: toggleFollow,
     h: () => !$('here').hidden && enter('here', true), g: () => enter('go', true),
     Escape: () => enter(null),
     Enter: () => mode && posed(middle, mode === 'here' ? turned : null),
@@ -184,6 +184,17 @@ function setFollows(on) {
   $('follow').setAttribute('aria-pressed', String(on));
 }
 
+// The whole plan, and the whole track where that leads out of it.
+function fitWhole() {
+  setFollows(false);
+  const box = [...planView.box], { points, count } = scene.trail;
+  for (let k = 0; k < count; k++) {
+    const [x, y] = [points[3 * k], points[3 * k + 1]];
+    box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
+  }
+  view.fit(box);
+}
+
 function toggleFollow() {
   const { told: estimate } = scene.frame ?? {};
   setFollows(!follows);
@@ -195,7 +206,7 @@ $('here').onclick = (e) => enter(mode === 'here' ? null : 'here', e.detail === 0
 $('follow').onclick = () => toggleFollow();
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
-$('whole').onclick = () => { setFollows(false); view.fit(planView.box); };
+$('whole').onclick = fitWhole;
 $('north').onclick = () => view.rotate(-view.turn);
 $('end-guidance').onclick = () => link.send('go_nowhere');
 $('goal').onchange = () => {

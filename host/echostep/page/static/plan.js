@@ -3,6 +3,7 @@
 
 const SVG = 'http://www.w3.org/2000/svg';
 const TILE_M = 30;  // side of a tile
+const NOTHING_DRAWN = [-10, -10, 10, 10];  // m about the origin, shown where there is no plan
 const KEPT_PX = 22;  // distance of names from the wearer
 
 export class PlanView {
@@ -85,5 +86,5 @@ function boxOf(walls, rooms) {
   const add = (x, y) => { box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y); };
   for (let k = 0; k < walls.length; k += 2) add(walls[k], walls[k + 1]);
   for (const room of rooms) add(...room.at_m);
-  return box[0] > box[2] ? [0, 0, 10, 10] : box;
+  return box[0] > box[2] ? NOTHING_DRAWN : box;
 }

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""Gaps after which the wearer may be elsewhere.
+
+In: `MeasuredSegment`s in order of time. Out: the kind of gap that ends with each. Owns the times of the last segment and of the last ping.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum, auto
+
+from echostep.path import MeasuredSegment
+
+# All by reason.
+PAUSE_S = 1.0  # between two segments: nothing was received, so the pressure may have begun anew, as after a restart
+LONG_S = 5.0  # of an unobserved segment: a walk out of the room
+MUTE_S = 10.0  # of standing without a ping, where there were pings before: rangers measure whatever the wearer does
+STANDING_M = 0.5  # path that still counts as standing
+
+
+class Gap(Enum):
+    """`PAUSE`: nothing came; `UNOBSERVED`: the foot was silent for long; `MUTE`: the foot stood and no ranger measured."""
+
+    PAUSE = auto()
+    UNOBSERVED = auto()
+    MUTE = auto()
+
+
+class Gaps:
+    """Watches the segments of one walk."""
+
+    def __init__(self) -> None:
+        self._end_s = math.inf  # of the last segment
+        self._ping_s = math.inf  # of the last ping
+        self._path_m = 0.0  # since that ping
+
+    def ended(self, measured: MeasuredSegment) -> Gap | None:
+        """The gap that this segment, or its first ping, ends; of an unobserved segment, the segment itself."""
+        segment = measured.segment
+        paused = segment.t0_s - self._end_s > PAUSE_S
+        self._end_s = segment.t1_s
+        is_mute = self._path_m < STANDING_M and len(measured.t_s) > 0 and measured.t_s[0] - self._ping_s > MUTE_S
+        if len(measured.t_s):
+            self._ping_s, self._path_m = float(measured.t_s[-1]), 0.0
+        else:
+            self._path_m += math.hypot(segment.dx_m, segment.dy_m)
+        if segment.unobserved:
+            return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
+        if paused:
+            return Gap.PAUSE
+        return Gap.MUTE if is_mute else None
