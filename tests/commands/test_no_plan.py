@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.localization.estimate import TrackStatus
 from echostep.localization.level_changes import HeightChange
 from echostep.localization.relative_height import RelativeHeight
 from echostep.page.elements.scene import status_text
@@ -77,4 +78,6 @@ def test_without_a_foot_the_pressure_alone_tells_the_height() -> None:
 
 def test_the_page_says_the_height_against_the_start() -> None:
     assert status_text(replace(told(), z_m=-3.2), no_plan=True) == "tracking, 3 m below the start, 0.2 m"
+    drifted = replace(told(), status=TrackStatus.LOST, xx_m2=16.0, yy_m2=16.0)
+    assert status_text(drifted, no_plan=True) == "lost, 10 m"
     assert status_text(replace(told(), z_m=0.4), no_plan=True) == "tracking, 0.2 m"

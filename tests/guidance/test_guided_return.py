@@ -19,9 +19,11 @@ from echostep.guidance.guided_return import AGAIN, IN, TURN_M, GuidedReturn
 from echostep.guidance.guided_run import guidance_of
 from echostep.guidance.own_way import JOIN_M, STEP_M, OwnWay
 from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN
 from echostep.tracker import Tracker
 
+MEASURED = MeasuredSegment(PathSegment(0.0, 1.0, 0.4, 0.0, 0.0, 0.0, 0.02, 0.0, 1), *np.empty((3, 0)))
 CORNERS = np.array([(0.0, 0.0), (0.0, 20.0), (15.0, 20.0), (15.0, 35.0)])  # of a way in, m
 
 
@@ -34,14 +36,14 @@ def along(corners: Floats, step_m: float = 0.4) -> Floats:
     return np.concatenate([*pieces, corners[-1:]])
 
 
-def guided(places: Floats, sd_m: float = 0.1) -> list[Cue]:
+def guided(places: Floats, sd_m: float = 0.1, status: TrackStatus = TrackStatus.TRACKING) -> list[Cue]:
     """The cues at these positions, one a second, the heading along the way."""
     tracker = SimpleNamespace(watchers=[], state=SimpleNamespace(beacon_heard_s=None))
     run = GuidedReturn(cast("Tracker", tracker))
     headings = np.arctan2(*np.diff(places, axis=0, append=places[-1:]).T[::-1])
     for k, ((x, y), heading) in enumerate(zip(places.tolist(), headings.tolist(), strict=True)):
-        e = Estimate(float(k), x, y, sd_m**2, 0.0, sd_m**2, heading, 0.05, k, TrackStatus.TRACKING)
-        run._watch(None, e)
+        e = Estimate(float(k), x, y, sd_m**2, 0.0, sd_m**2, heading, 0.05, k, status)
+        run._watch(MEASURED, e)
     return run.cues
 
 
@@ -69,6 +71,13 @@ def test_the_way_back_is_told_from_the_turn_to_the_start(drift_m: float) -> None
     left_m = np.array([cue.left_m for cue in back[begun:arrived]])
     assert (np.diff(left_m) < 0.5).all()
     assert len(back) - arrived < 6
+
+
+def test_a_long_way_leads_back_although_its_drift_is_great() -> None:
+    """Ten metres of standard deviation since the start: the position is lost, the way back is not."""
+    cues = guided(np.concatenate([along(CORNERS), along(CORNERS[::-1])]), sd_m=10.0, status=TrackStatus.LOST)
+    assert any(cue.kind is CueKind.TURN for cue in cues)
+    assert any(cue.kind is CueKind.ARRIVED for cue in cues)
 
 
 def test_going_in_again_ends_the_return() -> None:

@@ -10,6 +10,7 @@ start, or when the way back has grown by TURN_M again. Both are spoken.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,6 +31,7 @@ TURN_M = (
 )
 AHEAD_M = 3.0  # of the arrow's target along the way back, as in `GuidanceSettings`
 OFF_M = 2.0  # from the way, beyond the 95 % radius, that is not on it; by reason: the width of a corridor
+BESIDE_M = 3.0  # 95 % radius of the way back beside the way in, at most; by reason: a corridor and a half
 IN, AGAIN = "The way back", "You are going in again"
 
 
@@ -56,12 +58,14 @@ class GuidedReturn(CueList):
         begin, line = np.array([[start.x_m, start.y_m]]), self._way.line_m()
         return Route((Stretch(0, np.concatenate([begin, line])),))
 
-    def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
-        """Add the cue of a new estimate; a position that is lost is not on the way."""
+    def _watch(self, measured: MeasuredSegment | None, e: Estimate) -> None:
+        """Add the cue of a new estimate; one that was not measured is not on the way."""
+        if measured is not None:
+            e = _on_track(e)
         self.cues.append(self._cue_in(e) if self._guide is None else self._cue_back(e, self._guide))
 
     def _cue_in(self, e: Estimate) -> Cue:
-        """The cue on the way in: the length of the way back; that of the return when it begins here."""
+        """The cue on the way in: direction and length of the way back; that of the return when it begins here."""
         if e.status is not TrackStatus.LOST:
             self._since_m += self._way.add(e.x_m, e.y_m, e.z_m)
             progress_m, off_m = _nearest(self._line, e)
@@ -107,10 +111,22 @@ class GuidedReturn(CueList):
         self._line, self._since_m = self._way.line_m(), 0.0
 
     def _in(self, e: Estimate, spoken: str = "") -> Cue:
-        """The cue while going in: direction and length of the way back."""
-        line = self._way.line_m()
-        arrow = wrap(turn_ahead(line, AHEAD_M, e.x_m, e.y_m, e.heading_rad)) if len(line) > 1 else None
-        return Cue(e.t_s, CueKind.AHEAD, IN, arrow, spoken, self._way.back_m, arrow)
+        """The cue while going in: direction and length of the way back, from the place on it that is nearest."""
+        if len(self._line) < 2:
+            return Cue(e.t_s, CueKind.AHEAD, IN, None, spoken, self._way.back_m)
+        progress_m, off_m = _nearest(self._line, e)
+        arrow = wrap(turn_ahead(self._line, progress_m + AHEAD_M, e.x_m, e.y_m, e.heading_rad))
+        return Cue(e.t_s, CueKind.AHEAD, IN, arrow, spoken, off_m + way_m(self._line) - progress_m, arrow)
+
+
+def _on_track(e: Estimate) -> Estimate:
+    """An estimate relative to the track: the drift since the start, which moves the way back as well, makes nothing lost.
+
+    Of the covariance as much is kept as a track may be beside itself.
+    """
+    shrink = min(BESIDE_M / e.ellipse95.major_m, 1.0) ** 2 if e.ellipse95.major_m > 0.0 else 1.0
+    xx, xy, yy = (shrink * value for value in (e.xx_m2, e.xy_m2, e.yy_m2))
+    return replace(e, status=TrackStatus.TRACKING, heading_sd_rad=0.0, xx_m2=xx, xy_m2=xy, yy_m2=yy)
 
 
 def _nearest(line_m: Floats, e: Estimate) -> tuple[float, float]:

@@ -18,7 +18,7 @@ import numpy as np
 from echostep.arrays import Floats
 
 STEP_M = 0.5  # least distance between two positions; by reason: corners of corridors are kept
-JOIN_M = 0.7  # positions so near on one storey are the same place; by reason: less than a wall with a body on either side of it
+JOIN_M = 1.0  # positions so near on one storey are the same place; by reason: less than a wall between two people in the middle of their ways
 STOREY_M = 1.5  # less than this between their heights; by reason: half a storey
 
 

@@ -89,7 +89,7 @@ def status_text(
         return "this plan does not fit: is it another building or floor, or mirrored?"
     if estimate.status != TrackStatus.TRACKING and len(estimate.hypotheses) > 1:
         return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
-    if estimate.status == TrackStatus.LOST:
+    if estimate.status == TrackStatus.LOST and not no_plan:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
     where = ", outside the building" if estimate.outside > OUTSIDE else _height_words(estimate.z_m) if no_plan else ""
     return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"

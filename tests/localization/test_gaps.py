@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""Gaps after which the wearer may be elsewhere, and those after which not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from echostep.localization.gaps import LONG_S, MUTE_S, PAUSE_S, Gap, Gaps
+from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
+
+
+def segment(t0_s: float, t1_s: float, length_m: float = 0.7, sd_m: float = 0.02, pings: int = 5) -> MeasuredSegment:
+    """A segment straight ahead with its pings evenly on it."""
+    path = PathSegment(t0_s, t1_s, length_m, 0.0, 0.0, 0.0, sd_m, 0.0, 1)
+    t_s = np.linspace(t0_s, t1_s, pings)
+    return MeasuredSegment(path, t_s, np.zeros(pings, np.int64), np.ones(pings))
+
+
+def found(*segments: MeasuredSegment) -> list[Gap | None]:
+    gaps = Gaps()
+    return [gaps.ended(each) for each in segments]
+
+
+def test_a_walk_has_no_gap() -> None:
+    assert found(*(segment(0.5 * k, 0.5 * k + 0.5) for k in range(60))) == [None] * 60
+
+
+def test_a_walk_without_rangers_has_no_gap() -> None:
+    assert found(*(segment(0.5 * k, 0.5 * k + 0.5, pings=0) for k in range(60))) == [None] * 60
+
+
+@pytest.mark.parametrize(("pause_s", "gap"), [(0.9 * PAUSE_S, None), (1.1 * PAUSE_S, Gap.PAUSE)])
+def test_a_pause_is_one_that_nothing_covers(pause_s: float, gap: Gap | None) -> None:
+    assert found(segment(0.0, 0.5), segment(0.5 + pause_s, 1.0 + pause_s)) == [None, gap]
+
+
+@pytest.mark.parametrize(("span_s", "gap"), [(0.9 * LONG_S, None), (1.1 * LONG_S, Gap.UNOBSERVED)])
+def test_a_long_unobserved_segment_is_a_gap(span_s: float, gap: Gap | None) -> None:
+    silent = segment(0.5, 0.5 + span_s, sd_m=2.0 * UNOBSERVED_SD_M)
+    assert found(segment(0.0, 0.5), silent, segment(0.5 + span_s, 1.0 + span_s)) == [None, gap, None]
+
+
+@pytest.mark.parametrize(("mute_s", "gap"), [(0.9 * MUTE_S, None), (1.1 * MUTE_S, Gap.MUTE)])
+def test_standing_without_a_ping_is_a_gap_and_walking_is_not(mute_s: float, gap: Gap | None) -> None:
+    end_s = 0.5 + mute_s
+    for length_m, expected in ((0.0, gap), (10.0, None)):
+        mute = segment(0.5, end_s, length_m=length_m, pings=0)
+        assert found(segment(0.0, 0.5), mute, segment(end_s, end_s + 0.5)) == [None, None, expected]
