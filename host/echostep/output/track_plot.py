@@ -40,7 +40,12 @@ COLUMNS = (
     "level",
     "z_m",
     "z_sd_m",
+    "protection_m",
+    "right",
+    "outside",
+    "plan_fits",
 )
+HYPOTHESES = "hypotheses"  # the last column: probability:x,y,level of each place that fits
 MAX_HEIGHT_INCHES = 40.0  # of the picture
 GAP_S = 5.0  # the line of the track is broken after so long on another level
 MAX_ELLIPSES = 60  # drawn per level
@@ -52,8 +57,9 @@ def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
     """Write estimates as CSV; numbers read back to the same bits."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows([getattr(e, name) for name in COLUMNS] for e in estimates)
+        writer.writerow([*COLUMNS, HYPOTHESES])
+        for e in estimates:
+            writer.writerow([*(getattr(e, name) for name in COLUMNS), " ".join(map(str, e.hypotheses))])
 
 
 def draw_track(
