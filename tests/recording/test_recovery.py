@@ -54,6 +54,7 @@ def test_a_killed_recorder_has_lost_less_than_a_second_and_no_earlier_recording(
 def run_on_a_full_disk(path: Path, *more: str) -> list[str]:
     done = subprocess.run(
         [sys.executable, "-c", FULL_DISK, path, *more],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},  # the tests' own modules too
         capture_output=True,
         text=True,
         check=False,
