@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Simulated returns without a plan: people who obey with 15 degrees of error and a second of delay, on a track that drifts (simulated).
 
-Open ground: no wall holds the walker in a corridor. Drift of the track: a heading that turns by a bias and at random, a scale error, as of a foot that
-is 0.7 % off after 50 m.
+Open ground: no wall holds the walker in a corridor. Drift of the track: a heading that turns by a bias and at random, a scale error, as of a foot
+that is 0.7 % off after 50 m.
 """
 
 from __future__ import annotations
