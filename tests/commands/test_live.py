@@ -232,3 +232,17 @@ def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
         os.close(second)
         os.close(new)
     assert found == b"before after"
+
+
+def test_bytes_that_came_together_are_one_chunk() -> None:
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    ports = SerialPorts({"board": os.ttyname(theirs)}, {"board": 115200})
+    try:
+        os.write(ours, b"0123456789")
+        chunks = (chunk for chunk in ports.chunks() if chunk is not None)
+        assert next(chunks).data == b"0123456789"
+    finally:
+        ports.close()
+        os.close(ours)
+        os.close(theirs)
