@@ -8,6 +8,7 @@ The ports have names of their own in the folder, as udev's links in /dev/serial/
 from __future__ import annotations
 
 import csv
+import os
 import shutil
 import signal
 import subprocess
@@ -16,9 +17,10 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.board.frames import BoardReader
@@ -26,6 +28,7 @@ from echostep.plan.model import load_plan
 from echostep.ports.arrival_clock import now_ns
 from echostep.recording.reading import open_recording
 from echostep.simulation.scenario import demo_scenario
+from echostep.simulation.stimulus import BoardSensors
 from fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
@@ -61,16 +64,28 @@ class HostFault(NamedTuple):
         return "".join(c if c.isalnum() else "_" for c in self.title)
 
 
+class KnownRows(NamedTuple):
+    """All rows of a walk, so that none is computed while it is played."""
+
+    table: NDArray[Any]
+
+    def rows(self, start: int, stop: int) -> NDArray[Any]:
+        """Rows of the milliseconds start..stop-1."""
+        return self.table[start:stop]
+
+
 class LiveWalk:
-    """Call `play` once while it is entered. `live`: the newest run; `runs`: the folder of each."""
+    """Call `play` once while it is entered. `live`: the newest run; `runs`: the folder of each; `late_s`: how far the walk fell behind the clock."""
 
     def __init__(self, folder: Path, fault: HostFault, begin_s: float = BEGIN_S, end_s: float = END_S) -> None:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         self.folder, self.fault = folder, fault
         self.opened = ExitStack()  # closed at the end
-        self.output: int = subprocess.DEVNULL  # of the run
+        self.output = os.open(folder / "output.txt", os.O_WRONLY | os.O_CREAT)  # of the runs
+        self.opened.callback(os.close, self.output)
         self.runs: list[Path] = []
+        self.late_s = 0.0
         self.live: subprocess.Popen[bytes] | None = None
         self._begin_s, self._end_s = begin_s, end_s
         self._fault_ns = 0  # when it began, on the clock of the arrivals
@@ -114,12 +129,13 @@ class LiveWalk:
     def play(self) -> Outcome:
         """Walk up to the end, and judge."""
         scenario = demo_scenario(load_plan(PLAN), SEED, self.board)
+        scenario.sensors = cast("BoardSensors", KnownRows(scenario.sensors.rows(0, len(scenario.walk.t_s))))
         (self.folder / "run1").mkdir()
         if self.fault.prepare:
             self.fault.prepare(self)
         self.start()
         wait_for_opening(self.board, self.mtx, lambda: self.process.poll() is None)
-        began_s, fault_s = self.board.t_s, np.inf
+        began_s, fault_s, now_s = self.board.t_s, np.inf, 0.0
         due = [(self._begin_s, self.fault.begin), (self._begin_s + self.fault.seconds, self.fault.end)]
         for now_s in playing(scenario, self.board, self.mtx):
             while due and now_s >= due[0][0]:
@@ -129,6 +145,7 @@ class LiveWalk:
                     act(self)
             if now_s >= self._end_s + TAIL_S:
                 break
+        self.late_s = self._walk_s(now_ns()) - now_s
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(ENDING_S)
         return self._outcome(scenario.truth[:, :3] + [began_s, 0.0, 0.0], fault_s)
