@@ -45,9 +45,14 @@ enum twi_state twi_state(const struct twi_transfer *transfer);
 /* Ends a transfer that has taken longer than 5 ms as TWI_FAILED and frees the bus (0.2 ms); true: it did so. */
 bool twi_watch(uint32_t now);
 
-/* SPI: bytes in both directions between select and release; each chip has its own clock rate and mode. */
+/* SPI: bytes in both directions between select and release, with the clock rate and the mode of the part that may be there. */
 enum chip { CHIP_THIGH, CHIP_CALF, CHIP_BELT, CHIP_PRESSURE };
-void spi_select(enum chip chip);
+enum spi_protocol {
+	SPI_ADIS16100, /* mode 2, 2 MHz */
+	SPI_SCP1000,   /* mode 0, 250 kHz */
+	SPI_MODE3,     /* 2 MHz: BMP390, LSM6DSO */
+};
+void spi_select(enum chip chip, enum spi_protocol protocol);
 uint8_t spi_exchange(uint8_t out);
 void spi_release(void);
 bool spi_pressure_ready(void); /* level of the SCP1000's DRDY */

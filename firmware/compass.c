@@ -3,6 +3,7 @@
 #include "board.h"         /* twi_* */
 #include "configuration.h" /* rate, whether it is enabled */
 #include "link.h"          /* sending the messages */
+#include "parts.h"         /* what was found */
 #include "ranger.h"        /* ranger_quiet: the bus is kept free for triggers */
 #include "status.h"        /* error counter */
 
@@ -36,6 +37,7 @@ static void finish(enum twi_state state, uint32_t now)
 	reading = false;
 	if (state == TWI_DONE && bearing <= BEARING_MAX) {
 		status_ok(DEVICE_COMPASS);
+		parts_found(DEVICE_COMPASS, PART_CMPS10, 0);
 		report(transfer.ticks, bearing);
 	} else {
 		status_failed(DEVICE_COMPASS, state == TWI_DONE ? FAULT_BAD_VALUE : state == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK);

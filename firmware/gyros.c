@@ -3,6 +3,7 @@
 #include "board.h"         /* clock_now, spi_* */
 #include "configuration.h" /* rate, enabled gyros */
 #include "link.h"          /* sending the messages */
+#include "parts.h"         /* what was found */
 #include "selftest.h"      /* receives the rates while a self-test runs */
 #include "status.h"        /* error counters */
 
@@ -41,7 +42,7 @@ void gyros_start(uint32_t now)
 /* One frame: sends `command`, returns the reply to the previous frame. */
 static uint16_t exchange(enum chip chip, uint16_t command)
 {
-	spi_select(chip);
+	spi_select(chip, SPI_ADIS16100);
 	uint8_t high = spi_exchange((uint8_t)(command >> 8));
 	uint8_t low = spi_exchange((uint8_t)(command & 0xFFu));
 	spi_release();
@@ -102,6 +103,8 @@ static void report_health(void)
 			continue;
 		const struct selftest_result *test = selftest_result(k);
 		int16_t counts = temperature(k);
+		if (counts != MSG_GYRO_HEALTH_INVALID)
+			parts_found(devices[k].device, PART_ADIS16100, 0);
 		struct msg_gyro_health m = { clock_now(), k, counts, test->outcome, test->response[0], test->response[1] };
 		link_send(MSG_GYRO_HEALTH, msg_pack_gyro_health(link_body(), &m));
 	}

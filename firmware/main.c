@@ -6,6 +6,7 @@
 #include "configuration.h" /* carries out `configure` */
 #include "gyros.h"         /* sensor */
 #include "link.h"          /* messages to and from the host */
+#include "parts.h"         /* sent once a second */
 #include "pressure.h"      /* sensor */
 #include "ranger.h"        /* sensor */
 #include "selftest.h"      /* carries out `check_gyros` */
@@ -13,7 +14,7 @@
 #include "supply.h"        /* voltage */
 
 #define VERSION_MAJOR 1
-#define VERSION_MINOR 2
+#define VERSION_MINOR 3
 #define VERSION_PATCH 0
 
 static uint8_t subscribed; /* REPORTS_*, the optional messages that the host wants */
@@ -67,6 +68,15 @@ static void send_board_health(void)
 	};
 	supply_take(&m.supply_mv, &m.supply_least_mv);
 	link_send(MSG_BOARD_HEALTH, msg_pack_board_health(link_body(), &m));
+}
+
+/* The optional messages that come once a second. */
+static void send_subscribed_reports(void)
+{
+	if (subscribed & REPORTS_BOARD_HEALTH)
+		send_board_health();
+	if (subscribed & REPORTS_PARTS)
+		parts_send();
 }
 
 static void send_identity_and_configuration(void)
@@ -127,8 +137,7 @@ static bool handle_subscribe(const struct link_command *command)
 	if (!msg_unpack_subscribe(&m, command->body, command->length))
 		return false;
 	subscribed = m.reports;
-	if (subscribed & REPORTS_BOARD_HEALTH)
-		send_board_health();
+	send_subscribed_reports();
 	return true;
 }
 
@@ -187,8 +196,7 @@ static uint32_t send_each_second(uint32_t now)
 		return due;
 	send_identity();
 	send_status();
-	if (subscribed & REPORTS_BOARD_HEALTH)
-		send_board_health();
+	send_subscribed_reports();
 	due += TICKS_PER_S;
 	return due;
 }

@@ -157,6 +157,30 @@ uint8_t msg_pack_board_health(uint8_t *out, const struct msg_board_health *m)
 	return (uint8_t)(end - out);
 }
 
+uint8_t msg_pack_parts(uint8_t *out, const struct msg_parts *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put8(end, m->part_ranger_left);
+	end = put8(end, m->part_ranger_right);
+	end = put8(end, m->part_compass);
+	end = put8(end, m->part_thigh);
+	end = put8(end, m->part_calf);
+	end = put8(end, m->part_belt);
+	end = put8(end, m->part_pressure);
+	end = put8(end, m->part_foot);
+	end = put8(end, m->identity_ranger_left);
+	end = put8(end, m->identity_ranger_right);
+	end = put8(end, m->identity_compass);
+	end = put8(end, m->identity_thigh);
+	end = put8(end, m->identity_calf);
+	end = put8(end, m->identity_belt);
+	end = put8(end, m->identity_pressure);
+	end = put8(end, m->identity_foot);
+	end = put8(end, m->wiring);
+	return (uint8_t)(end - out);
+}
+
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)

@@ -32,6 +32,7 @@ enum {
 	MSG_CONFIGURATION = 0x09,
 	MSG_GYRO_HEALTH = 0x0A,
 	MSG_BOARD_HEALTH = 0x0B,
+	MSG_PARTS = 0x0C,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
@@ -51,6 +52,7 @@ enum {
 	MSG_CONFIGURATION_SIZE = 9,
 	MSG_GYRO_HEALTH_SIZE = 12,
 	MSG_BOARD_HEALTH_SIZE = 14,
+	MSG_PARTS_SIZE = 21,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
@@ -153,7 +155,26 @@ enum {
 };
 
 enum {
+	PART_NONE = 0,
+	PART_SRF02 = 1,
+	PART_PULSE = 2,
+	PART_CMPS10 = 3,
+	PART_LIS3MDL = 4,
+	PART_ADIS16100 = 5,
+	PART_LSM6DSO = 6,
+	PART_ICM20649 = 7,
+	PART_SCP1000 = 8,
+	PART_BMP390 = 9,
+};
+
+enum {
+	WIRING_OK = 0,
+	WIRING_MIXED_RANGERS = 1,
+};
+
+enum {
 	REPORTS_BOARD_HEALTH = 1,
+	REPORTS_PARTS = 2,
 };
 
 /* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
@@ -186,7 +207,7 @@ struct msg_gyros {
 };
 uint8_t msg_pack_gyros(uint8_t *out, const struct msg_gyros *m);
 
-/* Pressure and temperature of the barometer (SCP1000). */
+/* Pressure and temperature of the barometer (SCP1000, or BMP390, compensated by the board). */
 struct msg_pressure {
 	uint32_t ticks; /* 0.5 us */
 	uint32_t pressure; /* 0.25 Pa, 0: invalid */
@@ -280,6 +301,30 @@ struct msg_board_health {
 	uint8_t suspends;
 };
 uint8_t msg_pack_board_health(uint8_t *out, const struct msg_board_health *m);
+
+/* The part that the board has found in each place, by its identity register where it has one. Sent in answer to subscribe, then
+ * once a second, by firmware 1.3 and newer. A part that has failed stays named until another one answers. */
+struct msg_parts {
+	uint32_t ticks; /* 0.5 us */
+	uint8_t part_ranger_left;
+	uint8_t part_ranger_right;
+	uint8_t part_compass;
+	uint8_t part_thigh;
+	uint8_t part_calf;
+	uint8_t part_belt;
+	uint8_t part_pressure;
+	uint8_t part_foot;
+	uint8_t identity_ranger_left;
+	uint8_t identity_ranger_right;
+	uint8_t identity_compass;
+	uint8_t identity_thigh;
+	uint8_t identity_calf;
+	uint8_t identity_belt;
+	uint8_t identity_pressure;
+	uint8_t identity_foot;
+	uint8_t wiring;
+};
+uint8_t msg_pack_parts(uint8_t *out, const struct msg_parts *m);
 
 /* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */

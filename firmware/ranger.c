@@ -3,6 +3,7 @@
 #include "board.h"         /* twi_* */
 #include "configuration.h" /* schedule, enabled rangers */
 #include "link.h"          /* sending the messages */
+#include "parts.h"         /* what was found */
 #include "status.h"        /* error counters */
 
 /* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: at most 65 ms, in practice about 61 ms. */
@@ -106,6 +107,7 @@ static void succeed(struct ranger *r, uint32_t now)
 {
 	uint16_t time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
 	status_ok(devices[r->index].device);
+	parts_found(devices[r->index].device, PART_SRF02, r->transfer.bytes[0]);
 	report(r, time_of_flight_us ? OUTCOME_ECHO : OUTCOME_NO_ECHO, time_of_flight_us);
 	schedule_next(r, now);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SPI master: polled bytes to one of four chips, each with its own mode and rate; and the other pins of these chips. SCK PB1, MOSI PB2,
- * MISO PB3; chip selects PB4 thigh, PB5 calf, PB6 belt, PD7 SCP1000, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7,
+/* SPI master: polled bytes to one of four chips, in the mode and at the rate of the part; and the other pins of these chips. SCK PB1, MOSI
+ * PB2, MISO PB3; chip selects PB4 thigh, PB5 calf, PB6 belt, PD7 barometer, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7,
  * ST2 on PF6. */
 #include <avr/io.h> /* registers */
 #include "shared.h"
@@ -16,9 +16,16 @@
 #define ST2 BIT(PF6)
 
 #define MASTER (BIT(SPE) | BIT(MSTR))
-#define GYRO_MODE (MASTER | BIT(CPOL) | BIT(SPR0)) /* mode 2; with SPI2X 16 MHz / 8 = 2 MHz */
-#define PRESSURE_MODE (MASTER | BIT(SPR1))         /* mode 0; 16 MHz / 64 = 250 kHz */
+#define GYRO_MODE (BIT(CPOL) | BIT(SPR0)) /* mode 2; with SPI2X 16 MHz / 8 = 2 MHz */
 #define EXCHANGE_TRIES 255u                        /* more than 1000 cycles; a byte takes at most 512 */
+
+static const struct {
+	uint8_t control, status; /* SPCR, SPSR */
+} protocols[] = {
+	[SPI_ADIS16100] = { MASTER | GYRO_MODE, BIT(SPI2X) },
+	[SPI_SCP1000] = { MASTER | BIT(SPR1), 0 }, /* mode 0; 16 MHz / 64 = 250 kHz */
+	[SPI_MODE3] = { MASTER | BIT(CPOL) | BIT(CPHA) | BIT(SPR0), BIT(SPI2X) },
+};
 
 void spi_start(void)
 {
@@ -29,17 +36,14 @@ void spi_start(void)
 	DDRF |= ST1 | ST2; /* low */
 }
 
-void spi_select(enum chip chip)
+void spi_select(enum chip chip, enum spi_protocol protocol)
 {
-	if (chip == CHIP_PRESSURE) {
-		SPCR = PRESSURE_MODE;
-		SPSR = 0;
+	SPCR = protocols[protocol].control;
+	SPSR = protocols[protocol].status;
+	if (chip == CHIP_PRESSURE)
 		PORTD &= (uint8_t)~PRESSURE_SELECT;
-	} else {
-		SPCR = GYRO_MODE;
-		SPSR = BIT(SPI2X);
+	else
 		PORTB &= (uint8_t)~(uint8_t)(BIT(PB4) << chip);
-	}
 }
 
 uint8_t spi_exchange(uint8_t out)

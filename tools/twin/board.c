@@ -27,6 +27,7 @@ static void power_devices(void)
 	adis16100_power();
 	scp1000_power();
 	compass_power();
+	bmp390_power();
 }
 
 static void fill(unsigned from, unsigned size)
@@ -71,6 +72,7 @@ static void start_program(void)
 	twi_reset();
 	spi_reset();
 	scp1000_resume();
+	bmp390_resume();
 	adis16100_resume();
 	usb_host_start();
 }

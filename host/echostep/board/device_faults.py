@@ -19,9 +19,13 @@ from echostep.board.findings import (
     Finding,
     Severity,
     has_failed,
+    identity_in,
+    name_of,
+    part_in,
     status_field,
 )
 from echostep.board.messages import GYRO_HEALTH_INVALID, Fault, Gyro, GyroHealth, Healthy, SelfTest, Status
+from echostep.board.part_faults import part_text
 
 TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; by reason
 UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; by reason
@@ -70,7 +74,7 @@ def device_findings(reports: BoardReports, status: Status) -> list[Finding]:
     on = Healthy(reports.sensors & DEVICES)
     failed = [d for d in Healthy if d & on and not status.healthy & d and has_failed(status, d)]
     common, explained = _common_causes(status, failed, on)
-    single = [_device_finding(d, Fault(status_field(status, "fault", d))) for d in failed if not explained & d]
+    single = [_device_finding(reports, d, Fault(status_field(status, "fault", d))) for d in failed if not explained & d]
     return common + single
 
 
@@ -94,10 +98,12 @@ def _common_causes(status: Status, failed: list[Healthy], on: Healthy) -> tuple[
     return findings, explained
 
 
-def _device_finding(device: Healthy, fault: Fault) -> Finding:
+def _device_finding(reports: BoardReports, device: Healthy, fault: Fault) -> Finding:
     """Finding on one device with this fault; a general text for a fault that is not possible for the device."""
     what, remedy = f"failed ({fault.name.lower().replace('_', ' ')})", "check its wires and its supply"
-    if device == Healthy.PRESSURE:
+    if text := part_text(part_in(reports, device), identity_in(reports, device), device, fault):
+        what, remedy = text
+    elif device == Healthy.PRESSURE:
         what, remedy = _PRESSURE_TEXTS.get(fault, (what, remedy))
     elif fault == Fault.NO_ANSWER and device in ADDRESSES:
         what = f"does not answer at I2C address 0x{ADDRESSES[device]:02X}"
@@ -112,14 +118,14 @@ def _device_finding(device: Healthy, fault: Fault) -> Finding:
         what, remedy = _COMPASS_BAD
     elif fault == Fault.TOO_LATE:
         what, remedy = _RANGER_LATE
-    return Finding(Severity.FAULT, NAMES[device], what, remedy)
+    return Finding(Severity.FAULT, name_of(reports, device), what, remedy)
 
 
 def gyro_findings(reports: BoardReports) -> list[Finding]:
     """Findings by the gyros' self-tests and temperatures, for gyros that answer."""
     unhealthy = 0 if reports.status is None else ~reports.status.healthy
     answering = [
-        (NAMES[device], health)
+        (name_of(reports, device), health)
         for gyro, health in sorted(reports.gyros.items())
         if (device := Healthy[Gyro(gyro).name]) & reports.sensors and not device & unhealthy  # else it has a finding
     ]

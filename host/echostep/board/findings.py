@@ -9,7 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from echostep.board.messages import BoardHealth, Configuration, GyroHealth, Healthy, Identity, Message, Sensors, Status
+from echostep.board.messages import (
+    BoardHealth,
+    Configuration,
+    GyroHealth,
+    Healthy,
+    Identity,
+    Message,
+    Part,
+    Parts,
+    Sensors,
+    Status,
+)
 
 TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
 
@@ -44,6 +55,19 @@ NAMES = {
     Healthy.BELT: "belt gyro",
     Healthy.PRESSURE: "barometer",
 }
+PART_NAMES = {
+    Part.NONE: "no part",
+    Part.SRF02: "SRF02",
+    Part.PULSE: "pulse ranger",
+    Part.CMPS10: "CMPS10",
+    Part.LIS3MDL: "LIS3MDL",
+    Part.ADIS16100: "ADIS16100",
+    Part.LSM6DSO: "LSM6DSO",
+    Part.ICM20649: "ICM-20649",
+    Part.SCP1000: "SCP1000",
+    Part.BMP390: "BMP390",
+}
+OF_THE_PAPERS = (Part.NONE, Part.SRF02, Part.CMPS10, Part.ADIS16100, Part.SCP1000)
 DEVICES = 0x7F  # mask of all devices in `Healthy` and `Sensors`
 ON_I2C = Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT | Healthy.COMPASS
 GYROS = Healthy.THIGH | Healthy.CALF | Healthy.BELT
@@ -70,6 +94,7 @@ class BoardReports:
     board_health: BoardHealth | None = None
     usual_supply_mv: int = 0  # highest voltage so far
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
+    parts: Parts | None = None
 
     def add(self, message: Message) -> None:
         """Keep a message if it is a report; after a restart of the board there is no previous status."""
@@ -80,6 +105,8 @@ class BoardReports:
         elif isinstance(message, BoardHealth):
             self.board_health = message
             self.usual_supply_mv = max(self.usual_supply_mv, message.supply_mv)
+        elif isinstance(message, Parts):
+            self.parts = message
         elif isinstance(message, GyroHealth):
             self.gyros[message.gyro] = message
         elif isinstance(message, Status):
@@ -90,6 +117,32 @@ class BoardReports:
     def sensors(self) -> Sensors:
         """The sensors that are switched on; all of them before the first `Configuration`."""
         return Sensors(0xFF if self.configuration is None else self.configuration.sensors)
+
+
+def part_in(reports: BoardReports, device: Healthy) -> Part:
+    """The part that the board has found in a place; `Part.NONE` before its report, and for a part that this host does not know."""
+    found = 0 if reports.parts is None else getattr(reports.parts, f"part_{field_suffix(device)}")
+    return Part(found) if found in tuple(Part) else Part.NONE
+
+
+def identity_in(reports: BoardReports, device: Healthy) -> int:
+    """Content of the identity register in a place; 0 without one."""
+    return 0 if reports.parts is None else int(getattr(reports.parts, f"identity_{field_suffix(device)}"))
+
+
+def part_text_of(reports: BoardReports, device: Healthy) -> str:
+    """The part in a place with its identity: `BMP390, identity 0x60`; "" before the board's report."""
+    if reports.parts is None:
+        return ""
+    identity = identity_in(reports, device)
+    register = f", identity 0x{identity:02X}" if identity else ""
+    return PART_NAMES[part_in(reports, device)] + register
+
+
+def name_of(reports: BoardReports, device: Healthy) -> str:
+    """A device with the part that was found in its place, if it is not that of the papers: `barometer (BMP390)`."""
+    part = part_in(reports, device)
+    return NAMES[device] if part in OF_THE_PAPERS else f"{NAMES[device]} ({PART_NAMES[part]})"
 
 
 def field_suffix(device: Healthy) -> str:

@@ -19,6 +19,7 @@ from echostep.board.findings import (
     Severity,
     field_suffix,
     increase,
+    name_of,
     span_s,
     status_field,
 )
@@ -68,7 +69,9 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
             fault = Fault(status_field(status, "fault", device)).name.lower().replace("_", " ")
             what = f"failed {count} times in the last {span_s(status, previous):.0f} s ({fault}), and answers again"
             findings.append(
-                Finding(Severity.WARNING, NAMES[device], what, "a loose plug is likely: move the cable and watch")
+                Finding(
+                    Severity.WARNING, name_of(reports, device), what, "a loose plug is likely: move the cable and watch"
+                )
             )
     return findings
 

@@ -112,8 +112,27 @@ class CrashPlace(IntEnum):
     SLEEP = 11
 
 
+class Part(IntEnum):
+    NONE = 0
+    SRF02 = 1
+    PULSE = 2
+    CMPS10 = 3
+    LIS3MDL = 4
+    ADIS16100 = 5
+    LSM6DSO = 6
+    ICM20649 = 7
+    SCP1000 = 8
+    BMP390 = 9
+
+
+class Wiring(IntEnum):
+    OK = 0
+    MIXED_RANGERS = 1
+
+
 class Reports(IntFlag):
     BOARD_HEALTH = 1
+    PARTS = 2
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -212,7 +231,7 @@ PRESSURE_TEMPERATURE_INVALID = -32768
 
 
 class Pressure(NamedTuple):
-    """Pressure and temperature of the barometer (SCP1000)."""
+    """Pressure and temperature of the barometer (SCP1000, or BMP390, compensated by the board)."""
 
     ticks: int  # 0.5 us
     pressure: int  # 0.25 Pa, 0 = invalid
@@ -477,6 +496,66 @@ class BoardHealth(NamedTuple):
         return message
 
 
+_PARTS = struct.Struct("<IBBBBBBBBBBBBBBBBB")
+
+
+class Parts(NamedTuple):
+    """The part that the board has found in each place, by its identity register where it has one."""
+
+    ticks: int  # 0.5 us
+    part_ranger_left: int
+    part_ranger_right: int
+    part_compass: int
+    part_thigh: int
+    part_calf: int
+    part_belt: int
+    part_pressure: int
+    part_foot: int
+    identity_ranger_left: int
+    identity_ranger_right: int
+    identity_compass: int
+    identity_thigh: int
+    identity_calf: int
+    identity_belt: int
+    identity_pressure: int
+    identity_foot: int
+    wiring: int
+
+    @property
+    def id(self) -> int:
+        return 0x0C
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _PARTS.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Parts:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 21:
+            raise ValueError(f"parts: {len(body)} bytes, expected 21")
+        message = cls._make(_PARTS.unpack(body))
+        if message.part_ranger_left >= 10:
+            raise ValueError(f"parts: part_ranger_left {message.part_ranger_left} is unknown")
+        if message.part_ranger_right >= 10:
+            raise ValueError(f"parts: part_ranger_right {message.part_ranger_right} is unknown")
+        if message.part_compass >= 10:
+            raise ValueError(f"parts: part_compass {message.part_compass} is unknown")
+        if message.part_thigh >= 10:
+            raise ValueError(f"parts: part_thigh {message.part_thigh} is unknown")
+        if message.part_calf >= 10:
+            raise ValueError(f"parts: part_calf {message.part_calf} is unknown")
+        if message.part_belt >= 10:
+            raise ValueError(f"parts: part_belt {message.part_belt} is unknown")
+        if message.part_pressure >= 10:
+            raise ValueError(f"parts: part_pressure {message.part_pressure} is unknown")
+        if message.part_foot >= 10:
+            raise ValueError(f"parts: part_foot {message.part_foot} is unknown")
+        if message.wiring >= 2:
+            raise ValueError(f"parts: wiring {message.wiring} is unknown")
+        return message
+
+
 _IDENTIFY = struct.Struct("<")
 
 
@@ -645,6 +724,7 @@ Message = (
     | Configuration
     | GyroHealth
     | BoardHealth
+    | Parts
     | Identify
     | ClockQuery
     | Configure
@@ -665,6 +745,7 @@ BY_ID: dict[int, type[Message]] = {
     0x09: Configuration,
     0x0A: GyroHealth,
     0x0B: BoardHealth,
+    0x0C: Parts,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
@@ -786,6 +867,28 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("suspends", "u1"),
         ]
     ),
+    0x0C: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("part_ranger_left", "u1"),
+            ("part_ranger_right", "u1"),
+            ("part_compass", "u1"),
+            ("part_thigh", "u1"),
+            ("part_calf", "u1"),
+            ("part_belt", "u1"),
+            ("part_pressure", "u1"),
+            ("part_foot", "u1"),
+            ("identity_ranger_left", "u1"),
+            ("identity_ranger_right", "u1"),
+            ("identity_compass", "u1"),
+            ("identity_thigh", "u1"),
+            ("identity_calf", "u1"),
+            ("identity_belt", "u1"),
+            ("identity_pressure", "u1"),
+            ("identity_foot", "u1"),
+            ("wiring", "u1"),
+        ]
+    ),
     0x81: np.dtype([]),
     0x82: np.dtype([("token", "<u2")]),
     0x83: np.dtype(
@@ -825,6 +928,15 @@ GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x0A, 4, 2),  # gyro_health.gyro
     (0x0A, 7, 5),  # gyro_health.self_test
     (0x0B, 10, 11),  # board_health.crash_place
+    (0x0C, 4, 9),  # parts.part_ranger_left
+    (0x0C, 5, 9),  # parts.part_ranger_right
+    (0x0C, 6, 9),  # parts.part_compass
+    (0x0C, 7, 9),  # parts.part_thigh
+    (0x0C, 8, 9),  # parts.part_calf
+    (0x0C, 9, 9),  # parts.part_belt
+    (0x0C, 10, 9),  # parts.part_pressure
+    (0x0C, 11, 9),  # parts.part_foot
+    (0x0C, 20, 1),  # parts.wiring
     (0x83, 1, 1),  # configure.schedule
     (0x83, 4, 1),  # configure.pressure_mode
 )

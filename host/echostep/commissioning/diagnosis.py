@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from echostep.board.findings import part_text_of
 from echostep.board.health import (
     NAMES,
     SELECTS,
@@ -119,7 +120,8 @@ def _device_lines(probed: ProbeResult) -> list[str]:
         gyro_health = probed.reports.gyros.get(Gyro[device.name or ""]) if device in SELECTS else None
         if gyro_health is not None and state == "answers":
             state += f", {gyro_celsius(gyro_health):.0f} degC, self-test {SelfTest(gyro_health.self_test).name.lower().replace('_', ' ')}"
-        lines.append(f"{'devices' if not lines else '':10}{NAMES[device]}: {state}")
+        part = part_text_of(probed.reports, device)
+        lines.append(f"{'devices' if not lines else '':10}{NAMES[device]}: {state}{f', {part}' if part else ''}")
     return lines
 
 

@@ -29,6 +29,7 @@ from echostep.board.messages import (
     GyroHealth,
     Identity,
     Outcome,
+    Parts,
     Ping,
     Pressure,
     Status,
@@ -50,7 +51,7 @@ from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, p
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
-_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth, BoardHealth)]
+_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)]
 _TIMED = np.array([i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)])  # the body begins so
 
 

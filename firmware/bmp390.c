@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: MIT */
+#include "bmp390.h"
+#include "board.h"         /* spi_* */
+#include "configuration.h" /* mode */
+#include "parts.h"         /* what was found */
+#include "pressure.h"      /* the role */
+
+/* Registers, values and times [BST-BMP390-DS002, chapters 3 and 4]. */
+#define REGISTER_CHIP_ID 0x00u
+#define REGISTER_STATUS 0x03u
+#define REGISTER_DATA 0x04u /* pressure, then temperature: 24 bits each, least byte first */
+#define REGISTER_IF_CONF 0x1Au
+#define REGISTER_PWR_CTRL 0x1Bu
+#define REGISTER_OSR 0x1Cu
+#define REGISTER_ODR 0x1Du
+#define REGISTER_CONFIG 0x1Fu
+#define REGISTER_COEFFICIENTS 0x31u
+#define REGISTER_CMD 0x7Eu
+#define READ_FLAG 0x80u
+#define CHIP_ID 0x60u
+#define STATUS_PRESSURE_READY 0x20u
+#define FOUR_WIRES 0x00u
+#define PRESSURE_AND_TEMPERATURE_NORMAL 0x33u
+#define SOFT_RESET 0xB6u
+#define IIR_3 0x04u /* filter coefficient 3 */
+/* Oversampling of pressure (bits 2:0) and of temperature (bits 5:3); rate 200 Hz / 2^n. A sample takes 37 and 70 ms. */
+#define OSR_FAST 0x0Cu /* 16 and 2 */
+#define ODR_FAST 0x04u /* 12.5 Hz */
+#define OSR_SLOW 0x0Du /* 32 and 2 */
+#define ODR_SLOW 0x06u /* 3.1 Hz */
+#define UNMEASURED 0x800000u /* [4.3.4: value after a reset, and of a measurement that is switched off] */
+#define NO_REPLY 0xFFu       /* MISO is pulled up: an absent chip reads as ones */
+
+#define RESET_TICKS (10u * TICKS_PER_MS) /* start-up takes 2 ms */
+#define POLL_TICKS (5u * TICKS_PER_MS)
+#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 80 ms per sample: one that is ready earlier is a stuck flag */
+#define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)
+
+#define COEFFICIENTS_SIZE 21u
+#define DATA_SIZE 6u
+#define COUNTS_PER_PA 4.0f
+#define COUNTS_PER_DEGREE 20.0f
+
+static bool measuring;
+static uint32_t earliest, deadline; /* of the next sample, ticks */
+static float t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11; /* PAR_T1 ... PAR_P11 [8.4] */
+
+/* Two mode 3 frames: the first byte of a reply is a dummy. */
+static void read(uint8_t address, uint8_t *bytes, uint8_t length)
+{
+	spi_select(CHIP_PRESSURE, SPI_MODE3);
+	(void)spi_exchange(READ_FLAG | address);
+	(void)spi_exchange(0);
+	for (uint8_t n = 0; n < length; n++)
+		bytes[n] = spi_exchange(0);
+	spi_release();
+}
+
+static uint8_t read8(uint8_t address)
+{
+	uint8_t value;
+	read(address, &value, 1);
+	return value;
+}
+
+static void write8(uint8_t address, uint8_t value)
+{
+	spi_select(CHIP_PRESSURE, SPI_MODE3);
+	(void)spi_exchange(address);
+	(void)spi_exchange(value);
+	spi_release();
+}
+
+/* An SCP1000 takes both reads for the same register, so that two different bytes are not from it. The write has no effect on it. */
+bool bmp390_answers(void)
+{
+	write8(REGISTER_IF_CONF, FOUR_WIRES);
+	uint8_t identity = read8(REGISTER_CHIP_ID);
+	bool answers = identity == CHIP_ID && read8(REGISTER_CHIP_ID + 1u) != CHIP_ID;
+	bool unknown = parts_in(DEVICE_PRESSURE) == PART_NONE && identity != NO_REPLY;
+	if (answers || unknown)
+		parts_found(DEVICE_PRESSURE, answers ? PART_BMP390 : PART_NONE, identity);
+	return answers;
+}
+
+uint32_t bmp390_start(uint32_t now)
+{
+	measuring = false;
+	write8(REGISTER_CMD, SOFT_RESET);
+	return now + RESET_TICKS;
+}
+
+static float u16(const uint8_t *bytes)
+{
+	return (float)(uint16_t)(bytes[0] | (uint16_t)(bytes[1] << 8));
+}
+
+static float s16(const uint8_t *bytes)
+{
+	return (float)(int16_t)(uint16_t)(bytes[0] | (uint16_t)(bytes[1] << 8));
+}
+
+static float s8(uint8_t byte)
+{
+	return (float)(int8_t)byte;
+}
+
+/* The scales of the coefficients [8.4]; false: the chip's memory is empty. */
+static bool read_coefficients(void)
+{
+	uint8_t c[COEFFICIENTS_SIZE];
+	read(REGISTER_COEFFICIENTS, c, sizeof c);
+	t1 = u16(c) * 0x1p8f;
+	t2 = u16(c + 2) * 0x1p-30f;
+	t3 = s8(c[4]) * 0x1p-48f;
+	p1 = (s16(c + 5) - 0x1p14f) * 0x1p-20f;
+	p2 = (s16(c + 7) - 0x1p14f) * 0x1p-29f;
+	p3 = s8(c[9]) * 0x1p-32f;
+	p4 = s8(c[10]) * 0x1p-37f;
+	p5 = u16(c + 11) * 0x1p3f;
+	p6 = u16(c + 13) * 0x1p-6f;
+	p7 = s8(c[15]) * 0x1p-8f;
+	p8 = s8(c[16]) * 0x1p-15f;
+	p9 = s16(c + 17) * 0x1p-48f;
+	p10 = s8(c[19]) * 0x1p-48f;
+	p11 = s8(c[20]) * 0x1p-65f;
+	return (c[0] | c[1]) != 0 && !(c[0] == NO_REPLY && c[1] == NO_REPLY);
+}
+
+/* Temperature in degC [8.5]. */
+static float temperature_of(uint32_t raw)
+{
+	float d = (float)raw - t1;
+	return d * t2 + d * d * t3;
+}
+
+/* Pressure in Pa at temperature t [8.6]; 24-bit mantissas cost up to 0.1 Pa. */
+static float pressure_of(uint32_t raw, float t)
+{
+	float r = (float)raw;
+	float offset = p5 + t * (p6 + t * (p7 + t * p8));
+	float slope = p1 + t * (p2 + t * (p3 + t * p4));
+	return offset + r * (slope + r * (p9 + t * p10 + r * p11));
+}
+
+static uint32_t await_sample(uint32_t now)
+{
+	earliest = now + SAMPLE_MIN_TICKS;
+	deadline = now + SAMPLE_MAX_TICKS;
+	return now + POLL_TICKS;
+}
+
+static uint32_t measure(uint32_t now)
+{
+	bool slow = configuration.pressure_mode == PRESSURE_MODE_HIGH_RESOLUTION;
+	if (read8(REGISTER_CHIP_ID) != CHIP_ID)
+		return pressure_failed(now, FAULT_NO_ANSWER);
+	if (!read_coefficients())
+		return pressure_failed(now, FAULT_EEPROM);
+	write8(REGISTER_OSR, slow ? OSR_SLOW : OSR_FAST);
+	write8(REGISTER_ODR, slow ? ODR_SLOW : ODR_FAST);
+	write8(REGISTER_CONFIG, IIR_3);
+	write8(REGISTER_PWR_CTRL, PRESSURE_AND_TEMPERATURE_NORMAL);
+	measuring = true;
+	return await_sample(now);
+}
+
+static uint32_t raw_of(const uint8_t *bytes)
+{
+	return (uint32_t)bytes[2] << 16 | (uint16_t)(bytes[1] << 8 | bytes[0]);
+}
+
+static uint32_t sample(uint32_t now)
+{
+	uint8_t d[DATA_SIZE];
+	read(REGISTER_DATA, d, sizeof d);
+	uint32_t raw_pressure = raw_of(d), raw_temperature = raw_of(d + 3);
+	if (raw_pressure == UNMEASURED || raw_temperature == UNMEASURED)
+		return pressure_failed(now, FAULT_BAD_VALUE);
+	float t = temperature_of(raw_temperature), pa = pressure_of(raw_pressure, t);
+	if (!(pa >= 30000.0f && pa <= 125000.0f && t >= -40.0f && t <= 85.0f)) /* measuring range [1] */
+		return pressure_failed(now, FAULT_BAD_VALUE);
+	pressure_report(now, (uint32_t)(pa * COUNTS_PER_PA + 0.5f), (int16_t)(t * COUNTS_PER_DEGREE));
+	return await_sample(now);
+}
+
+uint32_t bmp390_run(uint32_t now)
+{
+	if (!measuring)
+		return measure(now);
+	uint8_t flags = read8(REGISTER_STATUS);
+	if (flags == NO_REPLY)
+		return pressure_failed(now, FAULT_NO_ANSWER);
+	bool ready = flags & STATUS_PRESSURE_READY;
+	if (ready && ticks_reached(now, earliest))
+		return sample(now);
+	if (ready || ticks_reached(now, deadline))
+		return pressure_failed(now, ready ? FAULT_ALWAYS_READY : FAULT_NEVER_READY);
+	return now + POLL_TICKS;
+}

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""Texts on the faults of parts of the kit of 2026, and on parts that the firmware does not know.
+
+In: the part in a place, and the fault that the board reports. Out: what is wrong and the remedy. Owns the texts.
+"""
+
+from __future__ import annotations
+
+from echostep.board.messages import Fault, Healthy, Part
+
+_SPI = "check its plug, its 5 V and ground, and the SPI wires"
+_AGAIN = "power-cycle the board; if it stays, replace the part"
+
+_BMP390 = {
+    Fault.NO_ANSWER: ("does not answer", f"{_SPI}; its chip select is D6"),
+    Fault.EEPROM: ("its calibration is empty", _AGAIN),
+    Fault.NEVER_READY: ("has had no sample for 2 s", f"it may have lost its supply for a moment: {_SPI}"),
+    Fault.ALWAYS_READY: ("reports a sample that it cannot have yet", f"its data line may be held high: {_SPI}"),
+    Fault.BAD_VALUE: ("gives pressures outside of 300 to 1250 hPa", _AGAIN),
+}
+_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {Part.BMP390: _BMP390}
+_WANTED = {Healthy.PRESSURE: "0x60 is a BMP390"}  # identities of the parts that the firmware knows, by place
+
+
+def part_text(part: Part, identity: int, device: Healthy, fault: Fault) -> tuple[str, str] | None:
+    """What is wrong with this part and the remedy; None where the general text fits."""
+    if part is Part.NONE and identity and device in _WANTED:
+        what = f"holds a part that the firmware does not know (identity register 0x{identity:02X})"
+        return what, f"plug in a part of firmware/README.md ({_WANTED[device]})"
+    return _TEXTS.get(part, {}).get(fault)

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first.
+ *
+ * In normal mode it measures at 200 Hz / 2^ODR; a measurement sets its bit in STATUS, and reading the pressure clears it. The counts are
+ * those from which the data sheet's compensation (8.5, 8.6) returns the row's pressure and temperature: found by bisection. */
+#include <math.h>
+#include <string.h>
+
+#include <simavr/sim_cycle_timers.h>
+
+#include "twin.h"
+
+enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, COEFFICIENTS = 0x31, CMD = 0x7E, REGISTERS = 0x80 };
+enum { READY_FOR_COMMANDS = 0x10, PRESSURE_READY = 0x20, TEMPERATURE_READY = 0x40, NORMAL = 0x30, THREE_WIRES = 1, SOFT_RESET = 0xB6 };
+#define MAX_HERTZ 10000000u
+#define START_UP US(2000)
+#define FASTEST US(5000)
+#define MISO_HIGH 0xFF
+#define FULL_SCALE 0xFFFFFFu
+
+static struct spi_device spi;
+static enum fault { GOOD, ABSENT, ZEROS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY, FAULTS } fault;
+static const char *const fault_names[FAULTS] = { "ok", "absent", "zeros", "wrong_identity", "empty", "stuck_ready", "never_ready" };
+static uint8_t registers[REGISTERS], address, count;
+static bool garbled, reading;
+static avr_cycle_count_t up_at, sample_at;
+
+/* PAR_T1 ... PAR_P11 of a typical part, as integers, and their powers of two [8.4]. */
+enum { T1, T2, T3, P1, P2, P3, P4, P5, P6, P7, P8, P9, P10, P11, PARAMETERS };
+static struct parameter {
+	int value, size, power;
+	double offset;
+} parameters[PARAMETERS] = {
+	{ 28159, 2, 8, 0 }, { 18902, 2, -30, 0 }, { -10, 1, -48, 0 }, { 773, 2, -20, 16384 }, { -1377, 2, -29, 16384 }, { 35, 1, -32, 0 },
+	{ 0, 1, -37, 0 }, { 25011, 2, 3, 0 }, { 30127, 2, -6, 0 }, { 3, 1, -8, 0 }, { -7, 1, -15, 0 }, { 16194, 2, -48, 0 }, { 6, 1, -48, 0 },
+	{ -60, 1, -65, 0 },
+};
+
+static double par(int k)
+{
+	return ldexp(parameters[k].value - parameters[k].offset, parameters[k].power);
+}
+
+static double celsius_of(double raw, double unused)
+{
+	double d = raw - par(T1);
+
+	(void)unused;
+	return d * par(T2) + d * d * par(T3);
+}
+
+static double pascal_of(double raw, double t)
+{
+	double offset = par(P5) + par(P6) * t + par(P7) * t * t + par(P8) * t * t * t;
+	double linear = raw * (par(P1) + par(P2) * t + par(P3) * t * t + par(P4) * t * t * t);
+
+	return offset + linear + raw * raw * (par(P9) + par(P10) * t) + raw * raw * raw * par(P11);
+}
+
+/* Counts at which `of` takes this value; it rises or falls with the counts over their whole range. */
+static uint32_t counts_at(double (*of)(double, double), double value, double t)
+{
+	uint32_t low = 0, high = FULL_SCALE;
+	bool rises = of(FULL_SCALE, t) > of(0, t);
+
+	while (low < high) {
+		uint32_t middle = (low + high) / 2;
+
+		if ((of(middle, t) < value) == rises)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+static void put24(uint8_t at, uint32_t value)
+{
+	for (int k = 0; k < 3; k++)
+		registers[at + k] = (uint8_t)(value >> 8 * k);
+}
+
+static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	double t = row.temperature / 20.0;
+
+	(void)a;
+	(void)param;
+	uint32_t raw_temperature = counts_at(celsius_of, t, 0);
+
+	put24(DATA, counts_at(pascal_of, row.pressure / 4.0, celsius_of(raw_temperature, 0)));
+	put24(DATA + 3, raw_temperature);
+	registers[STATUS] |= PRESSURE_READY | TEMPERATURE_READY;
+	sample_at = when + (FASTEST << registers[ODR]);
+	return sample_at;
+}
+
+static void plan_sample(avr_cycle_count_t when)
+{
+	sample_at = when;
+	avr_cycle_timer_cancel(avr, sample, NULL);
+	avr_cycle_timer_register(avr, when - avr->cycle, sample, NULL);
+}
+
+static void restart(void)
+{
+	uint8_t *c = registers + COEFFICIENTS;
+
+	memset(registers, 0, sizeof registers);
+	registers[CHIP_ID] = 0x60;
+	registers[REV_ID] = 0x01;
+	registers[STATUS] = READY_FOR_COMMANDS;
+	registers[OSR] = 0x02;
+	put24(DATA, 0x800000);
+	put24(DATA + 3, 0x800000);
+	for (int k = 0; k < PARAMETERS; k++)
+		for (int byte = 0; byte < parameters[k].size; byte++)
+			*c++ = (uint8_t)((unsigned)parameters[k].value >> 8 * byte);
+	sample_at = 0;
+	avr_cycle_timer_cancel(avr, sample, NULL);
+	up_at = avr->cycle + START_UP;
+}
+
+static uint8_t value_at(uint8_t at)
+{
+	uint8_t value = at < REGISTERS ? registers[at] : 0;
+
+	if (at == CHIP_ID && fault == WRONG_IDENTITY)
+		return 0x58; /* a BMP280 */
+	if (at >= COEFFICIENTS && at < COEFFICIENTS + 21 && fault == EMPTY)
+		return 0;
+	if (at == STATUS)
+		value = fault == STUCK_READY ? value | PRESSURE_READY : fault == NEVER_READY ? value & (uint8_t)~PRESSURE_READY : value;
+	if (at >= DATA && at < DATA + 3)
+		registers[STATUS] &= (uint8_t)~PRESSURE_READY;
+	return value;
+}
+
+static void write_register(uint8_t at, uint8_t value)
+{
+	if (at == CMD && value == SOFT_RESET)
+		restart();
+	if (at < IF_CONF || at >= COEFFICIENTS) /* read only */
+		return;
+	registers[at] = value;
+	if (at == PWR_CTRL && (value & NORMAL) == NORMAL)
+		plan_sample(avr->cycle + (FASTEST << registers[ODR]));
+}
+
+static bool is_mute(void)
+{
+	return !kit_of_2026(PLACE_PRESSURE) || fault == ABSENT || avr->cycle < up_at || garbled;
+}
+
+static void on_select(struct spi_device *self, bool on)
+{
+	(void)self;
+	count = 0;
+	if (!on || !kit_of_2026(PLACE_PRESSURE))
+		return;
+	garbled = spi_hertz() > MAX_HERTZ || (spi_mode() != 0 && spi_mode() != 3);
+	if (garbled)
+		bench_trace("bmp390 wrong clock");
+}
+
+static uint8_t on_exchange(struct spi_device *self, uint8_t out)
+{
+	(void)self;
+	if (is_mute())
+		return MISO_HIGH;
+	if (count++ == 0) {
+		reading = out & 0x80;
+		address = out & 0x7F;
+		return MISO_HIGH;
+	}
+	if (!reading) {
+		if (count == 2)
+			write_register(address, out);
+		return MISO_HIGH;
+	}
+	if (fault == ZEROS)
+		return 0;
+	if (registers[IF_CONF] & THREE_WIRES)
+		return MISO_HIGH;
+	return count == 2 ? 0 : value_at(address++); /* the dummy byte */
+}
+
+void bmp390_power(void)
+{
+	if (!spi.select) {
+		spi = (struct spi_device){ 'D', 7, on_select, on_exchange, false, NULL };
+		spi_add(&spi);
+	}
+	restart();
+}
+
+/* After a reset of the processor: the chip goes on; simavr has lost the timer. */
+void bmp390_resume(void)
+{
+	if (sample_at > avr->cycle)
+		plan_sample(sample_at);
+}
+
+bool bmp390_fault(const char *name, const char *value)
+{
+	if (strcmp(name, "bmp390"))
+		return false;
+	for (int f = 0; f < FAULTS; f++)
+		if (!strcmp(value, fault_names[f])) {
+			if (fault == ABSENT && f != ABSENT)
+				restart(); /* plugged in again */
+			fault = (enum fault)f;
+			return true;
+		}
+	return false;
+}
