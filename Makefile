@@ -71,9 +71,9 @@ measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmwar
 bench: $(VENV)/peers ## speed of the host as ratios against others, in the same run
 	$(BIN)/python tools/bench.py
 
-page-speed: $(READY) ## latency and frame rate of the live page in Chromium
+page-speed: $(READY) ## latency and frame rate of the live page and of the commander's page in Chromium
 	@tools/apt.sh chromium || echo "Chromium is not installed."
-	$(BIN)/python -m pytest -q -s -m speed tests/page/test_page_speed.py
+	$(BIN)/python -m pytest -q -s -m speed tests/page/test_page_speed.py tests/operation/test_table_speed.py
 
 $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."

@@ -324,11 +324,16 @@ def command(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the roster as JSON at the end, instead of the table.")
     ] = False,
+    page: Annotated[bool, typer.Option("--page/--no-page", help="Serve the commander's page, or do not.")] = True,
+    host: Host = LOCAL,
+    port: Port = None,
 ) -> None:
-    """Follow a team on one plan, lost and silent ones first."""
-    from echostep.team import commander
+    """Follow a team on one plan, lost and silent ones first: on a page and as a table."""
+    from echostep.operation import command as commander
+    from echostep.page.server import Address
 
-    commander.command(plan, broker, team, seconds, picture, as_json=as_json)
+    views = commander.Views(Address(host, port) if page else None, picture, as_json=as_json)
+    commander.command(plan, broker, team, seconds, views)
 
 
 @app.command()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The server: the page and its sockets, in a thread with an event loop of its own.
+"""The server: a page and its sockets, in a thread with an event loop of its own.
 
-In: a mailbox, an address. Out: HTML, walls and frames to browsers. Owns the thread, the listening socket and the sessions.
+In: a site or a mailbox, an address. Out: HTML, walls and frames to browsers. Owns the thread, the listening socket and the sessions.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import contextlib
 import secrets
 import socket
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Generic, Protocol, Self, TypeVar
 
 import uvicorn
 from starlette.applications import Starlette
@@ -30,12 +30,14 @@ from echostep.errors import EchostepError
 from echostep.page import protocol
 from echostep.page.access import LOOPBACK, AccessControl
 from echostep.page.connections import Connections
+from echostep.page.faults import Faults
 from echostep.page.gated_server import GatedServer
 from echostep.page.log_budget import logged_to
 from echostep.page.mailbox import Mailbox
 from echostep.page.requests import MOST_REQUEST
 from echostep.page.session import PageSession
 from echostep.page.shared import PageCounts, Shared
+from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"
 LOCAL = "127.0.0.1"
@@ -54,13 +56,38 @@ class Address:
     port: int | None = None
 
 
-class PageServer:
-    """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address."""
+class SocketSession(Protocol):
+    """The server's end of one page's socket."""
 
-    def __init__(self, mailbox: Mailbox, address: Address = Address()) -> None:
-        self.shared = Shared.of(mailbox.plan)
-        self.sessions: set[PageSession] = set()
-        self._mailbox = mailbox
+    def wake(self) -> None:
+        """Look for something new to send."""
+
+    async def run(self) -> None:
+        """Serve until the page disconnects."""
+
+
+S = TypeVar("S", bound=SocketSession)
+
+
+@dataclass(frozen=True, slots=True)
+class Site(Generic[S]):
+    """What a server serves: the page `index`, files of `folders` by the first part of their path, walls of `plan`, a session for each socket."""
+
+    name: str
+    plan: Plan
+    index: Path
+    folders: Mapping[str, Path]
+    session: Callable[[WebSocket], S]
+    faults: Faults
+    counts: PageCounts
+
+
+class SocketServer(Generic[S]):
+    """Serves a site until it is closed; raises EchostepError when it cannot listen at the address."""
+
+    def __init__(self, site: Site[S], address: Address = Address()) -> None:
+        self.sessions: set[S] = set()
+        self._site = site
         self._listener = open_listener(address)
         token = None if address.host in LOOPBACK else secrets.token_urlsafe(16)
         self.url = _url(self._listener, token)
@@ -73,17 +100,15 @@ class PageServer:
             ws_max_size=MOST_REQUEST, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
         )  # fmt: skip
         self._server = GatedServer(settings, self.connections)
-        self._thread = threading.Thread(target=self._server.run, name="echostep page", daemon=True)
+        self._thread = threading.Thread(target=self._server.run, name=site.name, daemon=True)
         self._logged = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        self._mailbox.on_publish = self._request_wake
-        self._logged.enter_context(logged_to(self.shared.faults.note_text))
+        self._logged.enter_context(logged_to(self._site.faults.note_text))
         self._thread.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._mailbox.on_publish = None
         self._server.should_exit = True
         self._thread.join(STOP_S)
         self._logged.close()
@@ -97,9 +122,9 @@ class PageServer:
     @property
     def counts(self) -> PageCounts:
         """Counts over all pages."""
-        return self.shared.counts
+        return self._site.counts
 
-    def _request_wake(self) -> None:
+    def request_wake(self) -> None:
         """Have the loop wake the sessions; may be called from any thread. Requests until the loop runs count as one."""
         loop = self._loop
         if loop is not None and not self._wake_pending:
@@ -117,7 +142,7 @@ class PageServer:
             Route("/", self._index),
             Route("/walls/{level:int}", self._walls),
             WebSocketRoute("/socket", self._socket),
-            Mount("/static", StaticFiles(directory=STATIC)),
+            *(Mount(f"/{name}", StaticFiles(directory=folder)) for name, folder in self._site.folders.items()),
         ]
         return Starlette(
             routes=[Mount(f"/{token}", routes=routes)] if token else routes,
@@ -127,7 +152,7 @@ class PageServer:
 
     async def _fail(self, _: Request, error: Exception) -> Response:
         """Log a fault and answer with it."""
-        return PlainTextResponse(self.shared.faults.note(error), 500)
+        return PlainTextResponse(self._site.faults.note(error), 500)
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
@@ -136,27 +161,51 @@ class PageServer:
         self._loop = None
 
     async def _index(self, _: Request) -> Response:
-        return FileResponse(STATIC / "index.html")
+        return FileResponse(self._site.index)
 
     async def _walls(self, request: Request) -> Response:
         level = request.path_params["level"]
-        if level >= len(self._mailbox.plan.levels):
+        if level >= len(self._site.plan.levels):
             raise HTTPException(404)
-        return Response(protocol.walls(self._mailbox.plan, level), media_type="application/octet-stream")
+        return Response(protocol.walls(self._site.plan, level), media_type="application/octet-stream")
 
     async def _socket(self, websocket: WebSocket) -> None:
         await websocket.accept()
         if len(self.sessions) >= MOST_PAGES:
-            self.shared.counts.refused += 1
+            self.counts.refused += 1
             await websocket.close(TRY_AGAIN_LATER)
             return
-        session = PageSession(websocket, self._mailbox, self.shared)
+        session = self._site.session(websocket)
         self.sessions.add(session)
         try:
             session.wake()
             await session.run()
         finally:
             self.sessions.discard(session)
+
+
+class PageServer(SocketServer[PageSession]):
+    """Serves the scenes of a mailbox until it is closed; raises EchostepError when it cannot listen at the address."""
+
+    def __init__(self, mailbox: Mailbox, address: Address = Address()) -> None:
+        self.shared = shared = Shared.of(mailbox.plan)
+        self._mailbox = mailbox
+
+        def session(socket: WebSocket) -> PageSession:
+            return PageSession(socket, mailbox, shared)
+
+        folders = {"static": STATIC}
+        index = STATIC / "index.html"
+        site = Site("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
+        super().__init__(site, address)
+
+    def __enter__(self) -> Self:
+        self._mailbox.on_publish = self.request_wake
+        return super().__enter__()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._mailbox.on_publish = None
+        super().__exit__(kind, error, at)
 
 
 def _url(listener: socket.socket, token: str | None) -> str:

@@ -12,39 +12,35 @@ import contextlib
 import time
 from collections import deque
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.page import protocol, requests
 from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.scene import PageScene, ParticleSample
+from echostep.page.guarded_socket import FRAME_S, GuardedSocket
 from echostep.page.mailbox import Mailbox
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
 from echostep.ports.check_in import CheckIn, Undo
 
-FRAME_S = 1.0 / 30.0  # shortest time between two frames
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
-MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
-POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]
 
 
-class PageSession:
+class PageSession(GuardedSocket):
     """Serves one page until it disconnects."""
 
     def __init__(self, socket: WebSocket, mailbox: Mailbox, shared: Shared) -> None:
         self.latency_s: deque[float] = deque(
             maxlen=512
         )  # from the arrival of an estimate's bytes to its frame being drawn
-        self._socket = socket
+        super().__init__(socket, shared.faults, shared.counts)
         self._mailbox = mailbox
         self._shared = shared
-        self._counts = shared.counts
         self._cursor = ReplayCursor(mailbox.history) if mailbox.replay else None
         self._destination: Destination | None = None
         self._searches: set[asyncio.Task[None]] = set()
-        self._news = asyncio.Event()
         self._undrawn: dict[
             int, int | None
         ] = {}  # number of a sent frame: `arrived_ns` of the estimate that is new in it
@@ -55,67 +51,15 @@ class PageSession:
         self._told_end = False
         self._frame_due = True  # the page needs a frame, even of the same scene
 
-    def wake(self) -> None:
-        """Look for something new to send."""
-        self._news.set()
-
-    async def run(self) -> None:
-        """Serve until the page disconnects or sends too many requests; a fault is logged, and told to the page."""
-        tasks: list[asyncio.Task[None]] = []
-        try:
-            await self._send_hello()
-            tasks = [asyncio.create_task(self._receive()), asyncio.create_task(self._send())]
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in done:
-                task.result()
-        except WebSocketDisconnect:
-            pass
-        except Exception as error:
-            await self._fail(error)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-
-    async def _fail(self, error: Exception) -> None:
-        """Log a fault, tell it to the page, close the socket."""
-        text = self._shared.faults.note(error)
-        with contextlib.suppress(WebSocketDisconnect):
-            await self._tell(protocol.encode(protocol.Failed(text)))
-            await self._socket.close(INTERNAL_ERROR)
-
-    async def _tell(self, message: str | bytes) -> None:
-        """Send a text or a frame; raises WebSocketDisconnect when the page has disconnected."""
-        try:
-            await (self._socket.send_text(message) if isinstance(message, str) else self._socket.send_bytes(message))
-        except RuntimeError as error:  # of Starlette: the socket is closed
-            raise WebSocketDisconnect(INTERNAL_ERROR) from error
-
-    async def _send_hello(self) -> None:
+    async def _greet(self) -> None:
         hello = protocol.hello(self._mailbox.plan, self._mailbox.title, replay=self._cursor is not None)
-        await self._tell(protocol.encode(hello))
+        await self.tell(protocol.encode(hello))
 
     async def _begin_replay(self) -> None:
         """The live run is over: from now on the page plays its scenes, beginning with the last one, at rest."""
         self._cursor = ReplayCursor(self._mailbox.history, at_end=True)
         self._trail_count, self._particles, self._frame_due = 0, None, True
-        await self._send_hello()
-
-    async def _receive(self) -> None:
-        """Handle requests; returns when the page disconnects or floods."""
-        second_began, count = time.monotonic(), 0
-        while True:
-            event = await self._socket.receive()
-            if event["type"] != "websocket.receive":
-                return
-            if time.monotonic() - second_began > 1.0:
-                second_began, count = time.monotonic(), 0
-            count += 1
-            if count > MOST_REQUESTS_A_SECOND:
-                self._counts.flooding += 1
-                await self._socket.close(POLICY_VIOLATION)
-                return
-            await self._handle(event.get("text"))
+        await self._greet()
 
     async def _handle(self, text: str | None) -> None:
         request = None if text is None else requests.parse_request(text)
@@ -129,7 +73,7 @@ class PageSession:
                     self.latency_s.append((time.monotonic_ns() - arrived_ns) * 1e-9)
             case requests.Consider(check_in) if check_in.level < levels:
                 answer = self._shared.taps.consider(check_in, self._mailbox.latest)
-                await self._tell(protocol.encode(answer))
+                await self.tell(protocol.encode(answer))
             case CheckIn() if request.level < levels:
                 await self._take(request, self._shared.taps.refusal(request))
             case Undo():
@@ -153,7 +97,7 @@ class PageSession:
             refusal = "Not accepted: this is a replay, or the tracker is too busy."
         if refusal:
             self._counts.refused += 1
-            await self._tell(protocol.encode(protocol.Refused(refusal)))
+            await self.tell(protocol.encode(protocol.Refused(refusal)))
 
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
@@ -176,7 +120,7 @@ class PageSession:
             if scene is None or (scene is self._last and not self._frame_due and not playing):
                 continue
             due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
-            await self._tell(self._frame(scene))
+            await self.tell(self._frame(scene))
 
     def _follow_goal(self) -> None:
         """Guide to the run's goal, which any page may have changed."""

@@ -1,36 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""The commander's view: a team on one plan, the most urgent states first.
+"""The commander's view on a terminal: a team on one plan, the most urgent states first.
 
-In: a plan, a broker's URL. Out: a table on the terminal, a picture, or the roster as JSON. Owns the loop.
+In: a roster, a plan. Out: a table, or the roster as JSON. Owns nothing.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import sys
-import time
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
-from rich.console import Console, Group
-from rich.live import Live
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from echostep.errors import EchostepError
-from echostep.plan.model import Plan, load_plan
-from echostep.team.endpoint import parse_endpoint
-from echostep.team.inbox import Inbox, Receiver
-from echostep.team.mqtt import Listener
-from echostep.team.picture import draw_team
-from echostep.team.report import checked_name
+from echostep.plan.model import Plan
+from echostep.team.inbox import Inbox, ReceivedMessage
 from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
 
-REFRESH_S = 0.25
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
 MAX_COLUMN_WIDTH = 24  # characters
 LOW_BATTERY_PERCENT = 20
@@ -46,47 +35,13 @@ STYLES = {
 }  # fmt: skip
 
 
-def command(
-    plan_path: Path, url: str, team: str | None, seconds: float | None, picture: Path | None, *, as_json: bool
-) -> None:
-    """Show a team until Ctrl-C, or for `seconds`; then draw `picture` and print JSON if asked for."""
-    plan = load_plan(plan_path)
-    endpoint = parse_endpoint(url, ("mqtt", "mqtts"))
-    if picture and picture.suffix not in (".png", ".svg"):
-        raise EchostepError(f"--picture {picture}: expected a name that ends in .png or .svg")
-    console = Console(soft_wrap=True, stderr=as_json)
-    inbox, roster = Inbox(), Roster()
-    topic = f"echostep/{checked_name('--team', team) if team else '+'}/+/+"
-    receiver = Receiver(
-        Listener(endpoint, topic, inbox.put), lambda text: console.print(f"{endpoint}: {text}", markup=False)
-    )
-    end_s = math.inf if seconds is None else time.monotonic() + seconds
-    try:
-        with Live(console=console, auto_refresh=False, transient=False, redirect_stdout=False) as shown:
-            while time.monotonic() < end_s:
-                time.sleep(min(REFRESH_S, max(end_s - time.monotonic(), 0.0)))
-                update_roster(inbox, roster)
-                if not as_json:
-                    shown.update(
-                        table(roster, plan, time.monotonic(), connected=receiver.connected, columns=console.width),
-                        refresh=True,
-                    )
-    except KeyboardInterrupt:
-        pass
-    finally:
-        receiver.close()
-    update_roster(inbox, roster)
-    now_s = time.monotonic()
-    if picture:
-        draw_team(picture, plan, roster.members(now_s), now_s)
-    if as_json:
-        json.dump(as_tree(roster, plan, now_s), sys.stdout, indent=2)
-        sys.stdout.write("\n")
-
-
 def update_roster(inbox: Inbox, roster: Roster) -> None:
     """Move all messages and drop counts of the inbox into the roster."""
-    messages, dropped = inbox.take_all()
+    take_messages(*inbox.take_all(), roster)
+
+
+def take_messages(messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], roster: Roster) -> None:
+    """Put messages into the roster, and counts of dropped ones by reason."""
     for message in messages:
         roster.receive(*message)
     for reason, count in dropped.items():

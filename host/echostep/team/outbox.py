@@ -8,6 +8,7 @@ overtaken. The tracker never waits.
 
 from __future__ import annotations
 
+import math
 import random
 import threading
 import time
@@ -17,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from echostep.localization.estimate import WALKER_M_S, ellipse95, trust
+from echostep.localization.estimate import RISK, WALKER_M_S, ellipse95, trust
 from echostep.team.report import Position, Report, moment
 
 HEARTBEAT_S = (
@@ -27,6 +28,9 @@ STALE_S = 10.0  # a report is valid for so long
 MAX_QUEUED = 1024  # reports
 FRESH_S = 1.0  # a report that has waited longer is dropped when a newer one waits too
 SETTLED_S = 2.0  # largest normal age of an estimate: the tracker gives two a second, or one per stride
+PROTECTED = math.sqrt(
+    -2.0 * math.log(RISK)
+)  # radius with this risk beyond it, in standard deviations per axis [Rayleigh]
 MAX_WALK_S = 1e5  # the covariance stops to grow after so long, about a day
 RETRY_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # after the first, second, ... failure in a row
 CLOSING_S = 3.0  # for sending the last reports at the end
@@ -199,7 +203,10 @@ def aged(position: Position, age_s: float) -> Position:
     more = _walk_variance_m2(age_s)
     xx, yy = position.xx_m2 + more, position.yy_m2 + more
     radius = ellipse95(xx, position.xy_m2, yy).major_m if more else position.radius95_m
-    return replace(position, age_s=age_s, xx_m2=xx, yy_m2=yy, radius95_m=radius)
+    protection = position.protection_m
+    if more and protection is not None:
+        protection = min(protection + PROTECTED * math.sqrt(more), 1e7)
+    return replace(position, age_s=age_s, xx_m2=xx, yy_m2=yy, radius95_m=radius, protection_m=protection)
 
 
 def _walk_variance_m2(age_s: float) -> float:

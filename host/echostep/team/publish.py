@@ -20,7 +20,7 @@ from typing import Literal, Self
 
 from echostep.board.health import board_findings
 from echostep.errors import EchostepError
-from echostep.localization.estimate import CHI2_95, Estimate
+from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus
 from echostep.plan.model import Level, Plan
 from echostep.plan.whereabouts import Whereabouts
 from echostep.team.cot import StreamTransport, UdpTransport
@@ -34,6 +34,7 @@ from echostep.tracker import Tracker
 Source = Literal["live", "replay", "simulated"]
 AVERAGING_S = 3.0  # of speed and rates
 MIN_SPEED_SPAN_S = 0.5  # a speed over less time is reported as 0
+MAX_PROTECTION_M = 100.0  # a larger protection radius is not reported, by reason: it says no more than none
 MAX_HEADING_SD_RAD = 1.0  # a heading with a larger standard deviation is not reported
 POWER_SUPPLIES = Path("/sys/class/power_supply")
 
@@ -174,6 +175,7 @@ def report_of(
         t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2, radius95_m=radius,
         heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=printable(levels[e.level].name, 64),
         floor_probability=min(max(e.levels[e.level], 0.0), 1.0), z_m=e.z_m, z_sd_m=e.z_sd_m,
+        protection_m=e.protection_m if e.protection_m <= MAX_PROTECTION_M and e.status is not TrackStatus.LOST else None,
     )  # fmt: skip
     place = ground.place(e.x_m, e.y_m, radius / math.sqrt(CHI2_95), heading) if ground else None
     return replace(empty, status=e.status.value, position=position, motion=motion, place=place, streams=streams)

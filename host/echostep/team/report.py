@@ -67,6 +67,10 @@ class Position:
     where: Annotated[
         str, Meta(max_length=100, description="the room or the corridor, in words; empty where the plan names none")
     ] = ""
+    protection_m: Annotated[
+        Annotated[float, Meta(ge=0.0, le=1e7)] | None,
+        Meta(description="radius beyond which the error is at a risk of 1 in 1,000, m; missing where no radius is"),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

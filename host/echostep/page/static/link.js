@@ -4,8 +4,9 @@
 const LONGEST_WAIT_MS = 5000;
 
 export class Link {
-  constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onState }) {
-    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, wait: 250 });
+  // `parse`: bytes of a frame -> frame.
+  constructor({ onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse = parseFrame }) {
+    Object.assign(this, { onHello, onFrame, onRefused, onFailed, onConsidered, onState, parse, wait: 250 });
     this.open();
   }
 
@@ -14,7 +15,7 @@ export class Link {
     url.protocol = url.protocol.replace('http', 'ws');
     this.socket = new WebSocket(url);
     this.socket.binaryType = 'arraybuffer';
-    this.socket.onmessage = ({ data }) => (typeof data === 'string' ? this.onText(JSON.parse(data)) : this.onFrame(parseFrame(data)));
+    this.socket.onmessage = ({ data }) => (typeof data === 'string' ? this.onText(JSON.parse(data)) : this.onFrame(this.parse(data)));
     this.socket.onclose = () => {
       this.onState(false);
       setTimeout(() => this.open(), this.wait);

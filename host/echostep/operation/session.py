@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""The session of one commander's page: frames at most 30 times a second, with at most two that the page has not drawn.
+
+In: a WebSocket, the feed. Out: frames. Owns what this page has been sent, and which wearer it has chosen. A page in the background draws nothing, so
+nothing is sent to it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from starlette.websockets import WebSocket
+
+from echostep.operation import wire
+from echostep.operation.operation import Operation, TableScene
+from echostep.page.faults import Faults
+from echostep.page.guarded_socket import FRAME_S, GuardedSocket
+from echostep.page.shared import PageCounts
+
+MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
+
+
+class TableFeed:
+    """The newest scene; the receiver's thread publishes, the server's thread reads."""
+
+    def __init__(self, operation: Operation, title: str) -> None:
+        self.operation = operation
+        self.title = title
+        self.latest: TableScene | None = None
+        self.on_publish: Callable[[], None] | None = None
+
+    def publish(self, scene: TableScene) -> None:
+        """Replace the scene and call `on_publish`."""
+        self.latest = scene
+        if self.on_publish:
+            self.on_publish()
+
+
+class TableSession(GuardedSocket):
+    """Serves one page until it disconnects."""
+
+    def __init__(self, socket: WebSocket, feed: TableFeed, faults: Faults, counts: PageCounts) -> None:
+        super().__init__(socket, faults, counts)
+        self._feed = feed
+        self._undrawn: set[int] = set()  # numbers of frames
+        self._seq = 0
+        self._trail_end = 0  # number of the next point of the trails that the page needs
+        self._last: TableScene | None = None
+        self._chosen: int | None = None
+        self._due = True  # the page needs a frame, even of the same scene
+
+    async def _greet(self) -> None:
+        await self.tell(wire.encode(wire.table_hello(self._feed.operation.plan, self._feed.title)))
+
+    async def _handle(self, text: str | None) -> None:
+        match wire.parse_request(text):
+            case None:
+                self._counts.unknown += 1
+            case wire.Drawn(seq):
+                self._undrawn.discard(seq)
+                self._news.set()
+            case wire.Choose(number):
+                self._chosen, self._due = number, True
+                self._news.set()
+
+    async def _send(self) -> None:
+        """Send a frame when there is something new, not before `FRAME_S` after the last one."""
+        due_s = 0.0
+        while True:
+            await self._news.wait()
+            if (early_s := due_s - time.monotonic()) > 0.0:
+                await asyncio.sleep(early_s)
+            self._news.clear()
+            scene = self._feed.latest
+            if len(self._undrawn) >= MOST_UNDRAWN or scene is None or (scene is self._last and not self._due):
+                continue
+            due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
+            await self.tell(self._frame(scene))
+
+    def _frame(self, scene: TableScene) -> bytes:
+        """A frame with what this page has not been sent yet; from then on it counts as sent."""
+        self._seq += 1
+        self._undrawn.add(self._seq)
+        operation, begin = self._feed.operation, self._trail_end
+        lists = self._due or self._last is None or scene.rows is not self._last.rows
+        trail, self._trail_end = operation.trail(begin, scene.t_s)
+        details = operation.details(self._chosen, scene.t_s) if lists and self._chosen is not None else None
+        self._last, self._due = scene, False
+        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, details))

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Floors of the plan: for each a button with the number of wearers on it, and a sign when one of them needs help; on a phone more than three are a list.
+
+const MOST_BUTTONS = 3;
+const URGENT = ['lost', 'stale'];
+const $ = (id) => document.getElementById(id);
+
+export class Floors {
+  constructor(onFloor) {
+    this.onFloor = onFloor;
+    $('floor').onchange = () => onFloor(Number($('floor').value));
+  }
+
+  plan(levels) {
+    this.levels = levels;
+    $('floors').hidden = $('floor').hidden = levels.length < 2;
+    $('floors').classList.toggle('many', levels.length > MOST_BUTTONS);
+    $('floor').replaceChildren(...levels.map(({ name }, level) => new Option(name, level)).reverse());
+    $('floors').replaceChildren(...levels.map((_, level) => {
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.onclick = () => this.onFloor(level);
+      return button;
+    }));
+  }
+
+  show(shown, rows) {
+    if (!this.levels) return;
+    $('floor').value = shown;
+    this.levels.forEach(({ name }, level) => {
+      const here = rows.filter((row) => row.level === level), urgent = here.some(({ state }) => URGENT.includes(state));
+      const text = `${name}${here.length ? `: ${here.length}` : ''}${urgent ? ' !' : ''}`, button = $('floors').children[level];
+      const option = [...$('floor').options].find(({ value }) => Number(value) === level);
+      if (button.textContent !== text) [button.textContent, option.text] = [text, text];
+      button.classList.toggle('urgent', urgent);
+      button.setAttribute('aria-pressed', String(level === shown));
+    });
+  }
+}

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+// The commander's page: connects the link to the server, the map and the list.
+
+import { Gestures } from '../static/gestures.js';
+import { Link } from '../static/link.js';
+import { PlanView } from '../static/plan.js';
+import { startTheme } from '../static/theme.js';
+import { View } from '../static/view.js';
+import { Floors } from './floors.js';
+import { List } from './list.js';
+import { Painter } from './paint.js';
+import { Trails } from './trails.js';
+import { parseFrame, placesOf } from './wire.js';
+
+const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
+const $ = (id) => document.getElementById(id);
+const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'));
+const scene = { places: new Map(), rows: [], level: 0, chosen: null };
+const floors = new Floors((level) => showLevel(level));
+const list = new List(choose);
+let plan = null, wantedLevel = 0, fitted = false, dirty = true, drawnStamp = -1, undrawn = [], found = false;
+
+const link = new Link({ onHello: hello, onFrame: frame, onRefused: (reason) => fault(reason), onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
+const painted = new MessageChannel();
+painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
+const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
+
+async function hello(message) {
+  plan = message.plan;
+  found = fitted = false;
+  fault('');
+  trails.clear();
+  $('title').textContent = `${message.title}: ${plan.name}`;
+  document.title = message.title;
+  floors.plan(plan.levels);
+  if (scene.chosen !== null) link.send('choose', { id: scene.chosen });
+  await showLevel(Math.min(scene.level, plan.levels.length - 1));
+}
+
+async function showLevel(level) {
+  wantedLevel = level;
+  const answer = await fetch(new URL(`walls/${level}`, document.baseURI)).catch(() => null);
+  if (!answer) return;  // the server is away; when it is back, its hello shows the level again
+  if (!answer.ok) return fault(await answer.text());
+  const walls = await answer.arrayBuffer();
+  if (level !== wantedLevel) return;
+  scene.level = level;
+  planView.show(new Float32Array(walls), plan.levels[level].rooms);
+  if (!fitted) view.fit(planView.box);
+  fitted = true;
+  floors.show(level, scene.rows);
+  view.changed();
+}
+
+function connection(open) {
+  if (open) return;
+  $('words').dataset.status = 'broken';
+  $('mark').textContent = '✕';
+  $('status-text').textContent = 'this page is not connected';
+}
+
+// Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.
+function frame(received) {
+  scene.places = placesOf(received.places);
+  trails.add(received.trail);
+  if (received.list) {
+    scene.rows = received.list;
+    list.show(received.list);
+    floors.show(scene.level, scene.rows);
+    findFirst();
+  }
+  list.details(received.details);
+  status(received);
+  undrawn.push(received.seq);
+  scene.frame = received;
+  dirty = true;
+}
+
+function status({ summary, refused, connected }) {
+  $('words').dataset.status = connected ? 'tracking' : 'broken';
+  $('mark').textContent = connected ? '●' : '✕';
+  const text = connected ? summary : `no connection to the broker: the last known state. ${summary}`;
+  if ($('status-text').textContent !== text) $('status-text').textContent = text;
+  const why = refused ? `rejected: ${refused}` : '';
+  if ($('refused').textContent !== why) $('refused').textContent = why;
+  $('refused').hidden = !why;
+}
+
+// The page begins on the floor of the most urgent wearer.
+function findFirst() {
+  const first = scene.rows.find(({ level }) => level !== null);
+  if (found || !first || !plan) return;
+  found = true;
+  if (first.level !== wantedLevel) showLevel(first.level);
+}
+
+function choose(id) {
+  scene.chosen = id;
+  dirty = true;
+  link.send('choose', { id });
+  const place = scene.places.get(id);
+  if (!place) return;
+  if (place.level !== wantedLevel) showLevel(place.level);
+  view.keep(place.x, place.y);
+}
+
+function fault(text) {
+  $('fault').textContent = text;
+  $('fault').hidden = !text;
+}
+
+function draw() {
+  requestAnimationFrame(draw);
+  if (!dirty && drawnStamp === view.stamp) return;
+  if (drawnStamp !== view.stamp) {
+    planView.draw(view);
+    scale();
+  }
+  const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => ({ ...row, place: scene.places.get(row.id) }));
+  trails.paint(view, scene.level, painter.colour, scene.chosen);
+  painter.paint(view, here, scene.chosen);
+  [dirty, drawnStamp, drawn.last] = [false, view.stamp, scene.frame ?? null];
+  drawn.frames++;
+  if (undrawn.length) painted.port2.postMessage(undrawn);
+  undrawn = [];
+}
+
+function scale() {
+  const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
+  $('bar').style.width = `${length * view.scale}px`;
+  $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+  $('needle').style.transform = `rotate(${-view.turn}rad)`;
+}
+
+function tapped(position, pixel) {
+  const near = scene.rows.map(({ id }) => scene.places.get(id)).filter((place) => place?.level === scene.level).map(({ id, x, y }) => {
+    const [sx, sy] = view.toScreen(x, y);
+    return { id, far: Math.hypot(sx - pixel[0], sy - pixel[1]) };
+  }).filter(({ far }) => far < TAP_PX).sort((a, b) => a.far - b.far);
+  if (near.length) list.choose(near[0].id);
+}
+
+function key(name) {
+  const does = { n: () => view.rotate(-view.turn), w: () => view.fit(planView.box), Escape: () => list.choose(null) }[name.length === 1 ? name.toLowerCase() : name];
+  does?.();
+  return Boolean(does);
+}
+
+new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => {}, key });
+$('closer').onclick = () => view.zoom(1.4);
+$('farther').onclick = () => view.zoom(1 / 1.4);
+$('whole').onclick = () => view.fit(planView.box);
+$('north').onclick = () => view.rotate(-view.turn);
+window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
+window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
+startTheme($('theme'), () => { painter.recolour(); dirty = true; view.changed(); });
+view.resize($('map').clientWidth, $('map').clientHeight);
+new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
+requestAnimationFrame(draw);

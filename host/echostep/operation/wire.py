@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""Everything that goes to a commander's page and comes from it: typed messages and their bytes.
+
+In: scenes, details; texts of pages, which may be damaged or hostile. Out: JSON for texts, bytes for frames; requests. Owns the limits. A frame,
+little-endian:
+
+    u32         length of the JSON header, padded with spaces to a multiple of four
+    bytes       the header (`TableHeader`)
+    float32[7]  `places` rows: wearer, x, y, level, heading, 95 % radius, protection radius (`Operation.scene`)
+    float32[5]  `trail` rows: wearer, x, y, level, age in seconds
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from echostep.operation.operation import TableScene
+from echostep.operation.words import ShownDetails, ShownWearer
+from echostep.page.protocol import PlanLabels, hello
+from echostep.page.requests import MOST_REQUEST
+from echostep.plan.model import Plan
+
+PLACE_BYTES, TRAIL_BYTES = 7 * 4, 5 * 4
+
+# The field names of all classes here are keys of the JSON.
+
+
+@dataclass(frozen=True, slots=True)
+class TableHello:
+    """The first message to a page."""
+
+    title: str
+    plan: PlanLabels
+    kind: Literal["hello"] = "hello"
+
+
+@dataclass(frozen=True, slots=True)
+class TableHeader:
+    """One moment. `seq`: the page returns it when the frame is drawn. `list`: None when the page has it already. `details`: of the chosen wearer."""
+
+    seq: int
+    unix_s: float
+    places: int
+    trail: int
+    trail_from: int
+    list: tuple[ShownWearer, ...] | None
+    summary: str
+    refused: str
+    connected: bool
+    details: ShownDetails | None
+    kind: Literal["table"] = "table"
+
+
+class Drawn(msgspec.Struct, frozen=True, tag_field="kind", tag="drawn"):
+    """The page has drawn frame number `seq`."""
+
+    seq: Annotated[int, Meta(ge=0, lt=1 << 53)]
+
+
+class Choose(msgspec.Struct, frozen=True, tag_field="kind", tag="choose"):
+    """Send the details of a wearer; None: of none."""
+
+    id: Annotated[int, Meta(ge=0, lt=1 << 53)] | None
+
+
+TableRequest = Drawn | Choose
+_ENCODER, _REQUESTS = msgspec.json.Encoder(), msgspec.json.Decoder(TableRequest)
+
+
+def encode(message: TableHello) -> str:
+    """A message as JSON."""
+    return _ENCODER.encode(message).decode()
+
+
+def table_hello(plan: Plan, title: str) -> TableHello:
+    """The first message of an operation on this plan."""
+    return TableHello(title, hello(plan, title, replay=False).plan)
+
+
+def parse_request(text: str | None) -> TableRequest | None:
+    """The request in a text from a page; None when it is not a valid one."""
+    if text is None or len(text) > MOST_REQUEST:
+        return None
+    try:
+        request: TableRequest = _REQUESTS.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    return request
+
+
+@dataclass(frozen=True, slots=True)
+class TableParts:
+    """What a frame has beside its scene, for one page. `trail`: rows, the first of which has the number `trail_from`. `lists`: the list is new."""
+
+    seq: int
+    trail: bytes
+    trail_from: int
+    lists: bool
+    details: ShownDetails | None
+
+
+def frame(scene: TableScene, parts: TableParts) -> bytes:
+    """A frame as bytes, in the layout of this module's docstring."""
+    header = TableHeader(
+        seq=parts.seq,
+        unix_s=scene.unix_s,
+        places=len(scene.places) // PLACE_BYTES,
+        trail=len(parts.trail) // TRAIL_BYTES,
+        trail_from=parts.trail_from,
+        list=scene.rows if parts.lists else None,
+        summary=scene.summary,
+        refused=scene.refused,
+        connected=scene.connected,
+        details=parts.details,
+    )
+    text = _ENCODER.encode(header)
+    text += b" " * (-len(text) % 4)
+    return len(text).to_bytes(4, "little") + text + scene.places + parts.trail

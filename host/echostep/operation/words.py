@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""A member of the team in words: the row of the list, and the details behind it.
+
+In: members, the plan, a time. Out: `ShownWearer`, `ShownDetails`: plain data, whose field names are keys of the page's JSON. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from echostep.plan.model import Plan
+from echostep.team.commander import notes
+from echostep.team.report import Position
+from echostep.team.roster import Member, MemberState
+
+STATES = {
+    MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
+    MemberState.WAITING: "no position yet", MemberState.TRACKING: "", MemberState.ENDED: "run ended",
+}  # in words; a position that is tracked needs none  # fmt: skip
+COUNTED = {state: words or "tracked" for state, words in STATES.items()}  # in the summary
+COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
+
+
+@dataclass(frozen=True, slots=True)
+class ShownEvent:
+    """A change of a wearer's state: time of day in seconds since 1970, and what happened."""
+
+    unix_s: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShownWearer:
+    """A row of the list. `level` is an index into the plan's levels, None without a position on this plan."""
+
+    id: int
+    team: str
+    name: str
+    state: str
+    words: str
+    level: int | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFact:
+    """One line of the details."""
+
+    name: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShownDetails:
+    """What is known of one wearer. `history`: the newest event first."""
+
+    id: int
+    facts: tuple[ShownFact, ...]
+    history: tuple[ShownEvent, ...]
+
+
+def summary_words(members: Sequence[Member], now_s: float) -> str:
+    """How many wearers there are, and how many in each state: "8 wearers: 1 lost, 7 tracked"."""
+    states = [m.state(now_s) for m in members]
+    counts = ", ".join(f"{states.count(state)} {COUNTED[state]}" for state in MemberState if state in states)
+    return f"{len(members)} wearer{'s' * (len(members) != 1)}" + (f": {counts}" if counts else "")
+
+
+def level_on(plan: Plan, m: Member) -> int | None:
+    """The plan's level that a member is on; None without a position, and when it was tracked on another plan."""
+    p = m.report.position
+    if p is None or m.report.plan_sha256 != plan.digest or not 0 <= p.floor < len(plan.levels):
+        return None
+    return p.floor
+
+
+def shown_wearer(number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]]) -> ShownWearer:
+    """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
+    state, p = m.state(now_s), m.position(now_s)
+    parts = [STATES[state], *(place_words(p) if p else ()), heard_words(m.silent_s(now_s))]
+    words = ", ".join(filter(None, parts))
+    remarks = tuple(notes(m, plan, duplicates))
+    return ShownWearer(number, m.report.team, m.report.name, state.value, words, level_on(plan, m), remarks)
+
+
+def place_words(p: Position) -> tuple[str, str, str]:
+    """Floor, place on it, and how sure that is: the protection radius where there is one, else the 95 % radius."""
+    if p.protection_m is not None:
+        return p.floor_name, p.where, f"within {metres(p.protection_m)}"
+    return p.floor_name, p.where, f"±{metres(p.radius95_m)}"
+
+
+def heard_words(silent_s: float) -> str:
+    """How long ago a member was heard."""
+    if silent_s < 1.5:
+        return "heard now"
+    return f"heard {silent_s:.0f} s ago" if silent_s < 120.0 else f"heard {silent_s / 60.0:.0f} min ago"
+
+
+def metres(m: float) -> str:
+    """A length as text: 0.4 m, 12 m."""
+    return f"{m:.1f} m" if m < 9.95 else f"{m:.0f} m"
+
+
+def shown_details(
+    number: int, m: Member, plan: Plan, now_s: float, history: tuple[ShownEvent, ...], duplicates: set[tuple[str, str]]
+) -> ShownDetails:
+    """Everything that the last report says, in words."""
+    r, p = m.report, m.position(now_s)
+    rows = [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
+    if p:
+        rows += [("floor", f"{p.floor_name} ({100.0 * p.floor_probability:.0f} %)"), ("place", p.where or "not named")]
+        rows += [("position", f"x {p.x_m:.1f}, y {p.y_m:.1f} m"), ("95 % within", metres(p.radius95_m))]
+        rows += [("safe radius", metres(p.protection_m) if p.protection_m is not None else "none")]
+        rows += [("heading", heading_words(p))]
+    if r.motion:
+        rows += [("walked", f"{r.motion.walked_m:.0f} m"), ("last step", f"{r.motion.still_s:.0f} s before the report")]
+    if r.battery_percent is not None:
+        rows += [("battery", f"{r.battery_percent} %")]
+    rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
+    rows += [("note", note) for note in notes(m, plan, duplicates)]
+    return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)
+
+
+def heading_words(p: Position) -> str:
+    """The heading: NE 45°."""
+    if p.heading_rad is None:
+        return "not known"
+    degrees = math.degrees(p.heading_rad) % 360.0
+    return f"{COMPASS[round(degrees / 45.0) % 8]} {degrees:.0f}°"

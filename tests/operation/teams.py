@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""A team of simulated wearers in a tower of three storeys, as a commander's inbox receives it, and its page."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import Any, Self
+
+from echostep.operation.operation import Operation, TableScene
+from echostep.operation.page import TablePage
+from echostep.page.server import Address
+from echostep.plan.model import Plan
+from echostep.plan.whereabouts import Whereabouts
+from echostep.simulation.world.tower import tower
+from echostep.team.inbox import Inbox
+from echostep.team.report import Position, Report, encode, moment
+from team.team_reports import POSITION, report
+
+STOREYS = 3
+FLOORS = ("Ground floor", "1st floor", "2nd floor")
+_PLAIN = tower(STOREYS)
+TOWER = replace(
+    _PLAIN,
+    digest="7" * 64,
+    name="Tower",
+    levels=tuple(replace(level, name=name) for level, name in zip(_PLAIN.levels, FLOORS, strict=True)),
+)
+WORDS = Whereabouts(TOWER)
+BASE = report()
+NAMES = ("Kim", "Anna", "Bo", "Chris", "Dana", "Eve", "Finn", "Gil")
+
+
+def place(plan: Plan, x_m: float, y_m: float, floor: int, **fields: Any) -> Position:
+    """A position on a plan, with its words."""
+    words = WORDS.words(x_m, y_m, floor) if plan is TOWER else ""
+    at = replace(POSITION, x_m=x_m, y_m=y_m, floor=floor, floor_name=plan.levels[floor].name, where=words)
+    return replace(at, **({"protection_m": 0.4} | fields))
+
+
+class Team:
+    """Wearers whose reports go into one operation. `now_s`: the commander's clock."""
+
+    def __init__(self, plan: Plan = TOWER, now_s: float | None = None) -> None:
+        self.plan = plan
+        self.operation = Operation(plan)
+        self.now_s = time.monotonic() if now_s is None else now_s
+        self.unix_s = 1.8e9
+        self.gathers = False  # messages wait for `receive`
+        self._inbox = Inbox()
+        self._sequence: dict[str, int] = {}
+
+    def hear(self, name: str, position: Position | None, **fields: Any) -> None:
+        """A report of this wearer, of now."""
+        self._sequence[name] = self._sequence.get(name, 0) + 1
+        status = {"status": "waiting", "place": None} if position is None else {}
+        known = {"plan_sha256": self.plan.digest, "position": position} | status
+        sent = {"time": moment(self.unix_s), "stale": moment(self.unix_s + 10.0)}
+        self.put(replace(BASE, name=name, sequence=self._sequence[name], **(sent | known | fields)))
+
+    def put(self, made: Report) -> None:
+        """A report as it is."""
+        self.put_bytes(f"echostep/{made.team}/{made.name}/estimate", encode(made))
+
+    def put_bytes(self, topic: str, payload: bytes) -> None:
+        """Any message."""
+        self._inbox.put(topic, payload, False)
+        if not self.gathers:
+            self.receive()
+
+    def receive(self) -> None:
+        """Have the operation take what came."""
+        messages, dropped = self._inbox.take_all()
+        dated = [message._replace(received_s=self.now_s, unix_s=self.unix_s) for message in messages]
+        self.operation.receive(dated, dropped, self.now_s, self.unix_s)
+
+    def pass_time(self, seconds: float) -> None:
+        """Nothing is heard for so many seconds."""
+        self.now_s += seconds
+        self.unix_s += seconds
+        self.operation.receive([], {}, self.now_s, self.unix_s)
+
+    def scene(self, **how: Any) -> TableScene:
+        """What a page would be sent."""
+        return self.operation.scene(self.now_s, self.unix_s, **how)
+
+
+def whole_team() -> Team:
+    """Eight wearers: tracked on three storeys, one lost, one silent, one uncertain, one without a position."""
+    team = Team()
+    x_m, y_m = TOWER.levels[0].rooms[0].at_m
+    for k in range(12):
+        for n, name in enumerate(NAMES):
+            angle = 0.15 * k + n
+            at = place(
+                TOWER,
+                x_m + 3.0 * math.cos(angle),
+                y_m + 1.2 * math.sin(angle),
+                n % STOREYS,
+                heading_rad=math.remainder(angle, math.tau),
+            )
+            if name == "Chris":
+                team.hear(name, None)
+            elif name == "Kim" and k > 6:
+                lost = replace(at, radius95_m=8.0, xx_m2=11.0, xy_m2=0.0, yy_m2=11.0, protection_m=None)
+                team.hear(name, lost, status="lost")
+            elif name == "Dana":
+                team.hear(name, replace(at, radius95_m=2.0, protection_m=3.0), status="uncertain")
+            elif name != "Bo" or k < 4:
+                team.hear(name, at, battery_percent=12 if name == "Eve" else 80)
+        team.pass_time(1.5)
+    return team
+
+
+class ServedTeam:
+    """The page of a team; `show` publishes its present scene."""
+
+    def __init__(self, team: Team) -> None:
+        self.team = team
+        self.page = TablePage(team.operation, "Simulated operation", Address(port=0))
+
+    def show(self, **how: Any) -> None:
+        self.page.publish(self.team.scene(**how))
+
+    def __enter__(self) -> Self:
+        self.page.__enter__()
+        self.show()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.page.__exit__(None, None, None)

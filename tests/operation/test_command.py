@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""`echostep command` as a program: a broker, a tracker's outbox, the page over its socket; guards against other sites."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin
+
+from command_line import PROGRAM
+from operation.teams import ServedTeam, whole_team
+from team.network import box_to
+from team.team_broker import Broker, needs_broker
+from team.team_reports import PLAN, POSITION, report
+from waiting import PATIENCE_S, until
+
+
+def header_of(raw: bytes) -> dict[str, Any]:
+    """The header of a frame."""
+    made: dict[str, Any] = json.loads(raw[4 : 4 + int.from_bytes(raw[:4], "little")])
+    return made
+
+
+def socket_of(url: str) -> str:
+    return url.replace("http", "ws", 1) + "socket"
+
+
+@needs_broker
+def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
+    with Broker(tmp_path) as broker:
+        command = [*PROGRAM, "command", broker.url, "--plan", str(PLAN), "--port", "0", "--json"]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONUNBUFFERED": "1"}
+        running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+        assert running.stderr
+        found = re.search(r"http://127\.0\.0\.1:\d+/", running.stderr.readline())
+        assert found
+        box = box_to(broker.url)
+        box.offer(report("anna", position=replace(POSITION, protection_m=0.4)))
+        with connect(socket_of(found[0]), origin=Origin(found[0].rstrip("/"))) as page:
+            hello = json.loads(page.recv(PATIENCE_S))
+            assert (hello["kind"], hello["plan"]["name"]) == ("hello", "Demo office")
+
+            def rows() -> Any:
+                header = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+                page.send(json.dumps({"kind": "drawn", "seq": header["seq"]}))
+                return header["list"]
+
+            assert until(lambda: any(row["name"] == "anna" and "within 0.4 m" in row["words"] for row in rows() or []))
+        box.close()
+        running.send_signal(signal.SIGINT)
+        out, _ = running.communicate(timeout=PATIENCE_S)
+    assert [member["name"] for member in json.loads(out)["members"]] == ["anna"]
+
+
+def test_other_sites_cannot_open_the_socket_and_hostile_requests_do_nothing() -> None:
+    with ServedTeam(whole_team()) as served:
+        url = served.page.url
+        with pytest.raises(InvalidStatus):
+            connect(socket_of(url), origin=Origin("http://evil.example")).__enter__()
+        with connect(socket_of(url), origin=Origin(url.rstrip("/"))) as page:
+            page.recv(PATIENCE_S)
+            first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            assert len(first["list"]) == 8
+            hostile = ["", "[]", "{", '{"kind":"choose","id":-1}', '{"kind":"choose","id":"x"}', "[" * 1500]
+            for text in [*hostile, '{"kind":"drawn","seq":1e99}', json.dumps({"kind": "choose", "id": 1 << 60})]:
+                page.send(text)
+            assert until(lambda: served.page.server.counts.unknown == len(hostile) + 2)
+            page.send(json.dumps({"kind": "choose", "id": first["list"][0]["id"]}))
+            chosen = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            assert chosen["details"]["id"] == first["list"][0]["id"]
+            assert chosen["trail"] == 0  # the page has it already
+
+
+def test_a_page_that_draws_nothing_is_sent_two_frames_and_no_more() -> None:
+    with ServedTeam(whole_team()) as served:
+        url = served.page.url
+        with connect(socket_of(url), origin=Origin(url.rstrip("/"))) as page:
+            page.recv(PATIENCE_S)
+            first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            served.show()
+            page.recv(PATIENCE_S)
+            for _ in range(5):
+                served.show()
+            served.team.pass_time(60.0)
+            served.show()
+            page.send(json.dumps({"kind": "drawn", "seq": first["seq"]}))
+            newest = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+    assert newest["seq"] == first["seq"] + 2
+    assert "silent" in newest["list"][1]["words"]  # it has the newest scene, not one of those that it missed

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""The commander's page in Chromium: on a desk and on a phone, by touch, by keys and for screen readers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from operation.teams import TOWER, ServedTeam, place, whole_team
+from page.browser import PHONE, PICTURES, opened_page, spot, wait_for
+
+WIDE = {"viewport": {"width": 1280, "height": 720}}
+LOOKS: dict[str, dict[str, Any]] = {
+    "wide": {**WIDE, "color_scheme": "light"},
+    "phone": {**PHONE, "color_scheme": "dark"},
+    "contrast": {**PHONE, "contrast": "more"},
+}
+READY = "echostep.last && document.querySelector('#walls path') && document.querySelectorAll('#list li').length"
+WORDS = "[...document.querySelectorAll('#list li')].map((e) => e.innerText.replaceAll('\\n', ' '))"
+
+
+def table(browser: Any, url: str, look: str) -> Any:
+    """A page that shows a plan and a list."""
+    page = opened_page(browser, **LOOKS[look])
+    page.wrong = []
+    page.on("pageerror", lambda error: page.wrong.append(str(error)))
+    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
+    page.goto(url)
+    wait_for(page, READY)
+    return page
+
+
+def shot(page: Any, name: str, tmp_path: Path) -> None:
+    page.screenshot(path=(PICTURES or tmp_path) / f"table-{name}.png")
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_nothing_keeps_a_commander_out(browser: Any, look: str, tmp_path: Path) -> None:
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    with ServedTeam(whole_team()) as served:
+        page = table(browser, served.page.url, look)
+        found = Axe().run(page)
+        shot(page, look, tmp_path)
+        page.click("#list li:nth-child(1) button")
+        wait_for(page, "document.querySelectorAll('#facts dt').length > 5")
+        again = Axe().run(page)
+        shot(page, f"{look}-one", tmp_path)
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        cut = page.evaluate(
+            "[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
+        )
+        assert not page.wrong
+        page.context.close()
+    assert found.violations_count == 0, found.generate_report()
+    assert again.violations_count == 0, again.generate_report()
+    assert (wide, cut) == (0, 0)
+
+
+def test_the_list_is_in_words_and_the_most_urgent_comes_first(browser: Any) -> None:
+    with ServedTeam(whole_team()) as served:
+        page = table(browser, served.page.url, "wide")
+        said = page.evaluate(WORDS)
+        assert said[0].startswith("✕ Kim lost, ")
+        assert said[1].startswith("◌ Bo silent, ")
+        assert "lost" in page.inner_text("#live")
+        assert page.inner_text("#floors button:nth-child(1)").endswith("!")  # one of this floor needs help
+        assert not page.wrong
+        page.context.close()
+
+
+def test_a_tap_on_the_map_or_on_the_list_shows_a_wearer_with_history(browser: Any) -> None:
+    team = whole_team()
+    with ServedTeam(team) as served:
+        page = table(browser, served.page.url, "wide")
+        page.click("#list li:has-text('Anna') button")
+        wait_for(page, "document.querySelectorAll('#history li').length > 0")
+        assert page.inner_text("#who") == "● Anna (red)"
+        wait_for(page, "echostep.scene.level === 1")  # the map went to the floor of this wearer
+        page.keyboard.press("Enter")  # the focus is on ✕
+        wait_for(page, "document.activeElement.innerText.includes('Anna')")
+        team.hear("Anna", place(TOWER, 7.0, 2.0, 1))
+        served.show()
+        wait_for(page, "[...echostep.scene.places.values()].some(({ x }) => x === 7)")
+        page.mouse.click(*spot(page, 7.0, 2.0))
+        wait_for(page, "document.querySelector('#who').textContent.includes('Anna')")
+        assert not page.wrong
+        page.context.close()
+
+
+def test_a_broker_that_dies_is_said_and_the_last_state_stays(browser: Any) -> None:
+    with ServedTeam(whole_team()) as served:
+        page = table(browser, served.page.url, "phone")
+        served.show(connected=False)
+        wait_for(page, "document.querySelector('#status-text').textContent.startsWith('no connection to the broker')")
+        assert page.locator("#list li").count() == 8
+        served.show(connected=True)
+        wait_for(page, "document.querySelector('#words').dataset.status === 'tracking'")
+        page.context.close()
