@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command line: `echostep demo | live | record | replay | foot | legs | doctor | flash | calibrate | decode` and groups of commands.
+"""The command line: `echostep demo | live | record | replay | score | foot | legs | doctor | flash | calibrate | decode` and groups of commands.
 
 In: the command's arguments and options. Out: files, views, an exit status (0: done; 2: a mistake, named in one line). Owns nothing.
 Modules that are slow to import are imported inside the command that needs them, so that `--help` answers at once.
@@ -357,6 +357,32 @@ def floors(
     from echostep.commands import floors as floor_run
 
     floor_run.floors(pressure, heights, out, start, plot=plot)
+
+
+@app.command()
+def score(
+    tracks: Annotated[
+        list[Path],
+        typer.Argument(metavar="TRACK...", help="CSV of any tracker: columns t_s, x_m, y_m, and more by their names."),
+    ],
+    truth: Annotated[
+        Path, typer.Option("--truth", metavar="FILE", help="True path, or surveyed points (CSV), on the same clock.")
+    ],
+    plan: Annotated[
+        Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with the table and the pictures.")
+    ] = None,
+    setup: Annotated[
+        float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Score tracks against the truth by ISO/IEC 18305 and EvAAL."""
+    from echostep.commands import score as scoring
+
+    scoring.score(tracks, truth, plan, html, setup, as_json=as_json)
 
 
 @app.command()

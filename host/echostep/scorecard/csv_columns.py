@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""A CSV file of anybody's: numbers by the names of its columns.
+
+In: a file with a line of names, then numbers, with commas, semicolons or tabs in between. Out: `CsvColumns`. Owns nothing. Every error is one line
+that names the file, the line and the column.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+
+DELIMITERS = ",;\t"
+SHOWN = 40  # characters of a wrong cell that an error repeats
+
+
+@dataclass(frozen=True, slots=True)
+class CsvColumns:
+    """Cells of a file: `names` of its columns as written, `rows` of text, `lines`: number of the line of each row."""
+
+    path: Path
+    names: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+
+    def find(self, names: Sequence[str]) -> str | None:
+        """The first of these names that a column has, small and capital letters being alike; None when none has."""
+        written = {name.lower(): name for name in reversed(self.names)}
+        return next((written[name] for name in names if name in written), None)
+
+    def texts(self, name: str) -> list[str]:
+        """Cells of a column."""
+        k = self.names.index(name)
+        return [row[k] for row in self.rows]
+
+    def numbers(self, name: str, *, gaps: bool = False) -> Floats:
+        """A column (n,) of numbers, finite unless `gaps`: then an empty cell is NaN, and infinity is allowed."""
+        k = self.names.index(name)
+        return np.array(
+            [self._number(row[k], line, name, gaps) for row, line in zip(self.rows, self.lines, strict=True)]
+        )
+
+    def error(self, row: int, name: str, what: str) -> EchostepError:
+        """An error about a cell."""
+        return EchostepError(f"{self.path}:{self.lines[row]}: column {name}: {what}")
+
+    def _number(self, cell: str, line: int, name: str, gaps: bool) -> float:
+        where = f"{self.path}:{line}: column {name}"
+        if not cell:
+            if gaps:
+                return math.nan
+            raise EchostepError(f"{where}: the cell is empty, a number is expected")
+        try:
+            value = float(cell)
+        except ValueError as error:
+            raise EchostepError(f"{where}: {cell[:SHOWN]!r} is not a number") from error
+        if not gaps and not math.isfinite(value):
+            raise EchostepError(f"{where}: {cell[:SHOWN]!r} is not a finite number")
+        return value
+
+
+def read_csv(path: Path) -> CsvColumns:
+    """Read a file; raises EchostepError. Empty lines are skipped; a # before the names is, too."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            first = file.readline()
+            delimiter = max(DELIMITERS, key=first.count)
+            names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
+            reader = csv.reader(file, delimiter=delimiter)
+            read = [(reader.line_num + 1, tuple(cell.strip() for cell in row)) for row in reader if any(row)]
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot read it: {error.strerror or error}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise EchostepError(f"{path}: not a CSV file in UTF-8: {error}") from error
+    if not any(names):
+        raise EchostepError(f"{path}:1: the names of the columns are expected in the first line")
+    for line, row in read:
+        if len(row) != len(names):
+            raise EchostepError(f"{path}:{line}: {len(row)} cells, but {len(names)} columns have a name in line 1")
+    if not read:
+        raise EchostepError(f"{path}: no line of numbers below the names of the columns")
+    return CsvColumns(path, names, tuple(row for _, row in read), tuple(line for line, _ in read))

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""Tracks and true paths of anybody's CSV files: which column means what.
+
+In: a CSV file, the plan's levels. Out: `ScoredPath`s. Owns the names that columns may have. Metres, seconds, radians; x and y in the frame of the
+truth, which is the plan's where there is one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.errors import EchostepError
+from echostep.localization.estimate import CHI2_95
+from echostep.plan.model import Plan
+from echostep.scorecard.csv_columns import CsvColumns, read_csv
+
+NAMES = {
+    "time": ("t_s", "t", "time_s", "time", "timestamp_s", "timestamp"),
+    "x": ("x_m", "x", "east_m", "east", "pos_x"),
+    "y": ("y_m", "y", "north_m", "north", "pos_y"),
+    "height": ("z_m", "z", "height_m", "height", "pos_z"),
+    "floor": ("level", "floor", "storey"),
+    "radius95": ("radius95_m", "ce95_m"),
+    "protection": ("protection_m", "protection_level_m"),
+    "latency": ("latency_s",),
+    "status": ("status",),
+    "xx": ("xx_m2",),
+    "xy": ("xy_m2",),
+    "yy": ("yy_m2",),
+}
+REQUIRED = ("time", "x", "y")
+
+
+@dataclass(frozen=True, slots=True)
+class ScoredPath:
+    """A track or a true path of n rows: `t_s` (n,), `xy_m` (n, 2); None for what the file does not have.
+
+    `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that say so
+    themselves. `columns`: what was found, name of the column by what it means.
+    """
+
+    path: Path
+    t_s: Floats
+    xy_m: Floats
+    lost: Bools
+    columns: dict[str, str] = field(compare=False)
+    height_m: Floats | None = None
+    level: Floats | None = None
+    covariance_m2: Floats | None = None
+    radius95_m: Floats | None = None
+    protection_m: Floats | None = None
+    latency_s: Floats | None = None
+
+    def described(self) -> str:
+        """The columns that were used, in words."""
+        return f"{self.path}: " + ", ".join(f"{what} is {name}" for what, name in self.columns.items())
+
+
+def load_path(path: Path, plan: Plan | None) -> ScoredPath:
+    """A track or a true path; raises EchostepError that names file, line and column."""
+    table = read_csv(path)
+    columns = {what: name for what, names in NAMES.items() if (name := table.find(names)) is not None}
+    for what in REQUIRED:
+        if what not in columns:
+            raise EchostepError(f"{path}:1: no column for {what}: it may be named {', '.join(NAMES[what])}")
+    t_s = table.numbers(columns["time"])
+    back = np.flatnonzero(np.diff(t_s) < 0.0)
+    if len(back):
+        raise table.error(int(back[0]) + 1, columns["time"], "the time goes back")
+
+    def optional(what: str) -> Floats | None:
+        return table.numbers(columns[what], gaps=True) if what in columns else None
+
+    height_m = optional("height")
+    moments = [optional(what) for what in ("xx", "xy", "yy")]
+    covariance = np.column_stack([m for m in moments if m is not None]) if all(m is not None for m in moments) else None
+    radius = optional("radius95")
+    if radius is None and covariance is not None:
+        radius = _radius95(covariance)
+    lost = np.array([s.lower() == "lost" for s in table.texts(columns["status"])]) if "status" in columns else None
+    return ScoredPath(
+        path, t_s, np.column_stack([table.numbers(columns[axis]) for axis in "xy"]),
+        np.zeros(len(t_s), bool) if lost is None else lost, columns, height_m,
+        _levels(table, columns.get("floor"), height_m, plan), covariance, radius, optional("protection"),
+        optional("latency"),
+    )  # fmt: skip
+
+
+def _levels(table: CsvColumns, name: str | None, height_m: Floats | None, plan: Plan | None) -> Floats | None:
+    """Floor of each row: the column's, else the level of the plan nearest to the height, else the plan's only one."""
+    if name is not None:
+        index = {level.name: k for k, level in enumerate(plan.levels)} if plan else {}
+        return np.array([_level(table, k, name, text, index.get) for k, text in enumerate(table.texts(name))])
+    if plan is None:
+        return None
+    heights = np.array([level.height_m for level in plan.levels])
+    if height_m is None:
+        return np.zeros(len(table.rows)) if len(heights) == 1 else None
+    nearest = np.abs(height_m[:, None] - heights).argmin(1).astype(float)
+    return np.asarray(np.where(np.isfinite(height_m), nearest, math.nan))
+
+
+def _level(table: CsvColumns, row: int, name: str, text: str, index_of: Callable[[str], int | None]) -> float:
+    """A floor from its cell: a whole number, or the name of a level of the plan; NaN where the cell is empty."""
+    if not text:
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        found = index_of(text)
+        if found is None:
+            raise table.error(row, name, f"{text[:40]!r} is neither a whole number nor a level of the plan") from None
+        return float(found)
+    if value != round(value) or abs(value) > 1000:
+        raise table.error(row, name, f"{text[:40]!r} is not a whole number of a floor")
+    return value
+
+
+def _radius95(covariance_m2: Floats) -> Floats:
+    """Longer half axis (m) of the 95 % ellipse of covariances (n, 3)."""
+    xx, xy, yy = covariance_m2.T
+    greatest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
+    return np.asarray(np.sqrt(CHI2_95 * np.maximum(greatest, 0.0)))
