@@ -41,14 +41,15 @@
 #define COUNTS_PER_PA 4.0f
 #define COUNTS_PER_DEGREE 20.0f
 
+static enum spi_protocol protocol; /* slow until the chip is known: an SCP1000 may be there */
 static bool measuring;
 static uint32_t earliest, deadline; /* of the next sample, ticks */
 static float t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11; /* PAR_T1 ... PAR_P11 [8.4] */
 
-/* Two mode 3 frames: the first byte of a reply is a dummy. */
+/* The first byte of a reply is a dummy. */
 static void read(uint8_t address, uint8_t *bytes, uint8_t length)
 {
-	spi_select(CHIP_PRESSURE, SPI_MODE3);
+	spi_select(CHIP_PRESSURE, protocol);
 	(void)spi_exchange(READ_FLAG | address);
 	(void)spi_exchange(0);
 	for (uint8_t n = 0; n < length; n++)
@@ -65,7 +66,7 @@ static uint8_t read8(uint8_t address)
 
 static void write8(uint8_t address, uint8_t value)
 {
-	spi_select(CHIP_PRESSURE, SPI_MODE3);
+	spi_select(CHIP_PRESSURE, protocol);
 	(void)spi_exchange(address);
 	(void)spi_exchange(value);
 	spi_release();
@@ -74,6 +75,7 @@ static void write8(uint8_t address, uint8_t value)
 /* An SCP1000 takes both reads for the same register, so that two different bytes are not from it. The write has no effect on it. */
 bool bmp390_answers(void)
 {
+	protocol = SPI_SCP1000;
 	write8(REGISTER_IF_CONF, FOUR_WIRES);
 	uint8_t identity = read8(REGISTER_CHIP_ID);
 	bool answers = identity == CHIP_ID && read8(REGISTER_CHIP_ID + 1u) != CHIP_ID;
@@ -86,6 +88,7 @@ bool bmp390_answers(void)
 uint32_t bmp390_start(uint32_t now)
 {
 	measuring = false;
+	protocol = SPI_MODE3;
 	write8(REGISTER_CMD, SOFT_RESET);
 	return now + RESET_TICKS;
 }

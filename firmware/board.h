@@ -72,6 +72,17 @@ int16_t usb_read(void);                               /* one byte, or -1 */
 bool usb_bootloader_wanted(void);                     /* whether the port was closed at 1200 Bd */
 uint8_t usb_suspends(void);                           /* how often the host has suspended the bus since the start; wraps */
 
+/* The echo lines of pulse rangers, side 0 left, 1 right: both edges are captured by a timer each. The left line is also SyncOut: its
+ * edges count as such except between echo_begin and echo_end, or the end of the pulse. */
+enum echo_state { ECHO_WAITING, ECHO_HIGH, ECHO_OVER };
+
+struct echo_pulse {
+	uint32_t rise, fall; /* ticks; fall is valid when the pulse is over */
+};
+bool echo_begin(uint8_t side); /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
+enum echo_state echo_take(uint8_t side, struct echo_pulse *out);
+void echo_end(uint8_t side);   /* gives up waiting */
+
 /* Supply voltage. */
 bool adc_take(uint16_t *reading); /* 1024 * 1.1 V / supply, and starts the next measurement (0.1 ms); false: not finished */
 

@@ -1,25 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 #include "ranger.h"
-#include "board.h"         /* twi_* */
+#include "board.h"         /* ticks */
 #include "configuration.h" /* schedule, enabled rangers */
 #include "link.h"          /* sending the messages */
-#include "parts.h"         /* what was found */
+#include "parts.h"         /* refused wiring */
+#include "pulse.h"         /* driver */
+#include "srf02.h"         /* driver */
 #include "status.h"        /* error counters */
-
-/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: at most 65 ms, in practice about 61 ms. */
-#define COMMAND_RANGE_US 0x52u
-#define REGISTER_COMMAND 0u
-#define REGISTER_REVISION 0u
-#define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
-#define RANGING_MIN_TICKS (60u * TICKS_PER_MS) /* first request for the result */
-#define RANGING_MAX_TICKS (72u * TICKS_PER_MS) /* last request: 65 ms with a margin */
-#define POLL_TICKS (TICKS_PER_MS / 2u)         /* between requests */
 
 #define TRIGGER_TRIES 3u
 #define RETRY_TICKS TICKS_PER_MS          /* between tries */
+#define POLL_TICKS (TICKS_PER_MS / 2u)    /* between tries to get the bus */
 #define QUIET_TICKS TICKS_PER_MS          /* before a trigger the bus is kept free: longer than any other transfer */
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
-#define IDLE_TICKS (30u * TICKS_PER_MS)   /* until the next call of a ranger with a transfer under way, or with nothing to do */
+#define MISSES_MAX 8u                     /* slots without an answer, half a second, after which any kind is sought again */
 
 /* Half periods of the two schedules: see ranger.h. */
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
@@ -30,25 +24,21 @@
 #define LFSR_TAPS 0xB400u              /* 16-bit Galois register of maximal length */
 #define LFSR_START 0xACE1u             /* any value but 0 */
 
-enum stage { WAITING, TRIGGERING, RANGING, READING };
+enum kind { UNKNOWN, SRF02, PULSE };
 
 static struct ranger {
-	struct twi_transfer transfer;
-	enum stage stage;
-	uint8_t index; /* RANGER_LEFT, RANGER_RIGHT */
-	uint8_t tries;
-	uint32_t slot;    /* grid time of this ping, without the delay */
-	uint32_t due;     /* time of the trigger, or of the next request for the result */
-	uint32_t trigger; /* time of the trigger */
+	bool pinging;
+	uint8_t index;     /* RANGER_LEFT, RANGER_RIGHT */
+	enum kind kind;    /* that answers */
+	enum kind pinged;  /* that was triggered in this slot */
+	uint8_t tries;     /* of the trigger in this slot */
+	uint8_t misses;    /* slots in a row without an answer */
+	uint32_t slot;     /* grid time of this ping, without the delay */
+	uint32_t due;      /* time of the trigger */
+	struct ranging ranging;
 } rangers[2];
 
-static const struct {
-	uint8_t address, sensor;
-	enum device device;
-} devices[2] = {
-	[RANGER_LEFT] = { 0x70, SENSORS_RANGER_LEFT, DEVICE_RANGER_LEFT },
-	[RANGER_RIGHT] = { 0x71, SENSORS_RANGER_RIGHT, DEVICE_RANGER_RIGHT },
-};
+static const uint8_t sensors[2] = { SENSORS_RANGER_LEFT, SENSORS_RANGER_RIGHT };
 
 static uint16_t lfsr;
 
@@ -70,12 +60,12 @@ static uint16_t jitter(void)
 
 static bool blocked_by_other(const struct ranger *r)
 {
-	return configuration.schedule == SCHEDULE_SEQUENTIAL && rangers[!r->index].stage != WAITING;
+	return configuration.schedule == SCHEDULE_SEQUENTIAL && rangers[!r->index].pinging;
 }
 
 static bool may_trigger(const struct ranger *r)
 {
-	return r->stage == WAITING && configuration_reads(devices[r->index].sensor) && !blocked_by_other(r);
+	return !r->pinging && configuration_reads(sensors[r->index]) && !blocked_by_other(r);
 }
 
 /* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips slots. The grid does
@@ -87,106 +77,109 @@ static void schedule_next(struct ranger *r, uint32_t now)
 	while (ticks_reached(now, r->slot + half_period()));
 	r->due = r->slot + jitter();
 	r->tries = 0;
-	r->stage = WAITING;
+	r->pinging = false;
+	r->pinged = r->kind == PULSE ? PULSE : SRF02;
 }
 
 static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_flight_us)
 {
-	struct msg_ping ping = { r->trigger, r->index, outcome, time_of_flight_us };
+	struct msg_ping ping = { r->ranging.trigger, r->index, outcome, time_of_flight_us };
 	link_send(MSG_PING, msg_pack_ping(link_body(), &ping));
 }
 
 static void fail(struct ranger *r, uint32_t now, uint8_t fault)
 {
-	status_failed(devices[r->index].device, fault);
+	status_failed((enum device)r->index, fault);
 	report(r, OUTCOME_BUS_ERROR, 0);
 	schedule_next(r, now);
 }
 
+static void refuse_mixed_kinds(void)
+{
+	for (uint8_t k = 0; k < 2; k++)
+		if (rangers[k].kind == PULSE && rangers[!k].kind == SRF02)
+			rangers[k].kind = UNKNOWN; /* its next answer is refused */
+}
+
 static void succeed(struct ranger *r, uint32_t now)
 {
-	uint16_t time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
-	status_ok(devices[r->index].device);
-	parts_found(devices[r->index].device, PART_SRF02, r->transfer.bytes[0]);
+	if (r->pinged == PULSE && rangers[!r->index].kind == SRF02) {
+		parts_set_wiring(WIRING_MIXED_RANGERS);
+		fail(r, now, FAULT_NO_ANSWER);
+		return;
+	}
+	uint16_t time_of_flight_us = r->ranging.time_of_flight_us;
+	r->kind = r->pinged;
+	r->misses = 0;
+	refuse_mixed_kinds();
+	if (rangers[0].kind == rangers[1].kind)
+		parts_set_wiring(WIRING_OK);
+	status_ok((enum device)r->index);
 	report(r, time_of_flight_us ? OUTCOME_ECHO : OUTCOME_NO_ECHO, time_of_flight_us);
 	schedule_next(r, now);
 }
 
-static void begin(struct ranger *r, enum stage stage)
+/* The ranger has not accepted its trigger: another try, then another kind if it is not known, then the next slot. */
+static void try_again(struct ranger *r, uint32_t now)
 {
-	if (twi_begin(&r->transfer))
-		r->stage = stage;
+	r->pinging = false;
+	r->due = now + RETRY_TICKS;
+	if (r->pinged == SRF02 && ++r->tries < TRIGGER_TRIES)
+		return;
+	if (r->pinged == SRF02 && r->kind == UNKNOWN) {
+		r->pinged = PULSE;
+		return;
+	}
+	if (r->kind != UNKNOWN && ++r->misses >= MISSES_MAX) {
+		r->kind = UNKNOWN;
+		r->misses = 0;
+	}
+	fail(r, now, FAULT_NO_ANSWER);
 }
 
 static void trigger(struct ranger *r, uint32_t now)
 {
-	r->transfer.write_length = 2;
-	r->transfer.read_length = 0;
-	r->transfer.bytes[0] = REGISTER_COMMAND;
-	r->transfer.bytes[1] = COMMAND_RANGE_US;
-	r->trigger = now;
-	begin(r, TRIGGERING);
-}
-
-static void check_trigger(struct ranger *r, uint32_t now)
-{
-	enum twi_state state = twi_state(&r->transfer);
-	if (state == TWI_DONE) {
-		r->trigger = r->transfer.ticks;
-		r->due = r->trigger + RANGING_MIN_TICKS;
-		r->stage = RANGING;
-	} else if (state == TWI_NACK && ++r->tries < TRIGGER_TRIES) {
-		r->due = now + RETRY_TICKS;
-		r->stage = WAITING;
-	} else if (state != TWI_BUSY) {
-		fail(r, now, state == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK);
-	}
-}
-
-/* Reads revision and result in one transfer: a revision of REVISION_BUSY means that the ranging is not over. */
-static void request_result(struct ranger *r)
-{
-	r->transfer.write_length = 1;
-	r->transfer.read_length = 4;
-	r->transfer.bytes[0] = REGISTER_REVISION;
-	begin(r, READING);
-}
-
-static void check_result(struct ranger *r, uint32_t now)
-{
-	enum twi_state state = twi_state(&r->transfer);
-	if (state == TWI_BUSY)
-		return;
-	if (state == TWI_DONE && r->transfer.bytes[0] != REVISION_BUSY) {
-		succeed(r, now);
-	} else if (ticks_reached(now, r->trigger + RANGING_MAX_TICKS)) {
-		fail(r, now, state == TWI_FAILED ? FAULT_BUS_STUCK : FAULT_TOO_LATE);
-	} else {
-		r->due = now + POLL_TICKS;
-		r->stage = RANGING;
-	}
+	r->ranging.trigger = now;
+	r->ranging.next = now;
+	if (r->pinged == SRF02)
+		r->pinging = srf02_begin(r->index, now);
+	else if (pulse_begin(r->index, now))
+		r->pinging = true;
+	else if (r->kind == PULSE)
+		fail(r, now, FAULT_ALWAYS_READY);
+	else
+		try_again(r, now);
 }
 
 static void advance(struct ranger *r, uint32_t now)
 {
-	if (r->stage == TRIGGERING)
-		check_trigger(r, now);
-	else if (r->stage == READING)
-		check_result(r, now);
-	if (!ticks_reached(now, r->due))
+	if (!r->pinging) {
+		if (ticks_reached(now, r->due) && may_trigger(r))
+			trigger(r, now);
 		return;
-	if (may_trigger(r))
-		trigger(r, now);
-	else if (r->stage == RANGING && ranger_quiet(now))
-		request_result(r);
+	}
+	switch (r->pinged == PULSE ? pulse_run(r->index, now, &r->ranging) : srf02_run(r->index, now, &r->ranging)) {
+	case RANGING_DONE:
+		succeed(r, now);
+		break;
+	case RANGING_FAILED:
+		fail(r, now, r->ranging.fault);
+		break;
+	case RANGING_REFUSED:
+		try_again(r, now);
+		break;
+	case RANGING_BUSY:
+		break;
+	}
 }
 
 /* Time of the next call. The end of a transfer needs none: its interrupt ends the sleep. */
 static uint32_t wake_time(const struct ranger *r, uint32_t now)
 {
-	bool timed = r->stage == RANGING || may_trigger(r);
-	if (!timed)
-		return now + IDLE_TICKS;
+	if (r->pinging)
+		return r->ranging.next;
+	if (!may_trigger(r))
+		return now + RANGER_IDLE_TICKS;
 	return ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
 }
 
@@ -194,10 +187,11 @@ static void start_one(uint8_t index, uint32_t slot)
 {
 	struct ranger *r = &rangers[index];
 	r->index = index;
-	r->transfer.address = devices[index].address;
 	r->slot = slot;
-	if (r->stage == WAITING)
+	if (!r->pinging) {
 		r->due = slot + jitter();
+		r->pinged = r->kind == PULSE ? PULSE : SRF02;
+	}
 }
 
 void ranger_start(uint32_t now)

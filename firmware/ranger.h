@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Devantech SRF02: the two ultrasonic rangers. Triggers them, reads them, one `ping` message per ranging cycle.
+/* The two ultrasonic rangers: finds which kind is wired, triggers and reads them, one `ping` message per ranging cycle.
  * Owns the ping schedule. Both schedules share one grid: each ranger has one slot per period, the right ranger half a period after
  * the left one.
  *   concurrent: period 66 ms, plus a pseudo-random delay of up to 4.1 ms on every trigger. From ping to ping, an echo of the other
  *               ranger's ping moves by a known amount; an own echo does not.
- *   sequential: period 140 ms, no delay, and a ranger waits until the other one has been read [Girard 2011, section 2]. */
+ *   sequential: period 140 ms, no delay, and a ranger waits until the other one has been read [Girard 2011, section 2].
+ * Both rangers must be of one kind: with two kinds, one beam and one range would be right for one side only. */
 #ifndef ECHOSTEP_RANGER_H
 #define ECHOSTEP_RANGER_H
 
@@ -19,5 +20,22 @@ uint32_t ranger_run(uint32_t now);
 
 /* Whether no trigger is due within the next millisecond, which is longer than any other transfer takes. */
 bool ranger_quiet(uint32_t now);
+
+/* For the drivers. A side is RANGER_LEFT or RANGER_RIGHT, which are also its `enum device`. */
+enum ranging_state {
+	RANGING_BUSY,
+	RANGING_DONE,
+	RANGING_REFUSED, /* the ranger has not accepted the trigger: it is busy or absent */
+	RANGING_FAILED,
+};
+
+struct ranging {
+	uint32_t trigger;           /* time of the ping, ticks */
+	uint32_t next;              /* of the driver's next call, unless an interrupt comes earlier */
+	uint16_t time_of_flight_us; /* 0: no echo */
+	uint8_t fault;              /* FAULT_*, of RANGING_FAILED */
+};
+
+#define RANGER_IDLE_TICKS (30u * TICKS_PER_MS) /* until the next call of a driver that waits for an interrupt */
 
 #endif

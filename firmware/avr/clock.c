@@ -6,6 +6,8 @@
 #include <util/atomic.h>   /* ATOMIC_BLOCK */
 #include "shared.h"
 
+#define SYNC_PULSES_TICKS (50u * TICKS_PER_MS) /* an MTx pulses at least every 20 ms */
+
 static volatile uint16_t overflows;
 static struct clock_edge edge; /* shared with the capture interrupt: read with interrupts off */
 static bool edge_waiting;      /* as above */
@@ -35,6 +37,22 @@ uint32_t clock_now(void)
 		now = extend(TCNT1);
 	}
 	return now;
+}
+
+uint32_t clock_at(uint16_t timer)
+{
+	uint32_t now = extend(TCNT1);
+	return now - (uint16_t)((uint16_t)now - timer);
+}
+
+bool clock_sync_pulses(void)
+{
+	bool pulses;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		pulses = edge.edge && !ticks_reached(extend(TCNT1), edge.ticks + SYNC_PULSES_TICKS);
+	}
+	return pulses;
 }
 
 void clock_alarm(uint32_t ticks)
@@ -67,6 +85,8 @@ ISR(TIMER1_COMPA_vect)
 
 ISR(TIMER1_CAPT_vect)
 {
+	if (echo_capture_left(ICR1))
+		return;
 	edge.ticks = extend(ICR1);
 	edge.edge++;
 	if (edge_waiting)

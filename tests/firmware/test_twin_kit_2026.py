@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from board_runs import Bench, kinds, needs_twin, quiet_rows
+from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
 from echostep.board.findings import BoardReports, part_text_of
 from echostep.board.health import board_findings
@@ -146,3 +146,142 @@ def test_the_parts_of_the_papers_are_named(bench: Bench) -> None:
         m.Part.SRF02, m.Part.SRF02, m.Part.CMPS10, m.Part.ADIS16100, m.Part.ADIS16100, m.Part.ADIS16100, m.Part.SCP1000, 0,
     )  # fmt: skip
     assert found.identity_ranger_left == 6
+
+
+JITTER_US = 2.0  # limit on the stamps and on the times of flight
+CLOCK_BEGINS_US = 1_163  # of the true time, after power-up
+
+
+@pytest.fixture
+def rangers(bench: Bench) -> Bench:
+    """A board of the papers with pulse rangers on both sides, subscribed."""
+    bench.fault("part_ranger_left=pulse")
+    bench.fault("part_ranger_right=pulse")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_200)
+    return bench
+
+
+SIDES = (("left", m.Ranger.LEFT), ("right", m.Ranger.RIGHT))
+
+
+def test_pulse_rangers_are_found_and_timed_to_two_microseconds(rangers: Bench) -> None:
+    """The stamps against the rising edges of the echo lines, with all other sensors running; both pings overlap at long ranges."""
+    rows = quiet_rows(10_000)
+    rng = np.random.default_rng(1)
+    rows["own_us"] = rng.integers(1_000, 26_000, rows["own_us"].shape)
+    found = rangers.run(10_000, rows)
+    assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == m.Part.PULSE
+    for side, ranger in SIDES:
+        answers = pings(found, ranger)
+        assert len(answers) >= 145
+        assert {p.outcome for p in answers} == {m.Outcome.ECHO}
+        truth_us = np.array([t for t, text in rangers.board.trace if text == f"trigger {side}"]) * 1e-3
+        stamps_us = np.array([p.ticks for p in answers]) * 0.5
+        nearest = truth_us[np.abs(truth_us[:, None] - CLOCK_BEGINS_US - stamps_us).argmin(0)]
+        errors = stamps_us - nearest
+        assert np.ptp(errors) <= JITTER_US
+
+
+def test_the_time_of_flight_of_a_pulse_is_right_to_two_microseconds(rangers: Bench) -> None:
+    for own_us in (200, 5_831, 15_003, 26_000):
+        rows = quiet_rows(1_000)
+        rows["own_us"] = own_us
+        rangers.run(200, rows[:200])
+        answers = [p for p in rangers.run(1_000, rows) if isinstance(p, m.Ping)]
+        assert len(answers) >= 28
+        assert max(abs(p.time_of_flight_us - own_us) for p in answers) <= JITTER_US
+
+
+def test_a_pulse_ranger_hears_the_other_rangers_ping(rangers: Bench) -> None:
+    """The echo of the other ping moves with the schedule's jitter, an own one stays."""
+    rows = quiet_rows(3_000)
+    rows["own_us"][:, 0], rows["own_us"][:, 1] = 0, 7_000
+    rows["cross_us"][:, 0] = 45_000
+    found = pings(rangers.run(3_000, rows), m.Ranger.LEFT)
+    heard = [p.time_of_flight_us for p in found if p.outcome == m.Outcome.ECHO]
+    assert len(heard) > 30
+    assert np.ptp(heard) > 2_000
+    assert {p.time_of_flight_us for p in pings(rangers.messages, m.Ranger.RIGHT)} == {7_000}
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause", "words"),
+    [
+        ("absent", m.Fault.NO_ANSWER, "left ranger (pulse ranger): does not answer its trigger"),
+        ("stuck_low", m.Fault.NO_ANSWER, "left ranger (pulse ranger): does not answer its trigger"),
+        ("stuck_high", m.Fault.ALWAYS_READY, "left ranger (pulse ranger): its echo line stays high"),
+    ],
+)
+def test_a_pulse_ranger_that_fails_is_named_and_comes_back(
+    rangers: Bench, kind: str, cause: m.Fault, words: str
+) -> None:
+    rangers.fault(f"pulse_left={kind}")
+    rangers.run(1_200)
+    found = rangers.run(1_000)
+    assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.BUS_ERROR}
+    assert len(pings(found, m.Ranger.RIGHT)) >= 14
+    assert rangers.status.fault_ranger_left == cause
+    assert any(text.startswith(words) for text in all_findings(rangers))
+    rangers.fault("pulse_left=ok")
+    rangers.run(1_500)
+    assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
+    assert rangers.status.healthy & m.Healthy.RANGER_LEFT
+
+
+@pytest.mark.parametrize(("kind", "outcome"), [("deaf", m.Outcome.NO_ECHO), ("long", m.Outcome.ECHO)])
+def test_a_pulse_ranger_without_an_echo_is_no_failure(rangers: Bench, kind: str, outcome: m.Outcome) -> None:
+    rangers.fault(f"pulse_right={kind}")
+    rangers.run(200)
+    assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.RIGHT)} == {outcome}
+
+
+def test_a_module_that_holds_its_line_for_long_is_named(rangers: Bench) -> None:
+    rangers.fault("pulse_right=long")
+    rows = quiet_rows(2_000)
+    rows["own_us"] = 0
+    rangers.run(2_000, rows)
+    assert rangers.status.fault_ranger_right == m.Fault.ALWAYS_READY
+
+
+def test_rangers_of_two_kinds_are_refused_in_words(bench: Bench) -> None:
+    bench.fault("part_ranger_right=pulse")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_000)
+    found = bench.run(2_000)
+    assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.ECHO}
+    assert {p.outcome for p in pings(found, m.Ranger.RIGHT)} == {m.Outcome.BUS_ERROR}
+    assert parts(bench).wiring == m.Wiring.MIXED_RANGERS
+    (text,) = [str(f) for f in board_findings(reports(bench)) if "ranger" in f.subject]
+    assert text.startswith("rangers: one is an SRF02 and the other one a pulse ranger, which is not used")
+    bench.fault("part_ranger_left=pulse")
+    bench.run(2_500)
+    assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+    assert parts(bench).wiring == m.Wiring.OK
+
+
+def test_rangers_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
+    for part, name in (("srf02", m.Part.SRF02), ("pulse", m.Part.PULSE)):
+        for side, _ in SIDES:
+            rangers.fault(f"part_ranger_{side}={part}")
+        rangers.run(2_500)
+        found = rangers.run(1_000)
+        assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+        assert kinds(found)["Ping"] >= 28
+        assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == name
+
+
+def test_sync_pulses_are_not_taken_for_a_pulse_ranger(bench: Bench) -> None:
+    bench.fault("srf_left=absent")
+    bench.fault("srf_right=absent")
+    found = bench.run(3_000)
+    assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.BUS_ERROR}
+    assert kinds(found)["Sync"] >= 290
+
+
+def test_pulse_rangers_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
+    rangers.fault("reset=watchdog")
+    rangers.run(1_500)
+    assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}

@@ -101,9 +101,11 @@ static bool read_all(int fd, void *into, size_t length)
 	return true;
 }
 
+/* With a pulse ranger on the left, its echo line is where SyncOut would be. */
 static void set_sync(bool level)
 {
-	drive_pin('D', 4, level);
+	if (!kit_of_2026(PLACE_RANGER_LEFT))
+		drive_pin('D', 4, level);
 }
 
 /* Ends the SyncOut pulse under way, whose timer the reset has removed. */
@@ -126,7 +128,8 @@ static avr_cycle_count_t sync_rise(avr_t *a, avr_cycle_count_t when, void *param
 	(void)when;
 	(void)param;
 	set_sync(true);
-	bench_trace("sync");
+	if (!kit_of_2026(PLACE_RANGER_LEFT))
+		bench_trace("sync");
 	avr_cycle_timer_register(a, SYNC_PULSE, sync_fall, NULL);
 	return 0;
 }

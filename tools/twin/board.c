@@ -28,6 +28,7 @@ static void power_devices(void)
 	scp1000_power();
 	compass_power();
 	bmp390_power();
+	pulse_power();
 }
 
 static void fill(unsigned from, unsigned size)
@@ -73,6 +74,7 @@ static void start_program(void)
 	spi_reset();
 	scp1000_resume();
 	bmp390_resume();
+	pulse_resume();
 	adis16100_resume();
 	usb_host_start();
 }

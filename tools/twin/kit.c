@@ -10,6 +10,8 @@ static struct socket {
 	void (*power)(void);
 	bool is_2026;
 } sockets[PLACES] = {
+	[PLACE_RANGER_LEFT] = { "part_ranger_left", "srf02", "pulse", pulse_power, false },
+	[PLACE_RANGER_RIGHT] = { "part_ranger_right", "srf02", "pulse", pulse_power, false },
 	[PLACE_PRESSURE] = { "part_pressure", "scp1000", "bmp390", bmp390_power, false },
 };
 

@@ -132,12 +132,15 @@ bool scp1000_fault(const char *name, const char *value);
 void compass_power(void);
 bool compass_fault(const char *name, const char *value);
 
+void pulse_power(void);
+void pulse_resume(void);
+bool pulse_fault(const char *name, const char *value);
 void bmp390_power(void);
 void bmp390_resume(void);
 bool bmp390_fault(const char *name, const char *value);
 
 /* kit.c: which part is in which place. */
-enum place { PLACE_PRESSURE, PLACES };
+enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_PRESSURE, PLACES };
 bool kit_of_2026(enum place place);
 bool kit_fault(const char *name, const char *value);
 

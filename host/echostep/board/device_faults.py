@@ -24,8 +24,18 @@ from echostep.board.findings import (
     part_in,
     status_field,
 )
-from echostep.board.messages import GYRO_HEALTH_INVALID, Fault, Gyro, GyroHealth, Healthy, SelfTest, Status
-from echostep.board.part_faults import part_text
+from echostep.board.messages import (
+    GYRO_HEALTH_INVALID,
+    Fault,
+    Gyro,
+    GyroHealth,
+    Healthy,
+    Part,
+    SelfTest,
+    Status,
+    Wiring,
+)
+from echostep.board.part_faults import MIXED_RANGERS, part_text
 
 TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; by reason
 UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; by reason
@@ -73,9 +83,21 @@ def device_findings(reports: BoardReports, status: Status) -> list[Finding]:
     """Findings on devices whose last access failed."""
     on = Healthy(reports.sensors & DEVICES)
     failed = [d for d in Healthy if d & on and not status.healthy & d and has_failed(status, d)]
-    common, explained = _common_causes(status, failed, on)
+    mixed, refused = _mixed_rangers(reports, failed)
+    failed = [d for d in failed if not refused & d]
+    pulses = _union(d for d in Healthy if part_in(reports, d) is Part.PULSE)
+    common, explained = _common_causes(status, failed, on & ~pulses)
     single = [_device_finding(reports, d, Fault(status_field(status, "fault", d))) for d in failed if not explained & d]
-    return common + single
+    return mixed + common + single
+
+
+def _mixed_rangers(reports: BoardReports, failed: list[Healthy]) -> tuple[list[Finding], Healthy]:
+    """A finding on rangers of two kinds, and the one that is refused."""
+    if reports.parts is None or reports.parts.wiring != Wiring.MIXED_RANGERS:
+        return [], Healthy(0)
+    what, remedy = MIXED_RANGERS
+    refused = _union(d for d in failed if d & (Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT))
+    return [Finding(Severity.FAULT, "rangers", what, remedy)], refused
 
 
 def _common_causes(status: Status, failed: list[Healthy], on: Healthy) -> tuple[list[Finding], Healthy]:

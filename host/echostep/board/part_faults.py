@@ -18,8 +18,24 @@ _BMP390 = {
     Fault.ALWAYS_READY: ("reports a sample that it cannot have yet", f"its data line may be held high: {_SPI}"),
     Fault.BAD_VALUE: ("gives pressures outside of 300 to 1250 hPa", _AGAIN),
 }
-_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {Part.BMP390: _BMP390}
+_PULSE = {
+    Fault.NO_ANSWER: (
+        "does not answer its trigger",
+        "check its 5 V and ground, and that trigger and echo are not exchanged (left A2 and D4, right A3 and D13)",
+    ),
+    Fault.ALWAYS_READY: (
+        "its echo line stays high",
+        "check it for a short to 5 V (left D4, right D13); a module that holds it for 0.2 s without an echo is of another kind: replace it",
+    ),
+}
+_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {Part.BMP390: _BMP390, Part.PULSE: _PULSE}
 _WANTED = {Healthy.PRESSURE: "0x60 is a BMP390"}  # identities of the parts that the firmware knows, by place
+
+
+MIXED_RANGERS = (
+    "one is an SRF02 and the other one a pulse ranger, which is not used: beam, range and resolution differ",
+    "plug in two of one kind",
+)
 
 
 def part_text(part: Part, identity: int, device: Healthy, fault: Fault) -> tuple[str, str] | None:

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+#include "pulse.h"
+#include "board.h" /* echo_* */
+#include "parts.h" /* what was found */
+
+/* [HC-SR04 user guide: a pulse of 150 us to 25 ms, or of 38 ms without an echo; a new ping every 60 ms. RCWL-1601: the same at 3 to 5 V.]
+ * The JSN-SR04T answers only 12 ms after its trigger. */
+#define ANSWER_MAX_TICKS (20u * TICKS_PER_MS)         /* from the trigger to the rising edge */
+#define PULSE_MAX_TICKS (60u * TICKS_PER_MS)          /* a line that is high for longer is stuck */
+#define ECHO_MAX_TICKS (TICKS_PER_MS * 26u)           /* 4.5 m, out and back: a longer pulse is one without an echo */
+#define TICKS_PER_US 2u
+#define POLL_TICKS TICKS_PER_MS
+
+static uint32_t begun[2]; /* when the trigger pulse was sent, ticks */
+
+bool pulse_begin(uint8_t side, uint32_t now)
+{
+	begun[side] = now;
+	return echo_begin(side);
+}
+
+static enum ranging_state finish(uint8_t side, const struct echo_pulse *pulse, struct ranging *out)
+{
+	uint32_t length = pulse->fall - pulse->rise;
+	out->time_of_flight_us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
+	parts_found(side, PART_PULSE, 0);
+	return RANGING_DONE;
+}
+
+enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *out)
+{
+	struct echo_pulse pulse;
+	enum echo_state state = echo_take(side, &pulse);
+	uint32_t elapsed = now - begun[side];
+	out->trigger = state == ECHO_WAITING ? begun[side] : pulse.rise;
+	out->next = now + POLL_TICKS;
+	if (state == ECHO_OVER)
+		return finish(side, &pulse, out);
+	if (state == ECHO_WAITING && elapsed > ANSWER_MAX_TICKS) {
+		echo_end(side);
+		return RANGING_REFUSED;
+	}
+	if (elapsed > PULSE_MAX_TICKS) {
+		echo_end(side);
+		out->fault = FAULT_ALWAYS_READY;
+		return RANGING_FAILED;
+	}
+	return RANGING_BUSY;
+}

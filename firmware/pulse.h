@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/* Pulse rangers (RCWL-1601, HC-SR04P): a pulse on the trigger line starts a ping; the echo line is high from the burst to its echo. */
+#ifndef ECHOSTEP_PULSE_H
+#define ECHOSTEP_PULSE_H
+
+#include "ranger.h" /* struct ranging */
+
+/* Sends a trigger pulse (12 us); false: another device drives the echo line. */
+bool pulse_begin(uint8_t side, uint32_t now);
+
+/* Looks for the two edges of the answer; `out` is complete when it is RANGING_DONE or RANGING_FAILED. RANGING_REFUSED: no answer. */
+enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *out);
+
+#endif

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: MIT */
+#include "srf02.h"
+#include "board.h" /* twi_* */
+#include "parts.h" /* what was found */
+
+/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: at most 65 ms, in practice about 61 ms. */
+#define ADDRESS_LEFT 0x70u
+#define COMMAND_RANGE_US 0x52u
+#define REGISTER_COMMAND 0u
+#define REGISTER_REVISION 0u
+#define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
+#define RANGING_MIN_TICKS (60u * TICKS_PER_MS) /* first request for the result */
+#define RANGING_MAX_TICKS (72u * TICKS_PER_MS) /* last request: 65 ms with a margin */
+#define POLL_TICKS (TICKS_PER_MS / 2u)         /* between requests */
+
+static struct srf02 {
+	struct twi_transfer transfer;
+	enum { TRIGGERING, RANGING, READING } stage;
+	uint32_t trigger; /* time of the trigger */
+	uint32_t due;     /* next request for the result */
+} rangers[2];
+
+bool srf02_begin(uint8_t side, uint32_t now)
+{
+	struct srf02 *r = &rangers[side];
+	r->transfer.address = (uint8_t)(ADDRESS_LEFT + side);
+	r->transfer.write_length = 2;
+	r->transfer.read_length = 0;
+	r->transfer.bytes[0] = REGISTER_COMMAND;
+	r->transfer.bytes[1] = COMMAND_RANGE_US;
+	r->trigger = now;
+	r->due = now;
+	r->stage = TRIGGERING;
+	return twi_begin(&r->transfer);
+}
+
+static enum ranging_state check_trigger(struct srf02 *r, struct ranging *out)
+{
+	enum twi_state state = twi_state(&r->transfer);
+	if (state == TWI_NACK)
+		return RANGING_REFUSED;
+	if (state == TWI_FAILED) {
+		out->fault = FAULT_BUS_STUCK;
+		return RANGING_FAILED;
+	}
+	if (state == TWI_DONE) {
+		r->trigger = r->transfer.ticks;
+		r->due = r->trigger + RANGING_MIN_TICKS;
+		r->stage = RANGING;
+	}
+	return RANGING_BUSY;
+}
+
+/* Reads revision and result in one transfer: a revision of REVISION_BUSY means that the ranging is not over. */
+static void request_result(struct srf02 *r)
+{
+	r->transfer.write_length = 1;
+	r->transfer.read_length = 4;
+	r->transfer.bytes[0] = REGISTER_REVISION;
+	if (twi_begin(&r->transfer))
+		r->stage = READING;
+}
+
+static enum ranging_state succeed(struct srf02 *r, uint8_t side, struct ranging *out)
+{
+	out->time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
+	parts_found(side, PART_SRF02, r->transfer.bytes[0]);
+	return RANGING_DONE;
+}
+
+static enum ranging_state check_result(struct srf02 *r, uint8_t side, uint32_t now, struct ranging *out)
+{
+	enum twi_state state = twi_state(&r->transfer);
+	if (state == TWI_BUSY)
+		return RANGING_BUSY;
+	if (state == TWI_DONE && r->transfer.bytes[0] != REVISION_BUSY)
+		return succeed(r, side, out);
+	if (ticks_reached(now, r->trigger + RANGING_MAX_TICKS)) {
+		out->fault = state == TWI_FAILED ? FAULT_BUS_STUCK : FAULT_TOO_LATE;
+		return RANGING_FAILED;
+	}
+	r->due = now + POLL_TICKS;
+	r->stage = RANGING;
+	return RANGING_BUSY;
+}
+
+enum ranging_state srf02_run(uint8_t side, uint32_t now, struct ranging *out)
+{
+	struct srf02 *r = &rangers[side];
+	enum ranging_state state = RANGING_BUSY;
+	if (r->stage == TRIGGERING)
+		state = check_trigger(r, out);
+	else if (r->stage == READING)
+		state = check_result(r, side, now, out);
+	if (r->stage == RANGING && ticks_reached(now, r->due) && ranger_quiet(now))
+		request_result(r);
+	out->trigger = r->trigger;
+	out->next = r->stage != RANGING ? now + RANGER_IDLE_TICKS : ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
+	return state;
+}
