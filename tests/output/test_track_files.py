@@ -17,7 +17,8 @@ from pyarrow import parquet
 
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.output.track_files import FORMATS, TrackOnPlan
 from echostep.output.track_files import export as write
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import load_plan
@@ -91,6 +92,26 @@ def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: li
     found = np.array([place.split(",") for place in text.split()], np.float64)
     assert np.abs(found - expected).max() < 1e-9
     assert pyogrio.read_info(folder / "track.kml", layer="estimates")["features"] == len(estimates)
+    assert pyogrio.read_info(export(folder, "track.gpx"), layer="track_points")["geometry_type"] == "Point"
+    waypoints = ET.parse(folder / "track.gpx").getroot().findall(".//{*}trkpt")
+    found = np.array([(point.get("lon"), point.get("lat")) for point in waypoints], np.float64)
+    assert np.abs(found - expected).max() < 1e-9
+
+
+def test_a_gpx_track_is_cut_where_the_track_is_lost(folder: Path, estimates: list[Estimate], tmp_path: Path) -> None:
+    """Lost estimates 10 to 14 are left out; a pause of 6 s begins a new stretch; times are there where they are known."""
+    plan = load_plan(folder / "plan.json")
+    some = [dataclasses.replace(e, t_s=e.t_s + 6.0 * (k >= 17)) for k, e in enumerate(estimates)]
+    some[10:15] = [dataclasses.replace(e, status=TrackStatus.LOST) for e in some[10:15]]
+    times = [f"2026-11-22T10:00:{k:02d}Z" for k in range(20)]
+    for moments, found in ((times, [10, 2, 3]), ([], [10, 2, 3])):
+        FORMATS[".gpx"](tmp_path / "cut.gpx", TrackOnPlan(some, plan, moments))
+        root = ET.parse(tmp_path / "cut.gpx").getroot()
+        assert (root.tag, root.get("version")) == ("{http://www.topografix.com/GPX/1/1}gpx", "1.1")
+        assert [len(segment) for segment in root.findall(".//{*}trkseg")] == found
+        assert len(root.findall(".//{*}time")) == (15 if moments else 0)
+    FORMATS[".gpx"](tmp_path / "lost.gpx", TrackOnPlan(some[10:15], plan, []))
+    assert ET.parse(tmp_path / "lost.gpx").getroot().findall(".//{*}trkseg") == []
 
 
 def test_a_recording_with_new_derived_messages_keeps_the_bytes(folder: Path) -> None:

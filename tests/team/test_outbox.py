@@ -181,7 +181,7 @@ def test_a_replay_says_that_it_is_one_and_when_it_was_recorded() -> None:
     recorded = "2026-11-21T10:00:00.000Z"
     made = {source: event(report(source=source, recorded=recorded, place=PLACE)) for source in ("replay", "simulated")}
     replayed, simulated = (ElementTree.fromstring(made[source] or b"") for source in ("replay", "simulated"))
-    assert (replayed.get("how"), simulated.get("how")) == ("m-p", "m-s")
+    assert (replayed.get("how"), simulated.get("how")) == ("m-r", "m-s")
     assert replayed.get("start") == recorded < str(replayed.get("time"))
     assert f"recorded {recorded}" in (replayed.findtext("detail/remarks") or "")
     assert decode(encode(report(recorded=recorded))).recorded == recorded

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep plan import | check | show | edit`.
+"""`echostep plan import | check | show | overlay | edit`.
 
 In: command-line arguments. Out: plans, pictures, findings. Owns the options. Heavy modules are imported when a command runs.
 """
@@ -157,6 +157,19 @@ def show(
 
     plan = open_limited(file)
     draw_plan(plan, out, list(range(len(plan.levels))) if level is None else [_level(plan, level)], _bounds(bounds))
+
+
+@app.command()
+def overlay(
+    file: PlanFile,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The overlay to write (.kmz).")],
+) -> None:
+    """Make a picture of each storey that lies on the map: in ATAK (GRG), Google Earth, QGIS."""
+    from echostep.plan.importers.limited import open_limited
+    from echostep.plan.overlay import write_overlays
+
+    for made in write_overlays(open_limited(file), out):
+        print(f"{made.name}: {made.south:.7f} to {made.north:.7f} N, {made.west:.7f} to {made.east:.7f} E")
 
 
 @app.command()

@@ -46,7 +46,7 @@ def export(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", "-o", metavar="OUT", help="track.csv, .parquet, .gpkg, .kml, or .mcap with derived messages."
+            "--out", "-o", metavar="OUT", help="track.csv, .parquet, .gpkg, .kml, .gpx, or .mcap with derived messages."
         ),
     ],
     start: Annotated[

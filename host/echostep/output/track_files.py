@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Tracks of recordings as files for other programs.
 
-In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, or a recording with newly derived messages, chosen by the suffix of the file
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, GPX, or a recording with newly derived messages, chosen by the suffix of the file
 name. Owns nothing.
 """
 
@@ -23,7 +23,7 @@ from rich.progress import Progress
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import Estimate
+from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.output.derived import Derived, earth_of
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.limited import open_limited
@@ -37,6 +37,7 @@ from echostep.tracker import Tracker
 Columns = dict[str, list[Any]]
 
 ELLIPSE_POINTS = 33
+GAP_S = 5.0  # without an estimate, after which a new stretch of a GPX track begins, by reason
 KML = "http://www.opengis.net/kml/2.2"
 COLORS = {"tracking": "ffff8020", "uncertain": "ff20a0ff", "lost": "ff2020ff"}  # alpha, blue, green, red
 
@@ -217,6 +218,23 @@ def _write_kml(out: Path, track: TrackOnPlan) -> None:
     ET.ElementTree(root).write(out, encoding="utf-8", xml_declaration=True)
 
 
+def _write_gpx(out: Path, track: TrackOnPlan) -> None:
+    """The track in stretches in which no estimate is lost and none is more than GAP_S after the one before."""
+    from echostep.output.gpx import write_gpx
+
+    earth = earth_of(track.plan)
+    assert earth is not None
+    known = [k for k, e in enumerate(track.estimates) if e.status is not TrackStatus.LOST]
+    t_s = np.array([track.estimates[k].t_s for k in known])
+    breaks = np.flatnonzero((np.diff(known) > 1) | (np.diff(t_s) > GAP_S)) + 1
+    stretches = [stretch.tolist() for stretch in np.split(np.array(known, dtype=int), breaks) if len(stretch)]
+    rows = [
+        (_degrees([track.estimates[k] for k in ks], earth), [track.moments[k] for k in ks] if track.moments else [])
+        for ks in stretches
+    ]
+    write_gpx(out, track.plan.name, rows)
+
+
 def _element(parent: ET.Element, name: str, text: str | None = None, **attributes: str) -> ET.Element:
     element = ET.SubElement(parent, f"{{{KML}}}{name}", attributes)
     element.text = text
@@ -243,6 +261,7 @@ FORMATS: dict[str, Write] = {
     ".parquet": _write_parquet,
     ".gpkg": _write_geopackage,
     ".kml": _write_kml,
+    ".gpx": _write_gpx,
     ".mcap": lambda *_: None,
 }
-NEEDS_GEOREFERENCE = (".gpkg", ".kml")
+NEEDS_GEOREFERENCE = (".gpkg", ".kml", ".gpx")

@@ -10,14 +10,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent, within
+from echostep.plan.faces import find_faces
 from echostep.plan.labels import Label, draw_labels
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
+from echostep.plan.spaces import MOST_WALLS
 
 if TYPE_CHECKING:
     from echostep.plan.findings import PlanFinding
@@ -28,6 +30,8 @@ WAY, WAY_NAME = "#009e73", "#00553e"  # stairs, lifts and ramps
 WRONG = "#d0021b"
 WIDTH_PX = 1500  # least width of a picture
 LEVEL_WIDTH_PX = 900  # least width of a level
+GROUND = (1.0, 1.0, 1.0, 0.85)  # of a picture that lies on a map
+BARE_DPI = 150  # of a picture without frame: lines are twice as wide in pixels as in points
 MANY = 20_000  # with more lines than these, pixels are drawn instead of lines
 BESIDE_RING_PT = (
     (9.0, 9.0),
@@ -85,6 +89,39 @@ def draw_plan(
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+
+
+def draw_bare_level(plan: Plan, level: int, bounds: Bounds, pixels_per_m: float, file: IO[bytes]) -> None:
+    """Write a level within the bounds as PNG without frame, to the edge of the picture, on a transparent ground."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    width_m, height_m = bounds[2] - bounds[0], bounds[3] - bounds[1]
+    points_m = 72.0 * pixels_per_m / BARE_DPI
+    figure = Figure(figsize=(width_m * pixels_per_m / BARE_DPI, height_m * pixels_per_m / BARE_DPI), dpi=BARE_DPI)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    view = View(bounds, points_m, 1.0 / pixels_per_m)
+    _draw_ground(axes, plan.levels[level])
+    _draw_level(axes, plan, level, view, ())
+    axes.set_axis_off()
+    axes.set_title("")
+    _draw_names(axes, plan, level, view, ())
+    axes.set_title("")
+    figure.savefig(file, format="png", transparent=True, metadata={"Software": None})
+
+
+def _draw_ground(axes: Any, level: Level) -> None:
+    """White, nearly opaque, in the spaces between the walls, and beside each wall: legible on any map."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    areas = (
+        [np.array(area.exterior.coords) for area in find_faces(level).areas] if len(level.solid) <= MOST_WALLS else []
+    )
+    axes.add_collection(PolyCollection(areas, facecolors=GROUND, edgecolors="none", zorder=-2))
+    if len(level.solid) <= MANY:
+        halo = LineCollection(list(level.solid.reshape(-1, 2, 2)), colors=GROUND, linewidths=3.5, zorder=-1)
+        axes.add_collection(halo)
 
 
 def _about(levels: Sequence[Level]) -> Bounds:

@@ -23,7 +23,7 @@ from echostep.team.report import Report
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 UNKNOWN = "9999999.0"  # value of `hae` and `le` when they are not known [CoT Event 2.0 schema]
-HOW = {"live": "m-f", "replay": "m-p", "simulated": "m-s"}  # made by a machine: fused now, passed on, simulated
+HOW = {"live": "m-f", "replay": "m-r", "simulated": "m-s"}  # made by a machine: fused now, relayed, simulated [schema]
 SOCKET_TIMEOUT_S = 3.0  # for connecting and for sending
 GROUPS = {
     "White", "Yellow", "Orange", "Magenta", "Red", "Maroon", "Purple",
