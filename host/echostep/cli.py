@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command line: `echostep demo | live | record | replay | score | foot | legs | doctor | flash | calibrate | decode` and groups of commands.
+"""The command line: `echostep demo | live | record | replay | map | score | foot | legs | doctor | flash | calibrate | decode` and more.
 
 In: the command's arguments and options. Out: files, views, an exit status (0: done; 2: a mistake, named in one line). Owns nothing.
 Modules that are slow to import are imported inside the command that needs them, so that `--help` answers at once.
@@ -264,6 +264,20 @@ def replay(
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page) or sys.stdout.isatty(), outlet)
     replay_run.replay(recording, TrackingOptions(plan, start, start_sd, settings, seed, guide), truth, output)
+
+
+@app.command("map")
+def map_command(
+    recording: Annotated[Path, typer.Argument(metavar="WALK", help="A recorded walk (.mcap).")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw plan and path there (PNG, SVG).")
+    ] = None,
+) -> None:
+    """Draw the plan of a building from a recorded walk."""
+    from echostep.commands import mapping
+
+    mapping.map_recording(recording, out, picture)
 
 
 @app.command()

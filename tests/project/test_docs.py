@@ -162,7 +162,7 @@ def test_the_tutorials_commands_run_in_their_order(tmp_path: Path) -> None:
         done = echostep(*arguments, cwd=tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
         printed[arguments[0]] = printed.get(arguments[0], "") + done.stdout
-    assert set(printed) == {"demo", "info", "replay", "cut", "export", "plan"}
+    assert set(printed) == {"demo", "info", "replay", "cut", "export", "plan", "map"}
     assert "/estimate" in printed["info"]
     sha = re.compile(r"sha256 (\w{16})")
     assert sha.findall(printed["demo"])[0] == sha.findall(printed["replay"])[0]

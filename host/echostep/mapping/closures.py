@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Loop closures: a stretch of the path is where an older one was.
+
+In: a graph solved so far. Out: `Closure`s with their odds. Owns the limits. The posterior of a shift is the graph's own uncertainty times the match
+of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure says what this posterior knows better than
+the graph, along the directions in which it does: of a corridor, its width only.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.mapping.graph import Closure, Graph
+from echostep.mapping.matching import Pieces, match
+
+STRETCH_M = 8.0  # of path that is matched as one
+APART_M = 20.0  # of path between a stretch and what is older
+NEAR_M = 7.0  # beyond the uncertainty, in which older fragments are looked for
+NEW = 0.5  # probability before the match that the place is new
+LEAST_LOG_ODDS = math.log(200.0)
+SHIFTS, TURNS = 31, 5  # of the grid to either side of three standard deviations
+LEAST_SD_M, LEAST_SD_RAD = 0.04, math.radians(0.4)
+MOST_SD_M = 4.0  # of the graph's uncertainty, beyond which no closure is tried: too many places look alike
+KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
+LEAST_OLD = 4
+
+
+def pieces(graph: Graph, which: Ints) -> Pieces:
+    """Fragments in the map."""
+    f = graph.fragments
+    centre, normal = graph.places()
+    range_m = np.hypot(*(centre[which] - graph.pose[f.node[which], :2]).T)
+    return Pieces(centre[which, 0], centre[which, 1], normal[which], f.half_m[which], f.sd_rad[which], range_m)
+
+
+def find_closure(graph: Graph, begin: int, end: int) -> Closure | None:
+    """The closure of the stretch of nodes [begin, end), if there is one."""
+    f, way_m = graph.fragments, graph.nodes.way_m
+    new = np.flatnonzero((f.node >= begin) & (f.node < end) & (f.half_m > 0.25))
+    if len(new) < 2:
+        return None
+    node = (begin + end) // 2
+    centre, _ = graph.places()
+    at = graph.pose[node, :2]
+    older = np.flatnonzero((way_m[f.node] < way_m[begin] - APART_M) & (f.half_m > 0.25))
+    if len(older) < LEAST_OLD:
+        return None
+    away = np.hypot(*(centre[older] - at).T)
+    nearest = int(f.node[older[np.argmin(away)]])
+    covariance = graph.covariance(node, nearest)
+    sd = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+    if sd > MOST_SD_M:
+        return None
+    older = older[away < NEAR_M + 3.0 * sd]
+    if len(older) < LEAST_OLD:
+        return None
+    old_node = int(f.node[older[np.argmin(np.hypot(*(graph.pose[f.node[older], :2] - at).T))]])
+    covariance = graph.covariance(node, old_node)
+    return _posterior(graph, new, older, node, old_node, covariance)
+
+
+def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, covariance: Floats) -> Closure | None:
+    """The closure that the posterior of the shift says, None if it is not sure or says nothing new."""
+    covariance = covariance + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
+    sd = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+    shifts = np.linspace(-3.0 * sd, 3.0 * sd, SHIFTS if sd < 0.6 else 2 * SHIFTS + 1)
+    turns = np.linspace(-2.0, 2.0, TURNS) * math.sqrt(covariance[2, 2])
+    score = match(pieces(graph, new), pieces(graph, older), graph.pose[node, :2], shifts, turns)
+    t, x, y = np.meshgrid(turns, shifts, shifts, indexing="ij")
+    grid = np.stack([x.ravel(), y.ravel(), t.ravel()], axis=1)
+    prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(covariance), grid))
+    prior /= prior.sum()
+    top = max(float(score.max()), 0.0)
+    found = prior * np.exp(score.ravel() - top)
+    log_odds = math.log(max(float(found.sum()), 1e-300)) + top + math.log((1.0 - NEW) / NEW)
+    if log_odds < LEAST_LOG_ODDS:
+        return None
+    found /= found.sum()
+    mean = found @ grid
+    spread = (grid - mean) * np.sqrt(found)[:, None]
+    after = spread.T @ spread + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
+    return _gained(graph, node, old_node, mean, after, covariance, log_odds)
+
+
+def _gained(
+    graph: Graph, node: int, old_node: int, mean: Floats, after: Floats, before: Floats, log_odds: float
+) -> Closure | None:
+    """What the posterior (mean, `after`) knows that the graph (`before`) does not, along the axes that are known well."""
+    value, vector = np.linalg.eigh(after[:2, :2])
+    information = np.zeros((3, 3))
+    for k in (0, 1):
+        e = np.array([vector[0, k], vector[1, k], 0.0])
+        if math.sqrt(value[k]) < KNOWN_SD_M:
+            information += np.outer(e, e) / value[k]
+    if not information.any():
+        return None
+    if after[2, 2] < 0.5 * before[2, 2]:
+        information[2, 2] = 1.0 / after[2, 2] - 1.0 / before[2, 2]
+    between = graph.pose[node] - graph.pose[old_node] + mean
+    return Closure(old_node, node, between, information, log_odds)

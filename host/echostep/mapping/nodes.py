@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""The path of a walk as nodes of a graph: one where each segment that moves or turns ends, and the pings beside them.
+
+In: `MeasuredSegment`s in order of time. Out: `Nodes`, `Pings`. Owns nothing. Frame: walk.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.angles import wrap
+from echostep.arrays import Floats, Ints
+from echostep.path import MeasuredSegment
+
+STILL_M, STILL_RAD = 0.01, math.radians(0.5)  # a segment that moves and turns less belongs to the node before it
+# Growth of the path's error per square root of a metre beside the step's own covariance, as the particle filter has it [particles.py]
+MOVE_SD, TURN_SD_RAD = 0.03, math.radians(0.3)
+RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
+
+
+@dataclass(frozen=True, slots=True)
+class Nodes:
+    """`t_s` (n,), `pose` (n, 3): x, y, heading by odometry; standard deviations (n - 1,) of the way from each node to the next.
+
+    `height_m` (n,): of the foot above the start; `way_m` (n,): length of the path so far.
+    """
+
+    t_s: Floats
+    pose: Floats
+    sd_m: Floats
+    turn_sd_rad: Floats
+    way_m: Floats
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Pings:
+    """Pings (k,): place `at_m` (k, 2) and `axis_rad` by odometry, `range_m` (NaN: no echo), ranger, and the node before each with the share of the
+    way to the next.
+    """
+
+    at_m: Floats
+    axis_rad: Floats
+    range_m: Floats
+    ranger: Ints
+    node: Ints
+    share: Floats
+
+
+def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
+    """Nodes and pings of a walk; the first node is the origin of the walk frame."""
+    first = segments[0].segment
+    rows = [(first.t0_s, 0.0, 0.0, first.heading0_rad, 0.0)]
+    sds: list[tuple[float, float]] = []
+    pings: list[Floats] = []
+    for measured in segments:
+        s = measured.segment
+        length, turn = math.hypot(s.dx_m, s.dy_m), float(wrap(s.heading1_rad - s.heading0_rad))
+        _, x, y, heading, way = rows[-1]
+        moves = length > STILL_M or abs(turn) > STILL_RAD
+        span_s = s.t1_s - s.t0_s
+        share = np.clip((measured.t_s - s.t0_s) / span_s, 0.0, 1.0) if span_s > 0.0 and moves else 0.0 * measured.t_s
+        along = share if moves else 0.0 * share
+        axis = heading + along * turn + RANGER_AXES_RAD[measured.ranger]
+        node = np.full(len(share), len(rows) - 1)
+        pings.append(
+            np.column_stack(
+                [x + along * s.dx_m, y + along * s.dy_m, axis, measured.range_m, measured.ranger, node, along]
+            )
+        )
+        if moves:
+            rows.append((s.t1_s, x + s.dx_m, y + s.dy_m, heading + turn, way + length))
+            sds.append(
+                (
+                    math.hypot(s.sd_m, MOVE_SD * math.sqrt(length)),
+                    math.hypot(s.turn_sd_rad, TURN_SD_RAD * math.sqrt(length)),
+                )
+            )
+    table, sd, ping = np.array(rows), np.array(sds).reshape(-1, 2), np.concatenate(pings)
+    nodes = Nodes(table[:, 0], table[:, 1:4].copy(), sd[:, 0], sd[:, 1], table[:, 4])
+    return nodes, Pings(
+        ping[:, :2].copy(),
+        ping[:, 2].copy(),
+        ping[:, 3].copy(),
+        ping[:, 4].astype(np.int64),
+        ping[:, 5].astype(np.int64),
+        ping[:, 6].copy(),
+    )

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""A picture of a drawing: walls, openings, the floor that was walked.
+
+In: a plan, a path. Out: a file. Owns the colours.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.plan.drawing import DOOR, OBSTACLE, WALL
+from echostep.plan.model import Level, Plan
+
+WALKED = "#0072b2"
+TRUE = "#e69f00"
+WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest height by width
+TRUNK_M = 0.5  # width of the floor that a person walks on
+
+
+def draw_picture(path: Path, plan: Plan, walked_m: Floats, built: Level | None = None) -> None:
+    """Draw the first level of a plan and the path (n, 2), over the true walls where they are known. Raises EchostepError."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    if path.suffix.casefold() not in (".png", ".svg"):
+        raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
+    level = plan.levels[0]
+    points = np.concatenate(
+        [level.walls.reshape(-1, 2), walked_m] + ([] if built is None else [built.walls.reshape(-1, 2)])
+    )
+    low, high = points.min(0) - 0.5, points.max(0) + 0.5
+    shape = min((high[1] - low[1]) / (high[0] - low[0]), HIGHEST)
+    figure = Figure(figsize=(WIDE_IN, WIDE_IN * shape + 0.4), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    points_m = 72.0 * WIDE_IN / (high[0] - low[0])
+    axes.plot(*walked_m.T, color=WALKED, alpha=0.12, linewidth=TRUNK_M * points_m, solid_capstyle="round")
+    axes.plot(*walked_m.T, color=WALKED, linewidth=0.7, label="path")
+    if built is not None:
+        axes.add_collection(LineCollection(_lines(built.walls), colors=TRUE, linewidths=3.0, label="true walls"))
+        for outline in built.obstacles:
+            axes.fill(*outline.T, color=OBSTACLE)
+    axes.add_collection(LineCollection(_lines(level.walls), colors=WALL, linewidths=1.6, label="drawn"))
+    doors = np.array([door.line for door in level.doors if door.state == "open"]).reshape(-1, 4)
+    axes.add_collection(
+        LineCollection(_lines(doors), colors=DOOR, linewidths=1.2, linestyles=":", label="walked through")
+    )
+    axes.legend(loc="upper right", fontsize="small")
+    axes.set(xlabel="x, m", ylabel="y, m")
+    try:
+        figure.savefig(path)
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+
+
+def _lines(segments: Floats) -> list[Floats]:
+    """Segments (n, 4) as lines of two points."""
+    return list(segments.reshape(-1, 2, 2))

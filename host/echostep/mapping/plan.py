@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""A drawing as a plan like any other.
+
+In: `Mapped`, the pose at which the walk began. Out: `Plan`. Owns nothing. The openings between walls are listed as doors; those that the path leads
+through are open, of the others nothing is known.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from echostep.arrays import Floats
+from echostep.mapping.directions import right_angles_off
+from echostep.mapping.mapper import Mapped
+from echostep.plan.gaps import door_gaps
+from echostep.plan.model import Door, Level, Plan, Pose
+
+LEAST_M = 0.1  # a shorter piece is no wall
+ROUND = 3  # digits of a metre
+COURSE_M, STRAIGHT = 4.0, 0.97  # the first heading is the course of so much of path, if it is straight
+SQUARE_RAD = math.radians(6.0)
+
+
+def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Floats]:
+    """The plan with the first pose of the walk at `start`, and the path (n, 2) on it."""
+    first = mapped.graph.pose[0]
+    turn = _turn(mapped, start.heading_rad)
+    c, s = math.cos(turn), math.sin(turn)
+    turned = np.array([[c, -s], [s, c]])
+
+    def moved(points: Floats) -> Floats:
+        found: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
+        return found
+
+    path = moved(mapped.drawing.path_m)
+    walls = np.round(moved(mapped.drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
+    long = np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > LEAST_M
+    level = Level("0", 0.0, walls[long])
+    level = replace(level, doors=_doors(level, path))
+    sd = math.sqrt(float(np.mean(mapped.drawing.sd_m[long] ** 2))) if long.any() else None
+    return Plan(name, (level,), start, "", uncertainty_m=None if sd is None else round(sd, ROUND)), path
+
+
+def _turn(mapped: Mapped, heading_rad: float) -> float:
+    """Turn of the map so that the first metres lead to where the wearer looked, and walls within SQUARE_RAD of the axes are parallel to them.
+
+    The foot does not know yet at its first step where the toe points.
+    """
+    graph = mapped.graph
+    k = int(np.searchsorted(graph.nodes.way_m, COURSE_M))
+    course = float(graph.pose[0, 2])
+    if k < len(graph.nodes):
+        dx, dy = graph.pose[k, :2] - graph.pose[0, :2]
+        if math.hypot(dx, dy) > STRAIGHT * graph.nodes.way_m[k]:
+            course = math.atan2(dy, dx)
+    turn = heading_rad - course
+    if graph.base_rad is not None:
+        off = right_angles_off(graph.base_rad + turn)
+        turn -= off if abs(off) < SQUARE_RAD else 0.0
+    return turn
+
+
+def _doors(level: Level, path: Floats) -> tuple[Door, ...]:
+    """The openings of a level, with what the path (n, 2) says of them."""
+    walked = shapely.LineString(path)
+    return tuple(
+        replace(door, state="open") if shapely.LineString((door.line[:2], door.line[2:])).intersects(walked) else door
+        for door in door_gaps(level)
+    )

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""Walls as segments: runs of cells that answered, joined over what was not heard, extended to the walls that they meet.
+
+In: lines and counts by cell. Out: segments with their standard deviations. Owns the limits.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.mapping.evidence import CELL_M, CROSSED, Cells
+from echostep.mapping.lines import Lines
+
+SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
+HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of one that passed it
+LEAST_PINGS, LEAST_M = 8, 0.6  # of a run
+LEAST_PINGS_ASKEW, LEAST_ASKEW_M = (
+    12,
+    0.8,
+)  # where the building has directions and this is none: corners and edges seem so
+BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
+EXTEND_M = 1.8  # farthest to the wall that an end is extended to
+SURE_M = 0.5  # an end is extended by so much though pings passed: they may have passed the end itself
+SNAP_M = 0.4  # an end that stands out beyond a crossing by less is cut there
+
+
+class Run(NamedTuple):
+    """A piece of a line from `low_m` to `high_m` along it, with the pings that it explains."""
+
+    line: int
+    low_m: float
+    high_m: float
+    pings: float
+
+
+def find_runs(cells: Cells, aligned: Bools) -> list[Run]:
+    """Runs of all lines; those of lines that are not `aligned` (l,) must be longer."""
+    runs = []
+    kernel = np.ones(2 * SMOOTH + 1)
+    for line, first in enumerate(cells.first_m.tolist()):
+        h, p = cells.heard[line, : cells.size[line]], cells.passed[line, : cells.size[line]]
+        least = (LEAST_PINGS, LEAST_M) if aligned[line] else (LEAST_PINGS_ASKEW, LEAST_ASKEW_M)
+        near, near_passed = np.convolve(h, kernel, "same"), np.convolve(p, kernel, "same")
+        there = (near > 0.0) & (HEARD_ODDS * near > PASSED_ODDS * near_passed)
+        for low, high in _bridged(_spans(there), near_passed):
+            at = np.flatnonzero(h[low:high]) + low
+            if not len(at):
+                continue
+            low_m, high_m = first + at[0] * CELL_M, first + (at[-1] + 1) * CELL_M
+            pings = float(h[low:high].sum())
+            if pings >= least[0] and high_m - low_m >= least[1]:
+                runs.append(Run(line, low_m, high_m, pings))
+    return runs
+
+
+def _spans(there: Bools) -> list[tuple[int, int]]:
+    """Begin and end of each run of true cells."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _bridged(spans: list[tuple[int, int]], passed: Floats) -> list[tuple[int, int]]:
+    """Spans joined over short gaps, and over longer ones that no ping passed."""
+    joined: list[tuple[int, int]] = []
+    for low, high in spans:
+        if joined:
+            gap = (low - joined[-1][1]) * CELL_M
+            silent = not passed[joined[-1][1] : low].any()
+            if gap < BRIDGE_M or (silent and gap < SILENT_BRIDGE_M):
+                joined[-1] = (joined[-1][0], high)
+                continue
+        joined.append((low, high))
+    return joined
+
+
+def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> tuple[Floats, Floats]:
+    """Segments (n, 4) with their ends where they meet other walls, and standard deviations (n,)."""
+    ends = np.array([(run.low_m, run.high_m) for run in runs]).reshape(-1, 2)
+    met = ends.copy()
+    for i, run in enumerate(runs):
+        crossings = [c for j in range(len(runs)) if (c := _crossing(lines, runs, i, j)) is not None]
+        for side in (0, 1):
+            met[i, side] = _end(
+                ends[i, side], 1.0 if side else -1.0, crossings, cells.passed[run.line], cells.first_m[run.line]
+            )
+    rows = [_segment(lines, run.line, *met[i]) for i, run in enumerate(runs)]
+    return np.array(rows).reshape(-1, 4), np.array([lines.sd_m[run.line] for run in runs])
+
+
+def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> float | None:
+    """Where along line i run j crosses it; None if it does not, even when its ends were extended."""
+    a, b = lines.normal_rad[runs[i].line], lines.normal_rad[runs[j].line]
+    sine = math.sin(b - a)
+    if abs(sine) < 0.3:
+        return None
+    rho_a, rho_b = lines.rho_m[runs[i].line], lines.rho_m[runs[j].line]
+    x = (rho_a * math.sin(b) - rho_b * math.sin(a)) / sine
+    y = (rho_b * math.cos(a) - rho_a * math.cos(b)) / sine
+    there = math.cos(b) * y - math.sin(b) * x
+    if not runs[j].low_m - EXTEND_M <= there <= runs[j].high_m + EXTEND_M:
+        return None
+    return math.cos(a) * y - math.sin(a) * x
+
+
+def _end(end_m: float, way: float, crossings: list[float], passed: Floats, first_m: float) -> float:
+    """The end moved outward to the nearest crossing within reach that no ping passed on the way, or inward to one that it hardly exceeds."""
+    best, best_m = end_m, math.inf
+    for c in crossings:
+        beyond = (c - end_m) * way
+        if -SNAP_M < beyond < EXTEND_M and abs(beyond) < best_m:
+            low, high = sorted((int((end_m - first_m) / CELL_M), int((c - first_m) / CELL_M)))
+            between = passed[max(low, 0) : max(high, 0)].sum()
+            if between >= CROSSED or (beyond > SURE_M and between > 1.0):
+                continue
+            best, best_m = c, abs(beyond)
+    return best
+
+
+def _segment(lines: Lines, line: int, low: float, high: float) -> tuple[float, float, float, float]:
+    c, s, rho = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line]), lines.rho_m[line]
+    return c * rho - s * low, s * rho + c * low, c * rho - s * high, s * rho + c * high

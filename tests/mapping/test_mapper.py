@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""A walk drawn without a plan: path, walls, closures, and the plan that comes of it (simulated)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from board_runs import ROOT
+from command_line import echostep
+from echostep.evaluate.anywhere.sites import Site
+from echostep.evaluate.anywhere.tours import clearance_m
+from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
+from echostep.mapping.graph import Closure, contradicted
+from echostep.mapping.mapper import Mapped, map_walk
+from echostep.mapping.plan import plan_of
+from echostep.plan.check import check_plan
+from echostep.plan.model import NO_PLAN, load_plan
+from echostep.session.metadata import run_metadata
+from echostep.session.recording import start_recording
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.scenario import DEMO_WAYPOINTS, demo_scenario
+
+PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+
+
+@pytest.fixture(scope="module")
+def walk() -> SimulatedWalk:
+    """The demo's walk."""
+    return simulate(Site(PLAN, DEMO_WAYPOINTS), 3)
+
+
+@pytest.fixture(scope="module")
+def mapped(walk: SimulatedWalk) -> Mapped:
+    """The same, drawn."""
+    return map_walk(walk.segments)
+
+
+def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
+    """Every drawn wall is one, within 0.2 m at nine of ten places; both corridors are there; the plan has no faults."""
+    plan, path = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
+    truth = np.column_stack([np.interp(mapped.graph.nodes.t_s, walk.truth[:, 0], walk.truth[:, k]) for k in (1, 2)])
+    assert np.sqrt(np.mean(np.sum((path - truth) ** 2, axis=1))) < 0.25
+    walls = plan.levels[0].walls
+    length = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
+    assert length.sum() > 80.0
+    shares = np.linspace(0.0, 1.0, 11)[:, None, None]
+    points = (walls[:, :2] + shares * (walls[:, 2:] - walls[:, :2])).reshape(-1, 2)
+    away = np.array([clearance_m(x, y, PLAN.levels[0].solid) for x, y in points.tolist()])
+    assert np.quantile(away, 0.9) < 0.2
+    assert sum(door.state == "open" for door in plan.levels[0].doors) >= 2
+    assert check_plan(plan) == []
+    assert plan.uncertainty_m is not None
+    assert 0.01 < plan.uncertainty_m < 0.2
+
+
+def test_closures_state_their_odds_and_lead_to_the_right_place(walk: SimulatedWalk, mapped: Mapped) -> None:
+    """The last corridor of the walk is the first one."""
+    closures, graph = mapped.graph.closures, mapped.graph
+    assert closures
+    assert min(c.log_odds for c in closures) > math.log(100.0)
+    first, last = (walk.pose_at(graph.nodes.t_s[k]) for k in (closures[-1].old, closures[-1].new))
+    apart = math.hypot(last.x_m - first.x_m, last.y_m - first.y_m)
+    assert math.hypot(*closures[-1].between[:2]) == pytest.approx(apart, abs=0.4)
+
+
+def test_a_closure_that_the_walk_contradicts_is_known_by_it(mapped: Mapped) -> None:
+    """A closure that shifts the path by 2 m between two places a step apart."""
+    graph = mapped.graph
+    between = graph.pose[11] - graph.pose[10] + [2.0, 0.0, 0.0]
+    assert contradicted(graph, Closure(10, 11, between, np.diag([100.0, 100.0, 0.0]), 10.0)) < 0.0
+    assert contradicted(graph, Closure(10, 11, graph.pose[11] - graph.pose[10], np.eye(3), 10.0)) == pytest.approx(10.0)
+
+
+def test_walls_at_any_angle_are_no_building_with_two_directions(mapped: Mapped, walk: SimulatedWalk) -> None:
+    """The evidence of the office is overwhelming; with a heading that turns by a degree each decimetre there is none."""
+    assert mapped.directions.evidence > math.log(1e6)
+    bent, turned = [], 0.0
+    for measured in walk.segments:
+        s = measured.segment
+        turn = math.radians(10.0) * math.hypot(s.dx_m, s.dy_m)
+        c, sn = math.cos(turned), math.sin(turned)
+        moved = replace(s, dx_m=c * s.dx_m - sn * s.dy_m, dy_m=sn * s.dx_m + c * s.dy_m)
+        bent.append(
+            replace(
+                measured,
+                segment=replace(
+                    moved, heading0_rad=s.heading0_rad + turned, heading1_rad=s.heading1_rad + turned + turn
+                ),
+            )
+        )
+        turned += turn
+    assert map_walk(bent).directions.evidence < math.log(1000.0)
+
+
+def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
+    """`echostep map` of a recorded demo; the same walk is tracked on the drawing, and never lost."""
+    scenario = demo_scenario(PLAN, 4, PythonBoard(4))
+    with start_recording(tmp_path / "walk.mcap", run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan")) as recorder:
+        for chunk in scenario.chunks():
+            recorder.write(chunk)
+    done = echostep("map", recorder.path, "-o", "plan.json", "--picture", "plan.png", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "returns to known places" in done.stdout
+    assert (tmp_path / "plan.png").stat().st_size > 10_000
+    checked = echostep("plan", "check", "plan.json", cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout
+    tracked = echostep("replay", recorder.path, "--plan", "plan.json", "--headless", "--out", "again", cwd=tmp_path)
+    assert tracked.returncode == 0, tracked.stderr
+    assert "never lost" in tracked.stdout
+    refused = echostep("map", recorder.path, "-o", "plan.json", "--picture", "plan.xyz", cwd=tmp_path)
+    assert refused.returncode == 2
+
+
+def test_a_recording_without_a_walk_is_refused(tmp_path: Path) -> None:
+    """An empty file, and two seconds of standing."""
+    (tmp_path / "empty.mcap").write_bytes(b"")
+    refused = echostep("map", "empty.mcap", "-o", "plan.json", cwd=tmp_path)
+    assert (refused.returncode, "no recorded bytes" in refused.stderr) == (2, True)
+    scenario = demo_scenario(PLAN, 4, PythonBoard(4))
+    with start_recording(tmp_path / "walk.mcap", run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan")) as recorder:
+        for chunk in scenario.chunks():
+            if chunk.t_arrival_ns > 3_000_000_000:
+                break
+            recorder.write(chunk)
+    refused = echostep("map", recorder.path, "-o", "plan.json", cwd=tmp_path)
+    assert (refused.returncode, "of steps in it" in refused.stderr) == (2, True)
+    assert not (tmp_path / "plan.json").exists()
