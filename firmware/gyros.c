@@ -1,22 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 #include "gyros.h"
-#include "board.h"         /* clock_now, spi_* */
+#include "adis16100.h"     /* driver */
 #include "configuration.h" /* rate, enabled gyros */
 #include "link.h"          /* sending the messages */
+#include "lsm6dso.h"       /* driver */
 #include "parts.h"         /* what was found */
 #include "selftest.h"      /* receives the rates while a self-test runs */
 #include "status.h"        /* error counters */
 
-/* Command bits [ADIS16100 datasheet]: WRITE, a channel, normal power, two's complement. Each 16-bit frame returns the reply to the
- * previous frame: channel in bits 13:12, value in bits 11:0. */
-#define COMMAND_RATE 0x8300u
-#define COMMAND_TEMPERATURE 0x8700u
-#define CHANNEL_RATE 0x0000u
-#define CHANNEL_TEMPERATURE 0x1000u
-#define CHANNEL_MASK 0xF000u /* both leading zeros and the channel */
-#define NO_REPLY 0xFFFFu     /* MISO is pulled up: an absent chip reads as ones */
-#define VALUE_MASK 0x0FFFu
-#define SIGN_BIT 0x0800
+#define START_UP_TICKS (20u * TICKS_PER_MS) /* of parts that got their power together with the board: 10 ms [LSM6DSO] */
+#define WARM_UP_SAMPLES 16u                 /* 80 ms: an LSM6DSO has rates after 70 ms */
+#define MISSES_MAX 40u                      /* samples in a row without a value after which the part is sought again: 0.2 s */
 
 static const struct {
 	enum chip chip;
@@ -28,6 +22,15 @@ static const struct {
 	[GYRO_BELT] = { CHIP_BELT, DEVICE_BELT, SENSORS_BELT },
 };
 
+static struct {
+	bool sought;      /* whether the part is known; without an LSM6DSO an ADIS16100 is assumed */
+	bool six_axes;    /* an LSM6DSO */
+	uint8_t misses;   /* samples in a row without a value */
+	int16_t warmth;   /* newest temperature of an LSM6DSO */
+	int16_t axes[LSM6DSO_AXES]; /* of the newest sample instant, MSG_MOTION_INVALID without one */
+} gyros[GYROS];
+
+static uint8_t warming; /* samples until an LSM6DSO that was switched on has rates: a self-test waits */
 /* Times in ticks of the board's clock. */
 static uint32_t due;        /* next sample */
 static uint32_t health_due; /* next `gyro_health` messages */
@@ -35,65 +38,143 @@ static uint32_t period;     /* between samples */
 
 void gyros_start(uint32_t now)
 {
-	due = now;
+	due = now + START_UP_TICKS;
 	period = TICKS_PER_S / configuration.gyro_rate_hz;
 }
 
-/* One frame: sends `command`, returns the reply to the previous frame. */
-static uint16_t exchange(enum chip chip, uint16_t command)
+/* An ADIS16100 in the place of an LSM6DSO must name its channel: a line that is held low reads as a rate of zero. */
+static bool is_six_axes(uint8_t gyro)
 {
-	spi_select(chip, SPI_ADIS16100);
-	uint8_t high = spi_exchange((uint8_t)(command >> 8));
-	uint8_t low = spi_exchange((uint8_t)(command & 0xFFu));
-	spi_release();
-	return (uint16_t)((uint16_t)(high << 8) | low);
+	uint8_t fault = FAULT_NONE;
+	if (lsm6dso_answers(devices[gyro].chip)) {
+		parts_found(devices[gyro].device, PART_LSM6DSO, LSM6DSO_IDENTITY);
+		return true;
+	}
+	if (gyros[gyro].six_axes)
+		(void)adis16100_temperature(devices[gyro].chip, &fault);
+	return fault != FAULT_NONE;
 }
 
-/* Counts of a reply; MSG_GYROS_INVALID, and an error in `status`, when it names another channel. */
-static int16_t value_of(uint8_t gyro, uint16_t reply, uint16_t channel)
+static void seek(uint8_t gyro)
 {
-	if ((reply & CHANNEL_MASK) != channel) {
-		status_failed(devices[gyro].device, reply == NO_REPLY ? FAULT_NO_ANSWER : FAULT_WRONG_CHANNEL);
-		return MSG_GYROS_INVALID;
+	gyros[gyro].sought = true;
+	gyros[gyro].misses = 0;
+	gyros[gyro].six_axes = is_six_axes(gyro);
+	if (!gyros[gyro].six_axes)
+		return;
+	lsm6dso_start(devices[gyro].chip);
+	warming = WARM_UP_SAMPLES;
+}
+
+/* Seeks parts that are not known, and makes each ADIS16100 convert: the value of its previous conversion is a whole period old. */
+static void prepare(void)
+{
+	for (uint8_t k = 0; k < GYROS; k++) {
+		if (!gyros[k].sought || gyros[k].misses >= MISSES_MAX)
+			seek(k);
+		if (!gyros[k].six_axes)
+			adis16100_convert(devices[k].chip);
 	}
-	status_ok(devices[gyro].device);
-	return (int16_t)((int16_t)((reply & VALUE_MASK) ^ SIGN_BIT) - SIGN_BIT);
+}
+
+static void note(uint8_t gyro, uint8_t fault)
+{
+	if (fault == FAULT_NONE) {
+		gyros[gyro].misses = 0;
+		status_ok(devices[gyro].device);
+	} else {
+		gyros[gyro].misses++;
+		status_failed(devices[gyro].device, fault);
+	}
+}
+
+/* 0.035 deg/s -> 0.2439 deg/s, rounded. */
+static int16_t in_units_of_gyros(int16_t rate)
+{
+	return (int16_t)(((int32_t)rate * 18809 + 65536) >> 17);
+}
+
+static void set_axes(uint8_t gyro, const int16_t *values)
+{
+	for (uint8_t k = 0; k < LSM6DSO_AXES; k++)
+		gyros[gyro].axes[k] = values ? values[k] : MSG_MOTION_INVALID;
+}
+
+/* An LSM6DSO without a sample in its first moments has not failed. */
+static int16_t read_six_axes(uint8_t gyro)
+{
+	struct lsm6dso_sample s;
+	uint8_t fault = lsm6dso_read(devices[gyro].chip, &s);
+	if (fault == FAULT_NEVER_READY && ++gyros[gyro].misses < MISSES_MAX)
+		return MSG_GYROS_INVALID;
+	note(gyro, fault);
+	if (fault != FAULT_NONE)
+		return MSG_GYROS_INVALID;
+	gyros[gyro].warmth = s.temperature;
+	set_axes(gyro, s.axes);
+	return in_units_of_gyros(s.axes[LSM6DSO_Z]);
 }
 
 static int16_t rate(uint8_t gyro)
 {
+	uint8_t fault;
+	set_axes(gyro, 0);
 	if (!configuration_reads(devices[gyro].sensor))
 		return MSG_GYROS_INVALID;
-	return value_of(gyro, exchange(devices[gyro].chip, COMMAND_RATE), CHANNEL_RATE);
+	if (gyros[gyro].six_axes)
+		return read_six_axes(gyro);
+	int16_t counts = adis16100_rate(devices[gyro].chip, &fault);
+	note(gyro, fault);
+	return counts;
 }
 
-/* First round of frames: makes all three chips convert now. The values of their previous conversion are a whole period old. */
-static void convert(void)
+static void send_motion(uint32_t ticks)
 {
-	for (uint8_t k = 0; k < GYROS; k++)
-		(void)exchange(devices[k].chip, COMMAND_RATE);
+	const int16_t *t = gyros[GYRO_THIGH].axes, *c = gyros[GYRO_CALF].axes, *b = gyros[GYRO_BELT].axes;
+	struct msg_motion m = {
+		ticks, t[0], t[1], t[2], t[3], t[4], t[5], c[0], c[1], c[2], c[3], c[4], c[5], b[0], b[1], b[2], b[3], b[4], b[5],
+	};
+	link_send(MSG_MOTION, msg_pack_motion(link_body(), &m));
+}
+
+static bool any_six_axes(void)
+{
+	return gyros[GYRO_THIGH].six_axes || gyros[GYRO_CALF].six_axes || gyros[GYRO_BELT].six_axes;
 }
 
 static void sample(void)
 {
-	convert();
+	prepare();
 	struct msg_gyros m = { clock_now(), MSG_GYROS_INVALID, MSG_GYROS_INVALID, MSG_GYROS_INVALID };
 	const int16_t rates[GYROS] = { rate(GYRO_THIGH), rate(GYRO_CALF), rate(GYRO_BELT) };
+	if (warming)
+		warming--;
 	if (selftest_running()) {
-		selftest_add_rates(rates);
+		if (!warming)
+			selftest_add_rates(rates);
 	} else {
 		m.thigh = rates[GYRO_THIGH];
 		m.calf = rates[GYRO_CALF];
 		m.belt = rates[GYRO_BELT];
+		if (any_six_axes() && link_wants(REPORTS_MOTION))
+			send_motion(m.ticks);
 	}
 	link_send(MSG_GYROS, msg_pack_gyros(link_body(), &m));
 }
 
-/* One frame requests the temperature; the next frame returns it and requests the rate again. */
+/* Counts of 0.1453 degC; of an LSM6DSO from counts of 1/256 degC, 6.88 / 256 as 55 / 2048. */
 static int16_t temperature(uint8_t gyro)
 {
-	(void)exchange(devices[gyro].chip, COMMAND_TEMPERATURE);
-	return value_of(gyro, exchange(devices[gyro].chip, COMMAND_RATE), CHANNEL_TEMPERATURE);
+	uint8_t fault;
+	if (gyros[gyro].six_axes && gyros[gyro].misses)
+		return MSG_GYRO_HEALTH_INVALID;
+	if (gyros[gyro].six_axes)
+		return (int16_t)((int32_t)gyros[gyro].warmth * 55 / 2048);
+	int16_t counts = adis16100_temperature(devices[gyro].chip, &fault);
+	note(gyro, fault);
+	if (fault == FAULT_NONE)
+		parts_found(devices[gyro].device, PART_ADIS16100, 0);
+	return counts;
 }
 
 static void report_health(void)
@@ -103,11 +184,17 @@ static void report_health(void)
 			continue;
 		const struct selftest_result *test = selftest_result(k);
 		int16_t counts = temperature(k);
-		if (counts != MSG_GYRO_HEALTH_INVALID)
-			parts_found(devices[k].device, PART_ADIS16100, 0);
 		struct msg_gyro_health m = { clock_now(), k, counts, test->outcome, test->response[0], test->response[1] };
 		link_send(MSG_GYRO_HEALTH, msg_pack_gyro_health(link_body(), &m));
 	}
+}
+
+void gyros_excite(enum excitation excitation)
+{
+	spi_excite_gyros(excitation);
+	for (uint8_t k = 0; k < GYROS; k++)
+		if (gyros[k].six_axes)
+			lsm6dso_excite(devices[k].chip, excitation);
 }
 
 uint32_t gyros_run(uint32_t now)

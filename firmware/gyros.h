@@ -1,19 +1,23 @@
 /* SPDX-License-Identifier: MIT */
-/* Analog Devices ADIS16100: the three rate gyros of thigh, calf and belt. One `gyros` message per sample instant, one `gyro_health`
- * message per gyro and second. */
+/* The gyros of thigh, calf and belt: finds which part is in each place; one `gyros` message per sample instant, one `motion` message
+ * beside it where parts of six axes are there and the host wants it, one `gyro_health` message per gyro and second. */
 #ifndef ECHOSTEP_GYROS_H
 #define ECHOSTEP_GYROS_H
 
 #include <stdint.h>
+#include "board.h" /* enum excitation */
 
 #define GYROS 3u
 #define GYROS_RATE_MIN_HZ 10u
 #define GYROS_RATE_MAX_HZ 200u
 
-/* Applies the configured rate; the first sample is due at once. */
+/* Applies the configured rate; the first sample is due in 20 ms. */
 void gyros_start(uint32_t now);
 
-/* Samples when a sample is due (0.1 ms); returns the time of the next call. */
+/* Samples when a sample is due (0.1 to 0.4 ms); returns the time of the next call. */
 uint32_t gyros_run(uint32_t now);
+
+/* For the self-test: its inputs of all gyros. */
+void gyros_excite(enum excitation excitation);
 
 #endif

@@ -11,6 +11,7 @@
 static uint8_t payload[FRAME_PAYLOAD_MAX];
 static uint16_t sequence;
 static uint8_t received[RECEIVE_MAX];
+static uint8_t subscribed; /* REPORTS_* */
 static uint8_t received_length; /* RECEIVE_MAX + 1: the frame is too long, its rest is skipped */
 
 uint8_t *link_body(void)
@@ -25,6 +26,7 @@ static uint16_t *dropped(uint8_t id)
 	case MSG_PING:
 		return &status.dropped_ping;
 	case MSG_GYROS:
+	case MSG_MOTION:
 		return &status.dropped_gyros;
 	case MSG_PRESSURE:
 		return &status.dropped_pressure;
@@ -51,7 +53,18 @@ void link_open(void)
 {
 	static const uint8_t zero = 0;
 	received_length = 0;
+	subscribed = 0;
 	(void)usb_write(&zero, 1); /* the buffer was just emptied: there is room */
+}
+
+void link_subscribe(uint8_t reports)
+{
+	subscribed = reports;
+}
+
+bool link_wants(uint8_t reports)
+{
+	return (subscribed & reports) != 0;
 }
 
 /* Decodes the bytes received before a zero; true: `out` holds a command. */

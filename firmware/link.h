@@ -29,4 +29,8 @@ void link_open(void);
 /* Takes the next command from the received bytes; false: there is none yet. Bad frames are counted. */
 bool link_receive(struct link_command *out);
 
+/* The optional messages (REPORTS_*) that the host wants, until the port is opened again; whether it wants any of these. */
+void link_subscribe(uint8_t reports);
+bool link_wants(uint8_t reports);
+
 #endif

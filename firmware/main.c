@@ -17,8 +17,6 @@
 #define VERSION_MINOR 3
 #define VERSION_PATCH 0
 
-static uint8_t subscribed; /* REPORTS_*, the optional messages that the host wants */
-
 #define SLEEP_MAX_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed within this time */
 
 static void send_identity(void)
@@ -73,9 +71,9 @@ static void send_board_health(void)
 /* The optional messages that come once a second. */
 static void send_subscribed_reports(void)
 {
-	if (subscribed & REPORTS_BOARD_HEALTH)
+	if (link_wants(REPORTS_BOARD_HEALTH))
 		send_board_health();
-	if (subscribed & REPORTS_PARTS)
+	if (link_wants(REPORTS_PARTS))
 		parts_send();
 }
 
@@ -136,7 +134,7 @@ static bool handle_subscribe(const struct link_command *command)
 	struct msg_subscribe m;
 	if (!msg_unpack_subscribe(&m, command->body, command->length))
 		return false;
-	subscribed = m.reports;
+	link_subscribe(m.reports);
 	send_subscribed_reports();
 	return true;
 }
@@ -165,7 +163,6 @@ static void handle_port_opening(void)
 	if (!usb_take_opening())
 		return;
 	link_open();
-	subscribed = 0;
 	send_identity_and_configuration();
 }
 

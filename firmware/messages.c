@@ -181,6 +181,31 @@ uint8_t msg_pack_parts(uint8_t *out, const struct msg_parts *m)
 	return (uint8_t)(end - out);
 }
 
+uint8_t msg_pack_motion(uint8_t *out, const struct msg_motion *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put16(end, (uint16_t)m->thigh_rate_x);
+	end = put16(end, (uint16_t)m->thigh_rate_y);
+	end = put16(end, (uint16_t)m->thigh_rate_z);
+	end = put16(end, (uint16_t)m->thigh_acceleration_x);
+	end = put16(end, (uint16_t)m->thigh_acceleration_y);
+	end = put16(end, (uint16_t)m->thigh_acceleration_z);
+	end = put16(end, (uint16_t)m->calf_rate_x);
+	end = put16(end, (uint16_t)m->calf_rate_y);
+	end = put16(end, (uint16_t)m->calf_rate_z);
+	end = put16(end, (uint16_t)m->calf_acceleration_x);
+	end = put16(end, (uint16_t)m->calf_acceleration_y);
+	end = put16(end, (uint16_t)m->calf_acceleration_z);
+	end = put16(end, (uint16_t)m->belt_rate_x);
+	end = put16(end, (uint16_t)m->belt_rate_y);
+	end = put16(end, (uint16_t)m->belt_rate_z);
+	end = put16(end, (uint16_t)m->belt_acceleration_x);
+	end = put16(end, (uint16_t)m->belt_acceleration_y);
+	end = put16(end, (uint16_t)m->belt_acceleration_z);
+	return (uint8_t)(end - out);
+}
+
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)

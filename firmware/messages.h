@@ -19,6 +19,7 @@
 #define MSG_COMPASS_BEARING_INVALID ((uint16_t)65535)
 #define MSG_GYRO_HEALTH_INVALID ((int16_t)-32768)
 #define MSG_BOARD_HEALTH_INVALID ((uint16_t)0)
+#define MSG_MOTION_INVALID ((int16_t)-32768)
 
 enum {
 	MSG_IDENTITY = 0x01,
@@ -33,6 +34,7 @@ enum {
 	MSG_GYRO_HEALTH = 0x0A,
 	MSG_BOARD_HEALTH = 0x0B,
 	MSG_PARTS = 0x0C,
+	MSG_MOTION = 0x0D,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
@@ -53,6 +55,7 @@ enum {
 	MSG_GYRO_HEALTH_SIZE = 12,
 	MSG_BOARD_HEALTH_SIZE = 14,
 	MSG_PARTS_SIZE = 21,
+	MSG_MOTION_SIZE = 40,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
@@ -175,6 +178,7 @@ enum {
 enum {
 	REPORTS_BOARD_HEALTH = 1,
 	REPORTS_PARTS = 2,
+	REPORTS_MOTION = 4,
 };
 
 /* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
@@ -198,7 +202,8 @@ struct msg_ping {
 };
 uint8_t msg_pack_ping(uint8_t *out, const struct msg_ping *m);
 
-/* Rates of the thigh, calf and belt gyros (ADIS16100) at one instant. */
+/* Rates of the thigh, calf and belt gyros at one instant: of ADIS16100, or about the z axis of LSM6DSO, which reach 1000 deg/s.
+ * */
 struct msg_gyros {
 	uint32_t ticks; /* 0.5 us */
 	int16_t thigh; /* 0.2439 deg/s, -32768: invalid */
@@ -325,6 +330,31 @@ struct msg_parts {
 	uint8_t wiring;
 };
 uint8_t msg_pack_parts(uint8_t *out, const struct msg_parts *m);
+
+/* All axes of the LSM6DSO on thigh, calf and belt at one instant, beside `gyros`, which has their rates about z in its own unit.
+ * */
+struct msg_motion {
+	uint32_t ticks; /* 0.5 us */
+	int16_t thigh_rate_x; /* 0.035 deg/s, -32768: invalid */
+	int16_t thigh_rate_y; /* 0.035 deg/s, -32768: invalid */
+	int16_t thigh_rate_z; /* 0.035 deg/s, -32768: invalid */
+	int16_t thigh_acceleration_x; /* 0.244 mg, -32768: invalid */
+	int16_t thigh_acceleration_y; /* 0.244 mg, -32768: invalid */
+	int16_t thigh_acceleration_z; /* 0.244 mg, -32768: invalid */
+	int16_t calf_rate_x; /* 0.035 deg/s, -32768: invalid */
+	int16_t calf_rate_y; /* 0.035 deg/s, -32768: invalid */
+	int16_t calf_rate_z; /* 0.035 deg/s, -32768: invalid */
+	int16_t calf_acceleration_x; /* 0.244 mg, -32768: invalid */
+	int16_t calf_acceleration_y; /* 0.244 mg, -32768: invalid */
+	int16_t calf_acceleration_z; /* 0.244 mg, -32768: invalid */
+	int16_t belt_rate_x; /* 0.035 deg/s, -32768: invalid */
+	int16_t belt_rate_y; /* 0.035 deg/s, -32768: invalid */
+	int16_t belt_rate_z; /* 0.035 deg/s, -32768: invalid */
+	int16_t belt_acceleration_x; /* 0.244 mg, -32768: invalid */
+	int16_t belt_acceleration_y; /* 0.244 mg, -32768: invalid */
+	int16_t belt_acceleration_z; /* 0.244 mg, -32768: invalid */
+};
+uint8_t msg_pack_motion(uint8_t *out, const struct msg_motion *m);
 
 /* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */

@@ -7,7 +7,7 @@
  * The JSN-SR04T answers only 12 ms after its trigger. */
 #define ANSWER_MAX_TICKS (20u * TICKS_PER_MS)         /* from the trigger to the rising edge */
 #define PULSE_MAX_TICKS (60u * TICKS_PER_MS)          /* a line that is high for longer is stuck */
-#define ECHO_MAX_TICKS (TICKS_PER_MS * 26u)           /* 4.5 m, out and back: a longer pulse is one without an echo */
+#define ECHO_MAX_TICKS (53u * TICKS_PER_MS / 2u)      /* 4.5 m, out and back: a longer pulse is one without an echo */
 #define TICKS_PER_US 2u
 #define POLL_TICKS TICKS_PER_MS
 

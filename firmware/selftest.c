@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "selftest.h"
-#include "board.h"    /* spi_excite_gyros */
 #include "messages.h" /* SELF_TEST_* */
+#include "parts.h"    /* whose limits apply */
 
 /* Four parts, 0.56 s in all: at rest, ST1, ST2, at rest again. Each part waits 60 ms for the 40 Hz filter, then averages 16 samples. */
 #define SETTLE_SAMPLES 12u
@@ -12,8 +12,12 @@
  * a margin of about 2 counts at the lower end and 7 at the upper one. */
 #define RESPONSE_MIN 121
 #define RESPONSE_MAX 376
-#define STILL_MAX 30    /* counts, 7 deg/s: a wider spread within a window is motion */
 #define SYMMETRY_MAX 80 /* counts: a larger sum of the two responses means that the rate itself changed */
+/* The same of an LSM6DSO: 150 to 700 deg/s [LSM6DSO data sheet, table 3]; a tenth of asymmetry, by reason. */
+#define LSM6DSO_RESPONSE_MIN 615
+#define LSM6DSO_RESPONSE_MAX 2870
+#define LSM6DSO_SYMMETRY_MAX 300
+#define STILL_MAX 30 /* counts, 7 deg/s: a wider spread within a window is motion */
 
 enum part { REST, DOWN, UP, RECOVERY, IDLE }; /* DOWN: ST1 lowers the rate; UP: ST2 raises it */
 
@@ -47,7 +51,7 @@ static void enter(enum part next)
 	samples = 0;
 	for (uint8_t k = 0; k < GYROS; k++)
 		clear_window(&gyros[k]);
-	spi_excite_gyros(next == DOWN ? EXCITE_ST1 : next == UP ? EXCITE_ST2 : EXCITE_NONE);
+	gyros_excite(next == DOWN ? EXCITE_ST1 : next == UP ? EXCITE_ST2 : EXCITE_NONE);
 }
 
 void selftest_begin(void)
@@ -93,20 +97,23 @@ static void close_window(struct gyro *g)
 		g->result.response[part - DOWN] = (int16_t)(mean - g->rest);
 }
 
-static bool is_proper(int16_t response)
+static bool is_proper(int16_t response, bool six_axes)
 {
+	if (six_axes)
+		return response >= LSM6DSO_RESPONSE_MIN && response <= LSM6DSO_RESPONSE_MAX;
 	return response >= RESPONSE_MIN && response <= RESPONSE_MAX;
 }
 
 static uint8_t outcome_of(const struct gyro *g)
 {
+	bool six_axes = parts_in((uint8_t)(DEVICE_THIGH + (g - gyros))) == PART_LSM6DSO;
 	int16_t down = g->result.response[0], up = g->result.response[1];
-	int16_t difference = (int16_t)(up + down);
+	int16_t difference = (int16_t)(up + down), most = six_axes ? LSM6DSO_SYMMETRY_MAX : SYMMETRY_MAX;
 	if (!g->answered)
 		return SELF_TEST_NO_ANSWER;
-	if (g->moved || difference > SYMMETRY_MAX || difference < -SYMMETRY_MAX)
+	if (g->moved || difference > most || difference < -most)
 		return SELF_TEST_MOVED;
-	return is_proper((int16_t)-down) && is_proper(up) ? SELF_TEST_PASSED : SELF_TEST_FAILED;
+	return is_proper((int16_t)-down, six_axes) && is_proper(up, six_axes) ? SELF_TEST_PASSED : SELF_TEST_FAILED;
 }
 
 void selftest_add_rates(const int16_t rate[GYROS])

@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
 from echostep.board.findings import BoardReports, part_text_of
-from echostep.board.health import board_findings
+from echostep.board.health import board_findings, gyro_celsius
 from echostep.board.subscription import SUBSCRIBE
+from echostep.simulation.stimulus import EXTENDED_ROW
 
 pytestmark = needs_twin
 
@@ -285,3 +289,117 @@ def test_pulse_rangers_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -
     rangers.fault("reset=watchdog")
     rangers.run(1_500)
     assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+
+
+PLACES = ("thigh", "calf", "belt")
+
+
+@pytest.fixture
+def imus(bench: Bench) -> Bench:
+    """A board of the papers with LSM6DSO on thigh, calf and belt, subscribed."""
+    for place in PLACES:
+        bench.fault(f"part_{place}=lsm6dso")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_200)
+    return bench
+
+
+def extended_rows(milliseconds: int) -> NDArray[Any]:
+    """Rows with all axes: each axis of each place has its own value."""
+    rows = np.zeros(milliseconds, EXTENDED_ROW)
+    rows["row"] = quiet_rows(milliseconds)
+    rows["motion"]["rate"] = np.arange(9).reshape(3, 3) * 100 - 300
+    rows["motion"]["force"] = np.arange(9).reshape(3, 3) * 1_000 - 4_000
+    rows["field"] = 1_000, -2_000, 3_000
+    return rows
+
+
+def test_all_axes_of_three_lsm6dso_come_at_200_hz(imus: Bench) -> None:
+    found = imus.run(2_000, extended_rows(2_000))
+    motions = [x for x in found if isinstance(x, m.Motion)]
+    gyros = [x for x in found if isinstance(x, m.Gyros)]
+    assert 399 <= len(motions) <= 401
+    assert [x.ticks for x in motions] == [x.ticks for x in gyros]
+    assert np.ptp(np.diff([x.ticks for x in motions])) <= 2_000  # a millisecond
+    values = np.array(motions[-1][1:]).reshape(3, 2, 3)
+    assert (values[:, 0] == np.arange(9).reshape(3, 3) * 100 - 300).all()
+    assert (values[:, 1] == np.arange(9).reshape(3, 3) * 1_000 - 4_000).all()
+    assert gyros[-1][1:] == tuple(round(z * 0.035 / 0.2439) for z in (-100, 200, 500))
+    assert [parts(imus)[1 + k] for k in (3, 4, 5)] == [m.Part.LSM6DSO] * 3
+    assert imus.status.dropped_gyros == imus.reader.counts.lost == 0
+
+
+def test_lsm6dso_reach_1000_degrees_a_second(imus: Bench) -> None:
+    rows = extended_rows(500)
+    rows["motion"]["rate"][:, 1, 2] = 20_000  # 700 deg/s
+    calf = [x.calf for x in imus.run(500, rows) if isinstance(x, m.Gyros)]
+    assert calf[-1] == 2_870
+
+
+def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:
+    newest = {x.gyro: x for x in imus.messages if isinstance(x, m.GyroHealth)}
+    assert {x.self_test for x in newest.values()} == {m.SelfTest.PASSED}
+    assert all(615 <= -x.response_st1 <= 2_870 and 615 <= x.response_st2 <= 2_870 for x in newest.values())
+    assert all(abs(gyro_celsius(x) - 20.0) < 0.2 for x in newest.values())
+    assert board_findings(reports(imus)) == []
+
+
+def test_an_lsm6dso_without_a_self_test_is_named(imus: Bench) -> None:
+    imus.fault("imu_calf=no_self_test")
+    imus.ask(m.CheckGyros())
+    imus.run(2_000)
+    (text,) = [str(f) for f in board_findings(reports(imus))]
+    assert text.startswith("calf gyro (LSM6DSO): failed its self-test (responses ")
+    assert "proper are -615 to -2870" in text
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause", "words"),
+    [
+        ("absent", m.Fault.NO_ANSWER, "calf gyro (LSM6DSO): does not answer"),
+        ("zeros", m.Fault.NEVER_READY, "calf gyro (LSM6DSO): has no new rates"),
+        ("never_ready", m.Fault.NEVER_READY, "calf gyro (LSM6DSO): has no new rates"),
+    ],
+)
+def test_an_lsm6dso_that_fails_is_named_and_comes_back(imus: Bench, kind: str, cause: m.Fault, words: str) -> None:
+    imus.fault(f"imu_calf={kind}")
+    imus.run(100)
+    found = imus.run(2_000)
+    assert {x.calf for x in found if isinstance(x, m.Gyros)} == {-32768}
+    assert {x.calf_acceleration_z for x in found if isinstance(x, m.Motion)} == {-32768}
+    assert all(x.thigh == 41 and x.belt == 5 for x in found if isinstance(x, m.Gyros))
+    assert cause in {x.fault_calf for x in found if isinstance(x, m.Status)}
+    assert any(text.startswith(words) for text in all_findings(imus))
+    imus.fault("imu_calf=ok")
+    imus.run(1_500)
+    assert {x.calf for x in imus.run(500) if isinstance(x, m.Gyros)} == {-82}
+    assert imus.status.healthy & m.Healthy.CALF
+
+
+def test_a_saturated_lsm6dso_shows_its_full_scale(imus: Bench) -> None:
+    imus.fault("imu_thigh=saturated")
+    imus.run(100)
+    assert {x.thigh for x in imus.run(200) if isinstance(x, m.Gyros)} == {4_702}
+
+
+def test_old_and_new_gyros_may_be_mixed_and_swapped(imus: Bench) -> None:
+    imus.fault("part_calf=adis16100")
+    imus.run(2_500)
+    found = imus.run(500)
+    assert {x[1:] for x in found if isinstance(x, m.Gyros)} == {(41, -82, 5)}
+    assert {(x.calf_rate_z, x.thigh_rate_z) for x in found if isinstance(x, m.Motion)} == {(-32768, 286)}
+    assert (parts(imus).part_thigh, parts(imus).part_calf) == (m.Part.LSM6DSO, m.Part.ADIS16100)
+    imus.fault("part_calf=lsm6dso")
+    imus.run(2_500)
+    assert {x[1:] for x in imus.run(500) if isinstance(x, m.Gyros)} == {(41, -82, 5)}
+    assert parts(imus).part_calf == m.Part.LSM6DSO
+
+
+def test_a_part_that_is_neither_gyro_is_not_read(bench: Bench) -> None:
+    bench.fault("part_thigh=lsm6dso")
+    bench.fault("imu_thigh=wrong_identity")
+    found = bench.run(2_000)
+    assert {x.thigh for x in found if isinstance(x, m.Gyros)} == {-32768}
+    assert bench.status.errors_thigh
+    assert not kinds(found)["Motion"]

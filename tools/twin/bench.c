@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * The bench protocol (host/DESIGN.md): rows, host bytes and faults in; board bytes, traces and acknowledgements out. */
 #include <errno.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,7 +15,13 @@
 #define MAX_RECORD (1u << 20)
 #define SYNC_PULSE US(1000)
 
+#define COUNTS_PER_GYRO_COUNT (0.2439 / 0.035)
+#define COUNTS_PER_G 4098
+#define NORTH_COUNTS 1368 /* 0.2 gauss to the north, level */
+
 struct row row;
+struct axes motion[3];
+int16_t field[3];
 
 static enum pair { NONE, RANGERS, THIGH_CALF, THIGH_BELT, CALF_BELT, PAIRS } swapped;
 
@@ -170,6 +177,15 @@ static void swap16(void *a, void *b)
 	memcpy(b, &kept, 2);
 }
 
+static void swap_gyros(int a, int b)
+{
+	struct axes kept = motion[a];
+
+	motion[a] = motion[b];
+	motion[b] = kept;
+	swap16(&row.rate[a], &row.rate[b]);
+}
+
 /* The plugs of two sensors are exchanged. */
 static void swap_sensors(void)
 {
@@ -178,9 +194,9 @@ static void swap_sensors(void)
 		swap16(&row.own_us[0], &row.own_us[1]);
 		swap16(&row.cross_us[0], &row.cross_us[1]);
 		break;
-	case THIGH_CALF: swap16(&row.rate[0], &row.rate[1]); break;
-	case THIGH_BELT: swap16(&row.rate[0], &row.rate[2]); break;
-	case CALF_BELT: swap16(&row.rate[1], &row.rate[2]); break;
+	case THIGH_CALF: swap_gyros(0, 1); break;
+	case THIGH_BELT: swap_gyros(0, 2); break;
+	case CALF_BELT: swap_gyros(1, 2); break;
 	default: break;
 	}
 }
@@ -197,13 +213,45 @@ bool bench_swap(const char *value)
 	return false;
 }
 
-/* Runs one millisecond per row. */
-static void advance(const uint8_t *rows, uint32_t length)
+/* What parts of more axes measure where the row has only those of the papers: rates about z, z up, a field by the bearing. */
+static void extend_row(void)
 {
-	if (length % ROW_SIZE)
-		fail("a record of rows has %u bytes, not a multiple of %zu", length, ROW_SIZE);
-	for (uint32_t offset = 0; offset < length; offset += ROW_SIZE) {
-		memcpy(&row, rows + offset, ROW_SIZE);
+	double bearing = row.bearing * 3.14159265358979 / 1800.0;
+
+	memset(motion, 0, sizeof motion);
+	for (int k = 0; k < 3; k++) {
+		motion[k].rate[2] = (int16_t)lround(row.rate[k] * COUNTS_PER_GYRO_COUNT);
+		motion[k].force[2] = COUNTS_PER_G;
+	}
+	field[0] = (int16_t)lround(NORTH_COUNTS * cos(bearing));
+	field[1] = (int16_t)lround(NORTH_COUNTS * sin(bearing));
+	field[2] = -2 * NORTH_COUNTS;
+}
+
+static void take_extended_row(const uint8_t *bytes)
+{
+	struct extended_row whole;
+
+	memcpy(&whole, bytes, sizeof whole);
+	row = whole.row;
+	memcpy(motion, whole.motion, sizeof motion);
+	memcpy(field, whole.field, sizeof field);
+}
+
+/* Runs one millisecond per row. */
+static void advance(const uint8_t *rows, uint32_t length, bool extended)
+{
+	uint32_t size = extended ? sizeof(struct extended_row) : ROW_SIZE;
+
+	if (length % size)
+		fail("a record of rows has %u bytes, not a multiple of %u", length, size);
+	for (uint32_t offset = 0; offset < length; offset += size) {
+		if (extended) {
+			take_extended_row(rows + offset);
+		} else {
+			memcpy(&row, rows + offset, ROW_SIZE);
+			extend_row();
+		}
 		swap_sensors();
 		run_millisecond(clock_next_millisecond());
 		if (pty_wanted())
@@ -229,7 +277,8 @@ void bench_run(int in, int out)
 			fail("the input ends in the middle of a record");
 		body[head.length] = 0;
 		switch (head.kind) {
-		case 'R': advance(body, head.length); break;
+		case 'R': advance(body, head.length, false); break;
+		case 'E': advance(body, head.length, true); break;
 		case 'H': usb_host_send(body, head.length); break;
 		case 'F': switch_fault((char *)body); break;
 		case 'Q': flush(); return;

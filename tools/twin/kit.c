@@ -12,6 +12,9 @@ static struct socket {
 } sockets[PLACES] = {
 	[PLACE_RANGER_LEFT] = { "part_ranger_left", "srf02", "pulse", pulse_power, false },
 	[PLACE_RANGER_RIGHT] = { "part_ranger_right", "srf02", "pulse", pulse_power, false },
+	[PLACE_THIGH] = { "part_thigh", "adis16100", "lsm6dso", lsm6dso_power, false },
+	[PLACE_CALF] = { "part_calf", "adis16100", "lsm6dso", lsm6dso_power, false },
+	[PLACE_BELT] = { "part_belt", "adis16100", "lsm6dso", lsm6dso_power, false },
 	[PLACE_PRESSURE] = { "part_pressure", "scp1000", "bmp390", bmp390_power, false },
 };
 

@@ -26,11 +26,25 @@ struct row {
 	uint16_t sync_us;     /* SyncOut edge within this millisecond, or NO_SYNC */
 } __attribute__((packed));
 
+/* The same millisecond for parts of three and more axes, in the axes that are printed on them. */
+struct axes {
+	int16_t rate[3];  /* LSM6DSO counts: 0.035 deg/s */
+	int16_t force[3]; /* 0.244 mg */
+} __attribute__((packed));
+
+struct extended_row {
+	struct row row;
+	struct axes motion[3]; /* thigh, calf, belt */
+	int16_t field[3];      /* at the belt: LIS3MDL counts, 6842 per gauss */
+} __attribute__((packed));
+
 #define ROW_SIZE sizeof(struct row)
 #define NO_SYNC 65535u
 
 extern avr_t *avr;
 extern struct row row;       /* the millisecond under way */
+extern struct axes motion[3];
+extern int16_t field[3];
 extern uint64_t random_state; /* for everything that varies from part to part */
 
 uint32_t random_below(uint32_t limit);
@@ -135,12 +149,14 @@ bool compass_fault(const char *name, const char *value);
 void pulse_power(void);
 void pulse_resume(void);
 bool pulse_fault(const char *name, const char *value);
+void lsm6dso_power(void);
+bool lsm6dso_fault(const char *name, const char *value);
 void bmp390_power(void);
 void bmp390_resume(void);
 bool bmp390_fault(const char *name, const char *value);
 
 /* kit.c: which part is in which place. */
-enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_PRESSURE, PLACES };
+enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_THIGH, PLACE_CALF, PLACE_BELT, PLACE_PRESSURE, PLACES };
 bool kit_of_2026(enum place place);
 bool kit_fault(const char *name, const char *value);
 

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
-from echostep.board.messages import GYROS_INVALID, PING_TIME_OF_FLIGHT_US_INVALID, Outcome
+from echostep.board.messages import GYROS_INVALID, MOTION_INVALID, PING_TIME_OF_FLIGHT_US_INVALID, Outcome
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
 ADIS16100_RAD_S = math.radians(0.2439)  # rad/s per count [ADIS16100 datasheet, sensitivity]
+LSM6DSO_RAD_S = math.radians(0.035)  # rad/s per count at 1000 deg/s [LSM6DSO data sheet, table 2]
+LSM6DSO_M_S2 = 0.244e-3 * 9.80665  # m/s2 per count at 8 g [LSM6DSO data sheet, table 2]
 BEARINGS = 3600  # counts of 0.1 degrees in a turn of the compass
 PRESSURE_PA = 0.25  # Pa per count of the barometer
 STANDARD_PA = 101_325.0  # pressure at height 0 [ISO 2533]
@@ -69,6 +71,17 @@ def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> Floats:
     ]  # fmt: skip
     rates[:, BELT] *= -1.0 if settings.belt_reversed else 1.0
     return rates
+
+
+def six_axes(samples: NDArray[np.void], place: str) -> tuple[Floats, Floats]:
+    """Rates (n, 3) in rad/s and specific forces (n, 3) in m/s2 of one place of motion samples (n,), in the part's axes; NaN where not measured."""
+    rates, forces = (
+        np.column_stack([samples[f"{place}_{kind}_{axis}"] for axis in "xyz"]).astype(np.float64)
+        for kind in ("rate", "acceleration")
+    )
+    for counts in (rates, forces):
+        counts[counts == MOTION_INVALID] = np.nan
+    return rates * LSM6DSO_RAD_S, forces * LSM6DSO_M_S2
 
 
 def compass_headings(samples: NDArray[np.void]) -> Floats:

@@ -35,7 +35,7 @@ from echostep.board.messages import (
     Status,
     Wiring,
 )
-from echostep.board.part_faults import MIXED_RANGERS, part_text
+from echostep.board.part_faults import MIXED_RANGERS, SIX_AXES_RESPONSES, SIX_AXES_TESTS, part_text
 
 TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; by reason
 UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; by reason
@@ -147,21 +147,26 @@ def gyro_findings(reports: BoardReports) -> list[Finding]:
     """Findings by the gyros' self-tests and temperatures, for gyros that answer."""
     unhealthy = 0 if reports.status is None else ~reports.status.healthy
     answering = [
-        (name_of(reports, device), health)
+        (device, health)
         for gyro, health in sorted(reports.gyros.items())
         if (device := Healthy[Gyro(gyro).name]) & reports.sensors and not device & unhealthy  # else it has a finding
     ]
-    unmoved = [name for name, health in answering if _is_unmoved(health)]
+    pins = [device for device, _ in answering if part_in(reports, device) is not Part.LSM6DSO]  # with self-test inputs
+    unmoved = [device for device, health in answering if device in pins and _is_unmoved(health)]
     findings = []
-    if len(unmoved) > 1 and len(unmoved) == len(answering):
-        what = f"none of them responds to its self-test ({', '.join(unmoved)})"
+    if len(unmoved) > 1 and len(unmoved) == len(pins):
+        what = f"none of them responds to its self-test ({_names(_union(unmoved))})"
         remedy = "check the wires from A0 to ST1 and from A1 to ST2; without them the gyros work, but cannot be tested"
         findings.append(Finding(Severity.WARNING, "gyros", what, remedy))
     explained = set(unmoved) if findings else set()
-    for name, health in answering:
-        if SelfTest(health.self_test) in _TESTS and name not in explained:
-            severity, what, remedy = _TESTS[SelfTest(health.self_test)]
-            findings.append(Finding(severity, name, what + _response_text(health), remedy))
+    for device, health in answering:
+        name, outcome = name_of(reports, device), SelfTest(health.self_test)
+        if outcome in _TESTS and device not in explained:
+            severity, what, remedy = _TESTS[outcome]
+            if device not in pins:
+                what, remedy = SIX_AXES_TESTS.get(outcome, (what, remedy))
+            proper = PROPER_RESPONSES if device in pins else SIX_AXES_RESPONSES
+            findings.append(Finding(severity, name, what + _response_text(health, proper), remedy))
         findings += _temperature_findings(name, health)
     return findings
 
@@ -185,12 +190,12 @@ def _temperature_findings(name: str, health: GyroHealth) -> list[Finding]:
     return [Finding(Severity.WARNING, name, what, "its bias drifts outside -20 to 60 degrees")]
 
 
-def _response_text(health: GyroHealth) -> str:
+def _response_text(health: GyroHealth, proper: str) -> str:
     """The measured responses of a failed self-test, to append to the finding; "" otherwise."""
     unmeasured = GYRO_HEALTH_INVALID in (health.response_st1, health.response_st2)
     if health.self_test not in (SelfTest.FAILED, SelfTest.MOVED) or unmeasured:
         return ""
-    return f" (responses {health.response_st1} and {health.response_st2} counts; proper are {PROPER_RESPONSES})"
+    return f" (responses {health.response_st1} and {health.response_st2} counts; proper are {proper})"
 
 
 def gyro_celsius(health: GyroHealth) -> float:

@@ -133,6 +133,7 @@ class Wiring(IntEnum):
 class Reports(IntFlag):
     BOARD_HEALTH = 1
     PARTS = 2
+    MOTION = 4
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -202,7 +203,7 @@ GYROS_INVALID = -32768
 
 
 class Gyros(NamedTuple):
-    """Rates of the thigh, calf and belt gyros (ADIS16100) at one instant."""
+    """Rates of the thigh, calf and belt gyros at one instant: of ADIS16100, or about the z axis of LSM6DSO, which reach 1000 deg/s."""
 
     ticks: int  # 0.5 us
     thigh: int  # 0.2439 deg/s, -32768 = invalid
@@ -556,6 +557,49 @@ class Parts(NamedTuple):
         return message
 
 
+_MOTION = struct.Struct("<Ihhhhhhhhhhhhhhhhhh")
+MOTION_INVALID = -32768
+
+
+class Motion(NamedTuple):
+    """All axes of the LSM6DSO on thigh, calf and belt at one instant, beside `gyros`, which has their rates about z in its own unit."""
+
+    ticks: int  # 0.5 us
+    thigh_rate_x: int  # 0.035 deg/s, -32768 = invalid
+    thigh_rate_y: int  # 0.035 deg/s, -32768 = invalid
+    thigh_rate_z: int  # 0.035 deg/s, -32768 = invalid
+    thigh_acceleration_x: int  # 0.244 mg, -32768 = invalid
+    thigh_acceleration_y: int  # 0.244 mg, -32768 = invalid
+    thigh_acceleration_z: int  # 0.244 mg, -32768 = invalid
+    calf_rate_x: int  # 0.035 deg/s, -32768 = invalid
+    calf_rate_y: int  # 0.035 deg/s, -32768 = invalid
+    calf_rate_z: int  # 0.035 deg/s, -32768 = invalid
+    calf_acceleration_x: int  # 0.244 mg, -32768 = invalid
+    calf_acceleration_y: int  # 0.244 mg, -32768 = invalid
+    calf_acceleration_z: int  # 0.244 mg, -32768 = invalid
+    belt_rate_x: int  # 0.035 deg/s, -32768 = invalid
+    belt_rate_y: int  # 0.035 deg/s, -32768 = invalid
+    belt_rate_z: int  # 0.035 deg/s, -32768 = invalid
+    belt_acceleration_x: int  # 0.244 mg, -32768 = invalid
+    belt_acceleration_y: int  # 0.244 mg, -32768 = invalid
+    belt_acceleration_z: int  # 0.244 mg, -32768 = invalid
+
+    @property
+    def id(self) -> int:
+        return 0x0D
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _MOTION.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Motion:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 40:
+            raise ValueError(f"motion: {len(body)} bytes, expected 40")
+        return cls._make(_MOTION.unpack(body))
+
+
 _IDENTIFY = struct.Struct("<")
 
 
@@ -725,6 +769,7 @@ Message = (
     | GyroHealth
     | BoardHealth
     | Parts
+    | Motion
     | Identify
     | ClockQuery
     | Configure
@@ -746,6 +791,7 @@ BY_ID: dict[int, type[Message]] = {
     0x0A: GyroHealth,
     0x0B: BoardHealth,
     0x0C: Parts,
+    0x0D: Motion,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
@@ -887,6 +933,29 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("identity_pressure", "u1"),
             ("identity_foot", "u1"),
             ("wiring", "u1"),
+        ]
+    ),
+    0x0D: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("thigh_rate_x", "<i2"),
+            ("thigh_rate_y", "<i2"),
+            ("thigh_rate_z", "<i2"),
+            ("thigh_acceleration_x", "<i2"),
+            ("thigh_acceleration_y", "<i2"),
+            ("thigh_acceleration_z", "<i2"),
+            ("calf_rate_x", "<i2"),
+            ("calf_rate_y", "<i2"),
+            ("calf_rate_z", "<i2"),
+            ("calf_acceleration_x", "<i2"),
+            ("calf_acceleration_y", "<i2"),
+            ("calf_acceleration_z", "<i2"),
+            ("belt_rate_x", "<i2"),
+            ("belt_rate_y", "<i2"),
+            ("belt_rate_z", "<i2"),
+            ("belt_acceleration_x", "<i2"),
+            ("belt_acceleration_y", "<i2"),
+            ("belt_acceleration_z", "<i2"),
         ]
     ),
     0x81: np.dtype([]),

@@ -6,7 +6,7 @@ In: the part in a place, and the fault that the board reports. Out: what is wron
 
 from __future__ import annotations
 
-from echostep.board.messages import Fault, Healthy, Part
+from echostep.board.messages import Fault, Healthy, Part, SelfTest
 
 _SPI = "check its plug, its 5 V and ground, and the SPI wires"
 _AGAIN = "power-cycle the board; if it stays, replace the part"
@@ -28,10 +28,20 @@ _PULSE = {
         "check it for a short to 5 V (left D4, right D13); a module that holds it for 0.2 s without an echo is of another kind: replace it",
     ),
 }
-_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {Part.BMP390: _BMP390, Part.PULSE: _PULSE}
+_LSM6DSO = {
+    Fault.NO_ANSWER: ("does not answer", f"{_SPI} and its chip select (thigh D8, calf D9, belt D10)"),
+    Fault.NEVER_READY: ("has no new rates", f"it may have lost its supply for a moment: {_SPI}"),
+}
+_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {Part.BMP390: _BMP390, Part.PULSE: _PULSE, Part.LSM6DSO: _LSM6DSO}
 _WANTED = {Healthy.PRESSURE: "0x60 is a BMP390"}  # identities of the parts that the firmware knows, by place
 
 
+SIX_AXES_TESTS = {  # what is wrong and the remedy, by the outcome of the self-test
+    SelfTest.FAILED: ("failed its self-test", _AGAIN),
+    SelfTest.NO_ANSWER: ("did not answer during its self-test", _SPI),
+    SelfTest.MOVED: ("turned during its self-test", "stand still and run echostep doctor"),
+}
+SIX_AXES_RESPONSES = "-615 to -2870 and 615 to 2870"  # counts, to the negative and the positive sign [LSM6DSO data sheet: 150 to 700 deg/s]
 MIXED_RANGERS = (
     "one is an SRF02 and the other one a pulse ranger, which is not used: beam, range and resolution differ",
     "plug in two of one kind",

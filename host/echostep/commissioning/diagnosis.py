@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from echostep.board.findings import part_text_of
+from echostep.board.findings import part_in, part_text_of
 from echostep.board.health import (
     NAMES,
     SELECTS,
@@ -21,7 +21,7 @@ from echostep.board.health import (
     gyro_celsius,
     rate_findings,
 )
-from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Ranger, SelfTest
+from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Part, Ranger, SelfTest
 from echostep.board.restart_findings import crash_text
 from echostep.board.subscription import knows_subscriptions
 from echostep.commissioning.probe import Drift, ProbeResult, drift_of
@@ -32,7 +32,8 @@ DRIFT_MAX_PPM = 200.0  # by reason: a crystal is within 50, a ceramic resonator 
 ANSWER_MAX_S = 0.02
 MTX_RATE_ERROR = 0.02  # relative
 CONSTANT_SAMPLES = 400  # so many equal samples in a row are a fault: a gyro has two counts of noise
-FULL_SCALE = 2047  # counts of a gyro
+FULL_SCALE = 2047  # counts of an ADIS16100
+SIX_AXES_FULL_SCALE = 4697  # counts of `gyros` at the 1000 deg/s of an LSM6DSO, less its last 0.1 %
 LEAST_PINGS = 20  # for a statement on echoes
 
 
@@ -147,11 +148,13 @@ def _gyro_findings(probed: ProbeResult) -> list[Finding]:
     for device in SELECTS:
         rates = [v for g in probed.gyros if (v := getattr(g, (device.name or "").lower())) != GYROS_INVALID]
         last = rates[-CONSTANT_SAMPLES:]
+        six_axes = part_in(probed.reports, device) is Part.LSM6DSO
+        full_scale, scale = (SIX_AXES_FULL_SCALE, "1000") if six_axes else (FULL_SCALE, "300")
         if len(last) == CONSTANT_SAMPLES and len(set(last)) == 1:
             what = f"gives a constant {last[0]} counts, without noise"
             findings.append(Finding(Severity.WARNING, NAMES[device], what, "it may be stuck: power-cycle the board"))
-        elif last and sum(abs(v) >= FULL_SCALE for v in last) > len(last) // 2:
-            what = "is at full scale, 300 degrees/s"
+        elif last and sum(abs(v) >= full_scale for v in last) > len(last) // 2:
+            what = f"is at full scale, {scale} degrees/s"
             findings.append(Finding(Severity.FAULT, NAMES[device], what, "if nothing turns: replace it"))
     return findings
 

@@ -14,6 +14,7 @@ from echostep.arrays import Bools, Floats
 
 # The source of these values is not recorded.
 NEAR = 0.985  # share of the limit from which a rate counts as clipped: a bias may have been subtracted from it
+BEYOND = 1.03  # share of the limit above which a rate shows that the sensor's range is wider: 9 deg/s more than a bias of 300 deg/s can explain
 EDGE = 2  # samples on either side of a peak, which give the slopes
 LONGEST = 100  # samples at the limit; more of them are a broken sensor, not a swing
 HIGHEST = 1.8  # largest reconstructed rate, as a multiple of the limit
@@ -26,14 +27,14 @@ class ClippingRepair:
 
     def __init__(self, low: Floats, high: Floats) -> None:
         """`low`, `high` (k,): the ends of the range of each column; infinite where there is none."""
-        self._low, self._high = NEAR * low, NEAR * high
+        self._low, self._high = low, high
         self._waiting = np.empty((0, 1 + len(low)))
         self._returned = 0  # of those that wait: returned already, kept for their slopes
 
     def feed(self, t_s: Floats, rates: Floats) -> tuple[Floats, Floats]:
         """Times (n,) and rates (n, k) of the samples that no later sample can change."""
         rows = np.vstack([self._waiting, np.column_stack([t_s, rates])])
-        at_limit: Bools = (rows[:, 1:] >= self._high) | (rows[:, 1:] <= self._low)
+        at_limit: Bools = _at_limit(rows[:, 1:], self._high) | _at_limit(-rows[:, 1:], -self._low)
         clipped = np.logical_or.reduce(at_limit, axis=1)
         until = len(rows) - EDGE
         while until > self._returned and clipped[until : until + EDGE].any() and len(rows) - until < LONGEST:
@@ -56,10 +57,16 @@ class ClippingRepair:
         """The rows (n, 1 + k), time first, with the peaks of all columns reconstructed."""
         repaired = rows.copy()
         for k, (low, high) in enumerate(zip(self._low.tolist(), self._high.tolist(), strict=True), start=1):
-            for limit, clipped in ((high, rows[:, k] >= high), (low, rows[:, k] <= low)):
+            for limit, clipped in ((high, _at_limit(rows[:, k], high)), (low, _at_limit(-rows[:, k], -low))):
                 if clipped.any():
-                    _reconstruct_peaks(repaired[:, 0], repaired[:, k], clipped, limit / NEAR)
+                    _reconstruct_peaks(repaired[:, 0], repaired[:, k], clipped, limit)
         return repaired
+
+
+def _at_limit(rate: Floats, limit: float | Floats) -> Bools:
+    """Whether rates are at the upper limit: not below it, and not beyond it either, where only a wider sensor can be."""
+    found: Bools = (rate >= NEAR * limit) & (rate <= BEYOND * limit)
+    return found
 
 
 def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) -> None:

@@ -26,6 +26,8 @@ ROW = np.dtype(
         ("bearing", "<u2"), ("pressure", "<u4"), ("temperature", "<i2"), ("sync_us", "<u2"),
     ]
 )  # fmt: skip
+AXES = np.dtype([("rate", "<i2", 3), ("force", "<i2", 3)])  # counts of an LSM6DSO
+EXTENDED_ROW = np.dtype([("row", ROW), ("motion", AXES, 3), ("field", "<i2", 3)])  # for parts of more than one axis
 NO_SYNC = 65535
 TEMPERATURE_C = 20.0
 

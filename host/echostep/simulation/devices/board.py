@@ -24,7 +24,7 @@ from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
 from echostep.errors import EchostepError
 from echostep.simulation.devices.srf02 import TICKS_US, Rangers
-from echostep.simulation.stimulus import NO_SYNC, ROW
+from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 
 Sent = list[tuple[int, bytes]]
 TIMEOUT_S = 60.0
@@ -202,8 +202,9 @@ class BoardProcess:
         return self._child.pid
 
     def advance(self, rows: NDArray[Any]) -> Sent:
-        """Let n milliseconds pass."""
-        self._write(b"R", np.ascontiguousarray(rows, ROW).tobytes())
+        """Let n milliseconds pass; `rows` (n,) are plain or extended ones."""
+        extended = rows.dtype == EXTENDED_ROW
+        self._write(b"E" if extended else b"R", np.ascontiguousarray(rows, EXTENDED_ROW if extended else ROW).tobytes())
         sent: Sent = []
         while True:
             kind, body = self._read()

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: MIT */
+#include "lsm6dso.h"
+#include "messages.h" /* FAULT_* */
+
+/* Registers and values [LSM6DSO data sheet DS12140, chapters 8 and 9]. */
+#define REGISTER_BEFORE_WHO_AM_I 0x0Eu /* INT2_CTRL, never written: 0 */
+#define REGISTER_CTRL1_XL 0x10u
+#define REGISTER_CTRL5_C 0x14u
+#define REGISTER_STATUS 0x1Eu /* then a reserved one, then temperature, gyros, accelerometers: 16 bits each, low byte first */
+#define READ_FLAG 0x80u
+#define STATUS_RATE_READY 0x02u
+#define NO_REPLY 0xFFu /* MISO is pulled up: an absent chip reads as ones */
+#define CTRL1_XL_1667_HZ_8_G 0x8Cu
+#define CTRL2_G_1667_HZ_1000_DPS 0x88u
+#define CTRL3_C_WHOLE_SAMPLES 0x44u /* BDU: no new value between the bytes of one; IF_INC: addresses count up */
+#define CTRL4_C_SPI_ONLY_FILTER 0x06u /* I2C off, low pass LPF1 of the gyros on */
+#define CTRL5_C_NEGATIVE 0x0Cu
+#define CTRL5_C_POSITIVE 0x04u
+#define CTRL6_C_50_HZ 0x05u /* LPF1 at this rate; the ADIS16100 has 40 Hz */
+
+#define SAMPLE_OFFSET 2u /* bytes of STATUS and of the reserved register */
+#define SAMPLE_WORDS (1u + LSM6DSO_AXES)
+
+static void begin(enum chip chip, uint8_t first_byte)
+{
+	spi_select(chip, SPI_MODE3);
+	(void)spi_exchange(first_byte);
+}
+
+static void write8(enum chip chip, uint8_t address, uint8_t value)
+{
+	begin(chip, address);
+	(void)spi_exchange(value);
+	spi_release();
+}
+
+/* An ADIS16100 that takes these 24 clocks for a frame returns another second byte than a zero, or the same byte twice. */
+bool lsm6dso_answers(enum chip chip)
+{
+	begin(chip, READ_FLAG | REGISTER_BEFORE_WHO_AM_I);
+	uint8_t before = spi_exchange(0), identity = spi_exchange(0);
+	spi_release();
+	return before == 0 && identity == LSM6DSO_IDENTITY;
+}
+
+void lsm6dso_start(enum chip chip)
+{
+	static const uint8_t settings[] = {
+		CTRL1_XL_1667_HZ_8_G, CTRL2_G_1667_HZ_1000_DPS, CTRL3_C_WHOLE_SAMPLES, CTRL4_C_SPI_ONLY_FILTER, 0, CTRL6_C_50_HZ,
+	};
+	begin(chip, REGISTER_CTRL1_XL); /* the addresses count up from the start: the default of IF_INC */
+	for (uint8_t n = 0; n < sizeof settings; n++)
+		(void)spi_exchange(settings[n]);
+	spi_release();
+}
+
+static int16_t read_word(void)
+{
+	uint8_t low = spi_exchange(0), high = spi_exchange(0);
+	return (int16_t)(uint16_t)((uint16_t)(high << 8) | low);
+}
+
+uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)
+{
+	begin(chip, READ_FLAG | REGISTER_STATUS);
+	uint8_t flags = spi_exchange(0), reserved = spi_exchange(0);
+	out->temperature = read_word();
+	for (uint8_t k = 0; k < LSM6DSO_AXES; k++)
+		out->axes[k] = read_word();
+	spi_release();
+	if (flags == NO_REPLY && reserved == NO_REPLY)
+		return FAULT_NO_ANSWER;
+	return flags & STATUS_RATE_READY ? FAULT_NONE : FAULT_NEVER_READY;
+}
+
+void lsm6dso_excite(enum chip chip, enum excitation excitation)
+{
+	write8(chip, REGISTER_CTRL5_C, excitation == EXCITE_ST1 ? CTRL5_C_NEGATIVE : excitation == EXCITE_ST2 ? CTRL5_C_POSITIVE : 0);
+}
