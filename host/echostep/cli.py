@@ -21,6 +21,7 @@ from echostep.errors import EchostepError
 from echostep.interruption import end_by_signals
 
 if TYPE_CHECKING:
+    from echostep.output.foxglove_live import FoxgloveAddress
     from echostep.page.server import Address
     from echostep.team.endpoint import Outlet
 
@@ -106,6 +107,14 @@ BoardPort = Annotated[
 MtxPort = Annotated[
     str | None,
     typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the board's leg gyros are used."),
+]
+Foxglove = Annotated[
+    str | None,
+    typer.Option(
+        "--foxglove",
+        metavar="[HOST:]PORT",
+        help="Serve estimates, echoes and the scene to Foxglove, as 8765; on this computer alone unless a host is given.",
+    ),
 ]
 Keep = Annotated[
     int | None,
@@ -205,13 +214,14 @@ def live(
     beacons: BeaconsPort = None,
     guide: GuideTo = None,
     keep: Keep = None,
+    foxglove: Foxglove = None,
 ) -> None:
     """Track a wearer live and record everything. Without an MTx the board's leg gyros are used."""
     from echostep.session import live as live_run
     from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
-    output = OutputOptions(out, not headless, address, bool(page), outlet)
+    output = OutputOptions(out, not headless, address, bool(page), outlet, foxglove=_foxglove(foxglove))
     tracking = TrackingOptions(plan, start, start_sd, settings, seed, guide)
     board, mtx = _ports(board, mtx)
     live_run.live(tracking, PortOptions(board, mtx, beacons, seconds, keep), output)
@@ -256,13 +266,16 @@ def replay(
     name: Name = "",
     team: Team = "team",
     guide: GuideTo = None,
+    foxglove: Foxglove = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
     from echostep.session import replay as replay_run
     from echostep.session.options import OutputOptions, TrackingOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
-    output = OutputOptions(out, not headless, address, bool(page) or sys.stdout.isatty(), outlet)
+    output = OutputOptions(
+        out, not headless, address, bool(page) or sys.stdout.isatty(), outlet, foxglove=_foxglove(foxglove)
+    )
     replay_run.replay(recording, TrackingOptions(plan, start, start_sd, settings, seed, guide), truth, output)
 
 
@@ -487,6 +500,12 @@ def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
     from echostep.team.endpoint import parse_outlet
 
     return parse_outlet(publish, name, team) if publish else None
+
+
+def _foxglove(text: str | None) -> FoxgloveAddress | None:
+    from echostep.output.foxglove_live import parse_address
+
+    return None if text is None else parse_address(text)
 
 
 def _ports(board: str | None, mtx: str | None) -> tuple[str, str | None]:

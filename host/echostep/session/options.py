@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from echostep.output.foxglove_live import FoxgloveAddress
     from echostep.page.server import Address
     from echostep.team.endpoint import Outlet
 
@@ -25,6 +26,7 @@ class OutputOptions:
     page_stays: bool = False  # serve the page until Ctrl-C after the run is over
     outlet: Outlet | None = None  # where estimates are published; None: nowhere
     browser: bool = False  # open the page in a browser, where there is one
+    foxglove: FoxgloveAddress | None = None  # where viewers of Foxglove's protocol connect; None: nowhere
 
     @property
     def watched(self) -> bool:

@@ -12,6 +12,7 @@ from pathlib import Path
 from echostep.localization.metrics import load_truth
 from echostep.plan.model import Plan
 from echostep.recording.reading import Recording, open_recording
+from echostep.session.chunk_streams import paced, portions_of
 from echostep.session.console import console
 from echostep.session.metadata import CHECK_IN_START, SIMULATED, plan_of, recorded_seed, recorded_start, start_given
 from echostep.session.options import OutputOptions, TrackingOptions
@@ -22,6 +23,8 @@ from echostep.session.skipped import skipped
 from echostep.session.starts import check_start
 from echostep.settings import parse_settings, read_settings
 from echostep.tracker import Tracker
+
+VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on, by reason: about 10 ms
 
 
 def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
@@ -43,6 +46,8 @@ def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, outpu
         session.prepare()
         start_s = time.perf_counter()
         portions = recording.portions()
+        if output.foxglove:  # a viewer shows what comes, so it comes as it came
+            portions = portions_of(paced(recording.chunks(), 1.0), VIEWED_PORTION)
         if not output.terminal:
             portions = with_bar(portions, f"tracking {path.name}", lambda: recording.fraction)
         session.track(portions, lambda: recording.fraction)

@@ -37,6 +37,7 @@ from echostep.session.results import Result, summary_words, write_results
 from echostep.tracker import Tracker
 
 if TYPE_CHECKING:
+    from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
     from echostep.team.publish import Publishing, Source
 
@@ -69,6 +70,7 @@ class Session:
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
         self._publishing: Publishing | None = None
+        self._foxglove: FoxgloveServer | None = None
         self._opened = ExitStack()
         self._interrupted = False
 
@@ -76,6 +78,7 @@ class Session:
         with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
             self._open_page(opened)
             self._open_publishing(opened)
+            self._open_foxglove(opened)
             self._opened = opened.pop_all()
         return self
 
@@ -124,6 +127,14 @@ class Session:
         publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line, clock)
         self._publishing = opened.enter_context(publishing)
 
+    def _open_foxglove(self, opened: ExitStack) -> None:
+        if self.output.foxglove is None:
+            return
+        from echostep.output.foxglove_live import FoxgloveServer
+
+        self._foxglove = opened.enter_context(FoxgloveServer(self.output.foxglove, self.title))
+        console.print(f"Foxglove: open connection, Foxglove WebSocket, {self._foxglove.url}", highlight=False)
+
     def track(
         self,
         portions: Iterable[Portion],
@@ -134,7 +145,10 @@ class Session:
 
         `progress` gives the finished fraction, 0 to 1. `recorder` gets the derived messages of each portion, after the portion was shown.
         """
-        derived = Derived(self.tracker) if recorder else None
+        sinks = [
+            sink for sink in (recorder and recorder.write_derived, self._foxglove and self._foxglove.write) if sink
+        ]
+        derived = Derived(self.tracker) if sinks else None
         shown = self.output.terminal and console.is_terminal
         view = TerminalView(self.tracker, self.title, progress, console) if shown else None
         with view or nullcontext():
@@ -143,8 +157,10 @@ class Session:
                     raise_lost()
                     estimates = self._take(portion)
                     self._show(estimates, view)
-                    if recorder and derived:
-                        recorder.write_derived(derived.take(portion, estimates))
+                    if derived:
+                        messages = derived.take(portion, estimates)
+                        for write in sinks:
+                            write(messages)
             except KeyboardInterrupt:
                 self._interrupted = True
 
