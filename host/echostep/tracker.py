@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from echostep.alarm import Alarm, WearerAlarm
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.board.findings import BoardReports
@@ -33,7 +34,7 @@ from echostep.localization.start import Start
 from echostep.odometry.front_end import FrontEnd, FrontEndCounts
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.ports.check_in import HEADING_SD_RAD, PERSON, CheckIn, Undo, parse_person
+from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
 from echostep.settings import Settings
 from echostep.walls.level_sheet import lay_out_levels
@@ -54,7 +55,7 @@ class TrackerState:
     `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `right`: probability that the wearer is where the
     cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
     newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
-    `undoable`: number of the check-in that can be undone.
+    `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well.
     """
 
     estimate: Estimate | None
@@ -70,6 +71,7 @@ class TrackerState:
     searches: bool
     beacon_numbers: tuple[int, ...]
     beacon_heard_s: float | None
+    alarm: Alarm | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +130,7 @@ class Tracker:
         self._building = Building(self.laid_out.walls, self.laid_out.sheet)
         self.filter: MapFilter | None = None  # from the first segment on
         self.gateway = Gateway()
+        self.alarm = WearerAlarm()
         self.watchers: list[Watch] = []  # called in this order
         self._readings: list[BeaconReading] = []  # that wait for their segment
         self._check_ins = self._bad_check_ins = self._undone = 0
@@ -156,6 +159,7 @@ class Tracker:
             searches=self.filter is not None and (self.filter.search is not None or self.filter.cloud.is_coarse),
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
+            alarm=self.alarm.alarm,
         )
 
     @property
@@ -206,6 +210,7 @@ class Tracker:
         for piece in portion.cut_after(PERSON):
             for part in piece.cut_after(GATEWAY):
                 estimates += self._track(part)
+            self.alarm.add(self.front_end.stillness.pop_windows())
             check_in = piece.of(PERSON)
             if len(check_in.row):
                 estimates += self._apply_person(check_in.received)
@@ -241,6 +246,8 @@ class Tracker:
         segment = measured.segment
         self.filter = self.filter or self._first_filter(segment.heading0_rad)
         last, self._segment = self._segment, segment
+        if last is not None and segment.step != last.step:
+            self.alarm.step(segment.t1_s)
         if self.filter is None:
             return []
         readings = self._pop_readings(segment.t1_s)
@@ -276,8 +283,15 @@ class Tracker:
         return new
 
     def _apply_person(self, received: bytes) -> list[Estimate]:
-        """Apply a check-in or its undoing; bytes that are neither are counted."""
-        match parse_person(received):
+        """Apply a check-in, its undoing or a call; other bytes are counted. A tap is a sign of life."""
+        said, now_s = parse_person(received), self.front_end.newest_s
+        if said is not None and said != Call(help=True):
+            self.alarm.answer(now_s, ends_help=isinstance(said, Call))
+        match said:
+            case Call(wanted):
+                if wanted:
+                    self.alarm.call_for_help(now_s)
+                return []
             case CheckIn() as check_in if check_in.level < len(self.plan.levels):
                 return self._apply_check_in(check_in)
             case Undo(number) if self._before and number == self._check_ins:

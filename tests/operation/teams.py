@@ -15,7 +15,7 @@ from echostep.plan.model import Plan
 from echostep.plan.whereabouts import Whereabouts
 from echostep.simulation.world.tower import tower
 from echostep.team.inbox import Inbox
-from echostep.team.report import Position, Report, encode, moment
+from echostep.team.report import Position, Report, ReportedAlarm, encode, moment
 from team.team_reports import POSITION, report
 
 STOREYS = 3
@@ -54,10 +54,14 @@ class Team:
     def hear(self, name: str, position: Position | None, **fields: Any) -> None:
         """A report of this wearer, of now."""
         self._sequence[name] = self._sequence.get(name, 0) + 1
-        status = {"status": "waiting", "place": None} if position is None else {}
-        known = {"plan_sha256": self.plan.digest, "position": position} | status
-        sent = {"time": moment(self.unix_s), "stale": moment(self.unix_s + 10.0)}
-        self.put(replace(BASE, name=name, sequence=self._sequence[name], **(sent | known | fields)))
+        status: dict[str, Any] = {"status": "waiting", "place": None} if position is None else {}
+        known: dict[str, Any] = {"plan_sha256": self.plan.digest, "position": position} | status
+        sent: dict[str, Any] = {
+            "time": moment(self.unix_s),
+            "stale": moment(self.unix_s + 10.0),
+            "sequence": self._sequence[name],
+        }
+        self.put(replace(BASE, name=name, **(sent | known | fields)))
 
     def put(self, made: Report) -> None:
         """A report as it is."""
@@ -87,9 +91,10 @@ class Team:
 
 
 def whole_team() -> Team:
-    """Eight wearers: tracked on three storeys, one lost, one silent, one uncertain, one without a position."""
+    """Eight wearers: tracked on three storeys, one fallen, one lost, one silent, one uncertain, one without a position."""
     team = Team()
     x_m, y_m = TOWER.levels[0].rooms[0].at_m
+    fallen = place(TOWER, x_m, y_m, 0)
     for k in range(12):
         for n, name in enumerate(NAMES):
             angle = 0.15 * k + n
@@ -100,11 +105,15 @@ def whole_team() -> Team:
                 n % STOREYS,
                 heading_rad=math.remainder(angle, math.tau),
             )
+            fallen = at if name == "Finn" and k < 6 else fallen
             if name == "Chris":
                 team.hear(name, None)
             elif name == "Kim" and k > 6:
                 lost = replace(at, radius95_m=8.0, xx_m2=11.0, xy_m2=0.0, yy_m2=11.0, protection_m=None)
                 team.hear(name, lost, status="lost")
+            elif name == "Finn" and k > 5:
+                alarm = ReportedAlarm("mayday", "no motion", 1, 30.0 + 1.5 * (k - 5))
+                team.hear(name, fallen, alarm=alarm)
             elif name == "Dana":
                 team.hear(name, replace(at, radius95_m=2.0, protection_m=3.0), status="uncertain")
             elif name != "Bo" or k < 4:

@@ -20,17 +20,19 @@ def columns(raw: bytes, width: int) -> np.ndarray[tuple[int, ...], np.dtype[np.f
     return np.frombuffer(raw, "<f4").reshape(-1, width)
 
 
-def test_the_lost_and_the_silent_come_first_each_in_words() -> None:
+def test_the_fallen_the_lost_and_the_silent_come_first_each_in_words() -> None:
     rows = whole_team().scene().rows
-    assert [(row.name, row.state) for row in rows[:4]] == [
-        ("Kim", "lost"), ("Bo", "stale"), ("Dana", "uncertain"), ("Chris", "waiting"),
+    assert [(row.name, row.state) for row in rows[:5]] == [
+        ("Finn", "mayday"), ("Kim", "lost"), ("Bo", "stale"), ("Dana", "uncertain"), ("Chris", "waiting"),
     ]  # fmt: skip
-    kim, anna = rows[0], next(row for row in rows if row.name == "Anna")
+    assert rows[0].words.startswith("mayday, Ground floor, ")
+    assert "mayday: no motion for 40 s" in rows[0].notes
+    kim, anna = rows[1], next(row for row in rows if row.name == "Anna")
     assert kim.words.startswith("lost, ")
     assert kim.words.endswith("±8.0 m, heard 2 s ago")
     assert anna.words.endswith("within 0.4 m, heard 2 s ago")
     assert anna.words.startswith(f"{TOWER.levels[1].name}, ")
-    assert rows[1].words.startswith("silent, ")
+    assert rows[2].words.startswith("silent, ")
 
 
 @pytest.mark.parametrize(

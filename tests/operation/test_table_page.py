@@ -63,9 +63,10 @@ def test_the_list_is_in_words_and_the_most_urgent_comes_first(browser: Any) -> N
     with ServedTeam(whole_team()) as served:
         page = table(browser, served.page.url, "wide")
         said = page.evaluate(WORDS)
-        assert said[0].startswith("✕ Kim lost, ")
-        assert said[1].startswith("◌ Bo silent, ")
-        assert "lost" in page.inner_text("#live")
+        assert said[0].startswith("▲ Finn mayday, ")
+        assert said[1].startswith("✕ Kim lost, ")
+        assert said[2].startswith("◌ Bo silent, ")
+        assert "Finn: mayday" in page.inner_text("#live")
         assert page.inner_text("#floors button:nth-child(1)").endswith("!")  # one of this floor needs help
         assert not page.wrong
         page.context.close()

@@ -18,7 +18,7 @@ from echostep.localization.map_filter import BELIEVED, DOUBTED
 from echostep.page import requests
 from echostep.page.live import LivePage
 from echostep.plan.model import Pose
-from echostep.ports.check_in import PERSON, CheckIn, Undo, parse_person
+from echostep.ports.check_in import PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from page.frames import LOCAL, PLAN, next_frame, opened_url
@@ -55,12 +55,20 @@ def test_no_text_breaks_the_parser(text: str) -> None:
 def test_no_chunk_of_a_person_breaks_the_tracker(payload: bytes) -> None:
     said = parse_person(payload)
     assert (
-        said is None or isinstance(said, Undo) or (math.isfinite(said.x_m + said.y_m + said.sd_m) and said.level >= 0)
+        said is None
+        or isinstance(said, Undo | Call)
+        or (math.isfinite(said.x_m + said.y_m + said.sd_m) and said.level >= 0)
     )
 
 
 def test_a_check_in_comes_back_from_its_bytes() -> None:
-    for said in (CheckIn(1.25, -3.5, None, 0.5), CheckIn(0.1, 0.2, 0.3, 0.4, 2), Undo(3)):
+    for said in (
+        CheckIn(1.25, -3.5, None, 0.5),
+        CheckIn(0.1, 0.2, 0.3, 0.4, 2),
+        Undo(3),
+        Call(help=True),
+        Call(help=False),
+    ):
         assert parse_person(said.encode()) == said
 
 
@@ -70,6 +78,7 @@ def test_a_check_in_comes_back_from_its_bytes() -> None:
         {"x_m": 1, "y_m": 2}, {"x_m": 1, "y_m": 2, "sd_m": "1"}, {"x_m": 1e9, "y_m": 2, "sd_m": 1}, {"x_m": True, "y_m": 2, "sd_m": 1},
         {"x_m": 1, "y_m": 2, "sd_m": 1, "heading_rad": "east"}, {"x_m": 1, "y_m": 2, "sd_m": 1, "level": -1},
         {"x_m": 1, "y_m": 2, "sd_m": 1, "level": 0.5}, [1], {"undo": 0}, {"undo": True}, {"undo": 1.0}, {"undo": 1 << 40},
+        {"help": 1}, {"help": None}, {"help": "yes"},
     ],
 )  # fmt: skip
 def test_half_a_check_in_is_none(tree: object) -> None:

@@ -55,6 +55,23 @@ def echoes(
 
 
 @app.command()
+def incapacity(
+    runs: Annotated[int, typer.Option("--runs", help="Wearers who cannot move.", min=1)] = 1000,
+    days: Annotated[int, typer.Option("--days", help="Working days of eight hours.", min=0)] = 5,
+    seed: Seed = 1,
+    json: Json = None,
+    data: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")] = Path(
+        "../shared/data"
+    ),
+) -> None:
+    """How soon a wearer who cannot move is told, and how often one who can (simulated; recordings where they are)."""
+    from echostep.evaluate.incapacity import incapacity_study
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    run_study(incapacity_study(days, data, seed), StudyRequest(runs, seed, json, Path("out/incapacity")))
+
+
+@app.command()
 def lee2010(
     runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
     seed: Seed = 1,

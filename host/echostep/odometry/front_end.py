@@ -42,6 +42,7 @@ from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, WearerSettings
 from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.gyro_blocks import GyroBlocks
+from echostep.odometry.stillness import Stillness
 from echostep.odometry.synchronizer import HEIGHT, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.check_in import PERSON
@@ -86,6 +87,7 @@ class FrontEnd:
         self.identity: Identity | None = None
         self.reports = BoardReports()
         self.pings = 0
+        self.stillness = Stillness()
         self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings())
@@ -129,6 +131,7 @@ class FrontEnd:
         self._keep_reports(frames, times)
         self._collect_pings(frames, times)
         leg_blocks = self._gyro_blocks.cut(frames, times)
+        self.stillness.add_legs([block for _, block in leg_blocks])
         # Foot: MTx samples -> segments of the trunk's path.
         foot_segments = self._track_foot(batch, times)
         # Handover: segments of foot and legs -> segments of one path.
@@ -191,6 +194,7 @@ class FrontEnd:
         if not len(timed):
             return completed
         t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
+        self.stillness.add_foot(t_s, batch.gyro[timed], batch.accel[timed])
         foot = self.foot.track(t_s, batch.accel[timed], batch.gyro[timed], batch.mag[timed])
         begin = 0
         for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from echostep.plan.model import Plan
 from echostep.team.commander import notes
+from echostep.team.cot import alarm_words
 from echostep.team.report import Position
 from echostep.team.roster import Member, MemberState
 
 STATES = {
-    MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
+    MemberState.MAYDAY: "mayday", MemberState.LOST: "lost", MemberState.STALE: "silent", MemberState.UNCERTAIN: "uncertain",
     MemberState.WAITING: "no position yet", MemberState.TRACKING: "", MemberState.ENDED: "run ended",
 }  # in words; a position that is tracked needs none  # fmt: skip
 COUNTED = {state: words or "tracked" for state, words in STATES.items()}  # in the summary
@@ -81,7 +82,7 @@ def shown_wearer(number: int, m: Member, plan: Plan, now_s: float, duplicates: s
     state, p = m.state(now_s), m.position(now_s)
     parts = [STATES[state], *(place_words(p) if p else ()), heard_words(m.silent_s(now_s))]
     words = ", ".join(filter(None, parts))
-    remarks = tuple(notes(m, plan, duplicates))
+    remarks = tuple(notes(m, plan, now_s, duplicates))
     return ShownWearer(number, m.report.team, m.report.name, state.value, words, level_on(plan, m), remarks)
 
 
@@ -109,7 +110,8 @@ def shown_details(
 ) -> ShownDetails:
     """Everything that the last report says, in words."""
     r, p = m.report, m.position(now_s)
-    rows = [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
+    rows = [("alarm", alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))] if r.alarm else []
+    rows += [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
     if p:
         rows += [("floor", f"{p.floor_name} ({100.0 * p.floor_probability:.0f} %)"), ("place", p.where or "not named")]
         rows += [("position", f"x {p.x_m:.1f}, y {p.y_m:.1f} m"), ("95 % within", metres(p.radius95_m))]
@@ -120,7 +122,7 @@ def shown_details(
     if r.battery_percent is not None:
         rows += [("battery", f"{r.battery_percent} %")]
     rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
-    rows += [("note", note) for note in notes(m, plan, duplicates)]
+    rows += [("note", note) for note in notes(m, plan, now_s, duplicates)]
     return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)
 
 

@@ -19,6 +19,7 @@ from typing import Self
 from echostep.guidance.cue_list import CueList
 from echostep.localization.echo_likelihood import echo_model
 from echostep.localization.estimate import Estimate, unobserved
+from echostep.page.elements.alarm import shown_alarm
 from echostep.page.elements.beacon_marks import beacon_marks
 from echostep.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
@@ -67,6 +68,7 @@ class LivePage:
         self._replay = replay
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
+        self.has_team = False  # the run's reports go somewhere
         self.server = PageServer(self._mailbox, address)
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
@@ -149,11 +151,14 @@ class LivePage:
         if due or self._new:
             streams, state = self._rate_meter.measure(self._tracker, self._arrived_ns), self._tracker.state
             undo = None if self._replay else self._undo_clock.offer(state, time.monotonic_ns())
-            self._scene = replace(self._scene, streams=streams, undo=undo, echoes_fit=echoes_fit(state))
+            alarm = shown_alarm(self._tracker, has_team=self.has_team)
+            self._scene = replace(self._scene, streams=streams, undo=undo, echoes_fit=echoes_fit(state), alarm=alarm)
         if self._new or (due and not self._replay):
             for scene in self._new or [self._scene_without_news()]:
                 shown = self._scene
-                scene = replace(scene, streams=shown.streams, undo=shown.undo, echoes_fit=shown.echoes_fit)
+                scene = replace(
+                    scene, streams=shown.streams, undo=shown.undo, echoes_fit=shown.echoes_fit, alarm=shown.alarm
+                )
                 self._mailbox.publish(scene)
                 if self._new:
                     self._mailbox.keep(scene)

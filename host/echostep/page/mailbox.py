@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from echostep.page.elements.scene import PageScene
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
-from echostep.ports.check_in import CheckIn, Undo
+from echostep.ports.check_in import Call, CheckIn, Undo
 
 MOST_CHECK_INS = (
     16  # in the queue to the tracker; further ones are refused. By reason: a person makes a few in a minute
@@ -82,7 +82,7 @@ class Mailbox:
         self.latest: PageScene | None = None
         self.goal: RoutePlace | None = None
         self.on_publish: Callable[[], None] | None = None
-        self._check_ins: queue.Queue[CheckIn | Undo] = queue.Queue(MOST_CHECK_INS)
+        self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
 
     def publish(self, scene: PageScene) -> None:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
@@ -110,8 +110,8 @@ class Mailbox:
         if self.on_publish:
             self.on_publish()
 
-    def add_check_in(self, check_in: CheckIn | Undo) -> bool:
-        """Queue a check-in or its undoing for the tracker; False when it is refused: in a replay, or with a full queue."""
+    def add_check_in(self, check_in: CheckIn | Undo | Call) -> bool:
+        """Queue a check-in, its undoing or a call for the tracker; False when it is refused: in a replay, or with a full queue."""
         if self.replay:
             return False
         try:
@@ -120,7 +120,7 @@ class Mailbox:
             return False
         return True
 
-    def pop_check_ins(self) -> Iterator[CheckIn | Undo]:
+    def pop_check_ins(self) -> Iterator[CheckIn | Undo | Call]:
         """Remove and yield the queued check-ins; never waits."""
         while True:
             try:

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
@@ -162,6 +163,7 @@ class FrameHeader:
     undo: UndoOffer | None
     play: PlayState | None
     truth: TruePosition | None
+    alarm: ShownAlarm | None
     ended: str | None
     kind: Literal["frame"] = "frame"
 
@@ -238,6 +240,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         undo=scene.undo,
         play=parts.play,
         truth=scene.truth,
+        alarm=scene.alarm,
         ended=parts.ended,
     )
     text = _ENCODER.encode(header)

@@ -13,7 +13,7 @@ from typing import Any
 
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.routing import RoutePlace
-from echostep.ports.check_in import MOST_LEVELS, CheckIn, Undo, check_in_of, undo_of
+from echostep.ports.check_in import MOST_LEVELS, Call, CheckIn, Undo, call_of, check_in_of, undo_of
 
 MOST_REQUEST = 2048  # bytes
 FASTEST = 32.0  # times as fast as it was recorded
@@ -73,7 +73,7 @@ class StepBy:
     by: int
 
 
-Request = CheckIn | Undo | Consider | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+Request = CheckIn | Undo | Call | Consider | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
 
 
 def parse_request(text: str) -> Request | None:
@@ -131,6 +131,7 @@ def _skip(tree: dict[str, Any]) -> StepBy | None:
 _REQUESTS: dict[str, Callable[[dict[str, Any]], Request | None]] = {
     "check_in": check_in_of,
     "undo": undo_of,
+    "call": call_of,
     "consider": _consider,
     "go_to": _go_to,
     "go_nowhere": lambda _: EndGuidance(),

@@ -23,7 +23,7 @@ from echostep.page.guarded_socket import FRAME_S, GuardedSocket
 from echostep.page.mailbox import Mailbox
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
-from echostep.ports.check_in import CheckIn, Undo
+from echostep.ports.check_in import Call, CheckIn, Undo
 
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 
@@ -80,6 +80,8 @@ class PageSession(GuardedSocket):
                 offer = self._mailbox.latest.undo if self._mailbox.latest else None
                 is_late = offer is None or offer.undo != request.undo
                 await self._take(request, "It is too late to undo this." if is_late else "")
+            case Call():
+                await self._take(request, "")
             case requests.GoTo(goal) if goal.level < levels:
                 self._mailbox.set_goal(goal)
             case requests.EndGuidance():
@@ -91,8 +93,8 @@ class PageSession(GuardedSocket):
                 self._counts.refused += 1
         self._news.set()
 
-    async def _take(self, request: CheckIn | Undo, refusal: str) -> None:
-        """Pass a check-in or its undoing on to the tracker, or tell the page why not."""
+    async def _take(self, request: CheckIn | Undo | Call, refusal: str) -> None:
+        """Pass a check-in, its undoing or a call on to the tracker, or tell the page why not."""
         if not refusal and not self._mailbox.add_check_in(request):
             refusal = "Not accepted: this is a replay, or the tracker is too busy."
         if refusal:

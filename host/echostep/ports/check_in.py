@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Check-in: the wearer's position, entered by hand, and its undoing.
+"""Check-in: the wearer's position, entered by hand, and its undoing; a call for help, and its end.
 
-In: a position from the page. Out: the bytes of a chunk of the port `PERSON`, and `CheckIn`s or `Undo`s from such bytes. Owns nothing.
+In: a position from the page, or a call. Out: the bytes of a chunk of the port `PERSON`; `CheckIn`s, `Undo`s or `Call`s from them. Owns nothing.
 The bytes are recorded like those of any port, so a replay has the same check-ins in the same order. They may be damaged or hostile.
 """
 
@@ -48,15 +48,34 @@ class Undo:
         return json.dumps(asdict(self)).encode()
 
 
-def parse_person(payload: bytes) -> CheckIn | Undo | None:
-    """The check-in or the undoing of a chunk; None when the bytes are neither."""
+@dataclass(frozen=True, slots=True)
+class Call:
+    """The wearer asks for help (`help` True), or says that all is well."""
+
+    help: bool
+
+    def encode(self) -> bytes:
+        """The call as JSON: the bytes of a chunk."""
+        return json.dumps(asdict(self)).encode()
+
+
+def parse_person(payload: bytes) -> CheckIn | Undo | Call | None:
+    """The check-in, the undoing or the call of a chunk; None when the bytes are none of them."""
     if len(payload) > MOST_BYTES:
         return None
     try:
         tree = json.loads(payload)
     except (ValueError, RecursionError):
         return None
+    if isinstance(tree, dict) and "help" in tree:
+        return call_of(tree)
     return undo_of(tree) if isinstance(tree, dict) and "undo" in tree else check_in_of(tree)
+
+
+def call_of(tree: Any) -> Call | None:
+    """The call in a JSON object; None when it says neither."""
+    wanted = tree.get("help") if isinstance(tree, dict) else None
+    return Call(wanted) if isinstance(wanted, bool) else None
 
 
 def undo_of(tree: Any) -> Undo | None:

@@ -126,6 +126,8 @@ class Session:
         print_line = partial(console.print, markup=False, highlight=False)
         publishing = Publishing(self.output.outlet, self.tracker, self.source, print_line, clock)
         self._publishing = opened.enter_context(publishing)
+        if self.page:
+            self.page.has_team = True
 
     def _open_foxglove(self, opened: ExitStack) -> None:
         if self.output.foxglove is None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -17,6 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from echostep.plan.model import Plan
+from echostep.team.cot import alarm_words
 from echostep.team.inbox import Inbox, ReceivedMessage
 from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
 
@@ -30,7 +32,8 @@ COLUMNS = {
 }  # fmt: skip
 LEAST_WIDTHS = {"looks": 110, "nearest m": 110, "walked m": 110, "where": 136}  # of a terminal that shows these columns
 STYLES = {
-    MemberState.LOST: "bold white on red", MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
+    MemberState.MAYDAY: "bold blink white on red", MemberState.LOST: "bold white on red",
+    MemberState.STALE: "bold red", MemberState.UNCERTAIN: "yellow",
     MemberState.WAITING: "cyan", MemberState.TRACKING: "green", MemberState.ENDED: "grey62",
 }  # fmt: skip
 
@@ -101,7 +104,7 @@ def _cells(
         "looks": "" if p is None or p.heading_rad is None else f"{math.degrees(p.heading_rad) % 360:.0f}°",
         "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",
         "walked m": f"{r.motion.walked_m:.0f}" if r.motion else "",
-        "note": "; ".join(notes(m, plan, duplicates)),
+        "note": "; ".join(notes(m, plan, now_s, duplicates)),
     }
 
 
@@ -114,11 +117,13 @@ def _state(m: Member, now_s: float) -> str:
     return f"{state} {silent_s:.0f} s" if state is MemberState.STALE else f"{state}, silent {silent_s:.0f} s"
 
 
-def notes(m: Member, plan: Plan, duplicates: set[tuple[str, str]]) -> list[str]:
-    """Remarks on a member: name used twice, broken connection, rest, other plan, clock, battery, faults, losses."""
+def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]]) -> list[str]:
+    """Remarks on a member: alarm, name used twice, broken connection, rest, other plan, clock, battery, faults, losses."""
     remarks, r = [], m.report
     if m.key[:2] in duplicates:
         remarks.append(f"name used twice (run {r.run})")
+    if r.alarm:
+        remarks.append(alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))
     if m.presence == "broken":
         remarks.append("connection broke")
     if r.motion and r.motion.still_s > STILL_S:
@@ -168,7 +173,7 @@ def _member(
         "missed": m.missed,
         "from_start_m": _from_start(m, plan),
         "nearest": {"name": near[1].report.name, "distance_m": near[0]} if near else None,
-        "notes": notes(m, plan, duplicates),
+        "notes": notes(m, plan, now_s, duplicates),
         "report": msgspec.to_builtins(m.report),
     }
 

@@ -15,13 +15,15 @@ import ipaddress
 import math
 import socket
 import ssl
+from contextlib import suppress
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
 from echostep.team.endpoint import Endpoint, tls_context
-from echostep.team.report import Report
+from echostep.team.report import Report, ReportedAlarm, ReportedPlace
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
+EMERGENCY, EMERGENCY_OVER = "b-a-o-tbl", "b-a-o-can"  # alarm, other: ATAK's "911 Alert" and its cancelling
 UNKNOWN = "9999999.0"  # value of `hae` and `le` when they are not known [CoT Event 2.0 schema]
 HOW = {"live": "m-f", "replay": "m-r", "simulated": "m-s"}  # made by a machine: fused now, relayed, simulated [schema]
 SOCKET_TIMEOUT_S = 3.0  # for connecting and for sending
@@ -44,15 +46,7 @@ def event(report: Report) -> bytes | None:
         "stale": report.stale,
         "how": HOW[report.source],
     }
-    hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
-    point = {
-        "lat": f"{place.lat_deg:.8f}",
-        "lon": f"{place.lon_deg:.8f}",
-        "hae": hae,
-        "ce": _rounded_up(place.sd_m),
-        "le": le,
-    }
-    ElementTree.SubElement(top, "point", point)
+    ElementTree.SubElement(top, "point", _point(place))
     detail = ElementTree.SubElement(top, "detail")
     ElementTree.SubElement(detail, "contact", callsign=report.name)
     if motion is not None and place.course_deg is not None:
@@ -68,6 +62,38 @@ def event(report: Report) -> bytes | None:
     return ElementTree.tostring(top, encoding="utf-8", xml_declaration=False)
 
 
+def events(report: Report) -> list[bytes]:
+    """The event of a report, and that of its emergency if there is one; empty without a position on Earth."""
+    return [made for made in (event(report), emergency(report)) if made is not None]
+
+
+def emergency(report: Report) -> bytes | None:
+    """A mayday as TAK's emergency, or its end; None without a mayday or a position on Earth.
+
+    The form is that of ATAK: uid of the wearer and "-9-1-1", a link to the wearer, `emergency` in the detail.
+    """
+    alarm, place = report.alarm, report.place
+    if alarm is None or alarm.kind == "asking" or place is None or report.position is None:
+        return None
+    over = alarm.kind == "over"
+    of, kind = uid(report.team, report.name), EMERGENCY_OVER if over else EMERGENCY
+    top = ElementTree.Element("event", version="2.0", uid=f"{of}-9-1-1", type=kind)
+    top.attrib |= {
+        "time": report.time,
+        "start": report.recorded or report.time,
+        "stale": report.stale,
+        "how": HOW[report.source],
+    }
+    ElementTree.SubElement(top, "point", _point(place))
+    detail = ElementTree.SubElement(top, "detail")
+    ElementTree.SubElement(detail, "link", uid=of, type=FRIEND_ON_FOOT, relation="p-p")
+    ElementTree.SubElement(detail, "contact", callsign=f"{report.name}-Alert")
+    says = {"cancel": "true"} if over else {"type": "911 Alert"}
+    ElementTree.SubElement(detail, "emergency", says).text = report.name
+    ElementTree.SubElement(detail, "remarks").text = remarks(report)
+    return ElementTree.tostring(top, encoding="utf-8", xml_declaration=False)
+
+
 def uid(team: str, name: str) -> str:
     """Unique identifier of a wearer; a part of a hash is appended when a hyphen in a name makes it ambiguous."""
     plain = f"echostep-{team}-{name}"
@@ -78,6 +104,8 @@ def remarks(report: Report) -> str:
     """Status, 95 % radius, room and floor, age, and other facts for which the event has no field."""
     p = report.position
     words = [f"{report.status}, 95 % within {p.radius95_m:.1f} m" if p else report.status]
+    if report.alarm:
+        words.insert(0, alarm_words(report.alarm))
     if p:
         words.append(", ".join(filter(None, (p.where, p.floor_name))))
         if p.age_s > 1.0:
@@ -90,6 +118,22 @@ def remarks(report: Report) -> str:
     if report.recorded:
         words.append(f"recorded {report.recorded}")
     return "; ".join(words)
+
+
+def alarm_words(alarm: ReportedAlarm) -> str:
+    """An alarm in words: "mayday: no motion for 34 s"."""
+    if alarm.kind == "over":
+        return f"mayday over for {alarm.age_s:.0f} s"
+    kind = "asked whether all is well" if alarm.kind == "asking" else "mayday"
+    why = "no motion for" if alarm.reason == "no motion" else "asked for help"
+    return f"{kind}: {why} {alarm.age_s:.0f} s{'' if alarm.reason == 'no motion' else ' ago'}"
+
+
+def _point(place: ReportedPlace) -> dict[str, str]:
+    """Attributes of a `point`."""
+    hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
+    lat, lon = f"{place.lat_deg:.8f}", f"{place.lon_deg:.8f}"
+    return {"lat": lat, "lon": lon, "hae": hae, "ce": _rounded_up(place.sd_m), "le": le}
 
 
 def _rounded_up(metres: float) -> str:
@@ -119,14 +163,12 @@ class UdpTransport:
         self._socket.connect(address)
 
     def send(self, report: Report) -> None:
-        """Send one datagram; an unreachable port is ignored, since the receiver may start later."""
-        made = event(report)
-        if made is None or self._socket is None:
+        """Send a datagram for each event; an unreachable port is ignored, since the receiver may start later."""
+        if self._socket is None:
             return
-        try:
-            self._socket.send(made)
-        except (ConnectionRefusedError, BlockingIOError):
-            return
+        for made in events(report):
+            with suppress(ConnectionRefusedError, BlockingIOError):
+                self._socket.send(made)
 
     def close(self, *, ended: bool) -> None:  # noqa: ARG002
         """Close the socket."""
@@ -158,13 +200,11 @@ class StreamTransport:
 
     def send(self, report: Report) -> None:
         """Send the event; bytes from the server are read and discarded."""
-        made = event(report)
         if self._socket is None:
             raise ConnectionError("not connected")
         self._drain(self._socket)
-        if made is not None:
-            self._socket.settimeout(SOCKET_TIMEOUT_S)
-            self._socket.sendall(made + b"\n")
+        self._socket.settimeout(SOCKET_TIMEOUT_S)
+        self._socket.sendall(b"".join(made + b"\n" for made in events(report)))
 
     def _drain(self, sock: socket.socket) -> None:
         sock.settimeout(0.0)

@@ -28,7 +28,7 @@ from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.georeference import GroundPlane
 from echostep.team.mqtt import MqttTransport
 from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
-from echostep.team.report import Motion, Position, Report, StreamReport, moment, printable
+from echostep.team.report import Motion, Position, Report, ReportedAlarm, StreamReport, moment, printable
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -61,11 +61,14 @@ class Publishing:
         self._whereabouts = Whereabouts(tracker.plan)
         transports = [(_transport(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(transport, name, print_line) for transport, name in transports]
+        self._last = self._empty
         self._offer(self._empty)
 
     def publish(self, estimates: Sequence[Estimate]) -> None:
         """Offer a report of each estimate to the outboxes; never blocks. Without estimates, heartbeats before the first one."""
+        alarm = reported_alarm(self._tracker)
         if not estimates:
+            self._offer_alarm(alarm)
             self._offer_heartbeat(time.monotonic())
             return
         self._offered_s = math.inf
@@ -76,7 +79,13 @@ class Publishing:
             report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)
             assert report.position
             position, recorded = replace(report.position, where=where), self._recorded_at(estimate.t_s)
-            self._offer(replace(report, position=position, recorded=recorded))
+            self._offer(replace(report, position=position, recorded=recorded, alarm=alarm))
+
+    def _offer_alarm(self, alarm: ReportedAlarm | None) -> None:
+        """Without an estimate, a change of the alarm is reported with the last position."""
+        last = self._last.alarm
+        if (alarm and (alarm.kind, alarm.number)) != (last and (last.kind, last.number)):
+            self._offer(replace(self._last, alarm=alarm))
 
     def _recorded_at(self, t_s: float) -> str | None:
         """When an estimate was recorded; None in a live run, and where the recording has no time of day."""
@@ -91,7 +100,10 @@ class Publishing:
         """Before the first estimate, report the streams every HEARTBEAT_S."""
         if now_s - self._offered_s >= HEARTBEAT_S:
             self._offered_s = now_s
-            self._offer(replace(self._empty, streams=self._history_before_estimate.streams(self._tracker, now_s)))
+            alarm = self._last.alarm
+            self._offer(
+                replace(self._empty, alarm=alarm, streams=self._history_before_estimate.streams(self._tracker, now_s))
+            )
 
     def __enter__(self) -> Self:
         return self
@@ -103,6 +115,7 @@ class Publishing:
             self._print_line(outbox.close())
 
     def _offer(self, report: Report) -> None:
+        self._last = report
         for outbox in self._outboxes:
             outbox.offer(report)
 
@@ -149,6 +162,17 @@ class ReportHistory:
             synchronised=state.synchronised,
             findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in board_findings(state.reports)[:4]),
         )
+
+
+def reported_alarm(tracker: Tracker) -> ReportedAlarm | None:
+    """The tracker's alarm as it is reported."""
+    alarm = tracker.alarm.alarm
+    if alarm is None:
+        return None
+    age_s = tracker.front_end.newest_s - alarm.since_s
+    return ReportedAlarm(
+        alarm.kind.value, alarm.reason.value, alarm.number, min(age_s, 1e9) if age_s > 0.0 else 0.0
+    )  # NaN before the first samples
 
 
 def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:

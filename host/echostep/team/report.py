@@ -119,6 +119,21 @@ class StreamReport:
 
 
 @dataclass(frozen=True, slots=True)
+class ReportedAlarm:
+    """The wearer's alarm."""
+
+    kind: Annotated[
+        Literal["asking", "mayday", "over"],
+        Meta(description="asking: still for 20 s, the wearer is asked; mayday: help is needed; over: it was, for 30 s"),
+    ]
+    reason: Annotated[Literal["no motion", "help"], Meta(description="help: the wearer asked for it")]
+    number: Annotated[int, Meta(ge=1, le=2**53, description="counts the alarms of this run")]
+    age_s: Annotated[
+        float, Meta(ge=0.0, le=1e9, description="seconds since the last motion, the call for help, or the end")
+    ]
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """All of it; `position` is missing until the tracker has its first estimate."""
 
@@ -150,6 +165,7 @@ class Report:
     recorded: Annotated[
         Moment | None, Meta(description="when the position was recorded, in a replay: UTC, by the recorder's clock")
     ] = None
+    alarm: Annotated[ReportedAlarm | None, Meta(description="missing while all is well")] = None
 
     @property
     def sent_s(self) -> float:

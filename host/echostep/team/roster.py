@@ -32,6 +32,7 @@ REPLACED_KEPT_S = 60.0  # a silent run is removed after so long when a newer run
 class MemberState(StrEnum):
     """State of a member, the most urgent first."""
 
+    MAYDAY = "mayday"
     LOST = "lost"
     STALE = "stale"
     UNCERTAIN = "uncertain"
@@ -79,6 +80,8 @@ class Member:
         """State at a time of the commander's clock."""
         if self.presence == "ended":
             return MemberState.ENDED
+        if self.report.alarm and self.report.alarm.kind == "mayday":
+            return MemberState.MAYDAY
         if self.report.status == "lost":
             return MemberState.LOST
         if self.presence == "broken" or self.silent_s(now_s) > self.stale_after_s:
@@ -124,7 +127,8 @@ class Roster:
             p, state = m.report.position, m.state(now_s)
             silence = (
                 m.silent_s(now_s)
-                if state in (MemberState.LOST, MemberState.STALE) and m.silent_s(now_s) > m.stale_after_s
+                if state in (MemberState.MAYDAY, MemberState.LOST, MemberState.STALE)
+                and m.silent_s(now_s) > m.stale_after_s
                 else 0.0
             )
             return _URGENCY[state], -silence, -(p.radius95_m if p else 0.0), m.key

@@ -2,7 +2,7 @@
 // Floors of the plan: for each a button with the number of wearers on it, and a sign when one of them needs help; on a phone more than three are a list.
 
 const MOST_BUTTONS = 3;
-const URGENT = ['lost', 'stale'];
+const URGENT = ['mayday', 'lost', 'stale'];
 const $ = (id) => document.getElementById(id);
 
 export class Floors {

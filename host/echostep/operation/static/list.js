@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
-export const SIGNS = { lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
-const URGENT = ['lost', 'stale'];
+export const SIGNS = { mayday: '▲', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
+const URGENT = ['mayday', 'lost', 'stale'];
 const $ = (id) => document.getElementById(id);
 const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };  // unchanged text causes no new layout
 

@@ -2,7 +2,7 @@
 // Paints the wearers on a canvas: a sign by state, an arrow along the heading, the circle of the protection radius (dashed) or of the 95 % radius (dotted), the name.
 
 const COLOURS = ['trail', 'here', 'halo', 'bad', 'fair', 'good', 'ink', 'faint', 'goal', 'expected'];
-const OF_STATE = { lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
+const OF_STATE = { mayday: 'bad', lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
 const WIDEST_M = 60;  // radius that is still drawn
 const SIGN_PX = 8;
 const FONT = '600 13px system-ui, sans-serif';
@@ -34,6 +34,7 @@ export class Painter {
   wearer(view, { state, place, at: [sx, sy] }, isChosen) {
     const { pen } = this, colour = this.colour[OF_STATE[state] ?? 'faint'], safe = Number.isFinite(place.protection), radius = safe ? place.protection : place.radius;
     if (radius < WIDEST_M && radius * view.scale > SIGN_PX) this.circle(sx, sy, radius * view.scale, colour, 1.5, safe ? [6, 5] : [2, 5]);
+    if (state === 'mayday') for (const more of [12, 17]) this.circle(sx, sy, SIGN_PX + more, colour, 2.5, []);
     if (isChosen) this.circle(sx, sy, SIGN_PX + 9, this.colour.ink, 2.5, []);
     if (Number.isFinite(place.heading)) this.arrow(sx, sy, -place.heading - view.turn, colour);
     this.sign(state, sx, sy, colour);
@@ -62,13 +63,14 @@ export class Painter {
     pen.fill();
   }
 
-  // Filled: tracking. Half: uncertain. Cross: lost. Hollow: silent. Square: ended.
+  // Triangle: mayday. Filled: tracking. Half: uncertain. Cross: lost. Hollow: silent. Square: ended.
   sign(state, sx, sy, colour) {
     const { pen } = this;
     pen.beginPath();
     if (state === 'ended') pen.rect(sx - 6, sy - 6, 12, 12);
+    else if (state === 'mayday') for (const [x, y] of [[0, -14], [13, 9], [-13, 9], [0, -14]]) pen.lineTo(sx + x, sy + y);
     else pen.arc(sx, sy, SIGN_PX, 0, 2 * Math.PI);
-    pen.fillStyle = state === 'tracking' ? colour : this.colour.halo;
+    pen.fillStyle = ['tracking', 'mayday'].includes(state) ? colour : this.colour.halo;
     pen.strokeStyle = this.colour.halo;
     pen.lineWidth = 5;
     pen.stroke();
@@ -96,7 +98,7 @@ export class Painter {
       pen.lineWidth = 4;
       pen.strokeStyle = this.colour.halo;
       pen.strokeText(name, left, sy);
-      pen.fillStyle = ['lost', 'stale'].includes(state) ? this.colour.bad : this.colour.ink;
+      pen.fillStyle = ['mayday', 'lost', 'stale'].includes(state) ? this.colour.bad : this.colour.ink;
       pen.fillText(name, left, sy);
     }
   }

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Octets
 from echostep.localization.estimate import OUTSIDE, UNFIT, Estimate, TrackStatus
+from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
@@ -64,6 +65,7 @@ class PageScene:
     echoes_fit: bool = False
     guidance: ShownGuidance | None = None
     truth: TruePosition | None = None
+    alarm: ShownAlarm | None = None
 
 
 def sample_of(particles: Particles) -> ParticleSample:

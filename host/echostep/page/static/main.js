@@ -44,7 +44,7 @@ async function hello(message) {
     view.resize($('map').clientWidth, $('map').clientHeight);
     fitted = false;
   }
-  $('here').hidden = $('sheet-here').hidden = message.replay;
+  $('here').hidden = $('sheet-here').hidden = $('help').hidden = message.replay;
   taps.reconnected();
   await showLevel(Math.min(scene.level, plan.levels.length - 1));
 }
@@ -83,7 +83,8 @@ function frame(received) {
   if (received.cloud) scene.cloud = received.cloud;
   extend(scene.trail, received.trail);
   undrawn.push(received.seq);
-  speech.update(received.guidance);
+  speech.alarm(received.play ? null : received.alarm);
+  if (!received.alarm) speech.update(received.guidance);
   dirty = true;
 }
 
@@ -208,6 +209,8 @@ $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = fitWhole;
 $('north').onclick = () => view.rotate(-view.turn);
+$('help').onclick = () => link.send('call', { help: true });
+$('fine').onclick = () => link.send('call', { help: false });
 $('end-guidance').onclick = () => link.send('go_nowhere');
 $('goal').onchange = () => {
   const { value } = $('goal');

@@ -40,7 +40,7 @@ export class Panel {
     }));
   }
 
-  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended }) {
+  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended, alarm }) {
     const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
     this.status(status, words);
     put('place', estimate ? positionText(estimate, this.plan.levels) : '');
@@ -52,9 +52,18 @@ export class Panel {
     $('wrong').hidden = !streams?.wrong;
     put('beacons', beaconText(beacons));
     $('beacons').hidden = !beacons.length;
+    this.alarm(alarm);
     this.guidance(guidance);
     this.goal(goal);
     this.announce(`${status} ${streams?.wrong ?? ''}`, [words, estimate?.where, streams?.wrong].filter(Boolean).join('. '));
+  }
+
+  alarm(alarm) {
+    $('alarm').hidden = !alarm;
+    if (!alarm) return;
+    $('alarm').dataset.kind = alarm.kind;
+    $('fine').hidden = alarm.kind === 'over';
+    put('alarm-text', alarm.text);
   }
 
   // The arrow is relative to the heading: up is straight ahead.

@@ -27,6 +27,16 @@ export class Speech {
     if (this.on) this.say(now?.text);
   }
 
+  // The wearer's alarm is spoken whether speech is switched on or not, with vibration where the device has it; the same one again when its `times` changes.
+  alarm(alarm) {
+    const now = alarm ? `${alarm.kind} ${alarm.times}` : '';
+    if (now === this.alarmed) return;
+    this.alarmed = now;
+    if (!alarm || !window.speechSynthesis) return;
+    this.say(alarm.spoken);
+    if (navigator.userActivation?.hasBeenActive) navigator.vibrate?.([400, 200, 400]);  // browsers forbid it before the first tap
+  }
+
   say(text) {
     window.speechSynthesis.cancel();
     if (!text) return;

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""The wearer's alarm: asked after 20 s without motion, mayday after 30 s, or when help is asked for.
+
+In: windows with or without motion, steps, taps. Out: the present `Alarm`, and every change of it. Owns the time of the last motion. All times are
+those of the samples.
+
+They follow NFPA 1982 (PASS), as remembered: alarm after 30 s without motion (+5/-0 s), a warning about 10 s before; compare them with a copy
+before relying on them. Different from it: a mayday for lack of motion also ends when the wearer walks, there only by hand. There is no sound of
+95 dB, no housing and no test of the standard: this is no PASS.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from echostep.odometry.stillness import WINDOW_S, Window
+
+ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
+WALKED_STEPS = 3  # of the foot: the wearer walks. By reason: a helper who turns a wearer over makes fewer
+OVER_S = 30.0  # an alarm that has ended is told as over for so long
+GAP_S = 2.0  # a longer time without samples is no time without motion
+MARGIN_S = WINDOW_S  # how late windows of the other sensor may come
+MOST_CHANGES = 1000  # that are kept
+
+
+class AlarmKind(StrEnum):
+    """What is told."""
+
+    ASKING = "asking"
+    MAYDAY = "mayday"
+    OVER = "over"
+
+
+class AlarmReason(StrEnum):
+    """Why."""
+
+    STILL = "no motion"
+    HELP = "help"
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """An alarm: `number` of this run; `since_s`: time of the last motion, of the call for help, or of its end."""
+
+    kind: AlarmKind
+    reason: AlarmReason
+    number: int
+    since_s: float
+
+
+class WearerAlarm:
+    """`add` takes windows, `step` the wearer's steps; `alarm` is the present one, None while all is well."""
+
+    def __init__(self) -> None:
+        self.alarm: Alarm | None = None
+        self.changes: deque[tuple[float, Alarm | None]] = deque(maxlen=MOST_CHANGES)  # with their times
+        self._number = 0
+        self._seen_s = math.nan  # end of the newest window
+        self._motion_s = math.nan  # end of the last one with motion; later after a tap
+        self._steps: deque[float] = deque(maxlen=WALKED_STEPS)  # times of the last ones
+        self._mayday_s = math.nan  # when the last mayday began
+
+    def step(self, t_s: float) -> None:
+        """The wearer made a step."""
+        self._steps.append(t_s)
+
+    def add(self, windows: Sequence[Window]) -> None:
+        """Take windows in order of time; before the first steps nothing is watched: a device that lies ready is no wearer who has fallen."""
+        if len(self._steps) == WALKED_STEPS:
+            for window in windows:
+                self._pass(window)
+            self._end_by_walking()
+
+    def _pass(self, window: Window) -> None:
+        if math.isnan(self._seen_s):
+            self._seen_s = self._motion_s = window.end_s
+        gap_s = window.end_s - self._seen_s
+        if window.moved:
+            self._motion_s = max(window.end_s, self._motion_s)
+        elif gap_s > GAP_S:
+            self._motion_s += gap_s
+        self._seen_s = max(window.end_s, self._seen_s)
+        self._advance(self._seen_s - MARGIN_S)
+
+    def call_for_help(self, t_s: float) -> None:
+        """The wearer asks for help."""
+        if self.alarm is None or self.alarm.kind is not AlarmKind.MAYDAY or self.alarm.reason is not AlarmReason.HELP:
+            self._begin(AlarmKind.MAYDAY, AlarmReason.HELP, self._time(t_s), self._time(t_s))
+
+    def answer(self, t_s: float, *, ends_help: bool) -> None:
+        """The wearer has tapped. `ends_help`: the tap says that all is well; another one says only that the wearer is conscious."""
+        self._motion_s = self._time(t_s)
+        if self.alarm and (ends_help or self.alarm.reason is AlarmReason.STILL):
+            self._end(self._time(t_s))
+
+    def _time(self, t_s: float) -> float:
+        """A time, also before the first samples."""
+        return 0.0 if math.isnan(t_s) else t_s
+
+    def _advance(self, t_s: float) -> None:
+        """Changes that are due by a time."""
+        alarm, still_s = self.alarm, t_s - self._motion_s
+        if alarm and alarm.kind is AlarmKind.OVER and t_s >= alarm.since_s + OVER_S:
+            self._change(t_s, None)
+        if alarm and alarm.kind is AlarmKind.MAYDAY:
+            return
+        if still_s >= MAYDAY_S:
+            self._begin(AlarmKind.MAYDAY, AlarmReason.STILL, self._motion_s, t_s)
+        elif still_s >= ASK_S and (alarm is None or alarm.kind is not AlarmKind.ASKING):
+            self._begin(AlarmKind.ASKING, AlarmReason.STILL, self._motion_s, t_s)
+        elif still_s < ASK_S and alarm and alarm.kind is AlarmKind.ASKING:
+            self._change(t_s, None)  # the team was not alarmed
+
+    def _end_by_walking(self) -> None:
+        """A mayday for lack of motion ends when the wearer walks."""
+        alarm = self.alarm
+        if alarm is None or alarm.kind is not AlarmKind.MAYDAY or alarm.reason is not AlarmReason.STILL:
+            return
+        if self._steps[0] > self._mayday_s:
+            self._end(self._seen_s)
+
+    def _begin(self, kind: AlarmKind, reason: AlarmReason, since_s: float, t_s: float) -> None:
+        if kind is AlarmKind.ASKING or self.alarm is None or self.alarm.kind is not AlarmKind.ASKING:
+            self._number += 1
+        self._mayday_s = t_s
+        self._change(t_s, Alarm(kind, reason, self._number, since_s))
+
+    def _end(self, t_s: float) -> None:
+        alarm = self.alarm
+        if alarm and alarm.kind is AlarmKind.MAYDAY:
+            self._change(t_s, Alarm(AlarmKind.OVER, alarm.reason, alarm.number, t_s))
+        elif alarm and alarm.kind is AlarmKind.ASKING:
+            self._change(t_s, None)
+
+    def _change(self, t_s: float, alarm: Alarm | None) -> None:
+        self.alarm = alarm
+        self.changes.append((t_s, alarm))

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""The wearer's alarm, judged: how soon a wearer who cannot move is told, and how often one who can is.
+
+In: seeds; public recordings of feet and legs where they are at hand. Out: rows. The samples of foot and leg sensors are simulated; windows and alarm
+are the tracker's own; the network is not part of it. How often people who wait or crouch move a foot is assumed (`PAUSES_S`), not measured: the
+rate of maydays in a working day is one of that assumption, and of how often the question is answered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echostep.alarm import AlarmKind, WearerAlarm
+from echostep.arrays import Floats
+from echostep.evaluate.feet.datasets import SETS as FEET
+from echostep.evaluate.legs.datasets import SETS as LEGS
+from echostep.evaluate.recordings import read_sets
+from echostep.evaluate.report import Row, Table, rows_by_name
+from echostep.evaluate.study import Study, StudyRequest
+from echostep.legs.trunk_path import GyroBlock
+from echostep.odometry.stillness import Stillness
+
+RATE_HZ = 100.0
+GYRO_NOISE, ACCEL_NOISE = math.radians(0.1) * 10.0, 0.04  # rad/s, m/s2: an MTx at 100 Hz, by its manual
+LEG_NOISE = math.radians(0.5)  # rad/s, an ADIS16100
+BREATH_HZ, BREATH_RAD_S = 0.3, math.radians(1.5)  # of a belt on a wearer who lies
+PORTION_S = 0.25  # that comes at once
+TOLD_S = 35.0  # within which a wearer who cannot move is told
+DAY_S = 8.0 * 3600.0
+PAUSES_S = {
+    "walk": 0.55,
+    "crawl": 0.8,
+    "crouch": 10.0,
+    "wait": 15.0,
+}  # mean time between two movements of a foot, by reason
+SPANS_S = {"walk": (20.0, 300.0), "crawl": (20.0, 120.0), "crouch": (30.0, 600.0), "wait": (20.0, 300.0)}
+ANSWER_S, ANSWERED = (1.0, 6.0), 0.98  # how soon, and how often, the question is answered by a movement, by reason
+
+
+class SimulatedWearer:
+    """Samples of foot and, if `legs`, of leg gyros, through the tracker's own windows into its own alarm."""
+
+    def __init__(self, rng: np.random.Generator, *, legs: bool) -> None:
+        self.rng, self.legs, self.t_s = rng, legs, 0.0
+        self.stillness, self.alarm = Stillness(), WearerAlarm()
+        self._axis = self._up = np.array([0.0, 0.0, 1.0])
+
+    def live(self, seconds: float, moves_s: Sequence[float], *, lies: bool = False) -> None:
+        """So many seconds with movements at these times from now on."""
+        t_s = self.t_s + np.arange(1, round(seconds * RATE_HZ) + 1) / RATE_HZ
+        moved = np.zeros(len(t_s))
+        for move_s in moves_s:
+            width_s, size = self.rng.uniform(0.15, 0.5), 0.6 * math.exp(0.6 * self.rng.standard_normal())
+            near = np.abs(t_s - self.t_s - move_s) < width_s
+            moved[near] += size * np.sin(np.pi * (t_s[near] - self.t_s - move_s) / width_s)
+        if len(moves_s):  # between movements a foot keeps its orientation
+            self._axis, self._up = (v / np.linalg.norm(v) for v in self.rng.standard_normal((2, 3)))
+        gyro = moved[:, None] * self._axis + GYRO_NOISE * self.rng.standard_normal((len(t_s), 3))
+        accel = 3.0 * moved[:, None] * self._up + ACCEL_NOISE * self.rng.standard_normal((len(t_s), 3))
+        self.stillness.add_foot(t_s, gyro, accel + 9.81 * self._up)
+        if self.legs:
+            thigh, shank, belt = 0.6 * moved + LEG_NOISE * self.rng.standard_normal((3, len(t_s)))
+            belt += BREATH_RAD_S * np.sin(2.0 * np.pi * BREATH_HZ * t_s) if lies else 0.0
+            self.stillness.add_legs([GyroBlock(t_s, thigh, shank, belt, np.full(len(t_s), np.nan))])
+        self.t_s = float(t_s[-1])
+        self.alarm.add(self.stillness.pop_windows())
+
+    def walk(self, seconds: float) -> None:
+        """Walk: a step of this foot each 1.1 s."""
+        self.live(seconds, np.arange(0.0, seconds, PAUSES_S["walk"]).tolist())
+        for t_s in np.arange(self.t_s - seconds, self.t_s, 2.0 * PAUSES_S["walk"]).tolist():
+            self.alarm.step(t_s)
+
+    @property
+    def kind(self) -> AlarmKind | None:
+        return self.alarm.alarm.kind if self.alarm.alarm else None
+
+
+def incapacitated(seed: int) -> Row:
+    """A wearer who walks, crouches or stands, falls within 2 s and then does not move but breathe."""
+    rng = np.random.default_rng([seed, 1])
+    wearer = SimulatedWearer(rng, legs=bool(seed % 2))
+    wearer.walk(rng.uniform(5.0, 40.0))
+    wearer.live(rng.uniform(0.0, 15.0), [])  # stands or crouches before
+    began_s, fall_s = wearer.t_s, rng.uniform(0.2, 2.0)
+    wearer.live(fall_s, np.arange(0.0, fall_s, 0.1).tolist())
+    while wearer.kind is not AlarmKind.MAYDAY and wearer.t_s - began_s < 60.0:
+        wearer.live(PORTION_S, [], lies=True)
+    told_s = wearer.t_s - began_s if wearer.kind is AlarmKind.MAYDAY else math.inf
+    return {"name": "cannot move", "seed": seed, "told_s": told_s, "told": float(told_s <= TOLD_S)}
+
+
+def work_day(pauses: float, answered: float, name: str, seed: int) -> Row:
+    """Eight hours of walking, crawling, crouching and waiting; movements `pauses` times as seldom as assumed."""
+    rng = np.random.default_rng([seed, 2])
+    wearer = SimulatedWearer(rng, legs=False)
+    asked = maydays = 0
+    while wearer.t_s < DAY_S:
+        activity = str(rng.choice(list(SPANS_S)))
+        end_s = wearer.t_s + rng.uniform(*SPANS_S[activity])
+        if activity == "walk":
+            wearer.walk(end_s - wearer.t_s)
+        next_s = wearer.t_s
+        while wearer.t_s < end_s:
+            next_s += rng.exponential(PAUSES_S[activity] * (pauses if activity in ("crouch", "wait") else 1.0))
+            answers = False
+            while wearer.t_s < min(next_s, end_s):
+                before = wearer.kind
+                wearer.live(min(1.0, max(min(next_s, end_s) - wearer.t_s, 0.05)), [])
+                if wearer.kind is AlarmKind.ASKING and before is None:
+                    asked += 1
+                    answers = rng.random() < answered
+                    next_s = min(next_s, wearer.t_s + rng.uniform(*ANSWER_S)) if answers else next_s
+                if wearer.kind is AlarmKind.MAYDAY and before is not AlarmKind.MAYDAY:
+                    maydays += 1
+                    wearer.alarm.answer(wearer.t_s, ends_help=True)
+            wearer.live(0.6, [0.3])
+    hours = wearer.t_s / 3600.0
+    return {"name": name, "seed": seed, "hours": hours, "asked": asked, "maydays": maydays}
+
+
+def recorded(folder: Path) -> list[Row]:
+    """Every recording of feet and legs: how often the alarm asked and called. They are walks, not work: half an hour in all."""
+    rows: list[Row] = []
+    for foot in read_sets(folder, FEET)[0]:
+        stillness = Stillness()
+        stillness.add_foot(np.asarray(foot.t_s, np.float64), foot.gyro, foot.accel)
+        rows.append(_of_recording("recorded feet", stillness, foot.t_s))
+    for leg in read_sets(folder, LEGS)[0]:
+        stillness = Stillness()
+        thigh, shank = (np.linalg.norm(rate, axis=1) for rate in (leg.thigh, leg.shank))
+        stillness.add_legs([GyroBlock(leg.t_s, thigh, shank, leg.belt, np.full(len(leg.t_s), np.nan))])
+        rows.append(_of_recording("recorded legs", stillness, leg.t_s))
+    return rows
+
+
+def _of_recording(name: str, stillness: Stillness, t_s: Floats) -> Row:
+    alarm = WearerAlarm()
+    for k in range(3):
+        alarm.step(float(k))  # on from the first sample, also before the walk
+    alarm.add(stillness.pop_windows())
+    kinds = [change.kind for _, change in alarm.changes if change]
+    counts = {"asked": kinds.count(AlarmKind.ASKING), "maydays": kinds.count(AlarmKind.MAYDAY)}
+    return {"name": name, "seed": 0, "hours": float(t_s[-1] - t_s[0]) / 3600.0, **counts}
+
+
+DAYS: dict[str, Callable[[int], Row]] = {
+    name: partial(work_day, pauses, answered, name)
+    for name, pauses, answered in (
+        ("day, each question answered", 1.0, 1.0),
+        (f"day, {100.0 * ANSWERED:.0f} % answered", 1.0, ANSWERED),
+        ("the same, movements half as often", 2.0, ANSWERED),
+        ("day, no question heard", 1.0, 0.0),
+    )
+}
+
+
+def one_run(days: int, data: Path, first: int, seed: int) -> list[Row]:
+    """A wearer who cannot move; with the first `days` seeds also the working days of one who can, with the first seed the recordings."""
+    rows = [incapacitated(seed)]
+    if seed - first < days:
+        rows += [day(seed) for day in DAYS.values()]
+    return rows + (recorded(data) if seed == first and data.is_dir() else [])
+
+
+def summarize(rows: Sequence[Row]) -> list[Row]:
+    """One row for each name."""
+    made: list[Row] = []
+    for group in rows_by_name(rows):
+        row: Row = {"name": group[0]["name"], "runs": len(group)}
+        if "told_s" in group[0]:
+            told = [r["told_s"] for r in group]
+            row |= {"told": sum(r["told"] for r in group), "median_s": float(np.median(told)), "longest_s": max(told)}
+        else:
+            hours = sum(r["hours"] for r in group)
+            counts = {key: sum(r[key] for r in group) for key in ("asked", "maydays")}
+            row |= {"hours": hours, **counts, "per_8h": 8.0 * counts["maydays"] / hours}
+        made.append(row)
+    return made
+
+
+def _tables(rows: Sequence[Row], _: StudyRequest) -> list[Table]:
+    told = f"told within {TOLD_S:.0f} s"
+    falls = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
+    days = {
+        "name": "",
+        "runs": "runs",
+        "hours": "hours",
+        "asked": "asked",
+        "maydays": "maydays",
+        "per_8h": "in 8 hours",
+    }
+    return [
+        Table("Wearers who cannot move (simulated)", [row for row in rows if "told" in row], falls),
+        Table("Wearers who can (days simulated, recordings real)", [row for row in rows if "hours" in row], days),
+    ]
+
+
+def incapacity_study(days: int, data: Path, first: int) -> Study:
+    """`runs` of a request: wearers who cannot move; `first`: its seed."""
+    return Study("incapacity", partial(one_run, days, data, first), summarize, _tables, journal=False, parquet=None)

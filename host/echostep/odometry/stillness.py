@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Stillness: since when the wearer has not moved, from the sensors themselves and not from the track.
+
+In: samples of the foot's MTx and of the leg gyros, with their times. Out: windows, with or without motion. Owns the extremes of the unfinished ones.
+A window of half a second has motion when the range of a channel (largest less smallest sample) exceeds its limit: so a slow bias, gravity and the
+orientation in which a wearer lies do not matter, and the result does not depend on how samples are cut into portions. Pings are not used: they change
+when others walk by.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.legs.trunk_path import GyroBlock
+
+WINDOW_S = 0.5
+# Limits by reason: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
+# public recordings: 0.04 rad/s, 0.16 m/s2). A foot that is lifted, turned or shifted exceeds them several times; breathing turns no shoe.
+FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
+LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range of 0.05 rad/s, breathing turns a belt by less than 0.03 rad/s
+MOST_WINDOWS = 100_000  # that wait to be read, half a day; beyond it the oldest are dropped
+
+
+class Window(NamedTuple):
+    """Half a second of one sensor that ends at `end_s`; `moved`: there was motion."""
+
+    end_s: float
+    moved: bool
+
+
+class MotionWindows:
+    """Windows of one sensor: `add` takes samples and returns the windows that they complete."""
+
+    def __init__(self, limits: Floats) -> None:
+        """`limits` (c,): of the range of each channel."""
+        self._limits = limits
+        self._index = -1  # of the unfinished window
+        self._low, self._high = np.full(len(limits), np.inf), np.full(len(limits), -np.inf)
+
+    def add(self, t_s: Floats, values: Floats) -> list[Window]:
+        """Windows completed by samples `values` (n, c) at `t_s` (n,); samples of an earlier window are skipped."""
+        index = np.floor(t_s / WINDOW_S).astype(np.int64)
+        kept = index >= self._index
+        index, values = index[kept], values[kept]
+        if not len(index):
+            return []
+        begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
+        low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
+        index = index[begins]
+        if index[0] == self._index:
+            low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
+        elif self._index >= 0:
+            index = np.r_[self._index, index]
+            low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
+        self._index, self._low, self._high = int(index[-1]), low[-1], high[-1]
+        moved: list[bool] = np.any((high - low)[:-1] > self._limits, axis=1).tolist()
+        ends_s = WINDOW_S * (index[:-1] + 1.0)
+        return [Window(*row) for row in zip(ends_s.tolist(), moved, strict=True)]
+
+
+class Stillness:
+    """Windows of foot and legs. A sensor counts from its first motion on: one that has never moved is not worn."""
+
+    def __init__(self) -> None:
+        self._foot = MotionWindows(np.array([FOOT_RAD_S] * 3 + [FOOT_M_S2] * 3))
+        self._legs = MotionWindows(np.array([LEG_RAD_S] * 3))
+        self._worn: set[MotionWindows] = set()
+        self._windows: deque[Window] = deque(maxlen=MOST_WINDOWS)
+
+    def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats) -> None:
+        """Samples of the foot: t_s (n,), gyro (n, 3) rad/s, accel (n, 3) m/s2."""
+        self._keep(self._foot, self._foot.add(t_s, np.hstack([gyro, accel])))
+
+    def add_legs(self, blocks: Sequence[GyroBlock]) -> None:
+        """Blocks of the leg gyros."""
+        for block in blocks:
+            self._keep(self._legs, self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt])))
+
+    def pop_windows(self) -> list[Window]:
+        """The windows since the last call, in order of time."""
+        windows = sorted(self._windows)
+        self._windows.clear()
+        return windows
+
+    def _keep(self, source: MotionWindows, windows: Sequence[Window]) -> None:
+        for window in windows:
+            if window.moved:
+                self._worn.add(source)
+            if source in self._worn:
+                self._windows.append(window)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""The wearer's alarm as a page shows and speaks it.
+
+In: the tracker. Out: `ShownAlarm`: plain data. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from echostep.alarm import MAYDAY_S, AlarmKind, AlarmReason
+from echostep.tracker import Tracker
+
+AGAIN_S = 5.0  # between two times that a sentence is spoken, by reason
+
+
+@dataclass(frozen=True, slots=True)
+class ShownAlarm:
+    """What is shown: `text`, and what is `spoken`, again whenever `times` changes. The names are keys of the frame's JSON."""
+
+    kind: str
+    text: str
+    spoken: str
+    times: int
+
+
+def shown_alarm(tracker: Tracker, *, has_team: bool) -> ShownAlarm | None:
+    """The present alarm; None while all is well. `has_team`: the run's reports go somewhere."""
+    alarm = tracker.alarm.alarm
+    if alarm is None:
+        return None
+    age_s = tracker.front_end.newest_s - alarm.since_s
+    age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
+    times = 1000 * alarm.number + int(age_s / AGAIN_S)
+    told = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
+    match alarm.kind, alarm.reason:
+        case AlarmKind.ASKING, _:
+            left_s = max(math.ceil(MAYDAY_S - age_s), 0)
+            text = f"Are you all right? Move, or tap. In {left_s} s it is a mayday."
+            return ShownAlarm(alarm.kind.value, text, "Are you all right? Move, or tap.", times)
+        case AlarmKind.MAYDAY, AlarmReason.HELP:
+            return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {told}", f"Mayday. {told}", times)
+        case AlarmKind.MAYDAY, _:
+            text = f"Mayday: no motion for {age_s:.0f} s. {told}"
+            return ShownAlarm(alarm.kind.value, text, f"Mayday. {told} Walk, or tap, if you are all right.", times)
+    return ShownAlarm(alarm.kind.value, "The mayday is over.", "The mayday is over.", 1000 * alarm.number)

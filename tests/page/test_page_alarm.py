@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""The wearer's alarm on the live page: it asks, it can be answered, and help can be called for, in Chromium."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from echostep.alarm import Alarm, AlarmKind, AlarmReason
+from echostep.page.elements.alarm import ShownAlarm, shown_alarm
+from echostep.page.mailbox import Mailbox
+from echostep.page.requests import parse_request
+from echostep.page.server import PageServer
+from echostep.ports.check_in import Call
+from echostep.tracker import Tracker
+from page.browser import LOCAL, PLAN, Walk, looking, picture, wait_for
+from page.frames import scene
+from waiting import until
+
+TEXT = "document.querySelector('#alarm-text').textContent"
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason", "age_s", "has_team", "words"),
+    [
+        (AlarmKind.ASKING, AlarmReason.STILL, 21.4, True, "In 9 s it is a mayday."),
+        (AlarmKind.MAYDAY, AlarmReason.STILL, 40.0, True, "no motion for 40 s. Your team has been alarmed."),
+        (AlarmKind.MAYDAY, AlarmReason.HELP, 1.0, False, "you asked for help. No team is connected"),
+        (AlarmKind.OVER, AlarmReason.HELP, 1.0, True, "The mayday is over."),
+    ],
+)
+def test_an_alarm_in_words(kind: AlarmKind, reason: AlarmReason, age_s: float, has_team: bool, words: str) -> None:
+    tracker = Tracker(PLAN)
+    assert shown_alarm(tracker, has_team=has_team) is None
+    tracker.front_end.newest_s = 100.0
+    tracker.alarm.alarm = Alarm(kind, reason, 1, 100.0 - age_s)
+    shown = shown_alarm(tracker, has_team=has_team)
+    assert shown
+    assert words in shown.text
+    assert shown.spoken
+
+
+def test_calls_are_requests_and_half_a_call_is_none() -> None:
+    assert parse_request('{"kind":"call","help":true}') == Call(help=True)
+    assert parse_request('{"kind":"call","help":false}') == Call(help=False)
+    for wrong in ({}, {"help": 1}, {"help": None}):
+        assert parse_request(json.dumps({"kind": "call"} | wrong)) is None
+
+
+@pytest.mark.parametrize("look", ["bright", "dark"])
+def test_the_page_asks_and_nothing_keeps_anybody_from_answering(browser: Any, look: str, tmp_path: Path) -> None:
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]
+
+    mailbox = Mailbox(PLAN, "test", replay=False)
+    asking = ShownAlarm("asking", "Are you all right? Move, or tap. In 9 s it is a mayday.", "Are you all right?", 1)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(replace(scene(), alarm=asking))
+        page = looking(browser, server.url, look)
+        wait_for(page, f"{TEXT}.startsWith('Are you all right?')")
+        found = Axe().run(page)
+        if look == "bright":
+            picture(page, "alarm", tmp_path)
+        page.click("#fine")
+        calls: list[Any] = []
+
+        def is_answered() -> bool:
+            calls.extend(mailbox.pop_check_ins())
+            return bool(calls)
+
+        assert until(is_answered)
+        mailbox.publish(replace(scene(), alarm=None))
+        wait_for(page, "document.querySelector('#alarm').hidden")
+        assert calls == [Call(help=False)]
+        assert not page.wrong
+        page.context.close()
+    assert found.violations_count == 0, found.generate_report()
+
+
+def test_help_is_called_for_and_taken_back(browser: Any) -> None:
+    with Walk(24.0, 1.0) as walk:
+        page = looking(browser, walk.page.url, "bright")
+        page.evaluate("() => { window.said = []; speechSynthesis.speak = ({ text }) => said.push(text); }")
+        page.click("#help")
+        wait_for(page, f"{TEXT}.startsWith('Mayday: you asked for help.')")
+        wait_for(page, "said.some((text) => text.startsWith('Mayday.'))")  # although speech is off
+        page.click("#fine")
+        wait_for(page, f"{TEXT} === 'The mayday is over.'")
+        assert page.locator("#fine").is_hidden()
+        assert not page.wrong
+        page.context.close()
