@@ -142,7 +142,10 @@ BeaconsPort = Annotated[
     typer.Option("--beacons", metavar="PORT", help="Port of a beacon gateway: serial, or udp://127.0.0.1:9000."),
 ]
 GuideTo = Annotated[
-    str | None, typer.Option("--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], or start.")
+    str | None,
+    typer.Option(
+        "--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], start, or wearer:NAME of the team."
+    ),
 ]
 
 

@@ -36,6 +36,7 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
+from echostep.ports.teammate import TEAM
 from echostep.settings import Settings
 from echostep.walls.level_sheet import lay_out_levels
 from echostep.xsens.reader import MtxCounts
@@ -132,6 +133,7 @@ class Tracker:
         self.gateway = Gateway()
         self.alarm = WearerAlarm()
         self.watchers: list[Watch] = []  # called in this order
+        self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # that wait for their segment
         self._check_ins = self._bad_check_ins = self._undone = 0
         self._before: BeforeCheckIn | None = None  # the newest check-in, while it can be undone
@@ -208,8 +210,12 @@ class Tracker:
         """Process many chunks; the estimates are those of the chunks one by one."""
         estimates: list[Estimate] = []
         for piece in portion.cut_after(PERSON):
-            for part in piece.cut_after(GATEWAY):
-                estimates += self._track(part)
+            for told in piece.cut_after(TEAM):
+                for part in told.cut_after(GATEWAY):
+                    estimates += self._track(part)
+                if from_team := told.of(TEAM).received:
+                    for hear in self.team_watchers:
+                        hear(from_team)
             self.alarm.add(self.front_end.stillness.pop_windows())
             check_in = piece.of(PERSON)
             if len(check_in.row):

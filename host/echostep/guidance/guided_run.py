@@ -12,6 +12,7 @@ import math
 from echostep.errors import EchostepError
 from echostep.guidance.cue_list import CueList
 from echostep.guidance.cues import Cue, CueKind, Guide
+from echostep.guidance.guided_rescue import GuidedRescue, rescued_wearer
 from echostep.guidance.guided_return import GuidedReturn
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
@@ -27,6 +28,10 @@ def guidance_of(tracker: Tracker, to: str | None) -> CueList | None:
     """The guidance of a run to a destination as given; None without one. Without a plan there is one destination, the start."""
     if to is None:
         return None
+    if (name := rescued_wearer(to)) is not None:
+        if not name or not tracker.plan.is_drawn:
+            raise EchostepError(f"--guide {to}: expected wearer:NAME, and a plan that shows the way")
+        return GuidedRescue(tracker, name)
     if tracker.plan.is_drawn:
         return GuidedRun(tracker, destination(to, tracker.plan))
     if to != "start":

@@ -47,6 +47,7 @@ from echostep.odometry.synchronizer import HEIGHT, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk, Portion, portion_of
+from echostep.ports.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, pack_mtdata
 
@@ -148,7 +149,7 @@ class FrontEnd:
 
     def _count_unknown_ports(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, GATEWAY, PERSON):
+            if port not in (BOARD, MTX, GATEWAY, PERSON, TEAM):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:

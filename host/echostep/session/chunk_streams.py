@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING
 
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
+from echostep.ports.teammate import TEAM
 from echostep.recording.recorder import Recorder
 from echostep.session.console import print_notices
 
 if TYPE_CHECKING:
     from echostep.page.live import LivePage
+    from echostep.session.team_ear import TeamEar
 
 LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
 
@@ -42,6 +44,16 @@ def with_check_ins(
         yield chunk
         for payload in page.pop_check_ins() if page else ():
             yield Chunk(PERSON, arrival_ns(chunk), payload)
+
+
+def with_team(
+    chunks: Iterable[Chunk | None], ear: TeamEar | None, arrival_ns: Callable[[Chunk | None], int]
+) -> Iterator[Chunk | None]:
+    """Insert what is heard of another wearer, each place behind the chunk after which it came."""
+    for chunk in chunks:
+        yield chunk
+        for payload in ear.pop() if ear else ():
+            yield Chunk(TEAM, arrival_ns(chunk), payload)
 
 
 def recorded(

@@ -22,7 +22,7 @@ from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
-from echostep.session.chunk_streams import portions_of, recorded, with_check_ins
+from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_team
 from echostep.session.console import console, print_notices
 from echostep.session.metadata import clock_metadata, plan_of, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
@@ -32,6 +32,7 @@ from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
 from echostep.session.starts import check_start
+from echostep.session.team_ear import TeamEar
 from echostep.settings import parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
@@ -57,7 +58,9 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         with session:
             with start_recording(folder / "walk.mcap", metadata, ports.keep) as recorder:
-                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session.page)
+                chunks = _recorded_chunks(
+                    opened, recorder, settings.mtx.rate_hz, ports.seconds, session.page, session.ear
+                )
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
@@ -95,10 +98,16 @@ def _open_ports(options: PortOptions) -> SerialPorts:
 
 
 def _recorded_chunks(
-    ports: SerialPorts, recorder: Recorder, rate_hz: float, seconds: float | None, page: LivePage | None = None
+    ports: SerialPorts,
+    recorder: Recorder,
+    rate_hz: float,
+    seconds: float | None,
+    page: LivePage | None = None,
+    ear: TeamEar | None = None,
 ) -> Iterator[Chunk | None]:
     """Chunks of the ports and check-ins of the page, each recorded before anything else sees it. The MTx is set up on the way."""
     chunks = with_check_ins(_chunks_for(ports, seconds), page, lambda _: now_ns())
+    chunks = with_team(chunks, ear, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 

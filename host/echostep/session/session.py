@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
+from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
 from echostep.interruption import raise_lost
 from echostep.localization.estimate import Estimate
@@ -39,6 +40,7 @@ from echostep.tracker import Tracker
 if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
+    from echostep.session.team_ear import TeamEar
     from echostep.team.publish import Publishing, Source
 
 PAGE_POLL_S = 0.2
@@ -69,6 +71,7 @@ class Session:
         self.losses = Losses(tracker)
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
+        self.ear: TeamEar | None = None  # hears the wearer whom a rescuer is guided to
         self._publishing: Publishing | None = None
         self._foxglove: FoxgloveServer | None = None
         self._opened = ExitStack()
@@ -78,6 +81,7 @@ class Session:
         with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
             self._open_page(opened)
             self._open_publishing(opened)
+            self._open_ear(opened)
             self._open_foxglove(opened)
             self._opened = opened.pop_all()
         return self
@@ -136,6 +140,16 @@ class Session:
 
         self._foxglove = opened.enter_context(FoxgloveServer(self.output.foxglove, self.title))
         console.print(f"Foxglove: open connection, Foxglove WebSocket, {self._foxglove.url}", highlight=False)
+
+    def _open_ear(self, opened: ExitStack) -> None:
+        """A rescuer's live run listens to the other wearer; a replay has in its recording what was heard."""
+        if self.recorded is not None or not isinstance(self.guided, GuidedRescue):
+            return
+        from echostep.session.team_ear import TeamEar
+
+        print_line = partial(console.print, markup=False, highlight=False)
+        self.ear = TeamEar(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
+        opened.callback(self.ear.close)
 
     def track(
         self,
