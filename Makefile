@@ -33,13 +33,13 @@ twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL
 	$(MAKE) -C tools/twin
 	$(BIN)/python tools/twin/run.py $(if $(STILL),--still)
 
-demo: $(READY) ## track a simulated walk through the real firmware in the simulator
+demo: $(READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
 	@if tools/apt.sh $(APT_PACKAGES); then \
 		$(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin && \
-		$(BIN)/echostep demo --out out/demo --board-command "$(TWIN) --elf $(ELF)" $(DEMO); \
+		$(BIN)/echostep demo --out out/demo --board-command "$(TWIN) --elf $(ELF)" $(if $(KIT),--kit $(KIT)) $(DEMO); \
 	else \
 		echo "No right to install the AVR tools: the demo runs on the Python board, not on the real firmware."; \
-		$(BIN)/echostep demo --out out/demo $(DEMO); \
+		$(BIN)/echostep demo --out out/demo $(if $(KIT),--kit $(KIT)) $(DEMO); \
 	fi
 
 real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path, echoes simulated; prints the error

@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: MIT */
 #include "compass.h"
 #include "board.h"         /* twi_* */
+#include "cmps10.h"        /* driver */
 #include "configuration.h" /* rate, whether it is enabled */
-#include "link.h"          /* sending the messages */
-#include "parts.h"         /* what was found */
+#include "lis3mdl.h"       /* driver */
 #include "ranger.h"        /* ranger_quiet: the bus is kept free for triggers */
 #include "status.h"        /* error counter */
 
-/* Bearing in 0.1 degrees, big-endian, in registers 2 and 3 [Devantech CMPS10 documentation]. */
-#define ADDRESS 0x60u
-#define REGISTER_BEARING 2u
-#define BEARING_MAX 3599u
-
 #define RETRY_TICKS TICKS_PER_MS /* when the bus is in use, or a trigger is near */
+#define FIRST_SAMPLE_TICKS (50u * TICKS_PER_MS) /* of a LIS3MDL; it measures at 80 Hz */
+#define MISSES_MAX 10u           /* readings in a row that failed, a second, after which either part is sought again */
 
+/* A CMPS10 is assumed where no LIS3MDL answers. */
+static enum { SEEK_FIRST, SEEK_SECOND, START_FIRST, START_SECOND, READS_LIS3MDL, READS_CMPS10 } state;
 static struct twi_transfer transfer;
+static bool second;     /* the LIS3MDL is at its second address */
 static bool reading;    /* a transfer is under way */
-static uint32_t due;    /* next reading, ticks */
+static uint8_t misses;  /* readings in a row that failed */
+static uint32_t due;    /* next transfer, ticks */
 static uint32_t period; /* between readings, ticks */
 
 void compass_start(uint32_t now)
@@ -25,35 +26,74 @@ void compass_start(uint32_t now)
 	period = TICKS_PER_S / configuration.compass_rate_hz;
 }
 
-static void report(uint32_t ticks, uint16_t bearing)
+static uint8_t fault_of(enum twi_state bus)
 {
-	struct msg_compass m = { ticks, bearing };
-	link_send(MSG_COMPASS, msg_pack_compass(link_body(), &m));
+	return bus == TWI_DONE ? FAULT_NONE : bus == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK;
 }
 
-static void finish(enum twi_state state, uint32_t now)
+/* One transfer of the search: the identity at either address, then the settings. */
+static void seek_on(enum twi_state bus, uint32_t now)
 {
-	uint16_t bearing = (uint16_t)((uint16_t)(transfer.bytes[0] << 8) | transfer.bytes[1]);
-	reading = false;
-	if (state == TWI_DONE && bearing <= BEARING_MAX) {
-		status_ok(DEVICE_COMPASS);
-		parts_found(DEVICE_COMPASS, PART_CMPS10, 0);
-		report(transfer.ticks, bearing);
+	bool done = bus == TWI_DONE;
+	if (state == SEEK_FIRST || state == SEEK_SECOND) {
+		second = state == SEEK_SECOND;
+		if (done && lis3mdl_answers(&transfer))
+			state = START_FIRST;
+		else
+			state = second ? READS_CMPS10 : SEEK_SECOND;
 	} else {
-		status_failed(DEVICE_COMPASS, state == TWI_DONE ? FAULT_BAD_VALUE : state == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK);
-		report(now, MSG_COMPASS_BEARING_INVALID);
+		state = !done ? SEEK_FIRST : state == START_FIRST ? START_SECOND : READS_LIS3MDL;
+		due = state == READS_LIS3MDL ? now + FIRST_SAMPLE_TICKS : due;
 	}
 }
 
-/* Starts a transfer if the bus is free, and then sets the time of the next one. */
+static void note(uint8_t fault, uint32_t now)
+{
+	if (fault == FAULT_NONE) {
+		misses = 0;
+		status_ok(DEVICE_COMPASS);
+		return;
+	}
+	status_failed(DEVICE_COMPASS, fault);
+	if (state == READS_CMPS10 && fault != FAULT_BAD_VALUE)
+		cmps10_send_none(now);
+	if (++misses >= MISSES_MAX) {
+		misses = 0;
+		state = SEEK_FIRST;
+	}
+}
+
+static void finish(enum twi_state bus, uint32_t now)
+{
+	uint8_t fault = fault_of(bus);
+	reading = false;
+	if (state < READS_LIS3MDL) {
+		seek_on(bus, now);
+		return;
+	}
+	if (fault == FAULT_NONE)
+		fault = state == READS_LIS3MDL ? lis3mdl_finish(&transfer) : cmps10_finish(&transfer);
+	note(fault, now);
+}
+
+static void prepare(void)
+{
+	if (state == READS_CMPS10)
+		cmps10_prepare(&transfer);
+	else if (state == READS_LIS3MDL)
+		lis3mdl_prepare(&transfer, LIS3MDL_SAMPLE, second);
+	else if (state == START_FIRST || state == START_SECOND)
+		lis3mdl_prepare(&transfer, state == START_FIRST ? LIS3MDL_SETTINGS : LIS3MDL_MORE_SETTINGS, second);
+	else
+		lis3mdl_prepare(&transfer, LIS3MDL_IDENTITY, state == SEEK_SECOND);
+}
+
+/* Starts a transfer if the bus is free, and then sets the time of the next one: those of the search follow each other. */
 static void begin(uint32_t now)
 {
-	transfer.address = ADDRESS;
-	transfer.write_length = 1;
-	transfer.read_length = 2;
-	transfer.bytes[0] = REGISTER_BEARING;
+	prepare();
 	reading = twi_begin(&transfer);
-	if (!reading)
+	if (!reading || state < READS_LIS3MDL)
 		return;
 	due += period;
 	if (ticks_reached(now, due))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Devantech CMPS10 (CMPS03 class): the compass. `compass` messages at the configured rate. */
+/* The compass: finds which part is there; `compass` or `magnetic` messages at the configured rate. */
 #ifndef ECHOSTEP_COMPASS_H
 #define ECHOSTEP_COMPASS_H
 

@@ -31,6 +31,7 @@ static uint16_t *dropped(uint8_t id)
 	case MSG_PRESSURE:
 		return &status.dropped_pressure;
 	case MSG_COMPASS:
+	case MSG_MAGNETIC:
 		return &status.dropped_compass;
 	case MSG_SYNC:
 		return &status.dropped_sync;

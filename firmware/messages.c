@@ -206,6 +206,16 @@ uint8_t msg_pack_motion(uint8_t *out, const struct msg_motion *m)
 	return (uint8_t)(end - out);
 }
 
+uint8_t msg_pack_magnetic(uint8_t *out, const struct msg_magnetic *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put16(end, (uint16_t)m->x);
+	end = put16(end, (uint16_t)m->y);
+	end = put16(end, (uint16_t)m->z);
+	return (uint8_t)(end - out);
+}
+
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)

@@ -20,6 +20,7 @@
 #define MSG_GYRO_HEALTH_INVALID ((int16_t)-32768)
 #define MSG_BOARD_HEALTH_INVALID ((uint16_t)0)
 #define MSG_MOTION_INVALID ((int16_t)-32768)
+#define MSG_MAGNETIC_INVALID ((int16_t)-32768)
 
 enum {
 	MSG_IDENTITY = 0x01,
@@ -35,6 +36,7 @@ enum {
 	MSG_BOARD_HEALTH = 0x0B,
 	MSG_PARTS = 0x0C,
 	MSG_MOTION = 0x0D,
+	MSG_MAGNETIC = 0x0E,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
@@ -56,6 +58,7 @@ enum {
 	MSG_BOARD_HEALTH_SIZE = 14,
 	MSG_PARTS_SIZE = 21,
 	MSG_MOTION_SIZE = 40,
+	MSG_MAGNETIC_SIZE = 10,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
@@ -179,6 +182,7 @@ enum {
 	REPORTS_BOARD_HEALTH = 1,
 	REPORTS_PARTS = 2,
 	REPORTS_MOTION = 4,
+	REPORTS_MAGNETIC = 8,
 };
 
 /* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
@@ -355,6 +359,15 @@ struct msg_motion {
 	int16_t belt_acceleration_z; /* 0.244 mg, -32768: invalid */
 };
 uint8_t msg_pack_motion(uint8_t *out, const struct msg_motion *m);
+
+/* Magnetic field at the belt, of a magnetometer of three axes (LIS3MDL), at the compass's rate; `compass` is not sent then. */
+struct msg_magnetic {
+	uint32_t ticks; /* 0.5 us */
+	int16_t x; /* 1/6842 gauss, -32768: invalid */
+	int16_t y; /* 1/6842 gauss, -32768: invalid */
+	int16_t z; /* 1/6842 gauss, -32768: invalid */
+};
+uint8_t msg_pack_magnetic(uint8_t *out, const struct msg_magnetic *m);
 
 /* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */

@@ -11,7 +11,7 @@
 #define TRIGGER_TRIES 3u
 #define RETRY_TICKS TICKS_PER_MS          /* between tries */
 #define POLL_TICKS (TICKS_PER_MS / 2u)    /* between tries to get the bus */
-#define QUIET_TICKS TICKS_PER_MS          /* before a trigger the bus is kept free: longer than any other transfer */
+#define QUIET_TICKS (5u * TICKS_PER_MS / 4u) /* before a trigger the bus is kept free: longer than any other transfer, of 1.0 ms */
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
 #define MISSES_MAX 8u                     /* slots without an answer, half a second, after which any kind is sought again */
 

@@ -32,11 +32,11 @@ void board_start(void)
 	MCUSR = 0;
 	paint_free_memory();
 	power_timer0_disable();
+	power_timer3_disable();
 	power_usart1_disable();
 	ACSR = BIT(ACD);
 	SMCR = SLEEP_MODE_IDLE;
 	clock_start();
-	echo_start();
 	spi_start();
 	twi_start();
 	usb_start();

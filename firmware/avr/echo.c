@@ -3,6 +3,7 @@
  * runs at the same rate. A capture has no jitter but the timers' half microsecond, however late its interrupt is. */
 #include <avr/interrupt.h> /* ISR */
 #include <avr/io.h>        /* registers */
+#include <avr/power.h>     /* switching on Timer3 */
 #include <util/atomic.h>   /* ATOMIC_BLOCK */
 #include <util/delay.h>    /* length of the trigger pulse */
 #include "shared.h"
@@ -21,14 +22,18 @@
 
 static struct echo_pulse pulses[2]; /* shared with the capture interrupts: read with interrupts off */
 static volatile enum echo_state states[2] = { ECHO_OVER, ECHO_OVER };
+static bool started;
 static uint16_t timer_3_behind; /* Timer1 less Timer3 */
 
-void echo_start(void)
+/* At the first trigger: with SRF02 the pins stay inputs, and Timer3 stays off. */
+static void start(void)
 {
+	power_timer3_enable();
 	DDRF |= TRIGGER_LEFT | TRIGGER_RIGHT;
 	TCCR3A = 0;
 	TCCR3B = RISING_3;
 	timer_3_behind = (uint16_t)(TCNT1 - TCNT3);
+	started = true;
 }
 
 /* A change of the edge may set the capture's flag: it is cleared. */
@@ -53,6 +58,8 @@ bool echo_begin(uint8_t side)
 	uint8_t trigger = side == LEFT ? TRIGGER_LEFT : TRIGGER_RIGHT;
 	if (line_is_taken(side))
 		return false;
+	if (!started)
+		start();
 	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		states[side] = ECHO_WAITING;

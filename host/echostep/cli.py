@@ -19,6 +19,7 @@ from echostep.commands.plan import app as plan_app
 from echostep.commands.recordings import app as logs
 from echostep.errors import EchostepError
 from echostep.interruption import end_by_signals
+from echostep.simulation.kits import Kit
 
 if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveAddress
@@ -182,6 +183,10 @@ def demo(
             max=100.0,
         ),
     ] = None,
+    kit: Annotated[
+        Kit,
+        typer.Option(help="Parts on the board: of the papers, or of 2026 (not built yet; with --board-command only)."),
+    ] = Kit.PAPERS,
     browser: Annotated[
         bool,
         typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False),
@@ -193,7 +198,7 @@ def demo(
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, browser and sys.stdout.isatty())
-    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed), output)
+    demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit), output)
 
 
 @app.command()

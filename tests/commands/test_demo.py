@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from websockets.sync.client import ClientConnection
 
-from board_runs import ROOT
+from board_runs import ELF, ROOT, TWIN, needs_twin
 from command_line import echostep
 from echostep.localization.metrics import load_truth
 from echostep.page.elements.true_position import TruePath
@@ -32,7 +32,8 @@ from page.frames import header, opened_url
 from waiting import PATIENCE_S
 from walks import walk_chunks
 
-PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+PLAN_FILE = ROOT / "host/echostep/plans/demo.json"
+PLAN = load_plan(PLAN_FILE)
 
 
 def sha_of(text: str) -> str:
@@ -161,3 +162,28 @@ def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
     empty = echostep("demo", "--headless", "--plan", tmp_path / "plan.json", "--out", tmp_path / "out")
     assert (empty.returncode, empty.stderr.count("\n")) == (2, 1)
     assert "name some rooms" in empty.stderr
+
+
+KIT_2026 = ("--kit", "2026", "--board-command", f"{TWIN} --elf {ELF}")
+
+
+@needs_twin
+def test_the_kit_of_2026_ends_within_the_figures_of_the_papers_kit(tmp_path: Path) -> None:
+    """Through the real firmware: mean error at most 0.10 m, the ellipse holds the truth 93 to 100 % of the time; its recording is replayed alike."""
+    done = echostep("demo", "--headless", *KIT_2026, "--out", tmp_path / "a")
+    assert done.returncode == 0, done.stderr
+    assert "parts of 2026, not built yet" in done.stdout
+    mean = re.search(r"error: mean ([0-9.]+) m", done.stdout)
+    share = re.search(r"holds the truth ([0-9]+) % of the time", done.stdout)
+    assert mean, done.stdout
+    assert share, done.stdout
+    assert float(mean[1]) <= 0.10
+    assert int(share[1]) >= 93
+    again = echostep("replay", tmp_path / "a" / "walk.mcap", "--plan", PLAN_FILE, "--headless", "--out", tmp_path / "b")
+    assert sha_of(again.stdout) == sha_of(done.stdout)
+
+
+def test_the_python_board_does_not_play_the_kit_of_2026(tmp_path: Path) -> None:
+    done = echostep("demo", "--headless", "--kit", "2026", "--out", tmp_path)
+    assert done.returncode == 2
+    assert "needs the real firmware in the simulator: make demo KIT=2026" in done.stderr

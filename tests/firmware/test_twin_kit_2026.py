@@ -403,3 +403,95 @@ def test_a_part_that_is_neither_gyro_is_not_read(bench: Bench) -> None:
     assert {x.thigh for x in found if isinstance(x, m.Gyros)} == {-32768}
     assert bench.status.errors_thigh
     assert not kinds(found)["Motion"]
+
+
+@pytest.fixture
+def magnetometer(bench: Bench) -> Bench:
+    """A board of the papers with a LIS3MDL, subscribed."""
+    bench.fault("part_compass=lis3mdl")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_200)
+    return bench
+
+
+def fields_of(found: list[m.Message]) -> list[tuple[int, ...]]:
+    return [x[1:] for x in found if isinstance(x, m.Magnetic)]
+
+
+def test_the_field_of_a_lis3mdl_comes_at_the_compass_rate(magnetometer: Bench) -> None:
+    found = magnetometer.run(2_000, extended_rows(2_000))
+    assert 19 <= len(fields_of(found)) <= 21
+    assert fields_of(found)[-1] == (1_000, -2_000, 3_000)
+    assert not kinds(found)["Compass"]
+    assert parts(magnetometer).part_compass == m.Part.LIS3MDL
+    assert parts(magnetometer).identity_compass == 0x3D
+    assert magnetometer.status.errors_compass == 0
+    assert kinds(found)["Ping"] >= 56  # the bus is shared with SRF02
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause", "words"),
+    [
+        ("absent", m.Fault.NO_ANSWER, "compass (LIS3MDL): does not answer at I2C address 0x1C or 0x1E"),
+        ("nack", m.Fault.NO_ANSWER, "compass (LIS3MDL): does not answer at I2C address 0x1C or 0x1E"),
+        ("never_ready", m.Fault.NEVER_READY, "compass (LIS3MDL): has no new field"),
+    ],
+)
+def test_a_lis3mdl_that_fails_is_named_and_comes_back(
+    magnetometer: Bench, kind: str, cause: m.Fault, words: str
+) -> None:
+    magnetometer.fault(f"lis3mdl={kind}")
+    magnetometer.run(200)
+    found = magnetometer.run(2_000)
+    assert not fields_of(found)
+    assert cause in {x.fault_compass for x in found if isinstance(x, m.Status)}
+    assert any(text.startswith(words) for text in all_findings(magnetometer))
+    magnetometer.fault("lis3mdl=ok")
+    magnetometer.run(3_000)
+    assert len(fields_of(magnetometer.run(1_000))) >= 9
+    assert magnetometer.status.healthy & m.Healthy.COMPASS
+
+
+def test_a_wrong_magnetometer_is_named(bench: Bench) -> None:
+    bench.fault("part_compass=lis3mdl")
+    bench.fault("lis3mdl=wrong_identity")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(2_000)
+    words = "compass: holds a part that the firmware does not know (identity register 0x40)"
+    assert any(text.startswith(words) for text in all_findings(bench))
+
+
+def test_compasses_may_be_swapped_in_mid_walk(magnetometer: Bench) -> None:
+    for part, kind, name in (("cmps10", "Compass", m.Part.CMPS10), ("lis3mdl", "Magnetic", m.Part.LIS3MDL)):
+        magnetometer.fault(f"part_compass={part}")
+        magnetometer.run(3_500)
+        assert kinds(magnetometer.run(1_000))[kind] >= 9
+        assert parts(magnetometer).part_compass == name
+
+
+def test_an_older_host_reads_the_kit_of_2026_but_for_its_compass(bench: Bench) -> None:
+    """A host that subscribes to nothing gets the messages that it knows."""
+    bench.fault("kit=2026")
+    bench.run(1_500)
+    found = kinds(bench.run(2_000))
+    assert set(found) <= {"Ping", "Gyros", "Pressure", "Identity", "Status", "GyroHealth"}
+    assert found["Ping"] >= 56
+    assert found["Gyros"] >= 399
+    assert found["Pressure"] >= 24
+
+
+def test_the_whole_kit_of_2026_at_once_keeps_all_rates(bench: Bench) -> None:
+    bench.fault("kit=2026")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_500)
+    found = kinds(bench.run(5_000, extended_rows(5_000)))
+    assert found["Ping"] >= 5 * 28
+    assert min(found["Gyros"], found["Motion"]) >= 998
+    assert found["Magnetic"] >= 48
+    assert bench.reader.counts.lost == 0
+    assert not any(v for k, v in bench.status._asdict().items() if k.startswith(("dropped_", "errors_")))
+    assert bench.status.memory_used < 2_200
+    assert board_findings(reports(bench)) == []

@@ -28,6 +28,7 @@ static void power_devices(void)
 	scp1000_power();
 	compass_power();
 	bmp390_power();
+	lis3mdl_power();
 	lsm6dso_power();
 	pulse_power();
 }

@@ -12,6 +12,7 @@ static struct socket {
 } sockets[PLACES] = {
 	[PLACE_RANGER_LEFT] = { "part_ranger_left", "srf02", "pulse", pulse_power, false },
 	[PLACE_RANGER_RIGHT] = { "part_ranger_right", "srf02", "pulse", pulse_power, false },
+	[PLACE_COMPASS] = { "part_compass", "cmps10", "lis3mdl", lis3mdl_power, false },
 	[PLACE_THIGH] = { "part_thigh", "adis16100", "lsm6dso", lsm6dso_power, false },
 	[PLACE_CALF] = { "part_calf", "adis16100", "lsm6dso", lsm6dso_power, false },
 	[PLACE_BELT] = { "part_belt", "adis16100", "lsm6dso", lsm6dso_power, false },

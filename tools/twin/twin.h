@@ -151,12 +151,14 @@ void pulse_resume(void);
 bool pulse_fault(const char *name, const char *value);
 void lsm6dso_power(void);
 bool lsm6dso_fault(const char *name, const char *value);
+void lis3mdl_power(void);
+bool lis3mdl_fault(const char *name, const char *text);
 void bmp390_power(void);
 void bmp390_resume(void);
 bool bmp390_fault(const char *name, const char *value);
 
 /* kit.c: which part is in which place. */
-enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_THIGH, PLACE_CALF, PLACE_BELT, PLACE_PRESSURE, PLACES };
+enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_COMPASS, PLACE_THIGH, PLACE_CALF, PLACE_BELT, PLACE_PRESSURE, PLACES };
 bool kit_of_2026(enum place place);
 bool kit_fault(const char *name, const char *value);
 

@@ -20,10 +20,11 @@ from echostep.board.findings import (
     field_suffix,
     increase,
     name_of,
+    part_in,
     span_s,
     status_field,
 )
-from echostep.board.messages import Fault, Healthy, PressureMode, Schedule, Sensors, Status
+from echostep.board.messages import Fault, Healthy, Part, PressureMode, Schedule, Sensors, Status
 from echostep.board.restart_findings import restart_findings, supply_findings
 
 __all__ = [
@@ -41,6 +42,7 @@ _STREAMS = {  # by message: subject and unit of a finding, devices
     "Ping": ("rangers", "pings", Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT),
     "Gyros": ("gyros", "samples", Healthy(0)),
     "Compass": ("compass", "bearings", Healthy.COMPASS),
+    "Magnetic": ("compass", "fields", Healthy.COMPASS),
     "Pressure": ("barometer", "samples", Healthy.PRESSURE),
 }
 
@@ -107,6 +109,7 @@ def expected_rates(reports: BoardReports) -> dict[str, float]:
     c, on = reports.configuration, reports.sensors
     schedule = Schedule.CONCURRENT if c is None else Schedule(c.schedule)
     mode = PressureMode.HIGH_SPEED if c is None else PressureMode(c.pressure_mode)
+    compass = "Magnetic" if part_in(reports, Healthy.COMPASS) is Part.LIS3MDL else "Compass"
     rangers = (on & (Sensors.RANGER_LEFT | Sensors.RANGER_RIGHT)).bit_count()
     return {
         name: rate
@@ -117,7 +120,7 @@ def expected_rates(reports: BoardReports) -> dict[str, float]:
                 DEFAULT_GYROS_HZ if c is None else float(c.gyro_rate_hz),
                 on & (Sensors.THIGH | Sensors.CALF | Sensors.BELT),
             ),
-            ("Compass", DEFAULT_COMPASS_HZ if c is None else float(c.compass_rate_hz), on & Sensors.COMPASS),
+            (compass, DEFAULT_COMPASS_HZ if c is None else float(c.compass_rate_hz), on & Sensors.COMPASS),
             ("Pressure", PRESSURE_HZ[mode], on & Sensors.PRESSURE),
         )
         if there

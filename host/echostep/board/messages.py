@@ -134,6 +134,7 @@ class Reports(IntFlag):
     BOARD_HEALTH = 1
     PARTS = 2
     MOTION = 4
+    MAGNETIC = 8
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -600,6 +601,34 @@ class Motion(NamedTuple):
         return cls._make(_MOTION.unpack(body))
 
 
+_MAGNETIC = struct.Struct("<Ihhh")
+MAGNETIC_INVALID = -32768
+
+
+class Magnetic(NamedTuple):
+    """Magnetic field at the belt, of a magnetometer of three axes (LIS3MDL), at the compass's rate; `compass` is not sent then."""
+
+    ticks: int  # 0.5 us
+    x: int  # 1/6842 gauss, -32768 = invalid
+    y: int  # 1/6842 gauss, -32768 = invalid
+    z: int  # 1/6842 gauss, -32768 = invalid
+
+    @property
+    def id(self) -> int:
+        return 0x0E
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _MAGNETIC.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Magnetic:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 10:
+            raise ValueError(f"magnetic: {len(body)} bytes, expected 10")
+        return cls._make(_MAGNETIC.unpack(body))
+
+
 _IDENTIFY = struct.Struct("<")
 
 
@@ -770,6 +799,7 @@ Message = (
     | BoardHealth
     | Parts
     | Motion
+    | Magnetic
     | Identify
     | ClockQuery
     | Configure
@@ -792,6 +822,7 @@ BY_ID: dict[int, type[Message]] = {
     0x0B: BoardHealth,
     0x0C: Parts,
     0x0D: Motion,
+    0x0E: Magnetic,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
@@ -956,6 +987,14 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("belt_acceleration_x", "<i2"),
             ("belt_acceleration_y", "<i2"),
             ("belt_acceleration_z", "<i2"),
+        ]
+    ),
+    0x0E: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("x", "<i2"),
+            ("y", "<i2"),
+            ("z", "<i2"),
         ]
     ),
     0x81: np.dtype([]),

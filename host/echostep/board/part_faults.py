@@ -32,8 +32,20 @@ _LSM6DSO = {
     Fault.NO_ANSWER: ("does not answer", f"{_SPI} and its chip select (thigh D8, calf D9, belt D10)"),
     Fault.NEVER_READY: ("has no new rates", f"it may have lost its supply for a moment: {_SPI}"),
 }
-_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {Part.BMP390: _BMP390, Part.PULSE: _PULSE, Part.LSM6DSO: _LSM6DSO}
-_WANTED = {Healthy.PRESSURE: "0x60 is a BMP390"}  # identities of the parts that the firmware knows, by place
+_LIS3MDL = {
+    Fault.NO_ANSWER: ("does not answer at I2C address 0x1C or 0x1E", "check its plug and 5 V, SDA (D2) and SCL (D3)"),
+    Fault.NEVER_READY: ("has no new field", "it may have lost its supply for a moment: check its plug and 5 V"),
+}
+_TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {
+    Part.BMP390: _BMP390,
+    Part.PULSE: _PULSE,
+    Part.LSM6DSO: _LSM6DSO,
+    Part.LIS3MDL: _LIS3MDL,
+}
+_WANTED = {
+    Healthy.PRESSURE: "0x60 is a BMP390",
+    Healthy.COMPASS: "0x3D is a LIS3MDL",
+}  # identities of the parts that the firmware knows, by place
 
 
 SIX_AXES_TESTS = {  # what is wrong and the remedy, by the outcome of the self-test

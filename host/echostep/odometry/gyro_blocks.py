@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, compass_headings, gyro_rates
 from echostep.board.frames import Frames
 from echostep.board.messages import BY_ID, Compass, Gyros
+from echostep.board.tilt_compass import TiltCompass
 from echostep.legs.trunk_path import GyroBlock
 from echostep.timing.timeline import Times
 
@@ -29,6 +30,7 @@ class GyroBlocks:
         self._gyro = gyro
         self._rows = np.empty((0, COLUMNS))  # of the unfinished block
         self._compass = np.nan  # heading read since the last sample, rad
+        self._tilt_compass = TiltCompass()
 
     def cut(self, frames: Frames, times: Times) -> list[tuple[int, GyroBlock]]:
         """The blocks that are full, each with the index of the message that fills it."""
@@ -43,10 +45,10 @@ class GyroBlocks:
     def _timed_rows(self, frames: Frames, times: Times) -> Floats:
         """Rows (n, COLUMNS) of the gyro samples that have a time."""
         sample_row, samples = frames.rows(_IDS[Gyros])
-        compass_row, bearings = frames.rows(_IDS[Compass])
+        compass_row, headings = self._headings(frames)
         compass = np.full(len(sample_row) + 1, np.nan)  # by the sample that follows the reading
         compass[0] = self._compass
-        compass[np.searchsorted(sample_row, compass_row)] = compass_headings(bearings)
+        compass[np.searchsorted(sample_row, compass_row)] = headings
         self._compass = compass[-1]
         rows = np.column_stack(
             [
@@ -57,3 +59,11 @@ class GyroBlocks:
             ]
         )
         return rows[~np.isnan(rows[:, T_S])]
+
+    def _headings(self, frames: Frames) -> tuple[Ints, Floats]:
+        """Row of the frame (n,) and heading (n,) of each reading of a compass or a magnetometer, in order."""
+        bearing_row, bearings = frames.rows(_IDS[Compass])
+        field_row, headings = self._tilt_compass.headings(frames)
+        row = np.concatenate([bearing_row, field_row])
+        order = np.argsort(row, kind="stable")
+        return row[order], np.concatenate([compass_headings(bearings), headings])[order]

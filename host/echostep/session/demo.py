@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
+from echostep.errors import EchostepError
 from echostep.localization.metrics import load_truth
 from echostep.page.elements.true_position import TruePath
 from echostep.plan.importers.limited import open_limited
@@ -28,8 +29,10 @@ from echostep.session.progress import progress_line
 from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
+from echostep.settings import parse_settings
 from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import Board, BoardProcess, PythonBoard
+from echostep.simulation.kits import Kit
 from echostep.simulation.people.tours import room_tour
 from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
@@ -46,6 +49,7 @@ class DemoOptions:
     """`board_command` starts the program that plays the board; `guide` adds beacons and guidance to the end of the walk.
 
     `plan_path` None: the demo's plan. `speed`: times real time; None: `WATCHED_SPEED` on a terminal, else as fast as it can.
+    `kit`: the parts on the board; those of 2026 need the real firmware in the simulator.
     """
 
     seed: int
@@ -53,6 +57,7 @@ class DemoOptions:
     guide: bool = False
     plan_path: Path | None = None
     speed: float | None = None
+    kit: Kit = Kit.PAPERS
 
 
 def demo(options: DemoOptions, output: OutputOptions) -> None:
@@ -60,6 +65,8 @@ def demo(options: DemoOptions, output: OutputOptions) -> None:
     with _plan_file(options) as plan_path:
         plan = open_limited(plan_path)
     waypoints = DEMO_WAYPOINTS if options.plan_path is None else room_tour(plan)
+    if options.kit is Kit.OF_2026 and options.board_command is None:
+        raise EchostepError("the kit of 2026 needs the real firmware in the simulator: make demo KIT=2026")
     with closing(_board(options)) as board:
         output = replace(output, folder=output_folder(output.folder))
         _track(board, plan, waypoints, options, output)
@@ -71,11 +78,17 @@ def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
     return as_file(files("echostep") / "plans" / "demo.json") if path is None else nullcontext(path)
 
 
+def _settings_of(kit: Kit) -> str:
+    """Settings (TOML) that fit the kit's rangers; none for the papers'."""
+    return (files("echostep") / "firmware" / "kit-2026.toml").read_text() if kit is Kit.OF_2026 else ""
+
+
 def _board(options: DemoOptions) -> Board:
     command = options.board_command
     player = "the real firmware in the simulator" if command else "the Python board, not the real firmware"
     board = BoardProcess(shlex.split(command)) if command else PythonBoard(seed=options.seed)
-    console.print(f"A simulated walk in a simulated building; the sensor board is {player}.")
+    parts = "of 2026, not built yet" if options.kit is Kit.OF_2026 else "of the papers, the default"
+    console.print(f"A simulated walk in a simulated building; the sensor board is {player}, with the parts {parts}.")
     return board
 
 
@@ -83,7 +96,8 @@ def _track(
     board: Board, plan: Plan, waypoints: Sequence[Waypoint], options: DemoOptions, output: OutputOptions
 ) -> None:
     start = start_of(plan, waypoints)
-    tracker = Tracker(plan, start, seed=options.seed)
+    settings_toml = _settings_of(options.kit)
+    tracker = Tracker(plan, start, seed=options.seed, settings=parse_settings(settings_toml, "the kit's settings"))
     speed = options.speed or (WATCHED_SPEED if console.is_terminal and output.watched else None)
     title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
     end = _place_text(plan, waypoints) if options.guide else None
@@ -91,10 +105,12 @@ def _track(
         session.prepare()
         with progress_line("Simulating the walk"):
             person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
-            scenario = Scenario(plan, waypoints, options.seed, board, person)
+            scenario = Scenario(plan, waypoints, options.seed, board, person, kit=options.kit)
         scenario.write_truth(output.folder / "truth.csv")
         session.show_truth(TruePath.of(scenario.truth, plan))
-        metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)
+        metadata = run_metadata(
+            plan, start, options.seed, "simulated walk, simulated sensors", settings_toml, SIMULATED
+        )
         with start_recording(output.folder / "walk.mcap", metadata) as recorder:
             chunks = with_beacons(scenario, plan, options.seed) if options.guide else scenario.chunks()
             portions = _portions(chunks, session, recorder, speed)

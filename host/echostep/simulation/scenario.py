@@ -16,10 +16,13 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.board.frames import encode
 from echostep.board.messages import Configure
+from echostep.board.subscription import SUBSCRIBE
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.simulation.devices.board import Board
+from echostep.simulation.devices.kit_2026 import Kit2026Sensors
 from echostep.simulation.devices.mtx import MtxModel, stream
+from echostep.simulation.kits import Kit
 from echostep.simulation.people.walker import Person, Waypoint, walk
 from echostep.simulation.stimulus import BoardSensors
 from echostep.simulation.world.magnetic_field import MagneticField
@@ -40,14 +43,19 @@ class Scenario:
     def __init__(
         self, plan: Plan, waypoints: Sequence[Waypoint], seed: int, board: Board,
         person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
+        kit: Kit = Kit.PAPERS,
     ) -> None:  # fmt: skip
         """`configure` is sent to the board before it starts."""
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
         magnetism = MagneticField(streams[3])
         self.walk = walk(waypoints, person or Person(), streams[0])
         self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
-        self.sensors = BoardSensors(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)
+        kind = Kit2026Sensors if kit is Kit.OF_2026 else BoardSensors
+        self.sensors: BoardSensors | Kit2026Sensors = kind(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)
         self._board = board
+        if kit is Kit.OF_2026:
+            board.fault("kit=2026")
+            board.send(encode(SUBSCRIBE, 0))
         self.fraction = 0.0  # of the walk that is over
         if configure is not None:
             board.send(encode(configure, 0))

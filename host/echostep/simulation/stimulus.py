@@ -15,7 +15,7 @@ from echostep.arrays import Floats
 from echostep.plan.model import Level
 from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model
 from echostep.simulation.people.walker import Walk
-from echostep.simulation.world.acoustics import SRF02, speed_of_sound_m_s
+from echostep.simulation.world.acoustics import SRF02, Acoustics, speed_of_sound_m_s
 from echostep.simulation.world.echoes import echoes, ranger_bias_m
 from echostep.simulation.world.magnetic_field import MagneticField
 
@@ -37,11 +37,14 @@ class BoardSensors:
 
     def __init__(
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
-        magnetism: MagneticField | None = None, air_pa: Floats | None = None,
+        magnetism: MagneticField | None = None, air_pa: Floats | None = None, acoustics: Acoustics = SRF02,
+        barometer: Scp1000Model | None = None,
     ) -> None:  # fmt: skip
         """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone.
 
         Echoes come from the walls of the nearest level.
+
+        `acoustics`: of the rangers; `barometer`: another one than an SCP1000.
 
         `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), in the place of its heights.
         """
@@ -49,12 +52,12 @@ class BoardSensors:
         self._walls = [level.solid for level in levels]
         self._level = np.abs(walk.height_m[:, None] - [level.height_m for level in levels]).argmin(1)
         self._sync_us = np.rint(sync_t_s * 1e6).astype(np.int64)
-        self._acoustics = SRF02._replace(speed_m_s=speed_of_sound_m_s(TEMPERATURE_C))
+        self._acoustics = acoustics._replace(speed_m_s=speed_of_sound_m_s(TEMPERATURE_C))
         self._echo_rng, *rest = rng.spawn(6)
         self._range_bias_m = ranger_bias_m(self._echo_rng, self._acoustics)
         self._thigh, self._calf, self._belt = (Adis16100Model(r) for r in rest[:3])
         self._air_pa = air_pa
-        self._barometer = Scp1000Model(rest[3])
+        self._barometer = barometer or Scp1000Model(rest[3])
         self._compass = CompassModel(magnetism, rest[4])
 
     def rows(self, start: int, stop: int) -> NDArray[np.void]:

@@ -48,9 +48,10 @@ class Adis16100Model:
 class Scp1000Model:
     """A barometer."""
 
-    def __init__(self, rng: np.random.Generator, mode: Mode = "high-speed") -> None:
+    def __init__(self, rng: np.random.Generator, mode: Mode = "high-speed", noise_pa: float | None = None) -> None:
+        """`noise_pa`: of another part, rms."""
         self._rng = rng
-        self._noise_pa = PRESSURE_NOISE_PA[mode]
+        self._noise_pa = PRESSURE_NOISE_PA[mode] if noise_pa is None else noise_pa
         self._drift_pa = 0.0
 
     def counts(

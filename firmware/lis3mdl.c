@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT */
+#include "lis3mdl.h"
+#include "link.h"  /* sending the messages */
+#include "parts.h" /* what was found */
+
+/* Registers and values [LIS3MDL data sheet, chapters 6 and 7]. */
+#define ADDRESS_LOW 0x1Cu  /* SA1 low */
+#define ADDRESS_HIGH 0x1Eu /* SA1 high */
+#define COUNT_UP 0x80u     /* the addresses of a transfer count up */
+#define REGISTER_WHO_AM_I 0x0Fu
+#define REGISTER_CTRL_REG1 0x20u
+#define REGISTER_CTRL_REG4 0x23u
+#define REGISTER_STATUS 0x27u /* then x, y, z: 16 bits each, low byte first */
+#define IDENTITY 0x3Du
+#define CTRL_REG1_FINEST_80_HZ 0x7Cu
+#define CTRL_REG2_4_GAUSS 0x00u
+#define CTRL_REG3_CONTINUOUS 0x00u
+#define CTRL_REG4_FINEST_Z 0x0Cu
+#define CTRL_REG5_WHOLE_SAMPLES 0x40u
+#define STATUS_READY 0x08u
+#define SAMPLE_LENGTH 7u
+
+void lis3mdl_prepare(struct twi_transfer *transfer, enum lis3mdl_step step, bool second)
+{
+	static const struct {
+		uint8_t write_length, read_length, bytes[4];
+	} steps[] = {
+		[LIS3MDL_IDENTITY] = { 1, 1, { REGISTER_WHO_AM_I } },
+		[LIS3MDL_SETTINGS] = { 4, 0, { COUNT_UP | REGISTER_CTRL_REG1, CTRL_REG1_FINEST_80_HZ, CTRL_REG2_4_GAUSS, CTRL_REG3_CONTINUOUS } },
+		[LIS3MDL_MORE_SETTINGS] = { 3, 0, { COUNT_UP | REGISTER_CTRL_REG4, CTRL_REG4_FINEST_Z, CTRL_REG5_WHOLE_SAMPLES } },
+		[LIS3MDL_SAMPLE] = { 1, SAMPLE_LENGTH, { COUNT_UP | REGISTER_STATUS } },
+	};
+	transfer->address = second ? ADDRESS_HIGH : ADDRESS_LOW;
+	transfer->write_length = steps[step].write_length;
+	transfer->read_length = steps[step].read_length;
+	for (uint8_t n = 0; n < sizeof steps[step].bytes; n++)
+		transfer->bytes[n] = steps[step].bytes[n];
+}
+
+bool lis3mdl_answers(const struct twi_transfer *transfer)
+{
+	uint8_t identity = transfer->bytes[0];
+	bool answers = identity == IDENTITY;
+	if (answers || parts_in(DEVICE_COMPASS) == PART_NONE)
+		parts_found(DEVICE_COMPASS, answers ? PART_LIS3MDL : PART_NONE, identity);
+	return answers;
+}
+
+static int16_t word(const uint8_t *bytes)
+{
+	return (int16_t)(uint16_t)((uint16_t)(bytes[1] << 8) | bytes[0]);
+}
+
+uint8_t lis3mdl_finish(const struct twi_transfer *transfer)
+{
+	const uint8_t *b = transfer->bytes;
+	if (!(b[0] & STATUS_READY))
+		return FAULT_NEVER_READY;
+	struct msg_magnetic m = { transfer->ticks, word(b + 1), word(b + 3), word(b + 5) };
+	if (link_wants(REPORTS_MAGNETIC))
+		link_send(MSG_MAGNETIC, msg_pack_magnetic(link_body(), &m));
+	return FAULT_NONE;
+}

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Headings from a magnetometer of three axes, tilt-compensated with the belt's accelerometer.
+
+In: board frames. Out: the heading at each `Magnetic` message. Owns the specific forces of the last two seconds.
+
+The specific force of a walking trunk averages to gravity over a stride. Its mean over the last two seconds with triangular weights (two means over a
+second each: what the first leaves of the steps, the second takes away) gives the vertical; the field's part across it points north [Caruso 2000,
+Applications of Magnetic Sensors for Low Cost Compass Systems]. Magnetometer and belt IMU are mounted alike: x forward.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echostep.arrays import Floats, Ints
+from echostep.board.frames import Frames
+from echostep.board.messages import BY_ID, MAGNETIC_INVALID, MOTION_INVALID, Magnetic, Motion
+
+INTERVALS = 20  # of the magnetometer, two seconds: about two strides
+LEVEL = np.array([0.0, 0.0, 1.0])  # vertical without an accelerometer
+FULL_SCALE = 32_700  # counts: nearer to the end of the range an axis is saturated
+_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
+_FORCES = [f"belt_acceleration_{axis}" for axis in "xyz"]
+
+
+def heading_of(field: Floats, vertical: Floats) -> float:
+    """Heading of the x axis (rad, counter-clockwise from east) by field (3,) and vertical (3,) in the same axes; NaN where they are parallel."""
+    up = vertical / np.linalg.norm(vertical)
+    north = field - (field @ up) * up
+    ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
+    if np.linalg.norm(north) == 0.0 or np.linalg.norm(ahead) == 0.0:
+        return math.nan
+    return 0.5 * math.pi + math.atan2(float(np.cross(north, ahead) @ up), float(north @ ahead))
+
+
+class TiltCompass:
+    """Call `headings` with the frames of each portion, in order."""
+
+    def __init__(self) -> None:
+        self._sums: deque[NDArray[np.int64]] = deque(maxlen=INTERVALS)  # of the forces' counts, one for each interval
+        self._sum = np.zeros(
+            3, np.int64
+        )  # of the interval under way; integers, so that the sum does not depend on the portions
+
+    def headings(self, frames: Frames) -> tuple[Ints, Floats]:
+        """Row of the frame (n,) and heading (n,) of each `Magnetic` message; NaN for a field that was not measured or is saturated."""
+        motion_row, motions = frames.rows(_IDS[Motion])
+        magnetic_row, fields = frames.rows(_IDS[Magnetic])
+        forces = np.column_stack([motions[name] for name in _FORCES]).astype(np.int64)
+        forces[(forces == MOTION_INVALID).any(axis=1)] = 0
+        found = np.full(len(magnetic_row), np.nan)
+        begin = 0
+        for k, end in enumerate(np.searchsorted(motion_row, magnetic_row).tolist()):
+            self._sums.append(self._sum + forces[begin:end].sum(axis=0))
+            self._sum = np.zeros(3, np.int64)
+            begin = end
+            found[k] = self._heading(np.array([fields[axis][k] for axis in "xyz"], np.float64))
+        self._sum = self._sum + forces[begin:].sum(axis=0)
+        return magnetic_row, found
+
+    def _heading(self, counts: Floats) -> float:
+        if (counts == MAGNETIC_INVALID).any() or (np.abs(counts) >= FULL_SCALE).any():
+            return math.nan
+        rank = np.arange(len(self._sums))
+        force = (np.minimum(rank + 1, len(rank) - rank) @ np.array(self._sums)).astype(np.float64)
+        return heading_of(counts, force if force.any() else LEVEL)
