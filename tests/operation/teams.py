@@ -15,6 +15,7 @@ from echostep.plan.model import Plan
 from echostep.plan.whereabouts import Whereabouts
 from echostep.simulation.world.tower import tower
 from echostep.team.inbox import Inbox
+from echostep.team.marks import Mark, MarkKind
 from echostep.team.report import Position, Report, ReportedAlarm, encode, moment
 from team.team_reports import POSITION, report
 
@@ -95,6 +96,10 @@ def whole_team() -> Team:
     team = Team()
     x_m, y_m = TOWER.levels[0].rooms[0].at_m
     fallen = place(TOWER, x_m, y_m, 0)
+    kinds: tuple[MarkKind, ...] = ("cleared", "hazard", "meeting")
+    for k, kind in enumerate(kinds):
+        at = (x_m - 10.0 + 9.0 * k, y_m + 4.5 - 4.5 * (k == 2))
+        team.put_bytes(*Mark(1, f"{k:08x}", kind, *at, 0, "Ann", team.unix_s, TOWER.digest).message)
     for k in range(12):
         for n, name in enumerate(NAMES):
             angle = 0.15 * k + n

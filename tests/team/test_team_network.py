@@ -43,7 +43,7 @@ class Ear:
     def __init__(self, url: str) -> None:
         self.inbox, self.roster, self.times = Inbox(), Roster(), list[float]()
         self.words: list[str] = []
-        self.reception = Receiver(Listener(parse_endpoint(url), "echostep/+/+/+", self.hear), self.words.append)
+        self.reception = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+"], self.hear), self.words.append)
 
     def hear(self, topic: str | None, payload: bytes, retained: bool) -> None:
         self.inbox.put(topic, payload, retained)

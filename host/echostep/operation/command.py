@@ -28,6 +28,7 @@ from echostep.plan.model import load_plan
 from echostep.team.commander import as_tree, table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
+from echostep.team.marks import ALL
 from echostep.team.mqtt import Listener
 from echostep.team.picture import draw_team
 from echostep.team.report import checked_name
@@ -58,6 +59,8 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
             console.print(f"The page: {page.url}", highlight=False)
         receiver = _receiver(endpoint, team, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
+        if page:
+            page.feed.send = receiver.send
         with suppress(KeyboardInterrupt):
             _follow(operation, inbox, receiver, page, console, math.inf if seconds is None else seconds, views)
     operation.update(inbox, time.monotonic(), time.time())
@@ -66,8 +69,8 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
 
 def _receiver(endpoint: Endpoint, team: str | None, inbox: Inbox, print_line: Callable[[str], None]) -> Receiver:
     """A subscription to the reports of a team, or of all teams."""
-    topic = f"echostep/{checked_name('--team', team) if team else '+'}/+/+"
-    return Receiver(Listener(endpoint, topic, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
+    topics = [f"echostep/{checked_name('--team', team) if team else '+'}/+/+", ALL]
+    return Receiver(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
 
 
 def _follow(

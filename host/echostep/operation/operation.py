@@ -8,6 +8,7 @@ Any thread may ask; one lock guards all of it.
 from __future__ import annotations
 
 import math
+import secrets
 import threading
 from array import array
 from collections import deque
@@ -15,19 +16,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
+from echostep.operation import requests
 from echostep.operation.trails import Trails
 from echostep.operation.words import (
     ShownDetails,
     ShownEvent,
     ShownWearer,
+    alarm_key,
     level_on,
     shown_details,
+    shown_mark,
     shown_wearer,
     summary_words,
 )
+from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import rejected, take_messages
 from echostep.team.inbox import Inbox, ReceivedMessage
+from echostep.team.marks import ROOT, Mark, MarkBoard, ack_message, is_shared
+from echostep.team.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
 
 LIST_S = 0.5  # between two versions of the list, by reason: words are read, not watched
@@ -50,6 +57,7 @@ class TableScene:
     summary: str
     refused: str
     connected: bool
+    marks: tuple[ShownMark, ...] = ()
 
 
 @dataclass(slots=True)
@@ -67,6 +75,8 @@ class Operation:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.roster = Roster()
+        self._board = MarkBoard()
+        self._shown_marks: tuple[ShownMark, ...] = ()
         self._trails = Trails()
         self._followed: dict[Key, _Followed] = {}
         self._numbers = count(1)
@@ -85,8 +95,38 @@ class Operation:
     ) -> None:
         """Take messages, and counts of dropped ones by reason."""
         with self._lock:
-            take_messages(messages, dropped, self.roster)
+            take_messages([m for m in messages if not is_shared(m.topic)], dropped, self.roster)
+            for message in messages:
+                if message.topic is not None and is_shared(message.topic):
+                    self._receive_shared(message.topic, message.payload)
             self._follow(now_s, unix_s)
+
+    def _receive_shared(self, topic: str, payload: bytes) -> None:
+        self.roster.received += 1
+        try:
+            self._board.receive(topic, payload)
+            self._changed = True
+        except BadReportError as error:
+            self.roster.count_rejected(str(error))
+
+    def act(self, request: requests.Action, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
+        """The message that carries out what a page asks for, or why there is none."""
+        with self._lock:
+            match request:
+                case requests.SetMark() if request.level < len(self.plan.levels):
+                    identity, at = secrets.token_hex(4), (request.x_m, request.y_m, request.level)
+                    return Mark(1, identity, request.mark, *at, request.by, unix_s, self.plan.digest).message
+                case requests.Unmark(identity) if identity in self._board.marks:
+                    return f"{ROOT}/mark/{identity}", b""
+                case requests.Acknowledge(number, by):
+                    for m in self.roster.members(now_s):
+                        if self._number(m) == number and (key := alarm_key(m)) is not None:
+                            return ack_message(key, by, unix_s)
+        return "There is no such alarm, mark or floor any more."
+
+    def _number(self, m: Member) -> int | None:
+        followed = self._followed.get(m.key)
+        return followed.number if followed else None
 
     def scene(self, now_s: float, unix_s: float, *, connected: bool = True) -> TableScene:
         """The scene at a time of the commander's clock.
@@ -98,7 +138,8 @@ class Operation:
             if self._changed or now_s - self._listed_s >= LIST_S:
                 self._list(members, now_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
-            return TableScene(now_s, unix_s, places, self._rows, summary_words(members, now_s), refused, connected)
+            words = summary_words(members, now_s)
+            return TableScene(now_s, unix_s, places, self._rows, words, refused, connected, self._marks())
 
     def trail(self, begin: int, now_s: float) -> tuple[bytes, int]:
         """Rows of the trails from point number `begin` on, and the number of the next point."""
@@ -143,11 +184,18 @@ class Operation:
         """Make the list anew."""
         duplicates = self.roster.duplicates(now_s)
         self._rows = tuple(
-            shown_wearer(self._followed[m.key].number, m, self.plan, now_s, duplicates)
+            shown_wearer(self._followed[m.key].number, m, self.plan, now_s, duplicates, self._board)
             for m in members
             if m.key in self._followed
         )
         self._listed_s, self._changed = now_s, False
+
+    def _marks(self) -> tuple[ShownMark, ...]:
+        """The marks on this plan; the same object while they are the same."""
+        shown = tuple(shown_mark(m) for m in self._board.marks.values() if m.plan_sha256 == self.plan.digest)
+        if shown != self._shown_marks:
+            self._shown_marks = shown
+        return self._shown_marks
 
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")

@@ -26,7 +26,7 @@ class TablePage:
     """Serves the scenes that are published until it is closed; raises EchostepError when it cannot listen at the address."""
 
     def __init__(self, operation: Operation, title: str, address: Address) -> None:
-        self._feed = feed = TableFeed(operation, title)
+        self.feed = feed = TableFeed(operation, title)
         faults, counts = Faults(), PageCounts()
         self.notices: deque[str] = faults.notices  # faults of the server that are not printed yet
 
@@ -44,13 +44,13 @@ class TablePage:
 
     def publish(self, scene: TableScene) -> None:
         """Show a scene on all pages; never waits."""
-        self._feed.publish(scene)
+        self.feed.publish(scene)
 
     def __enter__(self) -> Self:
-        self._feed.on_publish = self.server.request_wake
+        self.feed.on_publish = self.server.request_wake
         self.server.__enter__()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._feed.on_publish = None
+        self.feed.on_publish = None
         self.server.__exit__(kind, error, at)

@@ -13,10 +13,11 @@ from collections.abc import Callable
 
 from starlette.websockets import WebSocket
 
-from echostep.operation import wire
+from echostep.operation import requests, wire
 from echostep.operation.operation import Operation, TableScene
 from echostep.page.faults import Faults
 from echostep.page.guarded_socket import FRAME_S, GuardedSocket
+from echostep.page.protocol import Refused
 from echostep.page.shared import PageCounts
 
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
@@ -30,6 +31,16 @@ class TableFeed:
         self.title = title
         self.latest: TableScene | None = None
         self.on_publish: Callable[[], None] | None = None
+        self.send: Callable[[str, bytes], bool] | None = None  # topic and payload, to the broker
+
+    def act(self, request: requests.Action) -> str:
+        """Send what a page asks for to the broker, from which it comes back to all commanders; returns why not, or nothing."""
+        message = self.operation.act(request, time.time(), time.monotonic())
+        if isinstance(message, str):
+            return message
+        if self.send is None or not self.send(*message):
+            return "Not sent: the broker does not take it."
+        return ""
 
     def publish(self, scene: TableScene) -> None:
         """Replace the scene and call `on_publish`."""
@@ -55,15 +66,20 @@ class TableSession(GuardedSocket):
         await self.tell(wire.encode(wire.table_hello(self._feed.operation.plan, self._feed.title)))
 
     async def _handle(self, text: str | None) -> None:
-        match wire.parse_request(text):
+        request = requests.parse_request(text)
+        match request:
             case None:
                 self._counts.unknown += 1
-            case wire.Drawn(seq):
+            case requests.Drawn(seq):
                 self._undrawn.discard(seq)
                 self._news.set()
-            case wire.Choose(number):
+            case requests.Choose(number):
                 self._chosen, self._due = number, True
                 self._news.set()
+            case _:
+                if refusal := self._feed.act(request):
+                    self._counts.refused += 1
+                    await self.tell(wire.encode(Refused(refusal)))
 
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
@@ -87,5 +103,6 @@ class TableSession(GuardedSocket):
         lists = self._due or self._last is None or scene.rows is not self._last.rows
         trail, self._trail_end = operation.trail(begin, scene.t_s)
         details = operation.details(self._chosen, scene.t_s) if lists and self._chosen is not None else None
+        marks = self._last is None or scene.marks is not self._last.marks
         self._last, self._due = scene, False
-        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, details))
+        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, marks, details))

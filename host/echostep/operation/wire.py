@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Everything that goes to a commander's page and comes from it: typed messages and their bytes.
+"""Everything that goes to a commander's page: typed messages and their bytes.
 
-In: scenes, details; texts of pages, which may be damaged or hostile. Out: JSON for texts, bytes for frames; requests. Owns the limits. A frame,
-little-endian:
+In: scenes, details. Out: JSON for texts, bytes for frames. Owns nothing. A frame, little-endian:
 
     u32         length of the JSON header, padded with spaces to a multiple of four
     bytes       the header (`TableHeader`)
@@ -13,15 +12,14 @@ little-endian:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
-from msgspec import Meta
 
 from echostep.operation.operation import TableScene
 from echostep.operation.words import ShownDetails, ShownWearer
-from echostep.page.protocol import PlanLabels, hello
-from echostep.page.requests import MOST_REQUEST
+from echostep.page.elements.marks import ShownMark
+from echostep.page.protocol import PlanLabels, Refused, hello
 from echostep.plan.model import Plan
 
 PLACE_BYTES, TRAIL_BYTES = 7 * 4, 5 * 4
@@ -40,7 +38,10 @@ class TableHello:
 
 @dataclass(frozen=True, slots=True)
 class TableHeader:
-    """One moment. `seq`: the page returns it when the frame is drawn. `list`: None when the page has it already. `details`: of the chosen wearer."""
+    """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`: None when the page has them already.
+
+    `details`: of the chosen wearer.
+    """
 
     seq: int
     unix_s: float
@@ -52,26 +53,14 @@ class TableHeader:
     refused: str
     connected: bool
     details: ShownDetails | None
+    marks: tuple[ShownMark, ...] | None
     kind: Literal["table"] = "table"
 
 
-class Drawn(msgspec.Struct, frozen=True, tag_field="kind", tag="drawn"):
-    """The page has drawn frame number `seq`."""
-
-    seq: Annotated[int, Meta(ge=0, lt=1 << 53)]
+_ENCODER = msgspec.json.Encoder()
 
 
-class Choose(msgspec.Struct, frozen=True, tag_field="kind", tag="choose"):
-    """Send the details of a wearer; None: of none."""
-
-    id: Annotated[int, Meta(ge=0, lt=1 << 53)] | None
-
-
-TableRequest = Drawn | Choose
-_ENCODER, _REQUESTS = msgspec.json.Encoder(), msgspec.json.Decoder(TableRequest)
-
-
-def encode(message: TableHello) -> str:
+def encode(message: TableHello | Refused) -> str:
     """A message as JSON."""
     return _ENCODER.encode(message).decode()
 
@@ -81,25 +70,18 @@ def table_hello(plan: Plan, title: str) -> TableHello:
     return TableHello(title, hello(plan, title, replay=False).plan)
 
 
-def parse_request(text: str | None) -> TableRequest | None:
-    """The request in a text from a page; None when it is not a valid one."""
-    if text is None or len(text) > MOST_REQUEST:
-        return None
-    try:
-        request: TableRequest = _REQUESTS.decode(text)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError):
-        return None
-    return request
-
-
 @dataclass(frozen=True, slots=True)
 class TableParts:
-    """What a frame has beside its scene, for one page. `trail`: rows, the first of which has the number `trail_from`. `lists`: the list is new."""
+    """What a frame has beside its scene, for one page. `trail`: rows, the first of which has the number `trail_from`.
+
+    `lists`, `marks`: these are new.
+    """
 
     seq: int
     trail: bytes
     trail_from: int
     lists: bool
+    marks: bool
     details: ShownDetails | None
 
 
@@ -116,6 +98,7 @@ def frame(scene: TableScene, parts: TableParts) -> bytes:
         refused=scene.refused,
         connected=scene.connected,
         details=parts.details,
+        marks=scene.marks if parts.marks else None,
     )
     text = _ENCODER.encode(header)
     text += b" " * (-len(text) % 4)

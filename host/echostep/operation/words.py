@@ -10,9 +10,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import notes
 from echostep.team.cot import alarm_words
+from echostep.team.marks import AlarmKey, Mark, MarkBoard
 from echostep.team.report import Position
 from echostep.team.roster import Member, MemberState
 
@@ -34,7 +36,10 @@ class ShownEvent:
 
 @dataclass(frozen=True, slots=True)
 class ShownWearer:
-    """A row of the list. `level` is an index into the plan's levels, None without a position on this plan."""
+    """A row of the list. `level` is an index into the plan's levels, None without a position on this plan.
+
+    `open_alarm`: a mayday that no commander has acknowledged.
+    """
 
     id: int
     team: str
@@ -43,6 +48,7 @@ class ShownWearer:
     words: str
     level: int | None
     notes: tuple[str, ...]
+    open_alarm: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +83,34 @@ def level_on(plan: Plan, m: Member) -> int | None:
     return p.floor
 
 
-def shown_wearer(number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]]) -> ShownWearer:
+def alarm_key(m: Member) -> AlarmKey | None:
+    """Of the present mayday of a member; None without one."""
+    alarm = m.report.alarm
+    if alarm is None or alarm.kind != "mayday":
+        return None
+    return m.report.team, m.report.name, f"{m.report.run}-{alarm.number}"
+
+
+def shown_mark(m: Mark) -> ShownMark:
+    """A mark for a page."""
+    return ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by)
+
+
+def shown_wearer(
+    number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard
+) -> ShownWearer:
     """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
     state, p = m.state(now_s), m.position(now_s)
     parts = [STATES[state], *(place_words(p) if p else ()), heard_words(m.silent_s(now_s))]
     words = ", ".join(filter(None, parts))
-    remarks = tuple(notes(m, plan, now_s, duplicates))
-    return ShownWearer(number, m.report.team, m.report.name, state.value, words, level_on(plan, m), remarks)
+    remarks, key = notes(m, plan, now_s, duplicates), alarm_key(m)
+    ack = board.acks.get(key) if key else None
+    if ack:
+        remarks.insert(0, f"acknowledged by {ack.by}")
+    is_open = key is not None and ack is None
+    return ShownWearer(
+        number, m.report.team, m.report.name, state.value, words, level_on(plan, m), tuple(remarks), is_open
+    )
 
 
 def place_words(p: Position) -> tuple[str, str, str]:

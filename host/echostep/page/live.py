@@ -24,6 +24,7 @@ from echostep.page.elements.beacon_marks import beacon_marks
 from echostep.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep.page.elements.lookahead import extrapolate
+from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import MOST_SHOWN, PageScene, sample_of, status_text
 from echostep.page.elements.stream_rates import StreamRateMeter
 from echostep.page.elements.true_position import TruePath
@@ -113,6 +114,10 @@ class LivePage:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._tracker.watchers.remove(self._watch)
         self.server.__exit__(kind, error, at)
+
+    def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
+        """Show the commanders' marks on all pages."""
+        self._mailbox.set_marks(marks)
 
     def announce(self, text: str) -> None:
         """Show what the run is doing, until its first bytes."""

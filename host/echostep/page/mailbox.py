@@ -12,6 +12,7 @@ from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 
+from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
@@ -81,6 +82,7 @@ class Mailbox:
         self._keeps = keeps
         self.latest: PageScene | None = None
         self.goal: RoutePlace | None = None
+        self.marks: tuple[ShownMark, ...] = ()  # of the commanders; replaced, never changed
         self.on_publish: Callable[[], None] | None = None
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
 
@@ -95,6 +97,12 @@ class Mailbox:
     def set_goal(self, goal: RoutePlace | None) -> None:
         """Set the destination of all pages and call `on_publish`; None ends the guidance to it."""
         self.goal = goal
+        if self.on_publish:
+            self.on_publish()
+
+    def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
+        """Replace the commanders' marks and call `on_publish`."""
+        self.marks = marks
         if self.on_publish:
             self.on_publish()
 

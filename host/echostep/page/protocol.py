@@ -22,6 +22,7 @@ from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
+from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, ParticleSample
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.taps import Considered
@@ -164,6 +165,7 @@ class FrameHeader:
     play: PlayState | None
     truth: TruePosition | None
     alarm: ShownAlarm | None
+    marks: tuple[ShownMark, ...] | None
     ended: str | None
     kind: Literal["frame"] = "frame"
 
@@ -219,6 +221,7 @@ class FrameParts:
     guidance: ShownGuidance | None = None
     goal: RoutePlace | None = None
     play: PlayState | None = None
+    marks: tuple[ShownMark, ...] | None = None
     ended: str | None = None
 
 
@@ -241,6 +244,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         play=parts.play,
         truth=scene.truth,
         alarm=scene.alarm,
+        marks=parts.marks,
         ended=parts.ended,
     )
     text = _ENCODER.encode(header)

@@ -18,6 +18,7 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.page import protocol, requests
 from echostep.page.elements.guidance import Destination, ShownGuidance
+from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene, ParticleSample
 from echostep.page.guarded_socket import FRAME_S, GuardedSocket
 from echostep.page.mailbox import Mailbox
@@ -47,6 +48,7 @@ class PageSession(GuardedSocket):
         self._seq = 0
         self._last: PageScene | None = None
         self._particles: ParticleSample | None = None
+        self._marks: tuple[ShownMark, ...] | None = None  # that the page has
         self._trail_count = 0  # points of the trail that the page has
         self._told_end = False
         self._frame_due = True  # the page needs a frame, even of the same scene
@@ -118,6 +120,7 @@ class PageSession(GuardedSocket):
             if len(self._undrawn) >= MOST_UNDRAWN:
                 continue
             self._follow_goal()
+            self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
             if scene is None or (scene is self._last and not self._frame_due and not playing):
                 continue
@@ -147,8 +150,10 @@ class PageSession(GuardedSocket):
             guidance=self._guidance(scene),
             goal=self._mailbox.goal,
             play=self._cursor.state() if self._cursor else None,
+            marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
             ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
         )
+        self._marks = self._mailbox.marks
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)
 

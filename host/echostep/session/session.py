@@ -40,6 +40,7 @@ from echostep.tracker import Tracker
 if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
+    from echostep.session.marks_ear import MarksEar
     from echostep.session.team_ear import TeamEar
     from echostep.team.publish import Publishing, Source
 
@@ -73,6 +74,7 @@ class Session:
         self.estimates: list[Estimate] = []
         self.ear: TeamEar | None = None  # hears the wearer whom a rescuer is guided to
         self._publishing: Publishing | None = None
+        self._marks: MarksEar | None = None  # hears what commanders mark
         self._foxglove: FoxgloveServer | None = None
         self._opened = ExitStack()
         self._interrupted = False
@@ -82,6 +84,7 @@ class Session:
             self._open_page(opened)
             self._open_publishing(opened)
             self._open_ear(opened)
+            self._open_marks(opened)
             self._open_foxglove(opened)
             self._opened = opened.pop_all()
         return self
@@ -151,6 +154,17 @@ class Session:
         self.ear = TeamEar(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
         opened.callback(self.ear.close)
 
+    def _open_marks(self, opened: ExitStack) -> None:
+        """The page of a live run shows the marks of the first broker that it publishes to."""
+        endpoints = self.output.outlet.endpoints if self.output.outlet else ()
+        broker = next((e for e in endpoints if e.scheme in ("mqtt", "mqtts")), None)
+        if broker is None or self.page is None or self.recorded is not None:
+            return
+        from echostep.session.marks_ear import MarksEar
+
+        self._marks = MarksEar(broker, self.tracker.plan.digest, partial(console.print, markup=False, highlight=False))
+        opened.callback(self._marks.close)
+
     def track(
         self,
         portions: Iterable[Portion],
@@ -186,6 +200,8 @@ class Session:
             self.page.note_arrival()
         estimates = self.tracker.take(portion)
         if self.page:
+            if self._marks and (marks := self._marks.news()) is not None:
+                self.page.set_marks(marks)
             self.page.publish(portion)
             print_notices(self.page.notices)
         self.estimates += estimates

@@ -37,7 +37,7 @@ class TeamEar:
         self._last: Teammate | None = None
         self._looked_s = self._told_s = -math.inf
         self._warned = False
-        listener = Listener(brokers[0], f"echostep/+/{name}/+", self._inbox.put)
+        listener = Listener(brokers[0], [f"echostep/+/{name}/+"], self._inbox.put)
         self._receiver = Receiver(listener, lambda text: print_line(f"{brokers[0]}: {text}"))
 
     def pop(self) -> Iterator[bytes]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The inbox: a bounded buffer between the broker's messages and the commander's view, which empties it a few times a second.
+"""The inbox: a bounded buffer between the broker's messages and the commander's view, which empties it a few times a second; and the way back.
 
 In: messages from a `Listener`, in its own thread. Out: the newest messages of each topic, on demand. Owns the thread and the limits: a flood on one
 topic drops older messages of that topic only, and memory stays bounded.
@@ -19,6 +19,7 @@ from echostep.team.report import MAX_PAYLOAD
 
 MESSAGES_PER_TOPIC = 8  # kept until the next look; by reason: trackers send about two a second
 MAX_TOPICS = 1024
+MOST_OUTGOING = 64  # messages to the broker that wait
 PACKET_WAIT_S = 0.1
 
 
@@ -69,10 +70,18 @@ class Receiver:
 
     def __init__(self, listener: Listener, print_line: Callable[[str], None]) -> None:
         self.connected = False
+        self._outgoing: deque[tuple[str, bytes]] = deque()
         self._listener, self._print_line = listener, print_line
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._work, name="receiver", daemon=True)
         self._thread.start()
+
+    def send(self, topic: str, payload: bytes) -> bool:
+        """Have the broker keep a message; it waits while the connection is broken. False when too many wait."""
+        if len(self._outgoing) >= MOST_OUTGOING:
+            return False
+        self._outgoing.append((topic, payload))
+        return True
 
     def close(self) -> None:
         """Disconnect and end the thread."""
@@ -88,6 +97,9 @@ class Receiver:
                     self._print_line("connected again")
                 failures, self.connected = 0, True
                 while not self._closing.is_set():
+                    while self._outgoing:
+                        self._listener.publish(*self._outgoing[0])
+                        self._outgoing.popleft()
                     self._listener.run_once(PACKET_WAIT_S)
             except Exception as error:  # any fault is printed, then the connection is tried again
                 self.connected = False

@@ -9,7 +9,7 @@ used by one thread. The thread and the queue of paho are not used, because that 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -84,8 +84,10 @@ class MqttTransport:
 class Listener:
     """A subscription: `run_once` runs the connection and passes each message to `put(topic, payload, retained)`."""
 
-    def __init__(self, endpoint: Endpoint, topic: str, put: Callable[[str | None, bytes, bool], None]) -> None:
-        self._endpoint, self._topic, self._put = endpoint, topic, put
+    def __init__(
+        self, endpoint: Endpoint, topics: Sequence[str], put: Callable[[str | None, bytes, bool], None]
+    ) -> None:
+        self._endpoint, self._topics, self._put = endpoint, topics, put
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
         self._use_mqtt5 = True
@@ -101,17 +103,31 @@ class Listener:
             self._use_mqtt5 = not self._use_mqtt5
             raise
         subscribed: list[bool] = []
-        client.on_subscribe = lambda _c, _u, _m, codes, _p: subscribed.append(not codes[0].is_failure)
-        client.subscribe(self._topic, qos=0)
+        client.on_subscribe = lambda _c, _u, _m, codes, _p: subscribed.append(
+            not any(code.is_failure for code in codes)
+        )
+        client.subscribe([(topic, 0) for topic in self._topics])
         run_until(client, lambda: bool(subscribed), "the broker does not answer")
         if not subscribed[0]:
-            raise ConnectionError(f"the broker refuses the subscription to {self._topic}: check user and password")
+            raise ConnectionError(
+                f"the broker refuses the subscription to {', '.join(self._topics)}: check user and password"
+            )
 
     def run_once(self, timeout_s: float) -> None:
         """Wait for one packet and process it; raises OSError when the connection is broken."""
         if self._client is None:
             raise ConnectionError("not connected")
         run_once(self._client, timeout_s)
+
+    def publish(self, topic: str, payload: bytes) -> None:
+        """Publish a message that the broker keeps, and wait for its acknowledgement; raises OSError."""
+        if self._client is None:
+            raise ConnectionError("not connected")
+        try:
+            info = self._client.publish(topic, payload, qos=1, retain=True)
+            run_until(self._client, info.is_published, "the broker does not acknowledge")
+        except (ValueError, RuntimeError) as error:
+            raise ConnectionError(f"cannot publish: {error}") from error
 
     def close(self) -> None:
         """Disconnect; raises nothing."""

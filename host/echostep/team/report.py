@@ -209,7 +209,7 @@ def decode(payload: bytes) -> Report:
         raise BadReportError("status and position contradict each other")
     findings = report.streams.findings if report.streams else ()
     for text in (report.plan, report.version, p.floor_name if p else "", p.where if p else "", *findings):
-        if not _printable(text):
+        if not is_printable(text):
             raise BadReportError("unprintable text")
     return report
 
@@ -243,7 +243,7 @@ def _named(error: str) -> str:
 
 def check_name(text: str) -> None:
     """Raises BadReportError when a name is not safe in an MQTT topic or on a terminal."""
-    if not 1 <= len(text) <= 32 or text != text.strip() or not _printable(text) or any(c in "/+#" for c in text):
+    if not 1 <= len(text) <= 32 or text != text.strip() or not is_printable(text) or any(c in "/+#" for c in text):
         raise BadReportError("a name has 1 to 32 printable characters, none of them / + #")
 
 
@@ -258,10 +258,10 @@ def checked_name(option: str, text: str) -> str:
 
 def printable(text: str, most: int) -> str:
     """A text cut to `most` characters, with unprintable ones replaced by spaces."""
-    return "".join(c if _printable(c) else " " for c in text[:most])
+    return "".join(c if is_printable(c) else " " for c in text[:most])
 
 
-def _printable(text: str) -> bool:
+def is_printable(text: str) -> bool:
     """Whether a text has no control or format characters, line separators or lone surrogates."""
     return all(unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp") for c in text)
 

@@ -21,6 +21,7 @@ export class List {
       const item = this.items.get(row.id) ?? this.make(row.id), at = $('list').children[k];
       if (at !== item.li) $('list').insertBefore(item.li, at ?? null);
       item.button.dataset.state = row.state;
+      item.button.dataset.open = row.open_alarm;
       put(item.sign, SIGNS[row.state] ?? '!');
       put(item.name, this.teams() > 1 ? `${row.name} (${row.team})` : row.name);
       put(item.said, row.words);
@@ -68,6 +69,7 @@ export class List {
     const row = this.rows.find(({ id }) => id === this.chosen);
     put($('who'), row ? `${SIGNS[row.state] ?? '!'} ${row.name} (${row.team})` : '');
     put($('said'), row?.words ?? '');
+    $('acknowledge').hidden = !row?.open_alarm;
   }
 
   details(details) {

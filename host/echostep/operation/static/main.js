@@ -9,18 +9,20 @@ import { View } from '../static/view.js';
 import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
+import { Sheet } from './sheet.js';
 import { Trails } from './trails.js';
 import { parseFrame, placesOf } from './wire.js';
 
 const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const $ = (id) => document.getElementById(id);
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'));
-const scene = { places: new Map(), rows: [], level: 0, chosen: null };
+const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null };
 const floors = new Floors((level) => showLevel(level));
 const list = new List(choose);
 let plan = null, wantedLevel = 0, fitted = false, dirty = true, drawnStamp = -1, undrawn = [], found = false;
 
-const link = new Link({ onHello: hello, onFrame: frame, onRefused: (reason) => fault(reason), onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
+const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
+const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
 const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
@@ -69,6 +71,7 @@ function frame(received) {
     floors.show(scene.level, scene.rows);
     findFirst();
   }
+  if (received.marks) scene.marks = received.marks;
   list.details(received.details);
   status(received);
   undrawn.push(received.seq);
@@ -118,7 +121,7 @@ function draw() {
   }
   const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => ({ ...row, place: scene.places.get(row.id) }));
   trails.paint(view, scene.level, painter.colour, scene.chosen);
-  painter.paint(view, here, scene.chosen);
+  painter.paint(view, here, scene.chosen, scene.marks, scene.level);
   [dirty, drawnStamp, drawn.last] = [false, view.stamp, scene.frame ?? null];
   drawn.frames++;
   if (undrawn.length) painted.port2.postMessage(undrawn);
@@ -137,16 +140,36 @@ function tapped(position, pixel) {
     const [sx, sy] = view.toScreen(x, y);
     return { id, far: Math.hypot(sx - pixel[0], sy - pixel[1]) };
   }).filter(({ far }) => far < TAP_PX).sort((a, b) => a.far - b.far);
-  if (near.length) list.choose(near[0].id);
+  if (near.length) return list.choose(near[0].id);
+  place(position, pixel);
+}
+
+// What can be done at a place: with the mark that is there, or a new one.
+function place([x_m, y_m], pixel) {
+  const mark = scene.marks.find(({ x_m: x, y_m: y, level }) => {
+    const [sx, sy] = view.toScreen(x, y);
+    return level === scene.level && Math.hypot(sx - pixel[0], sy - pixel[1]) < TAP_PX;
+  });
+  sheet.open({ x_m, y_m, level: scene.level }, mark, pixel, [view.width, view.height]);
+}
+
+let hinted = 0;
+function hint(text) {
+  $('hint').textContent = text;
+  $('hint').hidden = false;
+  clearTimeout(hinted);
+  hinted = setTimeout(() => { $('hint').hidden = true; }, 6000);
 }
 
 function key(name) {
-  const does = { n: () => view.rotate(-view.turn), w: () => view.fit(planView.box), Escape: () => list.choose(null) }[name.length === 1 ? name.toLowerCase() : name];
+  const middle = [view.width / 2, view.height / 2];
+  const does = { m: () => { place(view.toMap(...middle), middle); $('mark-cleared').focus(); }, n: () => view.rotate(-view.turn), w: () => view.fit(planView.box), Escape: () => { sheet.close(); list.choose(null); } }[name.length === 1 ? name.toLowerCase() : name];
   does?.();
   return Boolean(does);
 }
 
-new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => {}, key });
+new Gestures($('map'), view, { takesPose: () => false, tapped, posing: () => {}, posed: () => {}, moved: () => sheet.close(), key });
+$('acknowledge').onclick = () => sheet.signed((by) => link.send('acknowledge', { id: scene.chosen, by }));
 $('closer').onclick = () => view.zoom(1.4);
 $('farther').onclick = () => view.zoom(1 / 1.4);
 $('whole').onclick = () => view.fit(planView.box);

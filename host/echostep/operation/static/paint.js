@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Paints the wearers on a canvas: a sign by state, an arrow along the heading, the circle of the protection radius (dashed) or of the 95 % radius (dotted), the name.
 
+import { paintMarks } from '../static/marks.js';
+
 const COLOURS = ['trail', 'here', 'halo', 'bad', 'fair', 'good', 'ink', 'faint', 'goal', 'expected'];
 const OF_STATE = { mayday: 'bad', lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
 const WIDEST_M = 60;  // radius that is still drawn
@@ -19,12 +21,13 @@ export class Painter {
   }
 
   // `wearers`: rows of the list with their `place`, the most urgent first.
-  paint(view, wearers, chosen) {
+  paint(view, wearers, chosen, marks, level) {
     const sharp = window.devicePixelRatio || 1, { canvas, pen } = this, width = Math.round(view.width * sharp), height = Math.round(view.height * sharp);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
+    paintMarks(pen, view, marks, level, this.colour);
     const shown = wearers.map((wearer) => ({ ...wearer, at: view.toScreen(wearer.place.x, wearer.place.y) }))
       .filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200);
     for (const wearer of [...shown].reverse()) this.wearer(view, wearer, wearer.id === chosen);

@@ -16,7 +16,7 @@ const $ = (id) => document.getElementById(id);
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
-const scene = { frame: null, cloud: null, trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
+const scene = { frame: null, cloud: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
 let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, invited = false, connected = false;
 
 const taps = new Taps(view, {
@@ -81,6 +81,7 @@ function connection(open) {
 function frame(received) {
   scene.frame = received;
   if (received.cloud) scene.cloud = received.cloud;
+  if (received.marks) panel.marks(scene.marks = received.marks);
   extend(scene.trail, received.trail);
   undrawn.push(received.seq);
   speech.alarm(received.play ? null : received.alarm);

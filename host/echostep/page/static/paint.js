@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Paints the moving things on a canvas: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
 
+import { paintMarks } from './marks.js';
+
 const GRADES = 4;  // shades of the particles' weight
 const PARTICLE_PX = 2.5;
 const WIDEST_M = 30;  // protection radius that is still drawn
@@ -28,6 +30,7 @@ export class Painter {
     pen.lineJoin = pen.lineCap = 'round';
     if (scene.cloud) this.particles(view, scene.cloud, scene.level);
     this.trail(view, scene.trail, scene.level);
+    paintMarks(pen, view, scene.marks, scene.level, this.colour);
     const { told: estimate } = scene.frame ?? {};
     const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.level === scene.level ? guidance.path : [];
     if (path.length > 1) this.line(path.map(([x, y]) => view.toScreen(x, y)), this.colour.goal, 3, [8, 7]);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
 
+import { marksText } from './marks.js';
+
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
 const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
@@ -56,6 +58,12 @@ export class Panel {
     this.guidance(guidance);
     this.goal(goal);
     this.announce(`${status} ${streams?.wrong ?? ''}`, [words, estimate?.where, streams?.wrong].filter(Boolean).join('. '));
+  }
+
+  // The marks that commanders have set; a screen reader says them when they change.
+  marks(marks) {
+    put('marks', marksText(marks, this.plan.levels));
+    $('marks').hidden = !marks.length;
   }
 
   alarm(alarm) {

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""Requests of a commander's page.
+
+In: texts, which may be damaged or hostile. Out: requests; None for a text that is none. Owns the limits.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from echostep.page.requests import MOST_REQUEST
+from echostep.plan.json_fields import LIMIT_M
+from echostep.team.marks import Identity, MarkKind, Person
+from echostep.team.report import is_printable
+
+Number = Annotated[int, Meta(ge=0, lt=1 << 53)]
+Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
+
+
+class Drawn(msgspec.Struct, frozen=True, tag_field="kind", tag="drawn"):
+    """The page has drawn frame number `seq`."""
+
+    seq: Number
+
+
+class Choose(msgspec.Struct, frozen=True, tag_field="kind", tag="choose"):
+    """Send the details of a wearer; None: of none."""
+
+    id: Number | None
+
+
+class SetMark(msgspec.Struct, frozen=True, tag_field="kind", tag="mark"):
+    """Set a mark."""
+
+    mark: MarkKind
+    x_m: Metres
+    y_m: Metres
+    level: Annotated[int, Meta(ge=0, lt=1000)]
+    by: Person
+
+
+class Unmark(msgspec.Struct, frozen=True, tag_field="kind", tag="unmark"):
+    """Remove a mark."""
+
+    id: Identity
+
+
+class Acknowledge(msgspec.Struct, frozen=True, tag_field="kind", tag="acknowledge"):
+    """Acknowledge the alarm of a wearer."""
+
+    id: Number
+    by: Person
+
+
+Action = SetMark | Unmark | Acknowledge
+TableRequest = Drawn | Choose | Action
+_REQUESTS = msgspec.json.Decoder(TableRequest)
+
+
+def parse_request(text: str | None) -> TableRequest | None:
+    """The request in a text from a page; None when it is not a valid one."""
+    if text is None or len(text) > MOST_REQUEST:
+        return None
+    try:
+        request: TableRequest = _REQUESTS.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    by = getattr(request, "by", "x")
+    return request if is_printable(by) and by.strip() else None
