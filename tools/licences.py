@@ -65,7 +65,7 @@ def main() -> int:
     """Print the table; the dependencies of `pip install echostep` first."""
     parser = argparse.ArgumentParser(description="licences of all dependencies, as a Markdown table")
     parser.parse_args()
-    runtime, everything = needed("echostep"), needed("echostep", ("cluster", "foxglove", "ifc", "dev"))
+    runtime, everything = needed("echostep"), needed("echostep", ("cluster", "foxglove", "ifc", "mesh", "dev"))
     print("| package | version | licence | needed |\n|---|---|---|---|")
     for name, package in sorted(everything.items(), key=lambda item: (item[0] not in runtime, item[0])):
         use = "to run" if name in runtime else "to develop, or by an extra"

@@ -20,7 +20,7 @@ HEAD = "# The versions with which the tests have passed. Made by make lock; make
 
 def text() -> str:
     """A line for each package that echostep and its tests need."""
-    packages = needed("echostep", ("cluster", "foxglove", "ifc", "dev"))
+    packages = needed("echostep", ("cluster", "foxglove", "ifc", "mesh", "dev"))
     return HEAD + "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages.items())
 
 

@@ -131,7 +131,7 @@ Publish = Annotated[
     typer.Option(
         "--publish",
         metavar="URL",
-        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls://; may be given several times.",
+        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls:// mesh://; may be given several times.",
     ),
 ]
 Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
@@ -348,7 +348,9 @@ def legs(
 
 @app.command()
 def command(
-    broker: Annotated[str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT] or mqtts://HOST[:PORT]?ca=FILE")],
+    broker: Annotated[
+        str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, or mesh:///dev/PORT")
+    ],
     plan: Plan,
     team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)] = None,

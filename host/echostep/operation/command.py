@@ -24,7 +24,7 @@ from echostep.operation.operation import Operation
 from echostep.operation.page import TablePage
 from echostep.page.guarded_socket import FRAME_S
 from echostep.page.server import Address
-from echostep.plan.model import load_plan
+from echostep.plan.model import Plan, load_plan
 from echostep.team.commander import as_tree, table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
@@ -47,7 +47,7 @@ class Views:
 
 def command(plan_path: Path, url: str, team: str | None, seconds: float | None, views: Views) -> None:
     """Show a team until Ctrl-C, or for `seconds`; then draw the picture and print JSON if asked for."""
-    endpoint = parse_endpoint(url, ("mqtt", "mqtts"))
+    endpoint = parse_endpoint(url, ("mqtt", "mqtts", "mesh"))
     if views.picture and views.picture.suffix not in (".png", ".svg"):
         raise EchostepError(f"--picture {views.picture}: expected a name that ends in .png or .svg")
     operation = Operation(load_plan(plan_path))
@@ -57,9 +57,9 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         page = opened.enter_context(TablePage(operation, "echostep command", views.page)) if views.page else None
         if page:
             console.print(f"The page: {page.url}", highlight=False)
-        receiver = _receiver(endpoint, team, inbox, lambda text: console.print(text, markup=False))
+        receiver = _receiver(endpoint, team, operation.plan, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
-        if page:
+        if page and endpoint.scheme != "mesh":  # marks need a broker
             page.feed.send = receiver.send
         with suppress(KeyboardInterrupt):
             _follow(operation, inbox, receiver, page, console, math.inf if seconds is None else seconds, views)
@@ -67,8 +67,15 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
     _finish(operation, views)
 
 
-def _receiver(endpoint: Endpoint, team: str | None, inbox: Inbox, print_line: Callable[[str], None]) -> Receiver:
-    """A subscription to the reports of a team, or of all teams."""
+def _receiver(
+    endpoint: Endpoint, team: str | None, plan: Plan, inbox: Inbox, print_line: Callable[[str], None]
+) -> Receiver:
+    """A subscription to the reports of a team, or of all teams: at a broker, or over a Meshtastic node."""
+    if endpoint.scheme == "mesh":
+        from echostep.team.mesh import MeshListener
+
+        listener = MeshListener(endpoint, checked_name("--team", team) if team else None, plan, inbox.put)
+        return Receiver(listener, lambda text: print_line(f"{endpoint}: {text}"))
     topics = [f"echostep/{checked_name('--team', team) if team else '+'}/+/+", ALL]
     return Receiver(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
 

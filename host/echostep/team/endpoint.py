@@ -15,7 +15,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from echostep.errors import EchostepError
 from echostep.team.report import checked_name
 
-PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089}
+PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
 FILES = ("ca", "cert", "key")
 
 
@@ -29,12 +29,15 @@ class Endpoint:
     user: str | None
     password: str | None
     files: dict[str, str]
+    wearers: int = 0  # that share the channel of a mesh; 0: not given
 
     @property
     def secure(self) -> bool:
         return self.scheme in ("mqtts", "cot+tls")
 
     def __str__(self) -> str:
+        if self.scheme == "mesh":
+            return f"mesh://{self.host}"
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}"
 
@@ -48,6 +51,8 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
         asked = parse_qs(parts.query, strict_parsing=True) if parts.query else {}
     except ValueError as error:
         raise EchostepError(f"{shown}: not an address: {error}") from error
+    if parts.scheme == "mesh" and "mesh" in schemes:
+        return _mesh(shown, parts.netloc + parts.path, asked)
     if parts.scheme not in schemes:
         raise EchostepError(f"{shown}: expected one of {', '.join(f'{s}://' for s in schemes)}")
     if not host or port == 0 or parts.path not in ("", "/") or parts.fragment:
@@ -69,6 +74,14 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
     if endpoint.user is not None and "mqtt" not in parts.scheme:
         raise EchostepError(f"{shown}: user and password are for mqtt:// and mqtts://")
     return endpoint
+
+
+def _mesh(shown: str, port: str, asked: dict[str, list[str]]) -> Endpoint:
+    """A Meshtastic node on a serial port, as mesh:///dev/ttyUSB0?wearers=5."""
+    wearers = asked.pop("wearers", ["0"])[-1]
+    if not port.startswith("/") or asked or not (wearers.isascii() and wearers.isdigit() and int(wearers) <= 1000):
+        raise EchostepError(f"{shown}: expected mesh:///dev/PORT[?wearers=N]")
+    return Endpoint("mesh", port, 0, None, None, {}, int(wearers))
 
 
 def _is_resolvable(host: str) -> bool:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The inbox: a bounded buffer between the broker's messages and the commander's view, which empties it a few times a second; and the way back.
 
-In: messages from a `Listener`, in its own thread. Out: the newest messages of each topic, on demand. Owns the thread and the limits: a flood on one
-topic drops older messages of that topic only, and memory stays bounded.
+In: messages from a `Subscription`, in its own thread. Out: the newest messages of each topic, on demand. Owns the thread and the limits: a flood on
+one topic drops older messages of that topic only, and memory stays bounded.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from echostep.team.mqtt import Listener
 from echostep.team.outbox import RETRY_PAUSES_S
 from echostep.team.report import MAX_PAYLOAD
 
@@ -65,10 +64,26 @@ class Inbox:
         return [message for of_topic in messages.values() for message in of_topic], dropped
 
 
+class Subscription(Protocol):
+    """Where messages come from: a broker, or a radio."""
+
+    def open(self) -> None:
+        """Connect; raises OSError."""
+
+    def run_once(self, timeout_s: float) -> None:
+        """Wait for one message and pass it on; raises OSError when the connection is broken."""
+
+    def publish(self, topic: str, payload: bytes) -> None:
+        """Have the broker keep a message; raises OSError."""
+
+    def close(self) -> None:
+        """Disconnect; raises nothing."""
+
+
 class Receiver:
     """Runs a listener in a thread until `close`, and connects again after each break."""
 
-    def __init__(self, listener: Listener, print_line: Callable[[str], None]) -> None:
+    def __init__(self, listener: Subscription, print_line: Callable[[str], None]) -> None:
         self.connected = False
         self._outgoing: deque[tuple[str, bytes]] = deque()
         self._listener, self._print_line = listener, print_line

@@ -59,7 +59,7 @@ class Publishing:
         self._empty = empty_report(tracker.plan, outlet.name, outlet.team, run, source)
         self._ground = GroundPlane(tracker.plan) if tracker.plan.georeference else None
         self._whereabouts = Whereabouts(tracker.plan)
-        transports = [(_transport(e, tracker.plan, outlet, run), str(e)) for e in outlet.endpoints]
+        transports = [(_transport(e, tracker.plan, outlet, run, print_line), str(e)) for e in outlet.endpoints]
         self._outboxes = [Outbox(transport, name, print_line) for transport, name in transports]
         self._last = self._empty
         self._offer(self._empty)
@@ -215,7 +215,13 @@ def battery_percent() -> int | None:
     return None
 
 
-def _transport(endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str) -> Transport:
+def _transport(
+    endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str, print_line: Callable[[str], None]
+) -> Transport:
+    if endpoint.scheme == "mesh":
+        from echostep.team.mesh import MeshTransport
+
+        return MeshTransport(endpoint, (outlet.team, outlet.name), print_line)
     if endpoint.scheme in ("mqtt", "mqtts"):
         return MqttTransport(endpoint, outlet.team, outlet.name, run)
     if plan.georeference is None:
