@@ -226,3 +226,19 @@ def test_the_drift_is_found_through_slow_answers(ppm: float) -> None:
     assert drift is not None
     assert drift.ppm == pytest.approx(ppm, abs=5.0)
     assert drift.sd_ppm < 5.0
+
+
+@needs_twin
+def test_the_parts_of_2026_are_named_and_so_is_the_one_that_fails() -> None:
+    with twin_board("kit=2026", "imu_calf=no_self_test") as port:
+        done = doctor("--board", port, "--seconds", 5)
+    assert done.returncode == 1, done.stdout
+    for words in (
+        "left ranger: answers, pulse ranger",
+        "compass: answers, LIS3MDL, identity 0x3D",
+        "thigh gyro: answers, 20 degC, self-test passed, LSM6DSO, identity 0x6C",
+        "barometer: answers, BMP390, identity 0x60",
+        "calf gyro (LSM6DSO): failed its self-test",
+        "magnetic 10.",
+    ):
+        assert words in done.stdout, (words, done.stdout)

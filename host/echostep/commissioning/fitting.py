@@ -12,7 +12,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.calibration import ADIS16100_RAD_S, GYROS, GyroSettings
+from echostep.board.frames import BoardReader, encode
 from echostep.board.messages import GYROS_INVALID
+from echostep.board.tilt_compass import TiltCompass
 from echostep.commissioning.probe import TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
 from echostep.legs.heading import compass_heading, fit_compass_errors
@@ -51,11 +53,22 @@ def gyro_rates(probed: ProbeResult, settings: GyroSettings | None = None) -> tup
 
 
 def bearings(probed: ProbeResult) -> tuple[Floats, Floats]:
-    """Times (n,) s and compass bearings (n,) rad, clockwise; invalid ones left out."""
+    """Times (n,) s and compass bearings (n,) rad, clockwise, of a compass or of a magnetometer; invalid ones left out."""
+    if not probed.compass and "Magnetic" in probed.ticks:
+        return _bearings_by_field(probed)
     t_s = np.array(probed.ticks.get("Compass", []), float) / TICKS_PER_S
     bearing = np.array([c.bearing for c in probed.compass], float)
     good = bearing < INVALID_BEARING
     return t_s[good], np.radians(0.1 * bearing[good])
+
+
+def _bearings_by_field(probed: ProbeResult) -> tuple[Floats, Floats]:
+    """The same of a magnetometer of three axes, compensated for tilt as while a walk is tracked."""
+    sent = b"".join(encode(message, 0) for message in probed.axes)
+    _, headings = TiltCompass().headings(BoardReader().frames(sent))
+    t_s = np.array(probed.ticks["Magnetic"], float) / TICKS_PER_S
+    good = np.isfinite(headings)
+    return t_s[good], np.mod(0.5 * math.pi - headings[good], 2.0 * math.pi)
 
 
 def still_bias(t_s: Floats, rate: Floats) -> tuple[float, float]:

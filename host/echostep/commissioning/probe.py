@@ -22,7 +22,9 @@ from echostep.board.messages import (
     Compass,
     Gyros,
     Identify,
+    Magnetic,
     Message,
+    Motion,
     Ping,
     SelfTest,
     Sync,
@@ -65,6 +67,7 @@ class ProbeResult:
     pings: list[Ping] = field(default_factory=list)
     gyros: list[Gyros] = field(default_factory=list)
     compass: list[Compass] = field(default_factory=list)
+    axes: list[Motion | Magnetic] = field(default_factory=list)  # in the order of their arrival
     replies: list[tuple[float, float, int]] = field(default_factory=list)
     bytes_of: Counter[str] = field(default_factory=Counter)
     first_bytes: dict[str, bytes] = field(default_factory=dict)  # by port, as many as tell the device
@@ -208,6 +211,8 @@ class _Probe:
             result.gyros.append(message)
         elif isinstance(message, Compass):
             result.compass.append(message)
+        elif isinstance(message, Motion | Magnetic):
+            result.axes.append(message)
 
     def _set_up_mtx(self, chunk: Chunk | None) -> None:
         if MTX not in self._names or self.result.mtx_fault:
