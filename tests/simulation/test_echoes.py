@@ -140,6 +140,26 @@ def test_a_corner_sends_the_ping_back_from_its_apex() -> None:
     assert ranges(listen([corner[0], [0.3, 1.9, 0.3, -3.0]], at=(-1.5, 0.2), heading_deg=-45.0))[0] == 0.0  # leaks
 
 
+@given(
+    st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 360.0), st.floats(40.0, 50.0), st.floats(2.0, 4.0)
+)
+def test_a_right_angled_corner_answers_wherever_the_map_begins(
+    x: float, y: float, turn_deg: float, bearing_deg: float, away_m: float
+) -> None:
+    """Both walls reflect at the end where they meet; a wall that goes on beyond the corner changes nothing."""
+
+    def at(distance_m: float, bearing_deg: float) -> list[float]:
+        angle = math.radians(turn_deg + bearing_deg)
+        return [x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)]
+
+    place = at(away_m, bearing_deg)
+    looking = math.degrees(math.atan2(y - place[1], x - place[0])) - 90.0
+    for beyond_m in (0.0, 3.0):
+        walls = [[*at(beyond_m, 180.0), *at(6.0, 0.0)], [*at(0.0, 90.0), *at(6.0, 90.0)]]
+        left, _ = ranges(listen(walls, at=(place[0], place[1]), heading_deg=looking))
+        assert left == pytest.approx(away_m, abs=2e-3)
+
+
 def test_edges_answer_from_outside_a_corner_only() -> None:
     outside = [[0.1, 1.0, 5.0, 1.0], [0.1, 1.0, 0.1, 5.0]]
     assert ranges(listen(outside))[0] == pytest.approx(math.hypot(0.1, 1.0), abs=1e-3)

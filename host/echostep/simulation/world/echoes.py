@@ -22,12 +22,12 @@ from echostep.jit import kernel
 from echostep.simulation.world.acoustics import FIRST_NULL, SRF02, Acoustics, path_db, rod_db, wall_db
 from echostep.simulation.world.image_sources import (
     blocked,
-    crossing,
     distance,
     foot,
     in_double_cone,
     inside_corner,
     mirror,
+    reflection,
     wall_edges,
 )
 
@@ -197,11 +197,11 @@ def _search_wall_pairs(rangers: RangerPair, search: Search) -> None:
             way2 = (jx - px) ** 2 + (jy - py) ** 2
             if first == last or way2 > reach2:
                 continue
-            s = crossing(px, py, jx, jy, walls[first])
-            bx, by = px + s * (jx - px), py + s * (jy - py)
-            t = crossing(bx, by, ix, iy, walls[last]) if s >= 0.0 else -1.0
-            if t >= 0.0:
-                cx, cy = bx + t * (ix - bx), by + t * (iy - by)
+            bx, by, reflects = reflection(px, py, jx, jy, walls[first])
+            if not reflects:
+                continue
+            cx, cy, reflects = reflection(bx, by, ix, iy, walls[last])
+            if reflects:
                 _consider_pair(rangers, (bx, by), (cx, cy), 0.5 * math.sqrt(way2), (first, last), search)
 
 

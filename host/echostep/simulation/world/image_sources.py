@@ -14,6 +14,7 @@ from echostep.arrays import Floats
 from echostep.jit import kernel
 
 TOUCH_M = 1e-3  # walls closer than this meet
+REFLECTED_M = 0.01  # beyond a wall's end that still reflects: a tenth of the first Fresnel zone's radius at 2 m, 40 kHz
 
 
 @kernel
@@ -41,6 +42,24 @@ def crossing(px: float, py: float, qx: float, qy: float, wall: Floats) -> float:
     t = ((wall[0] - px) * sy - (wall[1] - py) * sx) / det
     u = ((wall[0] - px) * ry - (wall[1] - py) * rx) / det
     return t if 0.0 < t < 1.0 and 0.0 <= u <= 1.0 else -1.0
+
+
+@kernel
+def reflection(px: float, py: float, qx: float, qy: float, wall: Floats) -> tuple[float, float, bool]:
+    """Point of a wall at which the way p-q meets it, and whether it does, to REFLECTED_M.
+
+    In a right-angled corner both walls reflect at their ends: without that margin rounding would decide.
+    """
+    rx, ry, sx, sy = qx - px, qy - py, wall[2] - wall[0], wall[3] - wall[1]
+    det = rx * sy - ry * sx
+    if abs(det) < 1e-12:
+        return 0.0, 0.0, False
+    t = ((wall[0] - px) * sy - (wall[1] - py) * sx) / det
+    u = ((wall[0] - px) * ry - (wall[1] - py) * rx) / det
+    more_t, more_u = REFLECTED_M / math.hypot(rx, ry), REFLECTED_M / math.hypot(sx, sy)
+    meets = -more_t < t < 1.0 + more_t and -more_u <= u <= 1.0 + more_u
+    u = min(max(u, 0.0), 1.0)
+    return wall[0] + u * sx, wall[1] + u * sy, meets
 
 
 @kernel
