@@ -46,4 +46,11 @@ def test_standing_without_a_ping_is_a_gap_and_walking_is_not(mute_s: float, gap:
     end_s = 0.5 + mute_s
     for length_m, expected in ((0.0, gap), (10.0, None)):
         mute = segment(0.5, end_s, length_m=length_m, pings=0)
-        assert found(segment(0.0, 0.5), mute, segment(end_s, end_s + 0.5)) == [None, None, expected]
+        assert found(segment(0.0, 0.5), mute, segment(end_s, end_s + 0.5)) == [None, expected, None]
+
+
+def test_standing_without_a_ping_is_told_once_until_the_next_ping() -> None:
+    standing = [segment(k, k + 1.0, length_m=0.0, pings=0) for k in range(1, 40)]
+    gaps = found(segment(0.0, 1.0), *standing, segment(40.0, 41.0))
+    assert gaps.index(Gap.MUTE) == MUTE_S + 1  # known while it lasts, not after it
+    assert gaps.count(Gap.MUTE) == 1

@@ -23,7 +23,7 @@ TRAVEL_M, ALIKE = 0.05, 0.2  # path between two pings; density of an echo like t
 MODEL = echo_model(EchoSettings())
 BOX = Walls(np.array([[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 2.0], [6.0, 2.0, 0.0, 2.0], [0.0, 2.0, 0.0, 0.0]]))
 NONE = np.zeros(0)
-NOTHING = PingBatch(NONE, NONE, NONE, NONE, np.zeros(0, np.int64), NONE, NONE)
+NOTHING = PingBatch(NONE, NONE, NONE, NONE, np.zeros(0, np.int64), NONE, NONE, NONE)
 Source = tuple[float, float, float]  # distance, degrees off the axis, kind
 
 
@@ -35,7 +35,7 @@ def heard(axis_rad: float, range_m: float, count: int = 1, power: float = 0.3) -
     share, axis, ranges, powers, travel, alike = np.tile(
         [[0.5], [axis_rad], [range_m], [power], [TRAVEL_M], [ALIKE]], count
     )
-    return PingBatch(share, axis, ranges, powers, np.zeros(count, np.int64), travel, alike)
+    return PingBatch(share, axis, ranges, powers, np.zeros(count, np.int64), travel, np.zeros(count), alike)
 
 
 def log_p(range_m: float, sources: list[Source]) -> float:
@@ -126,6 +126,7 @@ def test_pings_count_where_they_were_triggered() -> None:
             np.ones(10),
             np.zeros(10, np.int64),
             np.full(10, 0.15),
+            np.zeros(10),
             np.full(10, ALIKE),
         )
         found.propagate_and_reweight(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)

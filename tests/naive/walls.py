@@ -42,7 +42,7 @@ def echo_sources(px: float, py: float, axis_rad: float, walls: Floats) -> list[t
     for x, y, kind in found + points:
         distance = math.hypot(x - px, y - py)
         off_axis = abs(math.remainder(math.atan2(y - py, x - px) - axis_rad, 2 * math.pi))
-        if not 1e-6 < distance <= 6.3 or off_axis > math.radians(35.0):
+        if not 1e-6 < distance <= 6.3 or off_axis > math.radians(40.0):
             continue
         if kind == 0.0 or not hidden(px, py, x, y, 0.01, walls):
             heard.append((distance, off_axis, kind))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The echoes' density if nothing is known of the pose: what a wearer anywhere in the building receives, or what the last echo foretells.
 
-In: walls, their floor, pings. Out: `Background`: log-density by range; `RangeMemory`: log-density of a ping after those before. Owns the last ranges.
+In: walls, their floor, pings. Out: `Background`: log-density by range; `RangeMemory`: densities of a ping after those before. Owns the last ranges.
 A cloud that explains the echoes no better than this is wrong, or the plan is.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 from echostep.localization.echo_likelihood import EchoModel, echo_density
+from echostep.localization.missed_echoes import MissedEchoes
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
@@ -50,8 +51,12 @@ def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
 
 
 class UnplannedDensities(NamedTuple):
-    """Of pings (k,): `alike`, the density if like the one before. Logs, to the pings' power: `anywhere` in the building, `either`."""
+    """Of pings (k,): `missed`, odds that a silent one missed its echo, 0 for an echo; `alike`, the density if like the one before, without those.
 
+    Logs, to the pings' power, with them: `anywhere` in the building, `either`.
+    """
+
+    missed: Floats
     alike: Floats
     anywhere: Floats
     either: Floats
@@ -62,18 +67,25 @@ class RangeMemory:
 
     def __init__(self, background: Background) -> None:
         self._background = background
+        self._missed = MissedEchoes()
         self._last_m = [math.nan, math.nan]  # range of each ranger's last ping; 0: no echo, NaN: no ping yet
 
     def densities(self, ranger: Ints, range_m: Floats, power: Floats) -> UnplannedDensities:
         """For pings (k,) in order of time; range 0: no echo."""
         log_anywhere = self._background.of(range_m)
         anywhere = np.exp(log_anywhere)
-        alike = np.empty(len(range_m))
+        missed, alike = np.zeros(len(range_m)), np.empty(len(range_m))
         for k, (which, value_m) in enumerate(zip(ranger.tolist(), range_m.tolist(), strict=True)):
             alike[k] = _alike(value_m, self._last_m[which], float(anywhere[k]))
-            self._last_m[which] = value_m
-        either = power * np.log((1.0 - ALIKE) * anywhere + ALIKE * alike)
-        return UnplannedDensities(alike, power * log_anywhere, either)
+            if value_m <= 0.0:
+                missed[k] = self._missed.odds(which)
+            if (
+                missed[k] < 1.0 - STAYS
+            ):  # otherwise it is likelier that an echo was missed than that the view has changed
+                self._last_m[which] = value_m
+            self._missed.update(which, value_m)
+        either = power * np.log((1.0 - ALIKE) * anywhere + ALIKE * alike + missed)
+        return UnplannedDensities(missed, alike, power * np.log(anywhere + missed), either)
 
 
 def _alike(range_m: float, last_m: float, anywhere: float) -> float:

@@ -53,11 +53,12 @@ class CoarseField(NamedTuple):
 
 
 class CoarsePing(NamedTuple):
-    """One ping: axis in the walk frame, range (0: none), power."""
+    """One ping: axis in the walk frame, range (0: none), power, odds that a silent one missed its echo (else 0)."""
 
     axis_rad: float
     range_m: float
     power: float
+    missed: float
 
 
 def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
@@ -125,8 +126,8 @@ def _log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
                 far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
                 planned = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
                 planned *= (1.0 - MISSED) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
-        table[k] = ping.power * math.log((1.0 - HIDDEN) * planned + HIDDEN * hidden)
-    table[256] = ping.power * math.log(0.9 if range_m <= 0.0 else 0.1 * even)
+        table[k] = ping.power * math.log((1.0 - HIDDEN) * planned + HIDDEN * hidden + ping.missed)
+    table[256] = ping.power * math.log((0.9 if range_m <= 0.0 else 0.1 * even) + ping.missed)
 
 
 @kernel

@@ -35,17 +35,26 @@ class Gaps:
         self._path_m = 0.0  # since that ping
 
     def ended(self, measured: MeasuredSegment) -> Gap | None:
-        """The gap that this segment, or its first ping, ends; of an unobserved segment, the segment itself."""
+        """The gap that this segment ends, or that is known by its end."""
         segment = measured.segment
         paused = segment.t0_s - self._end_s > PAUSE_S
         self._end_s = segment.t1_s
-        is_mute = self._path_m < STANDING_M and len(measured.t_s) > 0 and measured.t_s[0] - self._ping_s > MUTE_S
-        if len(measured.t_s):
-            self._ping_s, self._path_m = float(measured.t_s[-1]), 0.0
-        else:
-            self._path_m += math.hypot(segment.dx_m, segment.dy_m)
+        is_mute = self._is_mute(measured)
         if segment.unobserved:
             return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
         if paused:
             return Gap.PAUSE
         return Gap.MUTE if is_mute else None
+
+    def _is_mute(self, measured: MeasuredSegment) -> bool:
+        """Whether the foot has stood for MUTE_S without a ping, once until the next one."""
+        segment = measured.segment
+        if len(measured.t_s):
+            is_mute = self._path_m < STANDING_M and measured.t_s[0] - self._ping_s > MUTE_S
+            self._ping_s, self._path_m = float(measured.t_s[-1]), 0.0
+            return is_mute
+        self._path_m += math.hypot(segment.dx_m, segment.dy_m)
+        is_mute = self._path_m < STANDING_M and segment.t1_s - self._ping_s > MUTE_S
+        if is_mute:
+            self._ping_s = math.inf
+        return is_mute

@@ -21,7 +21,7 @@ from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.beacon_model import BeaconSettings
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.estimate import LOST_M, TRACKING_M, Estimate, Right, estimate
+from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.level_changes import ClimbSettings, HeightChange
 from echostep.localization.particle_kernels import Move, PingBatch
@@ -38,6 +38,7 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reaso
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
 HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
 COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
+SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
 COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
 HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
@@ -51,9 +52,10 @@ FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
 REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
 WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
 FOUND_WITHIN_M = 40.0  # path after which a search that has found nothing begins anew
-PLAN_FITS = 0.99  # prior probability that the plan is that of the building
+PLAN_FITS = 0.99  # prior and greatest probability that the plan is that of the building
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 FAILS = 0.05  # probability that a search fails although the plan fits, over that if it does not: unknown starts are found within 40 m
+RESTORED_PER_M = -math.log(FAILS) / FOUND_WITHIN_M  # log-odds that the plan gains back on the path of a believed cloud
 # The same of a stated start that is rejected on the first EARLY_M of the path: taps and plans are wrong about as often.
 STATED_FAILS, EARLY_M = 0.05, 20.0
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
@@ -177,6 +179,9 @@ class MapFilter:
             self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
         for each in self._clouds():
             self._follow_with(each, measured, pings, unplanned)
+        if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
+            self._plan.add(RESTORED_PER_M * math.hypot(segment.dx_m, segment.dy_m))
+            self._plan.limit(PLAN_FITS)
 
     def _follow_with(
         self, each: Hypothetical, measured: MeasuredSegment, pings: PingBatch, unplanned: UnplannedDensities
@@ -210,13 +215,14 @@ class MapFilter:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
     def _right(self) -> Right:
-        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, on its level."""
+        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height."""
         here = self.tracked.plausibility.probability
         if self.search is None:
             return Right(here)
         cloud, mean = self.search.cloud, self._believed(0.0)
         distance_m = np.hypot(cloud.map_x_m - mean.x_m, cloud.y_m - mean.y_m)
-        weight = np.where(cloud.level == mean.level, cloud.weight, 0.0)
+        height_m = float(self.cloud.weight @ self.cloud.z_m)
+        weight = np.where(np.abs(cloud.z_m - height_m) < SAME_LEVEL_M, cloud.weight, 0.0)
         near, about = (float(weight @ (distance_m < limit)) for limit in (TRACKING_M, LOST_M))
         return Right(min(here, near), about)
 
@@ -232,7 +238,7 @@ class MapFilter:
         elif search is None:
             return self._doubt(tracked, walk_heading_rad)
         elif right > AGREED:
-            self.search, self._plan = None, Plausibility(PLAN_FITS)
+            self.search = None
         elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
             self.tracked, self.search = search, None
         elif self._has_failed(search):
@@ -243,9 +249,7 @@ class MapFilter:
         return True
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
-        """Begin a search if the tracked cloud is improbable, believe the plan again if it is probable; returns whether a search began."""
-        if tracked.has_contracted and tracked.plausibility.probability > BELIEVED:
-            self._plan = Plausibility(PLAN_FITS)
+        """Begin a search if the tracked cloud is improbable; returns whether a search began."""
         least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else WIDE_DOUBTED
         if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
             return False
@@ -277,11 +281,13 @@ class MapFilter:
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
         search = self.search.cloud if self.search else None
-        elsewhere = self._building.elsewhere
+        elsewhere, plan_fits = self._building.elsewhere, self._plan.probability
+        if plan_fits < UNFIT:  # then no place on it is probable
+            right = Right(min(right.here, plan_fits), right.about)
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
         if self._height is not None:
             new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)
-        return replace(new, plan_fits=self._plan.probability, outside=self._outside())
+        return replace(new, plan_fits=plan_fits, outside=self._outside())
 
     def _outside(self) -> float:
         """Weight of the tracked cloud outside of the building; 0 where walls enclose no floor."""

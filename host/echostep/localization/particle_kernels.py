@@ -45,7 +45,8 @@ class PingBatch(NamedTuple):
     """k pings on a move: share of the move at the trigger (ascending), axis of the ranger in the walk frame, range (0: none), power.
 
     `power`: share of independent information in the ping, the power of its densities. `ranger`: 0 left, 1 right. `travel_m`: length of
-    the path since this ranger's ping before. `alike`: density of an echo that is like the one before (`background`).
+    the path since this ranger's ping before. `missed`: odds that a silent ping missed its echo, 0 for an echo, and `alike`: density of an echo that
+    is like the one before (both: `background`).
     """
 
     share: Floats
@@ -54,6 +55,7 @@ class PingBatch(NamedTuple):
     power: Floats
     ranger: Ints
     travel_m: Floats
+    missed: Floats
     alike: Floats
 
 
@@ -64,6 +66,7 @@ class Ping(NamedTuple):
     range_m: float
     power: float
     travel_m: float
+    missed: float
     alike: float
 
 
@@ -112,7 +115,9 @@ def propagate_and_reweight(
             passed += left
             done = until
         if k < len(pings.share):
-            ping = Ping(pings.axis_rad[k], pings.range_m[k], pings.power[k], pings.travel_m[k], pings.alike[k])
+            ping = Ping(
+                pings.axis_rad[k], pings.range_m[k], pings.power[k], pings.travel_m[k], pings.missed[k], pings.alike[k]
+            )
             memory.log_evidence[k], size = reweight_by_ping(
                 particles, memory.hidden[pings.ranger[k]], ping, model.echo, walls
             )
@@ -187,7 +192,7 @@ def reweight_by_ping(
         count = echo_sources(x[i], y[i], ping.axis_rad + turn[i], walls, distance_m, off_axis_rad, kind)
         density = echo_densities(ping.range_m, count, distance_m, off_axis_rad, kind, model)
         before = model.hidden + kept * (hidden[i] - model.hidden)
-        outlier = model.outlier * density.outlier
+        outlier = model.outlier * density.outlier + ping.missed
         hidden_density = 0.5 * (density.hidden + ping.alike)  # anything, or what hides the view goes on
         by_hidden = before * math.exp(ping.power * math.log(inlier * hidden_density + outlier))
         likelihood = by_hidden + (1.0 - before) * math.exp(ping.power * math.log(inlier * density.planned + outlier))

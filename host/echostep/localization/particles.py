@@ -236,7 +236,8 @@ class Cloud:
                 done = share
             if is_ping:
                 self._last_used_m[pings.ranger[k]] = self._path_m + share * length
-                ping = CoarsePing(float(pings.axis_rad[k]), float(pings.range_m[k]), COARSE_POWER)
+                axis_rad, range_m, missed = (float(v[k]) for v in (pings.axis_rad, pings.range_m, pings.missed))
+                ping = CoarsePing(axis_rad, range_m, COARSE_POWER, missed)
                 reweight_coarsely(self.arrays, ping, field, model, table)
             self.resample_if_needed()
         self._path_m += length

@@ -54,7 +54,7 @@ class UsablePings:
         ranger, range_m = measured.ranger[used], range_m[used]
         unplanned = self._ranges.densities(ranger, range_m, power[used])
         return PingBatch(
-            share[used], axis[used], range_m, power[used], ranger, travel_m[used], unplanned.alike
+            share[used], axis[used], range_m, power[used], ranger, travel_m[used], unplanned.missed, unplanned.alike
         ), unplanned
 
     def _travels(self, ranger: Ints, path_m: Floats) -> Floats:
