@@ -75,6 +75,12 @@ page-speed: $(READY) ## latency and frame rate of the live page and of the comma
 	@tools/apt.sh chromium || echo "Chromium is not installed."
 	$(BIN)/python -m pytest -q -s -m speed tests/page/test_page_speed.py tests/operation/test_table_speed.py
 
+operation: $(READY) ## 20 wearers on one broker, two with the real firmware, one lost, one fallen, one rescuer, one commander
+	@tools/apt.sh $(APT_PACKAGES) mosquitto
+	$(MAKE) --quiet -C firmware
+	$(MAKE) --quiet -C tools/twin
+	$(BIN)/python tools/operation.py
+
 $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
@@ -132,4 +138,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips docs site licences lock audit flash clean
+.PHONY: operation help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips docs site licences lock audit flash clean

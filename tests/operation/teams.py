@@ -98,8 +98,8 @@ def whole_team() -> Team:
     fallen = place(TOWER, x_m, y_m, 0)
     kinds: tuple[MarkKind, ...] = ("cleared", "hazard", "meeting")
     for k, kind in enumerate(kinds):
-        at = (x_m - 10.0 + 9.0 * k, y_m + 4.5 - 4.5 * (k == 2))
-        team.put_bytes(*Mark(1, f"{k:08x}", kind, *at, 0, "Ann", team.unix_s, TOWER.digest).message)
+        spot_m = (x_m - 10.0 + 9.0 * k, y_m + 4.5 - 4.5 * (k == 2))
+        team.put_bytes(*Mark(1, f"{k:08x}", kind, *spot_m, 0, "Ann", team.unix_s, TOWER.digest).message)
     for k in range(12):
         for n, name in enumerate(NAMES):
             angle = 0.15 * k + n
