@@ -208,6 +208,21 @@ def anywhere_command(
     run_study(anywhere_study(folder, rows), StudyRequest(runs, seed, json, out, scheduler))
 
 
+@app.command("operation")
+def operation_command(
+    runs: Annotated[int, typer.Option("--runs", help="Operations of twenty minutes.", min=1)] = 10,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/operation"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated)."""
+    from echostep.evaluate.operation.study import operation_study
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    run_study(operation_study(), StudyRequest(runs, seed, json, out, scheduler))
+
+
 @app.command("clutter")
 def clutter_command(
     folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of CARMEN logs: *.log, *.log.gz.")],

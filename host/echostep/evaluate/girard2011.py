@@ -59,7 +59,7 @@ PAPER: tuple[Row, ...] = (  # [Girard 2011, Table 1]
     {"name": "ranging", "mean_m": 0.13, "sd_m": 0.07, "max_m": 0.40, "min_m": 0.03, "ending_m": 0.18},
 )
 COLUMNS = {
-    "name": "", "mean_m": "mean", "sd_m": "sd", "max_m": "max", "min_m": "min", "ending_m": "ending", "worst_m": "worst",
+    "name": "", "mean_m": "mean", "sd_m": "sd", "max_m": "max", "min_m": "min", "ending_m": "ending", "worst_m": "worst", "ce95_m": "CE95",
     "coverage95": "in 95 %", "lost": "lost",
 }  # fmt: skip
 

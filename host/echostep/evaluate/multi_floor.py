@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.error_statistics import error_statistics
 from echostep.errors import EchostepError
 from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
@@ -40,7 +41,7 @@ TIE_M = 0.5
 PORTION = 1000
 AWAY_M = (8.0, 30.0)  # of a place to visit from the stairs, as one walks
 COLUMNS = {
-    "name": "", "runs": "runs", "mean_m": "mean m", "max_m": "max m", "ending_m": "end m", "floor_right": "right %",
+    "name": "", "runs": "runs", "mean_m": "mean m", "ce95_m": "CE95 m", "max_m": "max m", "ending_m": "end m", "floor_right": "right %",
     "strict_right": "strict %", "longest_wrong_s": "longest wrong s", "coverage95": "in 95 % ellipse", "lost": "lost",
 }  # fmt: skip
 
@@ -107,9 +108,10 @@ def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate]) -> Row:
     for t, good in zip(t_s.tolist(), right.tolist(), strict=True):
         since = None if good else t if since is None else since
         wrong_s = max(wrong_s, 0.0 if since is None else t - since)
+    found = error_statistics(error)
     return {
-        "mean_m": float(error.mean()), "sd_m": float(error.std()), "max_m": float(error.max()),
-        "min_m": float(error.min()), "ending_m": float(error[-1]),
+        "mean_m": found.mean_m, "sd_m": found.sd_m, "max_m": found.max_m, "min_m": found.min_m,
+        "ending_m": found.ending_m, "ce95_m": found.p95_m,
         "coverage95": float(np.mean([e.holds(px, py) for e, px, py, _ in places])),
         "lost": int(error[-1] > LOST_M), "said_lost": float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
         "floor_right": float(right.mean()), "strict_right": float(strict.mean()), "longest_wrong_s": wrong_s,
@@ -139,7 +141,9 @@ def _summary(rows: Sequence[Row]) -> Row:
         return sum(values) / len(values)
 
     found: Row = {"name": rows[0]["name"], "profile": "default", "runs": len(rows)}
-    found |= {k: over(k, mean) for k in ("mean_m", "sd_m", "ending_m", "coverage95", "floor_right", "strict_right")}
+    found |= {
+        k: over(k, mean) for k in ("mean_m", "sd_m", "ending_m", "ce95_m", "coverage95", "floor_right", "strict_right")
+    }
     found |= {"max_m": over("max_m", max), "min_m": over("min_m", min), "lost": sum(row["lost"] for row in rows)}
     return found | {"longest_wrong_s": over("longest_wrong_s", max)}
 

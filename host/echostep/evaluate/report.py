@@ -7,7 +7,6 @@ In: rows, which are dictionaries with the same keys in every run. Out: printed t
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as TerminalTable
 
+from echostep.error_statistics import error_statistics
 from echostep.errors import EchostepError
 
 Row = dict[str, Any]
@@ -57,26 +57,22 @@ def rows_by_name(rows: Sequence[Row]) -> list[list[Row]]:
 def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]) -> Row:
     """A row in the form of [Girard 2011, Table 1] from the errors at the steps of each run, (runs, steps).
 
-    `mean_m`, `sd_m`, `max_m`, `min_m`, `ending_m` are computed for each run, then averaged over the runs; `worst_m` is the greatest error of all.
+    `mean_m`, `sd_m`, `max_m`, `min_m`, `ending_m` are computed for each run, then averaged over the runs; `worst_m` is the greatest error of all,
+    `ce50_m` and `ce95_m` are percentiles of all errors [ISO/IEC 18305:2016, 8.9].
     `coverage95`: share of all steps with the truth inside the 95 % ellipse, None without `inside95`.
     `lost`: number of runs that end more than `LOST_M` off.
     """
-    each = [_of_run(errors) for errors in errors_m]
+    each = [error_statistics(errors) for errors in errors_m]
     row: Row = {"name": name, "profile": profile, "runs": len(each)}
-    for k, key in enumerate(("mean_m", "sd_m", "max_m", "min_m", "ending_m")):
-        row[key] = round(sum(run[k] for run in each) / len(each), 4)
-    row["worst_m"] = round(max(run[2] for run in each), 4)
+    for key in ("mean_m", "sd_m", "max_m", "min_m", "ending_m"):
+        row[key] = round(sum(getattr(run, key) for run in each) / len(each), 4)
+    whole = error_statistics([error for errors in errors_m for error in errors])
+    row |= {"ce50_m": round(whole.median_m, 4), "ce95_m": round(whole.p95_m, 4)}
+    row["worst_m"] = round(whole.max_m, 4)
     steps = [bool(x) for run in inside95 for x in run]
     row["coverage95"] = round(sum(steps) / len(steps), 4) if steps else None
     row["lost"] = sum(errors[-1] > LOST_M for errors in errors_m)
     return row
-
-
-def _of_run(errors: Sequence[float]) -> tuple[float, float, float, float, float]:
-    """Mean, standard deviation, maximum, minimum and last of the errors of a run."""
-    mean = sum(errors) / len(errors)
-    sd = math.sqrt(sum((e - mean) ** 2 for e in errors) / len(errors))
-    return mean, sd, max(errors), min(errors), errors[-1]
 
 
 def write_json(path: Path, study: str, runs: int, seed: int, rows: Sequence[Mapping[str, Any]]) -> None:

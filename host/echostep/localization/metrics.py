@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.error_statistics import error_statistics
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 
@@ -76,12 +77,5 @@ def errors(estimates: Sequence[Estimate], truth: Truth) -> Errors | None:
     off = np.array([(e.x_m, e.y_m) for e in inside]) - true_xy_m
     distance = np.hypot(off[:, 0], off[:, 1])
     held = [e.holds(x, y) for e, (x, y) in zip(inside, true_xy_m.tolist(), strict=True)]
-    return Errors(
-        float(distance.mean()),
-        float(distance.std()),
-        float(distance.max()),
-        float(distance.min()),
-        float(distance[-1]),
-        float(np.sqrt((distance**2).mean())),
-        float(np.mean(held)),
-    )
+    found = error_statistics(distance)
+    return Errors(found.mean_m, found.sd_m, found.max_m, found.min_m, found.ending_m, found.rms_m, float(np.mean(held)))

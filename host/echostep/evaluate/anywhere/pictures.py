@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.evaluate.pictures import BLACK, BLUE, ORANGE, RED, axes_of, save
+from echostep.evaluate.pictures import ORANGE, axes_of, save
 from echostep.evaluate.report import Row, rows_by_name
+from echostep.output.score_plots import stanford_axes
 
 ACROSS = 4  # diagrams side by side
-RANGE_M = (0.01, 100.0)  # of both axes
 INCHES = 3.2
 
 
@@ -32,19 +32,8 @@ def draw_stanford(folder: Path, rows: Sequence[Row]) -> None:
             continue
         error, radius = (np.concatenate([run[key] for run in groups[k]]) for key in ("error_m", "protection_m"))
         beyond = error > radius
-        for which, colour in ((~beyond, BLUE), (beyond, RED)):
-            ax.plot(
-                error[which].clip(*RANGE_M),
-                radius[which].clip(*RANGE_M),
-                ".",
-                ms=2.0,
-                alpha=0.4,
-                color=colour,
-                zorder=2,
-            )
-        ax.plot(RANGE_M, RANGE_M, color=BLACK, lw=1.0)
+        stanford_axes(ax, error, radius)
         ax.axvline(1.0, color=ORANGE, lw=0.8)
-        ax.set(xscale="log", yscale="log", xlim=RANGE_M, ylim=RANGE_M)
         ax.set_title(f"{groups[k][0]['name']}: {100.0 * beyond.mean():.2f} % beyond", fontsize=8)
         ax.set_xlabel("error (m)", fontsize=7)
         ax.set_ylabel("protection radius (m)", fontsize=7)

@@ -41,8 +41,21 @@ ANKLE = np.array([-0.06, 0.0, 0.0])  # from the sensor on the instep, foot frame
 
 
 @dataclass(frozen=True, slots=True)
+class Manner:
+    """A manner of moving: strides of a length and a time, and where the body faces, from where the way leads."""
+
+    name: str
+    stride_m: float
+    stride_s: float
+    facing_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Person:
-    """Stride length and time with their spread, and how far corners are cut; typical of adults at 1.2 m/s [Perry 1992; Winter 2009]."""
+    """Stride length and time with their spread, and how far corners are cut; typical of adults at 1.2 m/s [Perry 1992; Winter 2009].
+
+    `manners`: of the level pieces of the way from one stop to the next, in turn; without any, and on stairs, the person walks.
+    """
 
     stride_m: float = 1.3
     stride_s: float = 1.1
@@ -51,13 +64,14 @@ class Person:
     stand_s: float = 3.0
     foot: FootPath = field(default_factory=FootPath)
     leg: LegDimensions = field(default_factory=LegDimensions)
+    manners: tuple[Manner, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Walk:
     """Arrays of n milliseconds. `trunk_m` (n, 2), `heading_rad` (n,), `height_m` (n,) of the floor below it; `foot_m` (n, 3), `foot_rpy_rad` (n, 3)
     roll, pitch, yaw of the foot (x toe, y left, z up; pitch positive is toe down); `thigh_rad_s`, `calf_rad_s`, `belt_rad_s` (n,); `flat` (n,) the
-    foot stands.
+    foot stands. `manners`: when a piece of the way begins, and how it is walked.
     """
 
     t_s: Floats
@@ -70,6 +84,7 @@ class Walk:
     belt_rad_s: Floats
     flat: Bools
     height_m: Floats
+    manners: tuple[tuple[float, str], ...] = ()
 
 
 def walk(waypoints: Sequence[Waypoint], person: Person, rng: np.random.Generator) -> Walk:
@@ -150,12 +165,17 @@ class _Schedule:
         self._heading: list[Floats] = []
         self._height: list[Floats] = []
         self._ms = 0
+        self._walking = Manner("walk", person.stride_m, person.stride_s)
+        self._manner, self._pieces = self._walking, 0
+        self._manners: list[tuple[float, str]] = []
 
     def walk(self, path: Floats) -> None:
-        """Walk a path (n, 3) from rest to rest; first turn on the spot to where it leads."""
-        along = _toil(path, self._person.stride_m)
-        course = np.unwrap(np.arctan2(*np.diff(path[:, :2], axis=0).T[::-1]))
+        """Walk a path (n, 3) from rest to rest; first turn on the spot to where it leads, or to where the body faces then."""
+        self._manner = self._next_manner(path)
+        along = _toil(path, self._manner.stride_m)
+        course = np.unwrap(np.arctan2(*np.diff(path[:, :2], axis=0).T[::-1])) + self._manner.facing_rad
         self._turn_to(path[0], float(course[0]))
+        self._manners.append((self._t[-1], self._manner.name))
         if self._heading:
             course += 2.0 * math.pi * round((self._heading[-1][-1] - course[0]) / (2.0 * math.pi))
         times, lengths = self._strides(float(along[-1]))
@@ -166,6 +186,14 @@ class _Schedule:
         self._trunk.append(np.column_stack([np.interp(progress, along, path[:, k]) for k in (0, 1)]))
         self._height.append(np.interp(progress, along, path[:, 2]))
         self._heading.append(np.interp(progress, middle, course))
+
+    def _next_manner(self, path: Floats) -> Manner:
+        """How the next piece is walked: in turn, but stairs are always walked."""
+        level = bool((np.abs(np.diff(path[:, 2])) <= STEEP * np.hypot(*np.diff(path[:, :2], axis=0).T)).all())
+        if not self._person.manners or not level:
+            return self._walking
+        self._pieces += 1
+        return self._person.manners[(self._pieces - 1) % len(self._person.manners)]
 
     def stand(self, pause_s: float) -> None:
         """Add a pause."""
@@ -200,7 +228,9 @@ class _Schedule:
         left_m, twist = sway(phase, effort)
         worn = heading + twist
         trunk = trunk + left_m[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
-        return Walk(t, trunk, worn, foot_m, rpy, thigh, calf, np.gradient(worn) * RATE_HZ, flat, height)
+        return Walk(
+            t, trunk, worn, foot_m, rpy, thigh, calf, np.gradient(worn) * RATE_HZ, flat, height, tuple(self._manners)
+        )
 
     def _leg(
         self, trunk: Floats, heading: Floats, foot_m: Floats, rpy: Floats, phase: Floats, effort: Floats, climb_m_s: Floats,
@@ -244,14 +274,14 @@ class _Schedule:
 
     def _strides(self, length_m: float) -> tuple[Floats, Floats]:
         """Times and lengths walked (k + 1,) from rest to rest; the first and the last stride are shorter."""
-        count = max(2, round(length_m / self._person.stride_m + 0.8))
+        count = max(2, round(length_m / self._manner.stride_m + 0.8))
         lengths = 1.0 + self._person.stride_sd * self._rng.standard_normal(count)
         lengths[[0, -1]] *= 0.6
         s = np.concatenate([[0.0], np.cumsum(lengths) * length_m / lengths.sum()])
         return np.concatenate([[0.0], np.cumsum(self._times(count))]), s
 
     def _times(self, count: int) -> Floats:
-        return self._person.stride_s * (1.0 + self._person.stride_sd * self._rng.standard_normal(count))
+        return self._manner.stride_s * (1.0 + self._person.stride_sd * self._rng.standard_normal(count))
 
     def _add_times(self, after_s: Floats) -> None:
         self._t += (self._t[-1] + after_s).tolist()

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""The study of operations: scores of all points, by manner of moving, before and after the change of the battery.
+
+In: seeds. Out: a row of all points, and one of each part. Simulated. The scores are those of `echostep score`, over the points of all runs together.
+
+`floor`: share of the points on the nearest floor; `floor_on`: of those where the wearer is on a floor, not between two. Estimates that say lost
+count in both. `search_s`: from the change of the battery on, until the new tracker says `tracking`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.error_statistics import error_statistics, quantile
+from echostep.evaluate.operation.walks import HALF_M, OperationWalk, operation
+from echostep.evaluate.report import Row, Table, rows_by_name
+from echostep.evaluate.study import Study, StudyRequest
+from echostep.localization.estimate import TrackStatus
+from echostep.scorecard.card import FLOOR_PENALTY_M, score
+from echostep.scorecard.own import track_of, truth_of
+
+ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for: by reason, a door; hardly ever another floor
+BETWEEN_M = 0.5  # from the nearest floor, beyond which a wearer is between two
+ALL = "all"  # the row of all points
+COLUMNS = {
+    "name": "", "points": "points", "ce50_m": "CE50 m", "ce95_m": "CE95 m", "se95_m": "SE95 m", "max_m": "max m",
+    "evaal_m": "EvAAL m", "floor": "floor %", "floor_on": "on floors %",
+}  # fmt: skip
+PERCENT = ("floor", "floor_on")
+
+
+def one_run(half_m: float, seed: int) -> list[Row]:
+    """Rows of one operation: its points, all of them and by part."""
+    walk = operation(seed, half_m)
+    truth = truth_of(walk.truth, walk.plan)
+    scored = score(track_of(walk.estimates), truth, walk.plan)
+    at = scored.matched
+    assert at.level is not None
+    assert at.true_level is not None
+    assert at.height_m is not None
+    assert at.true_height_m is not None
+    heights = np.array([level.height_m for level in walk.plan.levels])
+    points = {
+        "error_m": at.error_m,
+        "above_m": at.height_m - at.true_height_m,
+        "floors_off": np.abs(at.level - at.true_level),
+        "on_floor": np.abs(at.true_height_m[:, None] - heights).min(1) < BETWEEN_M,
+    }
+    whole: Row = {
+        "zone": scored.card.zone_probability, "available": scored.card.availability, "search_s": _search_s(walk),
+    }  # fmt: skip
+    rows = []
+    for name, chosen in _parts(walk, at.row, at.t_s).items():
+        row: Row = {"name": name, "seed": seed} | {key: values[chosen].tolist() for key, values in points.items()}
+        rows.append(row | (whole if name == ALL else {}))
+    return rows
+
+
+def _parts(walk: OperationWalk, row: Any, t_s: Floats) -> dict[str, Bools]:
+    """Which points belong to each part, by name; those of a manner are of before the change of the battery."""
+    begins, names = zip(*walk.manners, strict=True)
+    manner = np.array(names)[np.maximum(np.searchsorted(np.array(begins), t_s, side="right") - 1, 0)]
+    tracking = np.array([e.status is TrackStatus.TRACKING for e in walk.estimates])[row]
+    known = t_s < walk.restart_s
+    parts = {
+        ALL: np.ones(len(t_s), bool), "says tracking": tracking, "known start": known,
+        "unknown start": ~known,
+    }  # fmt: skip
+    return parts | {name: (manner == name) & known for name in sorted(set(names))}
+
+
+def _search_s(walk: OperationWalk) -> float | None:
+    """How long the new tracker searches before it says `tracking` for the first time; None where it never does."""
+    found = [e.t_s for e in walk.after if e.status is TrackStatus.TRACKING]
+    return found[0] - walk.restart_s if found else None
+
+
+def _summary(rows: Sequence[Row]) -> Row:
+    """Scores of the points of all runs together."""
+    error, above, off, on = (
+        np.concatenate([np.asarray(row[key]) for row in rows])
+        for key in ("error_m", "above_m", "floors_off", "on_floor")
+    )
+    on = on.astype(bool)
+    found: Row = {"name": rows[0]["name"], "runs": len(rows), "points": len(error)}
+    if not len(error):
+        return found
+    statistics = error_statistics(error)
+    found |= {
+        "mean_m": statistics.mean_m, "ce50_m": statistics.median_m, "ce95_m": statistics.p95_m,
+        "max_m": statistics.max_m, "ve95_m": quantile(np.abs(above), 0.95), "se95_m": quantile(np.hypot(error, above), 0.95),
+        "evaal_m": quantile(error + FLOOR_PENALTY_M * off, 0.75), "floor": float((off == 0.0).mean()),
+        "floor_on": float((off[on] == 0.0).mean()) if on.any() else None,
+    }  # fmt: skip
+    for key, how in (("zone", np.mean), ("available", np.mean), ("search_s", np.max)):
+        values = [row[key] for row in rows if row.get(key) is not None]
+        found[key] = float(how(values)) if values else None
+    return {key: round(value, 4) if isinstance(value, float) else value for key, value in found.items()}
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [
+        {key: 100.0 * value if key in PERCENT and value is not None else value for key, value in row.items()}
+        for row in rows
+    ]
+    whole = rows[0]
+    told = [
+        f"Asked: CE95 at most {ASKED_CE95_M} m: {_met(whole['ce95_m'] <= ASKED_CE95_M)}; "
+        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(whole['floor'] >= ASKED_FLOOR)} of all points, "
+        f"{_met(whole['floor_on'] >= ASKED_FLOOR)} of those on floors.",
+        f"Zone detection {100 * whole['zone']:.1f} %, availability {100 * whole['available']:.1f} %, "
+        f"search after the change at most {whole['search_s'] or math.inf:.0f} s. Simulated.",
+    ]
+    return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, told)]
+
+
+def _met(is_met: bool) -> str:
+    return "met" if is_met else "not met"
+
+
+def operation_study(half_m: float = HALF_M) -> Study:
+    """The study; `half_m`: length of the way before the change of the battery, and after it."""
+    return Study(
+        "operation", partial(one_run, half_m), lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables
+    )
