@@ -45,10 +45,10 @@ void hang_spi_selected(void)
 		hang_now();
 }
 
-/* The next millisecond begins. */
+/* The next millisecond begins. It is the main loop that hangs, not an interrupt: within one of these the next millisecond is awaited. */
 void hang_millisecond(void)
 {
-	if (wanted_hang == HANGS)
+	if (wanted_hang == HANGS && avr->sreg[S_I])
 		hang_now();
 }
 
