@@ -39,6 +39,21 @@ def girard2011(
 
 
 @app.command()
+def kits(
+    runs: Annotated[int, typer.Option("--runs", help="Walks to simulate.", min=1)] = 100,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/kits"),
+    scheduler: Scheduler = None,
+) -> None:
+    """The 52 steps of Girard et al. 2011 with the rangers of either kit (simulated; pulse rangers were not built yet)."""
+    from echostep.evaluate.kits import STUDY
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
+
+
+@app.command()
 def echoes(
     seed: Seed = 1,
     json: Json = None,

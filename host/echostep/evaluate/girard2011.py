@@ -18,7 +18,8 @@ from echostep.arrays import Floats
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.building import Building
-from echostep.localization.map_filter import MapFilter
+from echostep.localization.echo_likelihood import EchoSettings
+from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.start import Start
 from echostep.papers.girard2011 import Girard, GirardSettings
 from echostep.path import MeasuredSegment, PathSegment
@@ -116,24 +117,28 @@ def dead_reckoned(_site: SimulatedSite, walk: MarkerWalk, _seed: int) -> Iterato
 
 
 def girard(
-    site: SimulatedSite, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True
-) -> Iterator[MethodOutput]:
+    site: SimulatedSite, walk: MarkerWalk, seed: int, *, model: bool = True, ranging: bool = True,
+    settings: GirardSettings | None = None,
+) -> Iterator[MethodOutput]:  # fmt: skip
     """The paper's filter: on its plan or without, with one pair of pings a step or without."""
     walls = site.plan if model else None
     x0, y0 = walk.trunk_m[0].tolist()
-    filter_ = Girard(GirardSettings(), (x0, y0), walls, np.random.default_rng([seed, 20]))
+    filter_ = Girard(settings or GirardSettings(), (x0, y0), walls, np.random.default_rng([seed, 20]))
     for k, heading in enumerate(walk.heading_rad.tolist()):
         pair = (float(walk.pair_m[k + 1, 0]), float(walk.pair_m[k + 1, 1])) if ranging else None
         at = filter_.step(STEP_M * math.cos(heading), STEP_M * math.sin(heading), heading, pair)
         yield MethodOutput(at, None, np.column_stack([filter_.x_m, filter_.y_m]))
 
 
-def default(site: SimulatedSite, walk: MarkerWalk, seed: int) -> Iterator[MethodOutput]:
-    """The default filter: the same steps and headings, and every ping of the walk."""
+def default(
+    site: SimulatedSite, walk: MarkerWalk, seed: int, echo: EchoSettings | None = None
+) -> Iterator[MethodOutput]:
+    """The default filter: the same steps and headings, and every ping of the walk; `echo`: of other rangers than SRF02."""
     x0, y0 = walk.trunk_m[0].tolist()
     start = Start(Pose(x0, y0, walk.start_heading_rad))
     rng = np.random.default_rng([seed, 21])
-    map_filter = MapFilter(Building(Walls(site.plan)), start, walk.start_heading_rad, rng)
+    settings = FilterSettings(echo=echo or EchoSettings())
+    map_filter = MapFilter(Building(Walls(site.plan)), start, walk.start_heading_rad, rng, settings)
     since_s = -math.inf
     for k, (turning, step) in enumerate(_segments(walk)):
         if turning is not None:

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""`echostep evaluate kits`: the 52 steps of Girard with the rangers of either kit; the kit of 2026 was not built yet.
+
+In: seeds. Out: rows: errors and coverage of the paper's filter and of the default one with SRF02 and with pulse rangers, on the same steps.
+Everything here is simulated: building, walker, sensors. The foot is the same in all rows: the foot board does not exist yet.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+
+from echostep.evaluate.girard2011 import COLUMNS, MethodOutput, default, girard
+from echostep.evaluate.report import Row, Table, rows_by_name, summary
+from echostep.evaluate.study import Study, StudyRequest
+from echostep.localization.echo_likelihood import EchoSettings
+from echostep.papers.girard2011 import GirardSettings
+from echostep.settings import parse_settings
+from echostep.simulation.people.marker_walk import MarkerWalk, lay_markers, walk_markers
+from echostep.simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics
+from echostep.simulation.world.sites import SimulatedSite, furnished, otb
+
+PULSE_CONE_RAD = math.radians(30.0)  # [HC-SR04 user guide: best within 30 degrees]
+
+
+@dataclass(frozen=True, slots=True)
+class RangerKind:
+    """One kind of ranger: how it hears, and the settings of the two filters that fit it."""
+
+    acoustics: Acoustics
+    echo: EchoSettings
+    girard: GirardSettings
+
+
+@cache
+def kinds() -> dict[str, RangerKind]:
+    """The kinds of rangers by the names of their rows; `pulse, as SRF02` is a pulse ranger whose settings were forgotten."""
+    text = (files("echostep") / "firmware" / "kit-2026.toml").read_text()
+    echo = parse_settings(text, "kit-2026.toml").echo
+    paper = GirardSettings()
+    narrow = replace(paper, aperture_rad=PULSE_CONE_RAD, maximum_m=echo.maximum_m)
+    return {
+        "SRF02": RangerKind(SRF02, EchoSettings(), paper),
+        "pulse": RangerKind(PULSE_RANGER, echo, narrow),
+        "pulse, as SRF02": RangerKind(PULSE_RANGER, EchoSettings(), paper),
+    }
+
+
+def one_run(seed: int) -> list[Row]:
+    """Both filters with each kind of ranger on the paper's site, and the default filter among furniture."""
+    rows: list[Row] = []
+    for name, kind in kinds().items():
+        site = otb()
+        walk = _walk(site, seed, kind)
+        rows.append(_row(f"paper's filter, {name}", seed, walk, list(girard(site, walk, seed, settings=kind.girard))))
+        rows.append(_row(f"default, {name}", seed, walk, list(default(site, walk, seed, kind.echo))))
+        site = furnished(seed)
+        walk = _walk(site, seed, kind)
+        rows.append(_row(f"default, furniture, {name}", seed, walk, list(default(site, walk, seed, kind.echo))))
+    return rows
+
+
+def _walk(site: SimulatedSite, seed: int, kind: RangerKind) -> MarkerWalk:
+    return walk_markers(lay_markers(site.route), site.built, seed, site.passers, acoustics=kind.acoustics)
+
+
+def _row(name: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> Row:
+    errors = [
+        math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
+    ]
+    inside = [s.inside for s in seen if s.inside is not None]
+    return {"name": name, "seed": seed, "errors_m": errors, "inside95": inside}
+
+
+def _summary(runs: list[Row]) -> Row:
+    return summary(runs[0]["name"], "kits", [r["errors_m"] for r in runs], [r["inside95"] for r in runs])
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    title = f"Position error in metres by kind of ranger, {request.runs} simulated runs; pulse rangers: not built yet"
+    return [Table(title, sorted(rows, key=lambda row: row["name"].split(", ")[:-1]), COLUMNS)]
+
+
+STUDY = Study("kits", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

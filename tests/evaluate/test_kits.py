@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""The study of the kits: its rows, on the same steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echostep.evaluate import kits
+from echostep.evaluate.report import rows_by_name
+from echostep.simulation.world.sites import otb
+
+
+def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> None:
+    rows = kits.one_run(3)
+    names = [row["name"] for row in rows]
+    assert len(set(names)) == 9
+    assert all(len(row["errors_m"]) == 52 for row in rows)
+    means = {row["name"]: float(np.mean(row["errors_m"])) for row in rows}
+    assert means["default, SRF02"] < 0.13  # what the paper's system reached with ranging [Girard 2011, Table 1]
+    assert means["default, pulse"] < 0.13
+    assert [group[0]["name"] for group in rows_by_name(rows)]
+    walks = [kits._walk(otb(), 3, kind) for kind in kits.kinds().values()]
+    assert all(np.array_equal(walk.trunk_m, walks[0].trunk_m) for walk in walks)
+    assert all(np.array_equal(walk.heading_rad, walks[0].heading_rad) for walk in walks)
+
+
+def test_settings_of_pulse_rangers_are_read_from_the_file_that_ships() -> None:
+    kind = kits.kinds()["pulse"]
+    assert (kind.echo.maximum_m, kind.acoustics.maximum_m) == (4.5, 4.5)
