@@ -106,6 +106,7 @@ class MapFilter:
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
+        self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._plan = Plausibility(PLAN_FITS)
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
@@ -161,6 +162,7 @@ class MapFilter:
             self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
         if cloud.is_coarse or not len(self._building.floor.x_m):
             return
+        self._is_elsewhere = True
         self.search = self._new_search(Start(), segment.heading1_rad)
         if gap is not Gap.PAUSE:
             self.search.cloud.adopt_lag(cloud)
@@ -238,12 +240,13 @@ class MapFilter:
         elif search is None:
             return self._doubt(tracked, walk_heading_rad)
         elif right > AGREED:
-            self.search = None
+            self.search, self._is_elsewhere = None, False
         elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
-            self.tracked, self.search = search, None
+            self.tracked, self.search, self._is_elsewhere = search, None, False
         elif self._has_failed(search):
             self._plan.add(math.log(FAILS))
-            self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
+            near = None if self._is_elsewhere else self._believed(walk_heading_rad)
+            self.search = self._new_search(Start(near=near), walk_heading_rad)
         else:
             return False
         return True
