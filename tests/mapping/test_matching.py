@@ -55,8 +55,9 @@ def test_cells_are_those_of_the_twin(seed: int) -> None:
     )  # fmt: skip
     poses = np.column_stack([rng.uniform(-2.0, 2.0, (500, 2)), rng.uniform(-math.pi, math.pi, 500)])
     range_m = np.where(rng.random(500) < 0.2, np.nan, rng.uniform(0.2, 3.0, 500))
+    every = np.ones(500, np.bool_)
     heard, passed = naive.cell_counts(lines, poses, range_m)
-    cells = cell_counts(lines, poses, range_m, np.ones(500, np.bool_))
+    cells = cell_counts(lines, poses, range_m, every, every)
     for counts, expected in ((cells.heard, heard), (cells.passed, passed)):
         assert {(int(a), int(b)): int(counts[a, b]) for a, b in zip(*np.nonzero(counts), strict=True)} == expected
     assert heard

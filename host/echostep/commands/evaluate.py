@@ -253,3 +253,23 @@ def clutter_command(
 
     study = clutter_study(folder, starts, seed)
     run_study(study, StudyRequest(len(study.seeds or ()), seed, json, out, scheduler))
+
+
+@app.command("noplan")
+def noplan_command(
+    runs: Annotated[int, typer.Option("--runs", help="Walks of each row.", min=1)] = 50,
+    seed: Seed = 1,
+    folder: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
+    ] = None,
+    rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: '*/10min'.")] = "*",
+    json: Json = None,
+    out: Out = Path("out/noplan"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated)."""
+    from echostep.evaluate.noplan.study import noplan_study
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    request = StudyRequest(runs, seed, json, out, scheduler)
+    run_study(noplan_study(folder, rows, request), request)

@@ -10,12 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Floats
-from echostep.mapping.evidence import add_crossings, cell_counts, explained_by_ends, ping_poses
+from echostep.arrays import Bools, Floats, Ints
+from echostep.mapping.evidence import add_crossings, cell_counts, explained_by_ends, is_straight, ping_poses
 from echostep.mapping.graph import Graph
-from echostep.mapping.lines import Lines, find_lines
+from echostep.mapping.lines import Lines, find_lines, joined
 from echostep.mapping.nodes import Pings
-from echostep.mapping.segments import find_runs, segments_of
+from echostep.mapping.segments import Run, find_runs, meets, segments_of
+
+LONE_M, LONE_ASKEW_M = (
+    1.6,
+    2.5,
+)  # of wall on one line; shorter ones must be heard again: a passer-by is beside a ranger for 1 to 2 m of path
+PASSAGE_M = 5.0  # of path, between two passages
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,29 +36,58 @@ class Drawing:
 def draw(graph: Graph, pings: Pings) -> Drawing:
     """The walls that the echoes of a walk show."""
     poses, path = ping_poses(graph, pings), graph.pose[:, :2]
+    way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
     lines = find_lines(graph)
     free = np.ones(len(poses), np.bool_)
     aligned = lines.aligned if lines.aligned.any() else np.ones(len(lines.rho_m), np.bool_)
     straight = _selected(lines, aligned)
-    cells = cell_counts(straight, poses, pings.range_m, free)
+    cells = cell_counts(straight, poses, pings.range_m, free, ahead)
     add_crossings(straight, path, cells)
-    runs = find_runs(cells, np.ones(len(straight.rho_m), np.bool_))
+    every = np.ones(len(straight.rho_m), np.bool_)
+    runs = _without_lone(
+        find_runs(cells, every), straight, straight.aligned | ~lines.aligned.any(), poses, way_m, cells.of
+    )
     walls, _ = segments_of(straight, runs, cells)
     if not aligned.all():
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
-        more = cell_counts(askew, poses, pings.range_m, free)
+        more = cell_counts(askew, poses, pings.range_m, free, ahead)
         add_crossings(askew, path, more)
-        found = find_runs(more, np.zeros(len(askew.rho_m), np.bool_))
+        none = np.zeros(len(askew.rho_m), np.bool_)
+        found = _without_lone(find_runs(more, none), askew, none, poses, way_m, more.of)
         kept = sorted({run.line for run in found})
-        both = Lines(*(np.concatenate([a, b[kept]]) for a, b in zip(straight, askew, strict=True)))
+        both = joined(straight, _selected(askew, np.isin(np.arange(len(none)), kept)))
         runs += [run._replace(line=len(straight.rho_m) + kept.index(run.line)) for run in found]
-        cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_))
+        cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
         add_crossings(both, path, cells)
         straight = both
     walls, sd = segments_of(straight, runs, cells)
     return Drawing(walls, sd, path)
 
 
-def _selected(lines: Lines, which: np.ndarray) -> Lines:
-    return Lines(*(column[which] for column in lines))
+def _without_lone(runs: list[Run], lines: Lines, aligned: Bools, poses: Floats, way_m: Floats, of: Ints) -> list[Run]:
+    """Without short pieces that were heard in one passage, meet no wall and have none on their line: people stood or walked there."""
+    total = np.zeros(len(lines.rho_m))
+    for run in runs:
+        total[run.line] += run.high_m - run.low_m
+    kept = []
+    for i, run in enumerate(runs):
+        if not meets(lines, runs, i) and total[run.line] < (LONE_M if aligned[run.line] else LONE_ASKEW_M):
+            c, s = np.cos(lines.normal_rad[run.line]), np.sin(lines.normal_rad[run.line])
+            along = c * poses[:, 1] - s * poses[:, 0]
+            own = np.sort(way_m[(of == run.line) & (along >= run.low_m) & (along <= run.high_m)])
+            if not (np.diff(own) > PASSAGE_M).any():
+                continue
+        kept.append(run)
+    return kept
+
+
+def _selected(lines: Lines, which: Bools) -> Lines:
+    return Lines(
+        lines.normal_rad[which],
+        lines.rho_m[which],
+        lines.sd_m[which],
+        lines.low_m[which],
+        lines.high_m[which],
+        lines.aligned[which],
+    )

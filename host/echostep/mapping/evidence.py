@@ -26,6 +26,7 @@ HALF_CONE_RAD = math.radians(27.5)
 NEAR_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
 HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least so wide; weight of that against pings
 CORNER_M = 0.15  # of a range from the distance of a corner
+TURNING_RAD = math.radians(15.0)  # turn of a stride
 SURE_RAD, SURE_M = math.radians(15.0), 3.0  # within which a wall is hardly ever missed
 
 
@@ -51,13 +52,24 @@ def ping_poses(graph: Graph, pings: Pings) -> Floats:
     return np.column_stack([at, a[:, 2] + pings.share * turn + RANGER_AXES_RAD[pings.ranger]])
 
 
-def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools) -> Cells:
-    """Pings that each cell of each line explains, and pings that passed it. `free` (k,): pings that nothing else explains already."""
+def is_straight(graph: Graph, pings: Pings) -> Bools:
+    """Pings (k,) on a stride that turns little: in between two nodes the heading is interpolated."""
+    after = np.minimum(pings.node + 1, len(graph.pose) - 1)
+    turn = (graph.pose[after, 2] - graph.pose[pings.node, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    found: Bools = np.abs(turn) < TURNING_RAD
+    return found
+
+
+def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools) -> Cells:
+    """Pings that each cell of each line explains, and pings that passed it.
+
+    `free` (k,): pings that nothing else explains already; `straight` (k,): those with a well-known axis, which alone show that a wall is not there.
+    """
     first = lines.low_m - MARGIN_M
     count = np.ceil((lines.high_m - lines.low_m + 2.0 * MARGIN_M) / CELL_M).astype(np.int64)
     heard, passed = np.zeros((2, len(count), int(count.max(initial=1))))
     of = np.full(len(range_m), -1, np.int64)
-    _count(lines, poses, range_m, free, Cells(heard, passed, first, count, of))
+    _count(lines, poses, range_m, free, straight, Cells(heard, passed, first, count, of))
     return Cells(heard, passed, first, count, of)
 
 
@@ -77,7 +89,7 @@ def add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
 
 
 @kernel
-def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, cells: Cells) -> None:
+def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools, cells: Cells) -> None:
     for k in range(len(range_m)):
         for line in range(len(cells.size)):
             c, s = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line])
@@ -97,7 +109,7 @@ def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, cells: Cel
                 if free[k] and cells.of[k] < 0 and near:
                     cells.heard[line, cell] += 1.0
                     cells.of[k] = line
-            elif off_axis < SURE_RAD and distance < SURE_M and not range_m[k] < distance + BEYOND_M:
+            elif straight[k] and off_axis < SURE_RAD and distance < SURE_M and not range_m[k] < distance + BEYOND_M:
                 cells.passed[line, cell] += 1.0
 
 

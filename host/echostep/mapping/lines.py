@@ -59,6 +59,18 @@ def find_lines(graph: Graph) -> Lines:
     return Lines(table[:, 0], table[:, 1], table[:, 4], table[:, 2], table[:, 3], aligned)
 
 
+def joined(a: Lines, b: Lines) -> Lines:
+    """The lines of both."""
+    return Lines(
+        np.concatenate([a.normal_rad, b.normal_rad]),
+        np.concatenate([a.rho_m, b.rho_m]),
+        np.concatenate([a.sd_m, b.sd_m]),
+        np.concatenate([a.low_m, b.low_m]),
+        np.concatenate([a.high_m, b.high_m]),
+        np.concatenate([a.aligned, b.aligned]),
+    )
+
+
 def _line(centre: Floats, normal_rad: float, half_m: Floats, base_rad: float | None) -> Floats:
     """Normal, rho, low, high, sd, weight (length), spread of the pieces."""
     if base_rad is not None:

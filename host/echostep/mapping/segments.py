@@ -23,8 +23,11 @@ LEAST_PINGS_ASKEW, LEAST_ASKEW_M = (
     0.8,
 )  # where the building has directions and this is none: corners and edges seem so
 BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
-EXTEND_M = 1.8  # farthest to the wall that an end is extended to
+EXTEND_M = (
+    2.6  # farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
+)
 SURE_M = 0.5  # an end is extended by so much though pings passed: they may have passed the end itself
+MEETS_M, LONG_M = 0.5, 2.0  # a short piece so near to a wall of such a length meets it
 SNAP_M = 0.4  # an end that stands out beyond a crossing by less is cut there
 
 
@@ -91,8 +94,15 @@ def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> tuple[Floats, Fl
     return np.array(rows).reshape(-1, 4), np.array([lines.sd_m[run.line] for run in runs])
 
 
-def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> float | None:
-    """Where along line i run j crosses it; None if it does not, even when its ends were extended."""
+def meets(lines: Lines, runs: list[Run], i: int) -> bool:
+    """Whether run i reaches another wall as it stands: a corner or a junction."""
+    low, high = runs[i].low_m - MEETS_M, runs[i].high_m + MEETS_M
+    found = (_crossing(lines, runs, i, j) for j in range(len(runs)) if runs[j].high_m - runs[j].low_m > LONG_M)
+    return any(c is not None and c[1] and low < c[0] < high for c in found)
+
+
+def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> tuple[float, bool] | None:
+    """Where along line i run j crosses it, and whether as it stands; None if it does not, even when its ends were extended."""
     a, b = lines.normal_rad[runs[i].line], lines.normal_rad[runs[j].line]
     sine = math.sin(b - a)
     if abs(sine) < 0.3:
@@ -103,15 +113,16 @@ def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> float | None:
     there = math.cos(b) * y - math.sin(b) * x
     if not runs[j].low_m - EXTEND_M <= there <= runs[j].high_m + EXTEND_M:
         return None
-    return math.cos(a) * y - math.sin(a) * x
+    stands = runs[j].low_m - SNAP_M <= there <= runs[j].high_m + SNAP_M
+    return math.cos(a) * y - math.sin(a) * x, stands
 
 
-def _end(end_m: float, way: float, crossings: list[float], passed: Floats, first_m: float) -> float:
+def _end(end_m: float, way: float, crossings: list[tuple[float, bool]], passed: Floats, first_m: float) -> float:
     """The end moved outward to the nearest crossing within reach that no ping passed on the way, or inward to one that it hardly exceeds."""
     best, best_m = end_m, math.inf
-    for c in crossings:
+    for c, stands in crossings:
         beyond = (c - end_m) * way
-        if -SNAP_M < beyond < EXTEND_M and abs(beyond) < best_m:
+        if (-SNAP_M if stands else 0.0) < beyond < EXTEND_M and abs(beyond) < best_m:
             low, high = sorted((int((end_m - first_m) / CELL_M), int((c - first_m) / CELL_M)))
             between = passed[max(low, 0) : max(high, 0)].sum()
             if between >= CROSSED or (beyond > SURE_M and between > 1.0):
