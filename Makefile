@@ -79,7 +79,7 @@ operation: $(READY) ## 20 wearers on one broker, two with the real firmware, one
 	@tools/apt.sh $(APT_PACKAGES) mosquitto
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(BIN)/python tools/operation.py
+	$(BIN)/python tools/team_operation.py
 
 $(VENV)/peers: host/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."

@@ -68,9 +68,20 @@ def _device_faults() -> Iterator[Fault]:
             yield Fault((f"{name}={value}",), (f"{name}=ok",))
 
 
+def _kit_faults() -> Iterator[Fault]:
+    """Parts of the kit of 2026 that are plugged in instead of the papers' ones, and that then fail."""
+    for part, papers in (("thigh=lsm6dso", "adis16100"), ("compass=lis3mdl", "cmps10"), ("pressure=bmp390", "scp1000")):
+        yield Fault((f"part_{part}",), (f"part_{part.split('=')[0]}={papers}",))
+    rangers = ("part_ranger_left", "part_ranger_right")
+    yield Fault(tuple(f"{each}=pulse" for each in rangers), tuple(f"{each}=srf02" for each in rangers))
+    for fault in ("pulse_left=deaf", "imu_thigh=absent", "bmp390=absent", "lis3mdl=nack"):
+        yield Fault(("kit=2026", fault), (f"{fault.split('=')[0]}=ok", "kit=papers"))
+
+
 FAULTS = (
     Fault(()),
     *_device_faults(),
+    *_kit_faults(),
     Fault(("sda=stuck",)),
     Fault(("sda=stuck_forever",), ("sda=ok",)),
     Fault(("scl=stuck",), ("scl=ok",)),

@@ -13,8 +13,8 @@ from board_runs import ROOT
 
 @pytest.fixture(scope="module")
 def tool() -> ModuleType:
-    """tools/operation.py; tests/operation is a package of the same name."""
-    spec = importlib.util.spec_from_file_location("operation_tool", ROOT / "tools/operation.py")
+    """tools/team_operation.py; tests/operation is a package of the same name."""
+    spec = importlib.util.spec_from_file_location("operation_tool", ROOT / "tools/team_operation.py")
     assert spec
     assert spec.loader
     module = importlib.util.module_from_spec(spec)

@@ -150,7 +150,8 @@ def _gyro_findings(probed: ProbeResult) -> list[Finding]:
         last = rates[-CONSTANT_SAMPLES:]
         six_axes = part_in(probed.reports, device) is Part.LSM6DSO
         full_scale, scale = (SIX_AXES_FULL_SCALE, "1000") if six_axes else (FULL_SCALE, "300")
-        if len(last) == CONSTANT_SAMPLES and len(set(last)) == 1:
+        is_constant = len(last) == CONSTANT_SAMPLES and len(set(last)) == 1
+        if is_constant and not six_axes:  # at rest the noise of an LSM6DSO is a fifth of a count of `gyros`
             what = f"gives a constant {last[0]} counts, without noise"
             findings.append(Finding(Severity.WARNING, NAMES[device], what, "it may be stuck: power-cycle the board"))
         elif last and sum(abs(v) >= full_scale for v in last) > len(last) // 2:
