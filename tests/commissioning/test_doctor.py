@@ -231,7 +231,7 @@ def test_the_drift_is_found_through_slow_answers(ppm: float) -> None:
 @needs_twin
 def test_the_parts_of_2026_are_named_and_so_is_the_one_that_fails() -> None:
     with twin_board("kit=2026", "imu_calf=no_self_test") as port:
-        done = doctor("--board", port, "--seconds", 5)
+        done = doctor("--board", port, "--seconds", 8)
     assert done.returncode == 1, done.stdout
     for words in (
         "left ranger: answers, pulse ranger",
