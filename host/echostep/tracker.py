@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.alarm import Alarm, WearerAlarm
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.board.findings import BoardReports
@@ -31,6 +30,7 @@ from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.particle_kernels import systematic
 from echostep.localization.plausibility import STATED
 from echostep.localization.start import Start
+from echostep.odometry.alarm import Alarm, WearerAlarm
 from echostep.odometry.front_end import FrontEnd, FrontEndCounts
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose

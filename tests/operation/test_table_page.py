@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from operation.teams import TOWER, ServedTeam, place, whole_team
-from page.browser import PHONE, PICTURES, opened_page, spot, wait_for
+from page.browser import PHONE, PICTURES, loaded_page, overflow, spot, wait_for
 
 WIDE = {"viewport": {"width": 1280, "height": 720}}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -23,13 +23,7 @@ WORDS = "[...document.querySelectorAll('#list li')].map((e) => e.innerText.repla
 
 def table(browser: Any, url: str, look: str) -> Any:
     """A page that shows a plan and a list."""
-    page = opened_page(browser, **LOOKS[look])
-    page.wrong = []
-    page.on("pageerror", lambda error: page.wrong.append(str(error)))
-    page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
-    page.goto(url)
-    wait_for(page, READY)
-    return page
+    return loaded_page(browser, url, LOOKS[look], READY)
 
 
 def shot(page: Any, name: str, tmp_path: Path) -> None:
@@ -48,15 +42,12 @@ def test_nothing_keeps_a_commander_out(browser: Any, look: str, tmp_path: Path) 
         wait_for(page, "document.querySelectorAll('#facts dt').length > 5")
         again = Axe().run(page)
         shot(page, f"{look}-one", tmp_path)
-        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        cut = page.evaluate(
-            "[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
-        )
+        beyond = overflow(page)
         assert not page.wrong
         page.context.close()
     assert found.violations_count == 0, found.generate_report()
     assert again.violations_count == 0, again.generate_report()
-    assert (wide, cut) == (0, 0)
+    assert beyond == (0, 0)
 
 
 def test_the_list_is_in_words_and_the_most_urgent_comes_first(browser: Any) -> None:

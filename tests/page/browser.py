@@ -150,13 +150,27 @@ class Walk:
 
 def looking(browser: Any, url: str, look: str) -> Any:
     """A page with an estimate, a floor and names that are drawn."""
-    page = opened_page(browser, **LOOKS[look])
+    return loaded_page(browser, url, LOOKS[look], READY)
+
+
+def loaded_page(browser: Any, url: str, how: dict[str, Any], ready: str) -> Any:
+    """A page of its own context at a URL, once it is ready; faults and errors on its console are in `wrong`."""
+    page = opened_page(browser, **how)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
     page.goto(url)
-    wait_for(page, READY)
+    wait_for(page, ready)
     return page
+
+
+def overflow(page: Any) -> tuple[int, int]:
+    """How many pixels a page is wider than its window, and how many of its buttons and lists reach beyond the right edge."""
+    wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    cut = page.evaluate(
+        "[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
+    )
+    return wide, cut
 
 
 def opened_page(browser: Any, **how: Any) -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from echostep.alarm import Alarm, AlarmKind, AlarmReason
+from echostep.odometry.alarm import Alarm, AlarmKind, AlarmReason
 from echostep.page.elements.alarm import ShownAlarm, shown_alarm
 from echostep.page.mailbox import Mailbox
 from echostep.page.requests import parse_request

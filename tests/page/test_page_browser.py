@@ -19,7 +19,7 @@ from echostep.page.server import PageServer
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
-from page.browser import LOCAL, LOOKS, PLAN, Walk, demo_walk, looking, opened_page, picture, spot, wait_for
+from page.browser import LOCAL, LOOKS, PLAN, Walk, demo_walk, looking, opened_page, overflow, picture, spot, wait_for
 from page.frames import scene
 from waiting import until
 
@@ -42,15 +42,12 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
         picture(page, look, tmp_path)
         page.click("#here")
         again = Axe().run(page)
-        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        cut = page.evaluate(
-            "[...document.querySelectorAll('button, select')].filter((e) => e.offsetParent && e.getBoundingClientRect().right > innerWidth).length"
-        )
+        beyond = overflow(page)
         assert not page.wrong
         page.context.close()
     assert found.violations_count == 0, found.generate_report()
     assert again.violations_count == 0, again.generate_report()
-    assert (wide, cut) == (0, 0)
+    assert beyond == (0, 0)
 
 
 SHEET = "document.querySelector('#sheet-text').textContent"

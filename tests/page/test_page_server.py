@@ -20,9 +20,9 @@ from websockets.typing import Origin
 from echostep.errors import EchostepError
 from echostep.page import protocol
 from echostep.page.elements.scene import ParticleSample
+from echostep.page.guarded_socket import MOST_UNDRAWN
 from echostep.page.mailbox import MOST_CHECK_INS, Mailbox
 from echostep.page.server import MOST_PAGES, Address, PageServer
-from echostep.page.session import MOST_UNDRAWN
 from echostep.ports.check_in import CheckIn
 from page.frames import PLAN, fetched, header, next_frame, opened, scene, served
 from waiting import PATIENCE_S, ends

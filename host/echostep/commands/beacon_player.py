@@ -20,6 +20,7 @@ from echostep.errors import EchostepError
 from echostep.localization.metrics import load_truth
 from echostep.plan.importers.limited import open_limited
 from echostep.ports.datagram_key import seal
+from echostep.ports.port_faults import PORT_FAULTS
 from echostep.ports.udp import key_of
 from echostep.session.console import console
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
@@ -75,7 +76,7 @@ def _open_sender(to: str) -> tuple[Callable[[bytes], object], Callable[[], None]
     if not to.startswith("udp://"):
         try:
             port = serial.serial_for_url(to, baudrate=BAUD, write_timeout=WRITE_TIMEOUT_S)
-        except (serial.SerialException, OSError, ValueError) as error:
+        except PORT_FAULTS as error:
             raise EchostepError(f"{to}: cannot open the port: {error}; give another one with --to") from error
         return port.write, port.close
     try:

@@ -16,6 +16,9 @@ Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for plot
 Scheduler = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, not on this machine.")
 ]
+WestportData = Annotated[
+    Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
+]
 
 
 @app.callback()
@@ -155,9 +158,7 @@ def floors_command(
 def storeys_command(
     runs: Annotated[int, typer.Option("--runs", help="Walks through each building.", min=1)] = 10,
     seed: Seed = 1,
-    folder: Annotated[
-        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
-    ] = None,
+    folder: WestportData = None,
     json: Json = None,
     out: Out = Path("out/storeys"),
     scheduler: Scheduler = None,
@@ -208,9 +209,7 @@ def fischer2008(
 def anywhere_command(
     runs: Annotated[int, typer.Option("--runs", help="Walks of each row.", min=1)] = 200,
     seed: Seed = 1,
-    folder: Annotated[
-        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
-    ] = None,
+    folder: WestportData = None,
     rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: 'kidnap/*'.")] = "*",
     json: Json = None,
     out: Out = Path("out/anywhere"),
@@ -259,9 +258,7 @@ def clutter_command(
 def noplan_command(
     runs: Annotated[int, typer.Option("--runs", help="Walks of each row.", min=1)] = 50,
     seed: Seed = 1,
-    folder: Annotated[
-        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
-    ] = None,
+    folder: WestportData = None,
     rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: '*/10min'.")] = "*",
     json: Json = None,
     out: Out = Path("out/noplan"),

@@ -10,7 +10,6 @@ import math
 from pathlib import Path
 
 import numpy as np
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from echostep.errors import EchostepError
 from echostep.mapping.directions import LEAST_EVIDENCE
@@ -25,7 +24,7 @@ from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
 from echostep.session.metadata import recorded_start
 from echostep.session.options import TrackingOptions
-from echostep.session.progress import with_bar
+from echostep.session.progress import bar, with_bar
 from echostep.session.replay import tracker_of
 
 LEAST_WAY_M = 3.0  # of path that shows a wall
@@ -35,7 +34,8 @@ def map_recording(path: Path, out: Path, picture: Path | None) -> None:
     """Draw the building of a recorded walk; raises EchostepError when there is no walk in it, or no wall was heard."""
     recording = open_recording(path)
     segments = segments_of(recording)
-    mapped = _mapped(segments, path)
+    with bar(f"drawing {path.name}") as show:
+        mapped = map_walk(segments, show)
     start = recorded_start(recording.metadata, path)
     plan, walked_m = plan_of(mapped, start if isinstance(start, Pose) else _origin(), path.stem)
     if not plan.is_drawn:
@@ -51,7 +51,7 @@ def map_recording(path: Path, out: Path, picture: Path | None) -> None:
 
 
 def segments_of(recording: Recording) -> list[MeasuredSegment]:
-    """The path of a recording with its pings; raises EchostepError when nobody walked."""
+    """The path of a recording with its pings; raises EchostepError when it has no steps or no echo."""
     front_end: FrontEnd = tracker_of(recording, NO_PLAN, TrackingOptions(None)).front_end
     portions = with_bar(recording.portions(), f"reading {recording.path.name}", lambda: recording.fraction)
     pieces = [piece for portion in portions for piece in front_end.process(portion)]
@@ -62,16 +62,6 @@ def segments_of(recording: Recording) -> list[MeasuredSegment]:
     if not any(np.isfinite(s.range_m).any() for s in segments):
         raise EchostepError(f"{recording.path}: no echo in it: echostep doctor examines the rangers")
     return segments
-
-
-def _mapped(segments: list[MeasuredSegment], path: Path) -> Mapped:
-    """The walk drawn, with a bar on a terminal."""
-    if not console.is_terminal:
-        return map_walk(segments)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as bars:
-        task = bars.add_task(f"drawing {path.name}", total=1.0)
-        return map_walk(segments, lambda share: bars.update(task, completed=share))
 
 
 def _origin() -> Pose:

@@ -26,6 +26,7 @@ from echostep.commissioning.probe import probe
 from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD
+from echostep.ports.port_faults import PORT_FAULTS
 
 TOUCH_BAUD = 1200  # opening the port at this rate and closing it starts the bootloader
 BOOTLOADER_S = 10.0  # longest wait for its port; the bootloader runs for eight seconds
@@ -109,7 +110,7 @@ def enter_bootloader(port: str) -> str:
         with suppress(OSError):  # a port without modem lines
             touched.dtr = False
         touched.close()
-    except (serial.SerialException, OSError, ValueError) as error:
+    except PORT_FAULTS as error:
         raise EchostepError(f"{port}: cannot open the port: {error}") from error
 
     gone = False

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.alarm import AlarmKind, WearerAlarm
 from echostep.arrays import Floats
 from echostep.evaluate.feet.datasets import SETS as FEET
 from echostep.evaluate.legs.datasets import SETS as LEGS
@@ -23,6 +22,7 @@ from echostep.evaluate.recordings import read_sets
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.legs.trunk_path import GyroBlock
+from echostep.odometry.alarm import AlarmKind, WearerAlarm
 from echostep.odometry.stillness import Stillness
 
 RATE_HZ = 100.0

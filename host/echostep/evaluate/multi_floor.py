@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.error_statistics import error_statistics
 from echostep.errors import EchostepError
 from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
+from echostep.localization.error_statistics import error_statistics
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.start import ANY_LEVEL
 from echostep.plan.importers.formats import open_plan

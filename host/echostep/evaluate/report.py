@@ -15,8 +15,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as TerminalTable
 
-from echostep.error_statistics import error_statistics
 from echostep.errors import EchostepError
+from echostep.localization.error_statistics import error_statistics
 
 Row = dict[str, Any]
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.error_statistics import error_statistics
 from echostep.errors import EchostepError
+from echostep.localization.error_statistics import error_statistics
 from echostep.localization.estimate import Estimate
 
 NEARBY_S = 2.5  # by reason: estimates come at each step, and twice a second while standing

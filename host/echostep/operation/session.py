@@ -16,11 +16,9 @@ from starlette.websockets import WebSocket
 from echostep.operation import requests, wire
 from echostep.operation.operation import Operation, TableScene
 from echostep.page.faults import Faults
-from echostep.page.guarded_socket import FRAME_S, GuardedSocket
+from echostep.page.guarded_socket import FRAME_S, MOST_UNDRAWN, GuardedSocket
 from echostep.page.protocol import Refused
 from echostep.page.shared import PageCounts
-
-MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 
 
 class TableFeed:

@@ -19,7 +19,7 @@ import msgspec
 from echostep.operation.operation import TableScene
 from echostep.operation.words import ShownDetails, ShownWearer
 from echostep.page.elements.marks import ShownMark
-from echostep.page.protocol import PlanLabels, Refused, hello
+from echostep.page.protocol import PlanLabels, Refused, hello, packed
 from echostep.plan.model import Plan
 
 PLACE_BYTES, TRAIL_BYTES = 7 * 4, 5 * 4
@@ -57,12 +57,9 @@ class TableHeader:
     kind: Literal["table"] = "table"
 
 
-_ENCODER = msgspec.json.Encoder()
-
-
 def encode(message: TableHello | Refused) -> str:
     """A message as JSON."""
-    return _ENCODER.encode(message).decode()
+    return msgspec.json.encode(message).decode()
 
 
 def table_hello(plan: Plan, title: str) -> TableHello:
@@ -100,6 +97,4 @@ def frame(scene: TableScene, parts: TableParts) -> bytes:
         details=parts.details,
         marks=scene.marks if parts.marks else None,
     )
-    text = _ENCODER.encode(header)
-    text += b" " * (-len(text) % 4)
-    return len(text).to_bytes(4, "little") + text + scene.places + parts.trail
+    return packed(header, scene.places + parts.trail)

@@ -247,9 +247,14 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         marks=parts.marks,
         ended=parts.ended,
     )
+    return packed(header, parts.trail + cloud)
+
+
+def packed(header: object, rows: bytes) -> bytes:
+    """The length of a header (u32, little-endian), the header as JSON, padded with spaces to a multiple of four, and rows of numbers."""
     text = _ENCODER.encode(header)
     text += b" " * (-len(text) % 4)
-    return len(text).to_bytes(4, "little") + text + parts.trail + cloud
+    return len(text).to_bytes(4, "little") + text + rows
 
 
 def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:

@@ -20,13 +20,11 @@ from echostep.page import protocol, requests
 from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene, ParticleSample
-from echostep.page.guarded_socket import FRAME_S, GuardedSocket
+from echostep.page.guarded_socket import FRAME_S, MOST_UNDRAWN, GuardedSocket
 from echostep.page.mailbox import Mailbox
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
 from echostep.ports.check_in import Call, CheckIn, Undo
-
-MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 
 
 class PageSession(GuardedSocket):

@@ -20,6 +20,7 @@ from echostep.ports.access import holders, refusal
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunk_queue import ChunkQueue
 from echostep.ports.chunks import Chunk
+from echostep.ports.port_faults import PORT_FAULTS
 from echostep.ports.udp import UdpPort
 
 # All by reason.
@@ -77,7 +78,7 @@ class SerialPorts:
         """Write to a port, for at most `WRITE_TIMEOUT_S`; a failure becomes a notice."""
         try:
             self._ports[port].write(sent)
-        except (serial.SerialException, OSError) as error:
+        except PORT_FAULTS as error:
             self.notices.append(f"{port}: cannot write: {error}")
 
     def close(self) -> None:
@@ -96,7 +97,7 @@ class SerialPorts:
                 received = port.read(max(1, port.in_waiting))
                 if waiting := port.in_waiting if received else 0:  # a read that has waited returns its first byte alone
                     received += port.read(waiting)
-            except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under a blocking read
+            except (TypeError, *PORT_FAULTS) as error:  # TypeError: closed under a blocking read
                 self._reopen(name, url, baud, error)
                 continue
             if isinstance(port, UdpPort) and (news := port.news()):
@@ -136,7 +137,7 @@ def _open(url: str, baud: int) -> serial.SerialBase | UdpPort:
         return serial.serial_for_url(
             url, baudrate=baud, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True
         )
-    except (serial.SerialException, OSError, ValueError) as error:
+    except PORT_FAULTS as error:
         if getattr(error, "errno", None) in (errno.EWOULDBLOCK, errno.EBUSY):
             held = ", ".join(holders(url)) or "a program of another user"
             raise EchostepError(f"{url} is in use by {held}: end that program, or give another port") from error

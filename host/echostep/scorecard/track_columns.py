@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
-from echostep.localization.estimate import CHI2_95
+from echostep.localization.estimate import ellipse95
 from echostep.plan.model import Plan
 from echostep.scorecard.csv_columns import CsvColumns, read_csv
 
@@ -124,6 +124,4 @@ def _level(table: CsvColumns, row: int, name: str, text: str, index_of: Callable
 
 def _radius95(covariance_m2: Floats) -> Floats:
     """Longer half axis (m) of the 95 % ellipse of covariances (n, 3)."""
-    xx, xy, yy = covariance_m2.T
-    greatest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
-    return np.asarray(np.sqrt(CHI2_95 * np.maximum(greatest, 0.0)))
+    return np.array([ellipse95(*row).major_m for row in covariance_m2.tolist()])

@@ -40,13 +40,20 @@ def progress_line(text: str) -> Iterator[None]:
 
 def with_bar(items: Iterable[Item], text: str, fraction: Callable[[], float | None]) -> Iterator[Item]:
     """The same items, with a bar on a terminal; `fraction`, 0 to 1, is asked at each item; None: it is not known."""
+    with bar(text) as show:
+        for item in items:
+            yield item
+            if (done := fraction()) is not None:
+                show(done)
+
+
+@contextmanager
+def bar(text: str) -> Iterator[Callable[[float], None]]:
+    """A bar on a terminal while the block runs; it is given a function that shows the share that is done."""
     if not console.is_terminal:
-        yield from items
+        yield lambda _share: None
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bars:
         task = bars.add_task(text, total=None)
-        for item in items:
-            yield item
-            if (done := fraction()) is not None:
-                bars.update(task, total=1.0, completed=done)
+        yield lambda share: bars.update(task, total=1.0, completed=share)

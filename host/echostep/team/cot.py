@@ -39,14 +39,7 @@ def event(report: Report) -> bytes | None:
     place, position, motion = report.place, report.position, report.motion
     if place is None or position is None:
         return None
-    top = ElementTree.Element("event", version="2.0", uid=uid(report.team, report.name), type=FRIEND_ON_FOOT)
-    top.attrib |= {
-        "time": report.time,
-        "start": report.recorded or report.time,
-        "stale": report.stale,
-        "how": HOW[report.source],
-    }
-    ElementTree.SubElement(top, "point", _point(place))
+    top = _begun(report, place, uid(report.team, report.name), FRIEND_ON_FOOT)
     detail = ElementTree.SubElement(top, "detail")
     ElementTree.SubElement(detail, "contact", callsign=report.name)
     if motion is not None and place.course_deg is not None:
@@ -77,14 +70,7 @@ def emergency(report: Report) -> bytes | None:
         return None
     over = alarm.kind == "over"
     of, kind = uid(report.team, report.name), EMERGENCY_OVER if over else EMERGENCY
-    top = ElementTree.Element("event", version="2.0", uid=f"{of}-9-1-1", type=kind)
-    top.attrib |= {
-        "time": report.time,
-        "start": report.recorded or report.time,
-        "stale": report.stale,
-        "how": HOW[report.source],
-    }
-    ElementTree.SubElement(top, "point", _point(place))
+    top = _begun(report, place, f"{of}-9-1-1", kind)
     detail = ElementTree.SubElement(top, "detail")
     ElementTree.SubElement(detail, "link", uid=of, type=FRIEND_ON_FOOT, relation="p-p")
     ElementTree.SubElement(detail, "contact", callsign=f"{report.name}-Alert")
@@ -127,6 +113,19 @@ def alarm_words(alarm: ReportedAlarm) -> str:
     kind = "asked whether all is well" if alarm.kind == "asking" else "mayday"
     why = "no motion for" if alarm.reason == "no motion" else "asked for help"
     return f"{kind}: {why} {alarm.age_s:.0f} s{'' if alarm.reason == 'no motion' else ' ago'}"
+
+
+def _begun(report: Report, place: ReportedPlace, of: str, kind: str) -> ElementTree.Element:
+    """An event of this uid and type with its times and its point."""
+    top = ElementTree.Element("event", version="2.0", uid=of, type=kind)
+    top.attrib |= {
+        "time": report.time,
+        "start": report.recorded or report.time,
+        "stale": report.stale,
+        "how": HOW[report.source],
+    }
+    ElementTree.SubElement(top, "point", _point(place))
+    return top
 
 
 def _point(place: ReportedPlace) -> dict[str, str]:

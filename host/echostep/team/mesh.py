@@ -20,6 +20,7 @@ from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.plan.model import Plan
+from echostep.ports.port_faults import PORT_FAULTS
 from echostep.team.endpoint import Endpoint
 from echostep.team.mesh_airtime import INTERVAL_S, PRESETS, Modem, interval_s
 from echostep.team.mesh_report import MOST_NAMES, Unpacker, pack
@@ -54,7 +55,7 @@ class MeshNode:
         self._broken = False
         try:
             self._interface = SerialInterface(port, timeout=ANSWER_S)
-        except MeshInterface.MeshInterfaceError as error:
+        except (MeshInterface.MeshInterfaceError, *PORT_FAULTS) as error:
             raise ConnectionError(f"no Meshtastic node answers: {error}") from error
         pub.subscribe(self._received, "meshtastic.receive")
         pub.subscribe(self._lost, "meshtastic.connection.lost")
@@ -65,7 +66,10 @@ class MeshNode:
         """Give the node a packet for everybody."""
         if self._broken:
             raise ConnectionError("the connection to the node broke")
-        self._interface.sendData(data, portNum=port, hopLimit=0)
+        try:
+            self._interface.sendData(data, portNum=port, hopLimit=0)
+        except PORT_FAULTS as error:
+            raise ConnectionError(f"the connection to the node broke: {error}") from error
 
     def send_position(self, place: ReportedPlace, unix_s: float) -> None:
         """A position message of Meshtastic's own."""

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.error_statistics import error_statistics, quantile
 from echostep.evaluate.operation.walks import HALF_M, OperationWalk, operation
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
+from echostep.localization.error_statistics import error_statistics, quantile
 from echostep.localization.estimate import TrackStatus
 from echostep.scorecard.card import FLOOR_PENALTY_M, score
 from echostep.scorecard.own import track_of, truth_of

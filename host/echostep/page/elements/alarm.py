@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from echostep.alarm import MAYDAY_S, AlarmKind, AlarmReason
+from echostep.odometry.alarm import MAYDAY_S, AlarmKind, AlarmReason
 from echostep.tracker import Tracker
 
 AGAIN_S = 5.0  # between two times that a sentence is spoken, by reason

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.odometry.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
 from echostep.odometry.stillness import Window
 from echostep.plan.model import load_plan
 from echostep.ports.check_in import PERSON, Call, CheckIn

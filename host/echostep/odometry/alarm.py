@@ -69,7 +69,7 @@ class WearerAlarm:
         self._steps.append(t_s)
 
     def add(self, windows: Sequence[Window]) -> None:
-        """Take windows in order of time; before the first steps nothing is watched: a device that lies ready is no wearer who has fallen."""
+        """Take windows in order of time; before the first steps nothing is watched: a device that lies ready is not worn yet."""
         if len(self._steps) == WALKED_STEPS:
             for window in windows:
                 self._pass(window)
