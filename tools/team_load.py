@@ -86,7 +86,18 @@ def cpu_s(pid: int) -> float:
 
 def start_commander(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.Popen[str]:
     """Start a commander, on a pseudo terminal or with its output kept."""
-    command = [sys.executable, "-m", "echostep", "command", "--plan", str(plan_path), url, *more]
+    command = [
+        sys.executable,
+        "-m",
+        "echostep",
+        "command",
+        "--plan",
+        str(plan_path),
+        url,
+        "--out",
+        "out/load/operation.mcap",
+        *more,
+    ]
     if not terminal:
         return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     ours, theirs = os.openpty()

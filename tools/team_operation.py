@@ -131,7 +131,20 @@ def operate(url: str, plan_path: Path, wearers: int, firmware: int, speed: float
         ear = Listening(url)
         opened.callback(ear.receiver.close)
         commander = _start(
-            opened, ["-m", "echostep", "command", url, "--plan", str(plan_path), "--json", "--port", "0"]
+            opened,
+            [
+                "-m",
+                "echostep",
+                "command",
+                url,
+                "--plan",
+                str(plan_path),
+                "--json",
+                "--port",
+                "0",
+                "--out",
+                str(folder / "operation.mcap"),
+            ],
         )
         for k in range(firmware):
             out, name = str(folder / f"firmware-{k}"), f"firmware {k}"

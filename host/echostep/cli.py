@@ -349,9 +349,16 @@ def legs(
 @app.command()
 def command(
     broker: Annotated[
-        str, typer.Argument(metavar="URL", help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, or mesh:///dev/PORT")
+        str,
+        typer.Argument(
+            metavar="URL",
+            help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, mesh:///dev/PORT, or a recorded operation (.mcap)",
+        ),
     ],
     plan: Plan,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="The recording to write; each run gets a new number.")
+    ] = Path("out/command/operation.mcap"),
     team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)] = None,
     picture: Annotated[
@@ -365,12 +372,13 @@ def command(
     host: Host = LOCAL,
     port: Port = None,
 ) -> None:
-    """Follow a team on one plan, lost and silent ones first: on a page and as a table."""
+    """Follow a team on one plan, lost and silent ones first, on a page and as a table, and record it; or show a recording again."""
     from echostep.operation import command as commander
+    from echostep.operation.views import Views
     from echostep.page.server import Address
 
-    views = commander.Views(Address(host, port) if page else None, picture, as_json=as_json)
-    commander.command(plan, broker, team, seconds, views)
+    views = Views(Address(host, port) if page else None, picture, as_json=as_json)
+    commander.command(plan, broker, team, seconds, views, out)
 
 
 @app.command()

@@ -5,16 +5,20 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Self
 
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.page import TablePage
+from echostep.operation.record import OperationRecorder
+from echostep.operation.tape import Keyframe, Tape
 from echostep.page.server import Address
 from echostep.plan.model import Plan
 from echostep.plan.whereabouts import Whereabouts
 from echostep.simulation.world.tower import tower
-from echostep.team.inbox import Inbox
+from echostep.team.inbox import Inbox, ReceivedMessage
 from echostep.team.marks import Mark, MarkKind
 from echostep.team.report import Position, Report, ReportedAlarm, encode, moment
 from team.team_reports import POSITION, report
@@ -49,6 +53,7 @@ class Team:
         self.now_s = time.monotonic() if now_s is None else now_s
         self.unix_s = 1.8e9
         self.gathers = False  # messages wait for `receive`
+        self.on_believed: Callable[[list[ReceivedMessage]], None] = lambda _: None
         self._inbox = Inbox()
         self._sequence: dict[str, int] = {}
 
@@ -78,22 +83,49 @@ class Team:
         """Have the operation take what came."""
         messages, dropped = self._inbox.take_all()
         dated = [message._replace(received_s=self.now_s, unix_s=self.unix_s) for message in messages]
-        self.operation.receive(dated, dropped, self.now_s, self.unix_s)
+        self.on_believed(self.operation.receive(dated, dropped, self.now_s, self.unix_s))
 
     def pass_time(self, seconds: float) -> None:
         """Nothing is heard for so many seconds."""
         self.now_s += seconds
         self.unix_s += seconds
-        self.operation.receive([], {}, self.now_s, self.unix_s)
+        self.on_believed(self.operation.receive([], {}, self.now_s, self.unix_s))
 
     def scene(self, **how: Any) -> TableScene:
         """What a page would be sent."""
         return self.operation.scene(self.now_s, self.unix_s, **how)
 
 
-def whole_team() -> Team:
+class Recording:
+    """A team whose operation is recorded, with a keyframe every few messages."""
+
+    def __init__(self, folder: Path, team: Team, keyframe_messages: int = 20) -> None:
+        self.team = team
+        self.recorder = OperationRecorder(folder / "operation.mcap", team.plan, "mqtt://broker:1883")
+        self.tape = Tape(self.recorder.path, grows=True)
+        self.tape._messages = keyframe_messages
+        team.on_believed = self._record
+
+    def _record(self, believed: list[ReceivedMessage]) -> None:
+        now_s, unix_s, operation = self.team.now_s, self.team.unix_s, self.team.operation
+        self.recorder.add(believed)
+        roster = operation.roster
+        self.recorder.add_condition(now_s, unix_s, roster.received, roster.rejected, connected=True)
+        if self.tape.note(now_s, len(believed)):
+            self.tape.keep(Keyframe(now_s, unix_s, self.recorder.offset, True, operation.copy()))
+
+    def on_disk(self) -> bool:
+        """Whether the operating system has all of it."""
+        return self.recorder.path.stat().st_size == self.recorder.offset
+
+    def close(self) -> Path:
+        self.recorder.close()
+        return self.recorder.path
+
+
+def whole_team(team: Team | None = None) -> Team:
     """Eight wearers: tracked on three storeys, one fallen, one lost, one silent, one uncertain, one without a position."""
-    team = Team()
+    team = team or Team()
     x_m, y_m = TOWER.levels[0].rooms[0].at_m
     fallen = place(TOWER, x_m, y_m, 0)
     kinds: tuple[MarkKind, ...] = ("cleared", "hazard", "meeting")
@@ -130,9 +162,9 @@ def whole_team() -> Team:
 class ServedTeam:
     """The page of a team; `show` publishes its present scene."""
 
-    def __init__(self, team: Team) -> None:
+    def __init__(self, team: Team, tape: Tape | None = None) -> None:
         self.team = team
-        self.page = TablePage(team.operation, "Simulated operation", Address(port=0))
+        self.page = TablePage(team.operation, "Simulated operation", Address(port=0), tape)
 
     def show(self, **how: Any) -> None:
         self.page.publish(self.team.scene(**how))

@@ -40,6 +40,7 @@ def socket_of(url: str) -> str:
 def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
         command = [*PROGRAM, "command", broker.url, "--plan", str(PLAN), "--port", "0", "--json"]
+        command += ["--out", str(tmp_path / "operation.mcap")]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONUNBUFFERED": "1"}
         running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
         assert running.stderr

@@ -96,7 +96,7 @@ def test_two_runs_in_one_second_get_two_names(tmp_path: Path, monkeypatch: pytes
     taken = names.new_name(wanted)
     taken.write_bytes(b"of another process")
     made = iter([taken, tmp_path / "walk-0002-20260101T000000Z.mcap"])
-    monkeypatch.setattr("echostep.session.recording.new_name", lambda _: next(made))
+    monkeypatch.setattr("echostep.recording.numbered.new_name", lambda _: next(made))
     assert record(wanted, b"new").name == "walk-0002-20260101T000000Z.mcap"
     assert taken.read_bytes() == b"of another process"
 

@@ -196,7 +196,8 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
 def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
         commander = subprocess.Popen(
-            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "300", "--picture", tmp_path / "team.png"],
+            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "300", "--picture", tmp_path / "team.png",
+             "--out", tmp_path / "operation.mcap"],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         try:

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: MIT
 """`echostep command`: follow a team on one plan, on a page and on the terminal.
 
-In: a plan, a broker's URL. Out: the page, a table on the terminal, a picture, the roster as JSON. Owns the loop: it empties the inbox and
-shows the scene 30 times a second, and draws the table four times.
+In: a plan, a broker's URL. Out: the page, a table on the terminal, a recording, a picture, the roster as JSON. Owns the loop: it empties the
+inbox, records what it held, and shows the scene 30 times a second, and draws the table four times.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -22,49 +21,78 @@ from rich.live import Live
 from echostep.errors import EchostepError
 from echostep.operation.operation import Operation
 from echostep.operation.page import TablePage
+from echostep.operation.record import OperationRecorder
+from echostep.operation.replay import replay
+from echostep.operation.tape import Keyframe, Tape
+from echostep.operation.views import Views, finish
 from echostep.page.guarded_socket import FRAME_S
-from echostep.page.server import Address
 from echostep.plan.model import Plan, load_plan
-from echostep.team.commander import as_tree, table
+from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
 from echostep.team.marks import ALL
 from echostep.team.mqtt import Listener
-from echostep.team.picture import draw_team
 from echostep.team.report import checked_name
 
 TABLE_S = 0.25  # between two drawings of the table, by reason
 
 
-@dataclass(frozen=True, slots=True)
-class Views:
-    """Where a team is shown. `page` None: no page. `picture`: drawn at the end. `as_json`: the roster at the end, instead of the table."""
-
-    page: Address | None = None
-    picture: Path | None = None
-    as_json: bool = False
-
-
-def command(plan_path: Path, url: str, team: str | None, seconds: float | None, views: Views) -> None:
-    """Show a team until Ctrl-C, or for `seconds`; then draw the picture and print JSON if asked for."""
-    endpoint = parse_endpoint(url, ("mqtt", "mqtts", "mesh"))
+def command(plan_path: Path, url: str, team: str | None, seconds: float | None, views: Views, out: Path) -> None:
+    """Show a team until Ctrl-C, or for `seconds`, and record it; then draw the picture and print JSON if asked for. `url`: or a recording."""
     if views.picture and views.picture.suffix not in (".png", ".svg"):
         raise EchostepError(f"--picture {views.picture}: expected a name that ends in .png or .svg")
-    operation = Operation(load_plan(plan_path))
     console = Console(soft_wrap=True, stderr=views.as_json)
-    inbox = Inbox()
+    if "://" not in url:
+        replay(Path(url), load_plan(plan_path), seconds, views, console)
+        return
+    endpoint = parse_endpoint(url, ("mqtt", "mqtts", "mesh"))
+    operation, inbox = Operation(load_plan(plan_path)), Inbox()
+    checked = checked_name("--team", team) if team else None
     with ExitStack() as opened:
-        page = opened.enter_context(TablePage(operation, "echostep command", views.page)) if views.page else None
+        recorder = OperationRecorder(out, operation.plan, str(endpoint))
+        opened.callback(_end_recording, recorder, console)
+        tape = Tape(recorder.path, grows=True)
+        page = TablePage(operation, "echostep command", views.page, tape) if views.page else None
         if page:
+            opened.enter_context(page)
             console.print(f"The page: {page.url}", highlight=False)
-        receiver = _receiver(endpoint, team, operation.plan, inbox, lambda text: console.print(text, markup=False))
+        console.print(f"Recording: {recorder.path}", highlight=False)
+        receiver = _receiver(endpoint, checked, operation.plan, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
         if page and endpoint.scheme != "mesh":  # marks need a broker
             page.feed.send = receiver.send
+        run = _Run(operation, inbox, receiver, recorder, tape)
         with suppress(KeyboardInterrupt):
-            _follow(operation, inbox, receiver, page, console, math.inf if seconds is None else seconds, views)
-    operation.update(inbox, time.monotonic(), time.time())
-    _finish(operation, views)
+            _follow(run, page, console, math.inf if seconds is None else seconds, views)
+        run.look(time.monotonic())
+    finish(operation, time.monotonic(), views)
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """An operation with its source and its recording."""
+
+    operation: Operation
+    inbox: Inbox
+    receiver: Receiver
+    recorder: OperationRecorder
+    tape: Tape
+
+    def look(self, now_s: float) -> None:
+        """Take what was heard, and record it."""
+        unix_s, connected = time.time(), self.receiver.connected
+        believed = self.operation.update(self.inbox, now_s, unix_s)
+        roster = self.operation.roster
+        self.recorder.add(believed)
+        self.recorder.add_condition(now_s, unix_s, roster.received, roster.rejected, connected=connected)
+        if self.tape.note(now_s, len(believed)):
+            self.tape.keep(Keyframe(now_s, unix_s, self.recorder.offset, connected, self.operation.copy()))
+
+
+def _end_recording(recorder: OperationRecorder, console: Console) -> None:
+    recorder.close()
+    while recorder.notices:
+        console.print(recorder.notices.popleft(), markup=False)
 
 
 def _receiver(
@@ -74,39 +102,27 @@ def _receiver(
     if endpoint.scheme == "mesh":
         from echostep.team.mesh import MeshListener
 
-        listener = MeshListener(endpoint, checked_name("--team", team) if team else None, plan, inbox.put)
+        listener = MeshListener(endpoint, team, plan, inbox.put)
         return Receiver(listener, lambda text: print_line(f"{endpoint}: {text}"))
-    topics = [f"echostep/{checked_name('--team', team) if team else '+'}/+/+", ALL]
+    topics = [f"echostep/{team or '+'}/+/+", ALL]
     return Receiver(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
 
 
-def _follow(
-    operation: Operation, inbox: Inbox, receiver: Receiver, page: TablePage | None, console: Console, seconds: float,
-    views: Views,
-) -> None:  # fmt: skip
+def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float, views: Views) -> None:
     """Show the team for so many seconds."""
-    end_s, table_s = time.monotonic() + seconds, -math.inf
+    end_s, table_s, operation = time.monotonic() + seconds, -math.inf, run.operation
     pause_s = FRAME_S if page else TABLE_S
     with Live(console=console, auto_refresh=False, transient=False, redirect_stdout=False) as shown:
         while (now_s := time.monotonic()) < end_s:
             time.sleep(min(pause_s, max(end_s - now_s, 0.0)))
-            now_s, connected = time.monotonic(), receiver.connected
-            operation.update(inbox, now_s, time.time())
+            now_s, connected = time.monotonic(), run.receiver.connected
+            run.look(now_s)
+            for notices in (run.recorder.notices, page.notices if page else deque[str]()):
+                while notices:
+                    console.print(notices.popleft(), markup=False)
             if page:
                 page.publish(operation.scene(now_s, time.time(), connected=connected))
-                while page.notices:
-                    console.print(page.notices.popleft(), markup=False)
             if not views.as_json and now_s - table_s >= TABLE_S:
                 table_s = now_s
                 lines = table(operation.roster, operation.plan, now_s, connected=connected, columns=console.width)
                 shown.update(lines, refresh=True)
-
-
-def _finish(operation: Operation, views: Views) -> None:
-    """Draw the picture and print the roster, where asked for."""
-    now_s, roster, plan = time.monotonic(), operation.roster, operation.plan
-    if views.picture:
-        draw_team(views.picture, plan, roster.members(now_s), now_s)
-    if views.as_json:
-        json.dump(as_tree(roster, plan, now_s), sys.stdout, indent=2)
-        sys.stdout.write("\n")

@@ -11,10 +11,9 @@ import math
 import secrets
 import threading
 from array import array
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import count
+from dataclasses import dataclass, replace
 
 from echostep.operation import requests
 from echostep.operation.trails import Trails
@@ -79,35 +78,53 @@ class Operation:
         self._shown_marks: tuple[ShownMark, ...] = ()
         self._trails = Trails()
         self._followed: dict[Key, _Followed] = {}
-        self._numbers = count(1)
+        self._next_number = 1
         self._lock = threading.Lock()
         self._rows: tuple[ShownWearer, ...] = ()
         self._listed_s = -math.inf
         self._changed = False
 
-    def update(self, inbox: Inbox, now_s: float, unix_s: float) -> None:
-        """Take all messages of an inbox, and note what has changed since the last call."""
+    def copy(self) -> Operation:
+        """An operation of the same state that goes on by itself; it shares nothing that changes."""
+        made = Operation(self.plan)
+        with self._lock:
+            made.roster, made._board, made._trails = self.roster.copy(), self._board.copy(), self._trails.copy()
+            made._followed = {
+                key: replace(f, history=f.history.copy() if f.history is not None else None)
+                for key, f in self._followed.items()
+            }
+            made._next_number = self._next_number
+        return made
+
+    def update(self, inbox: Inbox, now_s: float, unix_s: float) -> list[ReceivedMessage]:
+        """Take all messages of an inbox, and note what has changed since the last call; returns those that were believed."""
         messages, dropped = inbox.take_all()
-        self.receive(messages, dropped, now_s, unix_s)
+        return self.receive(messages, dropped, now_s, unix_s)
 
     def receive(
         self, messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], now_s: float, unix_s: float
-    ) -> None:
-        """Take messages, and counts of dropped ones by reason."""
+    ) -> list[ReceivedMessage]:
+        """Take messages, and counts of dropped ones by reason; returns the messages that were believed."""
         with self._lock:
-            take_messages([m for m in messages if not is_shared(m.topic)], dropped, self.roster)
-            for message in messages:
-                if message.topic is not None and is_shared(message.topic):
-                    self._receive_shared(message.topic, message.payload)
+            believed = take_messages([m for m in messages if not is_shared(m.topic)], dropped, self.roster)
+            believed += [m for m in messages if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload)]
             self._follow(now_s, unix_s)
+        return believed
 
-    def _receive_shared(self, topic: str, payload: bytes) -> None:
+    def set_counts(self, received: int, rejected: Mapping[str, int]) -> None:
+        """Counts of messages heard and rejected, of a recorded operation, in which the rejected ones themselves are missing."""
+        with self._lock:
+            self.roster.received, self.roster.rejected = received, Counter(rejected)
+
+    def _receive_shared(self, topic: str, payload: bytes) -> bool:
         self.roster.received += 1
         try:
             self._board.receive(topic, payload)
-            self._changed = True
         except BadReportError as error:
             self.roster.count_rejected(str(error))
+            return False
+        self._changed = True
+        return True
 
     def act(self, request: requests.Action, unix_s: float, now_s: float) -> tuple[str, bytes] | str:
         """The message that carries out what a page asks for, or why there is none."""
@@ -162,10 +179,11 @@ class Operation:
         gone = [key for key in self._followed if key not in members]
         self._trails.forget({self._followed.pop(key).number for key in gone})
         self._changed = self._changed or bool(gone)
-        for key, m in members.items():
-            followed = self._followed.get(key)
+        for key in self.roster.keys:
+            m, followed = members[key], self._followed.get(key)
             if followed is None:
-                followed = self._followed[key] = _Followed(next(self._numbers), history=deque(maxlen=MOST_EVENTS))
+                followed = self._followed[key] = _Followed(self._next_number, history=deque(maxlen=MOST_EVENTS))
+                self._next_number += 1
             self._note(followed, m, now_s, unix_s)
             if m.report.status in SHOWN_STATUS and m.report.position and level_on(self.plan, m) is not None:
                 self._trails.add(followed.number, m.report.position, now_s)

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket
 
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.session import TableFeed, TableSession
+from echostep.operation.tape import Tape
 from echostep.page.faults import Faults
 from echostep.page.server import STATIC, Address, Site, SocketServer
 from echostep.page.shared import PageCounts
@@ -25,8 +26,8 @@ TABLE = Path(__file__).parent / "static"
 class TablePage:
     """Serves the scenes that are published until it is closed; raises EchostepError when it cannot listen at the address."""
 
-    def __init__(self, operation: Operation, title: str, address: Address) -> None:
-        self.feed = feed = TableFeed(operation, title)
+    def __init__(self, operation: Operation, title: str, address: Address, tape: Tape | None = None) -> None:
+        self.feed = feed = TableFeed(operation, title, tape)
         faults, counts = Faults(), PageCounts()
         self.notices: deque[str] = faults.notices  # faults of the server that are not printed yet
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.page.requests import MOST_REQUEST
+from echostep.page.requests import FASTEST, MOST_REQUEST
 from echostep.plan.json_fields import LIMIT_M
 from echostep.team.marks import Identity, MarkKind, Person
 from echostep.team.report import is_printable
@@ -55,8 +55,31 @@ class Acknowledge(msgspec.Struct, frozen=True, tag_field="kind", tag="acknowledg
     by: Person
 
 
+class Seek(msgspec.Struct, frozen=True, tag_field="kind", tag="seek"):
+    """Show the moment so many seconds after the beginning of the operation."""
+
+    t_s: Annotated[float, Meta(ge=0.0, le=1e10)]
+
+
+class Play(msgspec.Struct, frozen=True, tag_field="kind", tag="play"):
+    """Play on from the moment that is shown, or hold it."""
+
+    playing: bool
+
+
+class Speed(msgspec.Struct, frozen=True, tag_field="kind", tag="speed"):
+    """Play so many times as fast as it was."""
+
+    times: Annotated[float, Meta(gt=0.0, le=FASTEST)]
+
+
+class Now(msgspec.Struct, frozen=True, tag_field="kind", tag="now"):
+    """Show the present."""
+
+
+TimeRequest = Seek | Play | Speed | Now
 Action = SetMark | Unmark | Acknowledge
-TableRequest = Drawn | Choose | Action
+TableRequest = Drawn | Choose | TimeRequest | Action
 _REQUESTS = msgspec.json.Decoder(TableRequest)
 
 

@@ -15,18 +15,25 @@ from starlette.websockets import WebSocket
 
 from echostep.operation import requests, wire
 from echostep.operation.operation import Operation, TableScene
+from echostep.operation.past import PastView
+from echostep.operation.tape import Tape
 from echostep.page.faults import Faults
 from echostep.page.guarded_socket import FRAME_S, MOST_UNDRAWN, GuardedSocket
 from echostep.page.protocol import Refused
 from echostep.page.shared import PageCounts
 
+BAR_S = 0.5  # between two frames of one scene, by reason: the time bar grows
+PAST = "The page shows the past: return to now first."
+
 
 class TableFeed:
     """The newest scene; the receiver's thread publishes, the server's thread reads."""
 
-    def __init__(self, operation: Operation, title: str) -> None:
+    def __init__(self, operation: Operation, title: str, tape: Tape | None = None) -> None:
+        """`tape`: of the operation's recording, by which a page can show the past."""
         self.operation = operation
         self.title = title
+        self.tape = tape
         self.latest: TableScene | None = None
         self.on_publish: Callable[[], None] | None = None
         self.send: Callable[[str, bytes], bool] | None = None  # topic and payload, to the broker
@@ -59,6 +66,9 @@ class TableSession(GuardedSocket):
         self._last: TableScene | None = None
         self._chosen: int | None = None
         self._due = True  # the page needs a frame, even of the same scene
+        self._view = PastView(feed.tape) if feed.tape else None
+        self._shown: Operation = feed.operation  # whose scene was sent last
+        self._sent_s = 0.0  # when, on the monotonic clock
 
     async def _greet(self) -> None:
         await self.tell(wire.encode(wire.table_hello(self._feed.operation.plan, self._feed.title)))
@@ -74,6 +84,14 @@ class TableSession(GuardedSocket):
             case requests.Choose(number):
                 self._chosen, self._due = number, True
                 self._news.set()
+            case requests.Seek() | requests.Play() | requests.Speed() | requests.Now():
+                if self._view is not None:
+                    self._view.handle(request)
+                    self._due = True
+                    self._news.set()
+            case _ if self._view is not None and self._view.is_past:
+                self._counts.refused += 1
+                await self.tell(wire.encode(Refused(PAST)))
             case _:
                 if refusal := self._feed.act(request):
                     self._counts.refused += 1
@@ -87,20 +105,39 @@ class TableSession(GuardedSocket):
             if (early_s := due_s - time.monotonic()) > 0.0:
                 await asyncio.sleep(early_s)
             self._news.clear()
-            scene = self._feed.latest
-            if len(self._undrawn) >= MOST_UNDRAWN or scene is None or (scene is self._last and not self._due):
+            if len(self._undrawn) >= MOST_UNDRAWN:
+                continue
+            operation, scene = await self._moment()
+            if scene is None or (scene is self._last and not self._is_due()):
                 continue
             due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
-            await self.tell(self._frame(scene))
+            await self.tell(self._frame(operation, scene))
 
-    def _frame(self, scene: TableScene) -> bytes:
+    async def _moment(self) -> tuple[Operation, TableScene | None]:
+        """What this page shows: the newest scene, or one of the past, which another thread makes."""
+        if self._view is not None and self._view.is_past:
+            past = await asyncio.to_thread(self._view.look, time.monotonic())
+            if past is not None:
+                return past
+        return self._feed.operation, self._feed.latest
+
+    def _is_due(self) -> bool:
+        """Whether the page needs a frame of the scene that it has: it asked for one, or the time bar has grown."""
+        is_past = self._view is not None and self._view.is_past
+        return self._due or (is_past and time.monotonic() - self._sent_s >= BAR_S)
+
+    def _frame(self, operation: Operation, scene: TableScene) -> bytes:
         """A frame with what this page has not been sent yet; from then on it counts as sent."""
         self._seq += 1
         self._undrawn.add(self._seq)
-        operation, begin = self._feed.operation, self._trail_end
+        if operation is not self._shown:
+            self._shown, self._trail_end, self._last, self._due = operation, 0, None, True
+        begin, self._sent_s = self._trail_end, time.monotonic()
         lists = self._due or self._last is None or scene.rows is not self._last.rows
         trail, self._trail_end = operation.trail(begin, scene.t_s)
         details = operation.details(self._chosen, scene.t_s) if lists and self._chosen is not None else None
         marks = self._last is None or scene.marks is not self._last.marks
+        latest = self._feed.latest or scene
+        shown = self._view.shown(scene.t_s, sum(row.open_alarm for row in latest.rows)) if self._view else None
         self._last, self._due = scene, False
-        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, marks, details))
+        return wire.frame(scene, wire.TableParts(self._seq, trail, begin, lists, marks, details, shown))

@@ -37,6 +37,12 @@ class Trails:
         self._first = 0  # number of the oldest point that is kept
         self._last: dict[int, TrailPoint] = {}
 
+    def copy(self) -> Trails:
+        """Trails of the same state that grow by themselves."""
+        made = Trails()
+        made._points, made._first, made._last = self._points.copy(), self._first, dict(self._last)
+        return made
+
     @property
     def end(self) -> int:
         """Number of the next point."""

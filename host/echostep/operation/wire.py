@@ -17,6 +17,7 @@ from typing import Literal
 import msgspec
 
 from echostep.operation.operation import TableScene
+from echostep.operation.past import ShownTime
 from echostep.operation.words import ShownDetails, ShownWearer
 from echostep.page.elements.marks import ShownMark
 from echostep.page.protocol import PlanLabels, Refused, hello, packed
@@ -40,7 +41,7 @@ class TableHello:
 class TableHeader:
     """One moment. `seq`: the page returns it when the frame is drawn. `list`, `marks`: None when the page has them already.
 
-    `details`: of the chosen wearer.
+    `trail_from` 0: trails begin anew. `details`: of the chosen wearer. `time`: of the time bar.
     """
 
     seq: int
@@ -54,6 +55,7 @@ class TableHeader:
     connected: bool
     details: ShownDetails | None
     marks: tuple[ShownMark, ...] | None
+    time: ShownTime | None
     kind: Literal["table"] = "table"
 
 
@@ -80,6 +82,7 @@ class TableParts:
     lists: bool
     marks: bool
     details: ShownDetails | None
+    time: ShownTime | None
 
 
 def frame(scene: TableScene, parts: TableParts) -> bytes:
@@ -96,5 +99,6 @@ def frame(scene: TableScene, parts: TableParts) -> bytes:
         connected=scene.connected,
         details=parts.details,
         marks=scene.marks if parts.marks else None,
+        time=parts.time,
     )
     return packed(header, scene.places + parts.trail)

@@ -7,6 +7,7 @@ recorded, and what is wrong with the file. Owns nothing.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +40,8 @@ class Recording:
     damaged_bytes: int = 0  # in no valid record
     damaged_places: int = 0
     unreadable_chunks: int = 0  # chunk records of the file that could not be decompressed
+    grows: bool = False  # it is being written: reading ends before an unfinished record
+    resume: int = -1  # offset from which `portions_from` goes on behind the last portion; -1 inside a compressed chunk
 
     def chunks(self) -> Iterator[Chunk]:
         """Chunks in the order in which they were recorded."""
@@ -52,6 +55,24 @@ class Recording:
                 yield record
         self.fraction = 1.0
 
+    def portions_from(self, offset: int) -> Iterator[Portion]:
+        """The portions behind a `resume` offset; all of them from 0 on. Channels are those known before the first message."""
+        if not offset:
+            yield from self.portions()
+            return
+        file, channels = map_file(self.path), PortChannels()
+        for opcode, body in summary(file):
+            if opcode == Opcode.CHANNEL:
+                channels.add(body)
+        for _, record in self._scan(file, len(MCAP_MAGIC), channels):
+            if isinstance(record, tuple) and record[0] == Opcode.CHUNK:
+                deque(self._records_in_chunk(record[1], channels), maxlen=0)
+            if isinstance(record, Portion) or record[0] == Opcode.CHUNK:
+                break
+        for record in self._from(file, offset, channels):
+            if isinstance(record, Portion):
+                yield record
+
     def _records(self) -> Iterator[Portion | tuple[int, bytes]]:
         """Messages as portions, other records as opcode and body, in order, up to the footer; damaged bytes are skipped and counted."""
         file, channels = map_file(self.path), PortChannels()
@@ -60,8 +81,13 @@ class Recording:
         for opcode, body in summary(file):
             if opcode == Opcode.CHANNEL:
                 channels.add(body)
-        for begin, record in self._scan(file, len(MCAP_MAGIC), channels):
+        yield from self._from(file, len(MCAP_MAGIC), channels)
+
+    def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
+        """The records from an offset on."""
+        for begin, record in self._scan(file, offset, channels):
             self.fraction = begin / len(file)
+            self.resume = begin
             if isinstance(record, tuple):
                 opcode, body = record
                 if opcode == Opcode.FOOTER and begin + HEAD_SIZE + len(body) + len(MCAP_MAGIC) >= len(file):
@@ -70,8 +96,21 @@ class Recording:
                 if opcode == Opcode.DATA_END:
                     self.altered = self.altered or checksum_differs(file, begin)
                 if opcode == Opcode.CHUNK:
-                    yield from self._records_in_chunk(body, channels)
+                    yield from self._marked(self._records_in_chunk(body, channels), begin + HEAD_SIZE + len(body))
             yield record
+
+    def _marked(
+        self, records: Iterator[Portion | tuple[int, bytes]], end: int
+    ) -> Iterator[Portion | tuple[int, bytes]]:
+        """The records of a compressed chunk that ends at `end`: only behind the last one can reading go on."""
+        before = next(records, None)
+        self.resume = -1
+        while before is not None:
+            record = next(records, None)
+            if record is None:
+                self.resume = end
+            yield before
+            before = record
 
     def _records_in_chunk(self, body: bytes, channels: PortChannels) -> Iterator[Portion | tuple[int, bytes]]:
         records = decompress_chunk(body)
@@ -90,6 +129,8 @@ class Recording:
             if portion:
                 yield offset, portion
             end = record_end(file, offset, channels.known)
+            if end < 0 and offset < len(file) and self.grows:
+                return
             if end < 0 and offset < len(file):
                 end = next_valid_run(file, offset + 1, channels.known)
                 self.damaged_places += 1

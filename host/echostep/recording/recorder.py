@@ -76,6 +76,11 @@ class Recorder:
         return self._file.path
 
     @property
+    def offset(self) -> int:
+        """Bytes of the file so far, those that wait for the disk among them."""
+        return self._file.tell()
+
+    @property
     def notices(self) -> deque[str]:
         """Messages about the disk; the caller prints and clears them."""
         return self._file.notices

@@ -9,16 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from echostep.recording.names import RecordingExistsError, link_newest, new_name, remove_older
+from echostep.recording.names import link_newest, remove_older
+from echostep.recording.numbered import numbered_recorder
 from echostep.recording.recorder import Recorder
 from echostep.session.console import console
-
-TRIES = 10  # of a new name, while other processes take the same one; by reason
 
 
 def start_recording(wanted: Path, metadata: Mapping[str, str], keep: int | None = None) -> Recorder:
     """A recorder on a new file named after `wanted`; raises EchostepError. `keep`: remove the oldest until so many are left."""
-    recorder = _new_recorder(wanted, metadata)
+    recorder = numbered_recorder(wanted, metadata)
     if link_newest(recorder.path, wanted):
         console.print(f"Recording: {recorder.path}, also named {wanted.name}", highlight=False)
     else:
@@ -27,12 +26,3 @@ def start_recording(wanted: Path, metadata: Mapping[str, str], keep: int | None 
     for path in remove_older(wanted, keep) if keep else ():
         console.print(f"Removed: {path} (--keep {keep})", highlight=False)
     return recorder
-
-
-def _new_recorder(wanted: Path, metadata: Mapping[str, str]) -> Recorder:
-    for _ in range(TRIES - 1):
-        try:
-            return Recorder(new_name(wanted), metadata)
-        except RecordingExistsError:
-            continue
-    return Recorder(new_name(wanted), metadata)

@@ -43,13 +43,15 @@ def update_roster(inbox: Inbox, roster: Roster) -> None:
     take_messages(*inbox.take_all(), roster)
 
 
-def take_messages(messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], roster: Roster) -> None:
-    """Put messages into the roster, and counts of dropped ones by reason."""
-    for message in messages:
-        roster.receive(*message)
+def take_messages(
+    messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], roster: Roster
+) -> list[ReceivedMessage]:
+    """Put messages into the roster, and counts of dropped ones by reason; returns those that were believed."""
+    believed = [message for message in messages if roster.receive(*message)]
     for reason, count in dropped.items():
         roster.received += count
         roster.count_rejected(reason, count)
+    return believed
 
 
 def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns: int = ALL_COLUMNS_WIDTH) -> Group:

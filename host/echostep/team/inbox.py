@@ -57,11 +57,12 @@ class Inbox:
             messages.append(ReceivedMessage(topic, payload, retained, time.monotonic(), time.time()))
 
     def take_all(self) -> tuple[list[ReceivedMessage], Counter[str]]:
-        """The kept messages, oldest first within each topic, and the counts of dropped ones; both are reset."""
+        """The kept messages, oldest first, and the counts of dropped ones; both are reset."""
         with self._lock:
             messages, self._messages = self._messages, {}
             dropped, self._dropped = self._dropped, Counter()
-        return [message for of_topic in messages.values() for message in of_topic], dropped
+        kept = [message for of_topic in messages.values() for message in of_topic]
+        return sorted(kept, key=lambda message: message.received_s), dropped
 
 
 class Subscription(Protocol):

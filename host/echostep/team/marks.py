@@ -71,6 +71,12 @@ class MarkBoard:
         self.marks: dict[str, Mark] = {}
         self.acks: dict[AlarmKey, Ack] = {}
 
+    def copy(self) -> MarkBoard:
+        """A board of the same state that changes by itself."""
+        made = MarkBoard()
+        made.marks, made.acks = dict(self.marks), dict(self.acks)
+        return made
+
     def receive(self, topic: str, payload: bytes) -> None:
         """Take one message; raises BadReportError with the reason why it is not believed."""
         parts = topic.split("/")

@@ -98,8 +98,21 @@ class Roster:
         self._members: dict[tuple[str, str, str], Member] = {}
         self._presence: dict[tuple[str, str, str], str] = {}
 
-    def receive(self, topic: str | None, payload: bytes, retained: bool, now_s: float, unix_s: float) -> None:
-        """Update the roster with one payload; never raises."""
+    def copy(self) -> Roster:
+        """A roster of the same state that changes by itself."""
+        made = Roster()
+        made.rejected, made.received = self.rejected.copy(), self.received
+        made._members = {key: replace(m, notes=m.notes.copy()) for key, m in self._members.items()}
+        made._presence = dict(self._presence)
+        return made
+
+    @property
+    def keys(self) -> list[tuple[str, str, str]]:
+        """Keys of all members, in the order in which they came."""
+        return list(self._members)
+
+    def receive(self, topic: str | None, payload: bytes, retained: bool, now_s: float, unix_s: float) -> bool:
+        """Update the roster with one payload; returns whether it was believed. Never raises."""
         self.received += 1
         try:
             team, name, leaf = _topic_parts(topic)
@@ -111,6 +124,8 @@ class Roster:
                 raise BadReportError("unknown topic")
         except BadReportError as error:
             self.count_rejected(str(error))
+            return False
+        return True
 
     def count_rejected(self, reason: str, count: int = 1) -> None:
         """Count rejected payloads; after MAX_REASONS different reasons the others are counted together."""

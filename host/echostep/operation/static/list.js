@@ -12,8 +12,8 @@ export class List {
     $('close').onclick = () => this.choose(null);
   }
 
-  // Rows in order of urgency; elements stay, so that focus and scrolling stay.
-  show(rows) {
+  // Rows in order of urgency; elements stay, so that focus and scrolling stay. What happened in the past is not announced.
+  show(rows, isPast) {
     this.rows = rows;
     const known = new Set(rows.map(({ id }) => id)), focused = document.activeElement;
     for (const [id, item] of this.items) if (!known.has(id)) { item.li.remove(); this.items.delete(id); }
@@ -28,7 +28,7 @@ export class List {
       put(item.note, row.notes.join('; '));
     });
     if (focused?.isConnected && document.activeElement !== focused) focused.focus({ preventScroll: true });
-    this.announce(rows);
+    this.announce(rows, isPast);
     if (this.chosen !== null && !known.has(this.chosen)) this.choose(null);
   }
 
@@ -91,8 +91,9 @@ export class List {
   }
 
   // A wearer who has become lost or silent is said once, others are not.
-  announce(rows) {
+  announce(rows, isPast) {
     const said = rows.filter(({ id, state }) => URGENT.includes(state) && this.states.get(id) !== state).map(({ name, words }) => `${name}: ${words}`);
+    if (isPast) return;
     this.states = new Map(rows.map(({ id, state }) => [id, state]));
     if (said.length) put($('live'), said.slice(0, 3).join('. '));
   }

@@ -10,6 +10,7 @@ import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
 import { Sheet } from './sheet.js';
+import { TimeBar } from './timebar.js';
 import { Trails } from './trails.js';
 import { parseFrame, placesOf } from './wire.js';
 
@@ -23,6 +24,7 @@ let plan = null, wantedLevel = 0, fitted = false, dirty = true, drawnStamp = -1,
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
+const timeBar = new TimeBar((kind, fields) => link.send(kind, fields));
 const painted = new MessageChannel();
 painted.port1.onmessage = ({ data }) => data.forEach((seq) => link.send('drawn', { seq }));
 const drawn = (window.echostep = { frames: 0, view, scene, link, last: null });  // read by tests
@@ -32,6 +34,7 @@ async function hello(message) {
   found = fitted = false;
   fault('');
   trails.clear();
+  timeBar.again();
   $('title').textContent = `${message.title}: ${plan.name}`;
   document.title = message.title;
   floors.plan(plan.levels);
@@ -64,10 +67,12 @@ function connection(open) {
 // Store a frame; it is drawn with the next animation frame. A hidden page draws nothing, so it reports no frame as drawn and gets no more of them.
 function frame(received) {
   scene.places = placesOf(received.places);
-  trails.add(received.trail);
+  if (!received.trail_from) trails.clear();
+  trails.add(received.trail, received.unix_s);
+  timeBar.show(received.time, received.unix_s);
   if (received.list) {
     scene.rows = received.list;
-    list.show(received.list);
+    list.show(received.list, timeBar.isPast);
     floors.show(scene.level, scene.rows);
     findFirst();
   }
@@ -82,7 +87,7 @@ function frame(received) {
 function status({ summary, refused, connected }) {
   $('words').dataset.status = connected ? 'tracking' : 'broken';
   $('mark').textContent = connected ? '●' : '✕';
-  const text = connected ? summary : `no connection to the broker: the last known state. ${summary}`;
+  const past = timeBar.isPast ? 'the past: ' : '', text = past + (connected ? summary : `no connection to the broker: the last known state. ${summary}`);
   if ($('status-text').textContent !== text) $('status-text').textContent = text;
   const why = refused ? `rejected: ${refused}` : '';
   if ($('refused').textContent !== why) $('refused').textContent = why;

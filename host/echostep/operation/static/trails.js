@@ -9,17 +9,18 @@ const FAR_M = 15;  // a longer gap between two points is not drawn: the wearer w
 
 export class Trails {
   constructor(canvas) {
-    Object.assign(this, { canvas, pen: canvas.getContext('2d'), of: new Map(), painted: -Infinity, stamp: -1 });
+    Object.assign(this, { canvas, pen: canvas.getContext('2d'), of: new Map(), painted: -Infinity, stamp: -1, now_s: 0 });
   }
 
   clear() { this.of.clear(); this.painted = -Infinity; }
 
-  add(rows) {
-    const now = performance.now() / 1000;
+  // `now_s`: time of the frame, which is not that of the clock while the past is shown
+  add(rows, now_s) {
+    this.now_s = now_s;
     for (let k = 0; k < rows.length; k += TRAIL) {
       const [id, x, y, level, age] = rows.subarray(k, k + TRAIL);
       if (!this.of.has(id)) this.of.set(id, []);
-      this.of.get(id).push({ x, y, level, at: now - age });
+      this.of.get(id).push({ x, y, level, at: now_s - age });
     }
   }
 
@@ -33,7 +34,7 @@ export class Trails {
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = 'round';
     for (const [id, points] of this.of) {
-      while (points.length && points[0].at < now / 1000 - KEPT_S) points.shift();
+      while (points.length && points[0].at < this.now_s - KEPT_S) points.shift();
       if (points.length) this.line(view, points, level, colour.trail, id === chosen);
       else this.of.delete(id);
     }

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
+
+const $ = (id) => document.getElementById(id);
+const SKIP_S = 10;
+
+export class TimeBar {
+  // `send(kind, fields)`: sends a request to the server
+  constructor(send) {
+    Object.assign(this, { send, holding: false, last: null });
+    $('play').onclick = () => send('play', { playing: !this.last?.playing });
+    $('back').onclick = () => this.skip(-SKIP_S);
+    $('on').onclick = () => this.skip(SKIP_S);
+    $('now').onclick = () => { send('now'); $('time').focus(); };
+    $('times').onchange = () => send('speed', { times: Number($('times').value) });
+    $('time').oninput = () => { this.holding = true; send('seek', { t_s: Number($('time').value) }); };
+    $('time').onchange = () => { this.holding = false; };
+  }
+
+  skip(by) { if (this.last) this.send('seek', { t_s: Math.min(Math.max(this.last.t_s + by, 0), this.last.end_s) }); }
+
+  get isPast() { return Boolean(this.last && !this.last.now); }
+
+  // After a new connection the server has forgotten where this page was.
+  again() {
+    const { last } = this;
+    if (!last || last.now) return;
+    this.send('speed', { times: last.times });
+    this.send('seek', { t_s: last.t_s });
+    this.send('play', { playing: last.playing });
+  }
+
+  show(time, unix_s) {
+    $('bar-of-time').hidden = !time;
+    this.last = time;
+    if (!time) return;
+    const { t_s, end_s, playing, times, now, live, open_alarms } = time, bar = $('time');
+    bar.max = end_s;
+    if (!this.holding) bar.value = t_s;
+    const day = new Date(1000 * unix_s).toLocaleTimeString('en-GB'), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} of ${minutes(end_s)}`;
+    const text = now ? `${day}, now` : `${day}, ${behind}`;
+    put($('clock'), text);
+    bar.setAttribute('aria-valuetext', text);
+    put($('play'), playing ? '❚❚' : '▶');
+    $('play').setAttribute('aria-label', playing ? 'Hold' : 'Play');
+    $('on').disabled = now;
+    $('now').hidden = !live;
+    $('now').disabled = now;
+    put($('now'), !now && open_alarms ? `Now: ▲ ${open_alarms}` : 'Now');
+    $('now').classList.toggle('urgent', !now && open_alarms > 0);
+    $('now').setAttribute('aria-label', !now && open_alarms ? `Return to now: ${open_alarms} open mayday${open_alarms > 1 ? 's' : ''}` : 'Return to now');
+    if (document.activeElement !== $('times')) $('times').value = String(times);
+    $('times').disabled = now;
+    document.body.dataset.past = String(!now && live);
+  }
+}
+
+const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
+const minutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;
