@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The pages of host/docs that are made from the code, written or compared (`make docs`, `make check`).
+"""The pages that are made from the code and from tables, written or compared (`make docs`, `make check`).
 
-In: the installed package. Out: host/docs/*.md and report.schema.json. `--check` writes nothing and exits 1 when one is stale. Owns nothing.
+In: the installed package, firmware/hardware. Out: host/docs/*.md, report.schema.json, tables of firmware/README.md, wiring drawings.
+`--check` writes nothing and exits 1 when one is stale. Owns nothing.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import sys
 from pathlib import Path
 
 from echostep.team.report import schema
-from pages import DOCS, commands, plan, python, recordings, settings, teams
+from pages import DOCS, commands, hardware, plan, python, recordings, settings, teams
 
 
 def pages() -> dict[Path, str]:
@@ -24,7 +25,8 @@ def pages() -> dict[Path, str]:
         "teams": teams,
         "python": python,
     }
-    return {DOCS / f"{name}.md": module.page() for name, module in made.items()} | {teams.SCHEMA: schema()}
+    texts = {DOCS / f"{name}.md": module.page() for name, module in made.items()} | {teams.SCHEMA: schema()}
+    return texts | {hardware.README: hardware.page()} | hardware.drawings()
 
 
 def main() -> int:

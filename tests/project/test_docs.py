@@ -34,7 +34,10 @@ PAGES = [
             "host/SECURITY.md",
         )
     ),
-    *(ROOT / name for name in ("protocol/README.md", "firmware/README.md", "tools/twin/README.md")),
+    *(
+        ROOT / name
+        for name in ("protocol/README.md", "firmware/README.md", "firmware/hardware/README.md", "tools/twin/README.md")
+    ),
     *MANUAL,
 ]
 PROGRAMS = (

@@ -22,7 +22,15 @@ copyright = "the echostep authors"  # noqa: A001 (Sphinx' name)
 extensions = ["myst_parser"]
 highlight_language = "none"  # of blocks that name no language
 root_doc = "README"
-include_patterns = ["README.md", "host/*.md", "host/docs/*.md", "firmware/*.md", "protocol/*.md", "tools/twin/*.md"]
+include_patterns = [
+    "README.md",
+    "host/*.md",
+    "host/docs/*.md",
+    "firmware/*.md",
+    "firmware/hardware/*.md",
+    "protocol/*.md",
+    "tools/twin/*.md",
+]
 exclude_patterns = [".?*", "out", "tests", "host/echostep", "**/build", "**/__pycache__"]
 myst_heading_anchors = 4
 suppress_warnings = ["myst.header"]  # a page may begin below its title's level

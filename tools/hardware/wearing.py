@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Drawing of where each device is worn: python firmware/drawings/wearing.py > firmware/drawings/wearing.svg
+"""Drawing of where each device is worn.
 
-In: nothing. Out: SVG on standard output. Owns the places and the notes.
+In: nothing. Out: SVG. Owns the places and the notes.
 """
 
 from __future__ import annotations
 
-import sys
-
-from pen import SOFT, Pen
+from hardware.pen import SOFT, Pen
 
 SKIN, CLOTH = "#e7eaee", "#d5dae1"
 MTX, GYRO, BELT, RANGER, CABLE, HOST = "#be185d", "#c2410c", "#0b62d6", "#15803d", "#59636e", "#7c3aed"
 
 
-def main() -> None:
+def wearing() -> str:
+    """The SVG."""
     pen = Pen(1170, 750, "How the system is worn")
     pen.label(30, 40, "How the system is worn", 22, bold=True)
     pen.label(
@@ -26,7 +25,7 @@ def main() -> None:
     )
     _side(pen, 250)
     _behind(pen, 850)
-    sys.stdout.write(pen.svg())
+    return pen.svg()
 
 
 def _limb(pen: Pen, points: list[tuple[float, float]], width: float, ink: str) -> None:
@@ -130,7 +129,3 @@ def _behind(pen: Pen, x: float) -> None:
     _label(pen, x - 250, 600, ("barometer", "a hole in the box, foam", "over it against wind"), BELT)
     _arrow(pen, x, 384, x, 318, BELT)
     pen.label(x, 306, "axis of the belt gyro", 12, "middle", BELT)
-
-
-if __name__ == "__main__":
-    main()

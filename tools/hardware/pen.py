@@ -17,6 +17,7 @@ class Pen:
 
     def __init__(self, width: int, height: int, title: str) -> None:
         self._elements = [
+            "<!-- SPDX-License-Identifier: MIT -->",
             f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width} {height}' width='{width}' height='{height}' role='img'>",
             f"<title>{escape(title)}</title>",
             f"<rect width='{width}' height='{height}' fill='{PAPER}'/>",

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""The materials for building: wiring as in the firmware's sources, sound nets, parts for each role, a guide that shows what the twin prints."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from board_runs import ROOT, needs_twin
+from command_line import echostep
+from hardware.lanes import lanes
+from hardware.nets import problems
+from hardware.wiring import Board, Device, boards, pins
+from pages import hardware
+from players import twin_board
+
+FIRMWARE = ROOT / "firmware"
+README = (FIRMWARE / "README.md").read_text()
+ON_MICRO = {  # Arduino's pin-out of the Micro, of 23 March 2020
+    "PD1": "D2", "PD0": "D3", "PD4": "D4", "PC6": "D5", "PD7": "D6", "PE6": "D7", "PB4": "D8", "PB5": "D9", "PB6": "D10",
+    "PB7": "D11", "PD6": "D12", "PC7": "D13", "PF7": "A0", "PF6": "A1", "PF5": "A2", "PF4": "A3", "PF1": "A4", "PF0": "A5",
+    "PB1": "SCK", "PB2": "MOSI", "PB3": "MISO",
+}  # fmt: skip
+
+
+def board(name: str) -> Board:
+    return next(one for one in boards() if one.name == name)
+
+
+def device(of: str, name: str) -> Device:
+    return next(one for one in board(of).devices if one.name == name)
+
+
+def with_device(name: str, new: Device) -> Board:
+    old = board(name)
+    return replace(old, devices=tuple(new if one.name == new.name else one for one in old.devices))
+
+
+def test_each_pin_is_the_firmwares() -> None:
+    for pin in pins():
+        source = (FIRMWARE / pin.file).read_text()
+        defined = re.search(rf"#define {pin.define} (.*)", source)
+        assert defined, pin.define
+        assert f"BIT({pin.port})" in defined[1], pin
+        assert ON_MICRO[pin.port] == pin.board
+
+
+def test_the_firmware_uses_no_pin_that_is_not_in_the_table() -> None:
+    """Every BIT(Pxn) of the drivers, but for SS, which is wired to nothing."""
+    sources = "".join((FIRMWARE / "avr" / name).read_text() for name in ("spi.c", "twi.c", "echo.c", "clock.c"))
+    assert set(re.findall(r"BIT\((P[BCDEF]\d)\)", sources)) - {"PB0"} == {pin.port for pin in pins()}
+
+
+def test_the_chip_selects_are_in_the_order_of_the_chips() -> None:
+    """spi.c shifts BIT(PB4) by the chip's number; D8 is also the foot's."""
+    chips = re.search(r"enum chip \{(.*?)\}", (FIRMWARE / "board.h").read_text())
+    assert chips
+    names = [name.strip().removeprefix("CHIP_") for name in chips[1].split(",")]
+    ports = {net: pin.port for pin in pins() for net in pin.nets}
+    assert "BIT(PB4) << chip" in (FIRMWARE / "avr/spi.c").read_text()
+    assert [ports[f"CS_{name}"] for name in names[:3]] == ["PB4", "PB5", "PB6"]
+
+
+def test_the_i2c_addresses_are_the_firmwares() -> None:
+    notes = " ".join(one.note for one in board("papers").devices)
+    sources = "".join((FIRMWARE / name).read_text() for name in ("srf02.c", "srf02.h", "cmps10.c"))
+    for address in re.findall(r"0x[0-9A-F]{2}", notes):
+        assert re.search(rf"{address}u?\b", sources, flags=re.I), address
+
+
+@pytest.mark.parametrize("name", ["papers", "2026", "foot"])
+def test_the_nets_are_sound(name: str) -> None:
+    assert problems(board(name)) == []
+
+
+def test_bad_wiring_is_found() -> None:
+    barometer, thigh = device("papers", "barometer"), device("2026", "thigh")
+    cases = {
+        "3.3V is wired to 5V": with_device("papers", replace(barometer, pins=barometer.pins | {"3.3V": "5V"})),
+        "pin SCK withstands 3.6 V": with_device("papers", replace(barometer, pins=barometer.pins | {"SCK": "SCK"})),
+        "pin CS is not wired": with_device("2026", replace(thigh, pins={"VIN": "5V", "GND": "GND"})),
+        "net CS_THIHG: it ends nowhere": with_device("2026", replace(thigh, pins=thigh.pins | {"CS": "CS_THIHG"})),
+        "it has several drivers": with_device("2026", replace(thigh, pins=thigh.pins | {"DO": "CS_CALF"})),
+        "pin I1 must stay open": with_device("2026", replace(thigh, pins=thigh.pins | {"I1": "SCK"})),
+        "it has no pin C5": with_device("2026", replace(thigh, pins=thigh.pins | {"C5": "SCK"})),
+        "ground pin GND is wired to 5V": with_device("2026", replace(thigh, pins=thigh.pins | {"GND": "5V"})),
+    }
+    for words, bad in cases.items():
+        assert any(words in text for text in problems(bad)), (words, problems(bad))
+
+
+def test_an_adis16100_beside_breakout_boards_of_2026_is_a_problem() -> None:
+    """What the README says of mixed kits."""
+    mixed = with_device("2026", device("papers", "calf"))
+    assert any("thigh, pin DO withstands 3.6 V, another drives 5 V" in text for text in problems(mixed))
+
+
+@pytest.mark.parametrize("kit", ["papers", "2026"])
+def test_each_role_has_a_part_with_an_order_number(kit: str) -> None:
+    rows = [row for row in hardware.parts() if kit in row["kits"]]
+    assert {"processor board", "side rangers", "thigh, calf, belt", "pressure", "compass", "foot"} <= {
+        row["role"] for row in rows
+    }
+    for row in rows:
+        assert row["count"][kit] > 0
+        assert 0 < row["eur"] <= 2000
+        assert row["order"]
+        assert row["source"]
+    boards_of = {"papers": ["papers"], "2026": ["2026", "foot"]}[kit]
+    assert next(row for row in rows if row["role"] == "processor board")["count"][kit] == len(boards_of)
+
+
+def test_wires_of_one_lane_do_not_touch() -> None:
+    ends = {"a": [0.0, 100.0], "b": [50.0, 200.0], "c": [110.0, 300.0], "d": [130.0, 180.0]}
+    assert lanes(ends) == {"a": 0, "b": 1, "c": 2, "d": 0}
+
+
+@pytest.mark.parametrize("name", ["papers", "2026", "foot"])
+def test_a_drawing_has_every_wire_and_no_text_beyond_its_box(name: str) -> None:
+    """A letter of a bold 13-pixel label is at most 8.5 pixels wide on average [DejaVu Sans Bold]."""
+    svg = (FIRMWARE / f"hardware/drawings/wiring-{name}.svg").read_text()
+    for one in board(name).devices:
+        title = f"{one.name}: {one.symbol.title}"
+        assert title in svg
+        assert 8.5 * len(title) < 290.0 - 12.0, title
+        for net in one.wires().values():
+            label = board(name).pins[net].board if net in board(name).pins else net
+            assert f">{label}</text>" in svg, net
+
+
+def test_the_readme_comes_in_the_order_of_the_work() -> None:
+    order = [
+        "## What to order",
+        "## How to wire it",
+        "## How to build it",
+        "## How to wear it",
+        "## What `status` counts",
+    ]
+    places = [README.index(f"\n{title}") for title in order]
+    assert places == sorted(places)
+    for title in order[:3]:
+        assert "*Not built yet" in README.partition(f"\n{title}")[2][:200], title
+    guide = README.partition("\n## How to build it")[2].partition("\n### ")[0]
+    assert re.findall(r"^(\d+)\. ", guide, flags=re.M) == [str(k) for k in range(1, 11)]
+
+
+def guide_step(number: int) -> list[str]:
+    """Lines of the output that a step shows."""
+    step = README.partition("\n## How to build it")[2].partition(f"\n{number}. ")[2].partition(f"\n{number + 1}. ")[0]
+    shown = "".join(re.findall(r"```\n(.*?)```", step, flags=re.S))
+    return [line.strip() for line in shown.splitlines() if line.strip()]
+
+
+LEGS = ("imu_thigh=absent", "imu_calf=absent")
+RANGERS = ("pulse_left=absent", "pulse_right=absent")
+
+
+@needs_twin
+@pytest.mark.parametrize(
+    ("step", "faults"),
+    [
+        (2, (*RANGERS, "lis3mdl=absent", *LEGS, "imu_belt=absent", "bmp390=absent")),
+        (4, (*RANGERS, "lis3mdl=absent", *LEGS)),
+        (6, RANGERS),
+        (7, ()),
+    ],
+)
+def test_a_step_of_the_guide_shows_what_the_doctor_prints(step: int, faults: tuple[str, ...]) -> None:
+    with twin_board("kit=2026", *faults) as port:
+        printed = echostep("doctor", "--board", port, "--seconds", 5).stdout
+    lines = [line.strip() for line in printed.splitlines()]
+    for shown in guide_step(step):
+        if shown.startswith("rates"):
+            rates = dict(re.findall(r"(\w+) ([\d.]+)/s", shown))
+            measured = dict(re.findall(r"(\w+) ([\d.]+)/s", printed))
+            assert {name: float(rate) for name, rate in measured.items()} == {
+                name: pytest.approx(float(rate), rel=0.05) for name, rate in rates.items()
+            }
+        else:
+            assert shown in lines, (shown, printed)
+    assert guide_step(step)
