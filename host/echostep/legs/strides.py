@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Strides from two gyros on one leg: the travel of the hips, stride by stride.
 
-In: time, pitch rates of thigh and shank, either sign, and of the belt, 50 to 500 Hz. Out: `Stride`s in order of time. Owns the gyros' errors, the
-level and the bout under way. `kinematics` gives the travel of the hips over a stance, `swing_detection` the swings and the sign of each gyro,
-`edges` the first and the last swing.
+In: time, pitch rates of thigh and shank, either sign, and of the belt, 50 to 500 Hz. Out: `Stride`s in order of time. Owns the bout under way.
+`leg_angles` gives the angles, `kinematics` the travel of the hips over a stance, `swing_detection` the swings and the sign of each gyro, `edges` the
+first and the last swing.
 
 A stride goes from mid swing to mid swing. Before the first and after the last mid swing the hips move over the standing foot; these edges are
 reported, too. A gyro does not measure the vertical (`level`). Its bias is its rate at rest, and the change of its angle over a stride, less
@@ -15,9 +15,6 @@ and their standard deviation covers the possible length.
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
 import numpy as np
 
 from echostep.arrays import Floats
@@ -25,11 +22,11 @@ from echostep.legs import swing_detection as leg_swings
 from echostep.legs.angle_grid import AngleGrid, Sample
 from echostep.legs.edges import SPEED_S, Swing, leaving_share, speed
 from echostep.legs.gyro_bias import GyroBias
-from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, knee_at, travel
-from echostep.legs.level import MEAN_RAD, MEAN_SD_RAD, STANDING_RAD, Level
+from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, travel
+from echostep.legs.leg_angles import LegAngles, knees
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.swing_detection import GRID_HZ, Swings
-from echostep.legs.walking_bout import Bout, climbs, pace_flag, stairs_flag
+from echostep.legs.walking_bout import Bout, pace_flag, stairs_flag
 
 # The source of a value without a citation is not recorded.
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
@@ -39,15 +36,11 @@ LEAST_PASSED = 0.12  # share of the stride that the hips move in single support;
 LONGEST_ON_STAIRS_M = 1.0  # length of a stride
 STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses differ by 2 cm each [DIN 18065]
 STAIRS_WEIGHT = 0.15  # of the length by the angles
-CLOSURE_SD_RAD = math.radians(2.5)  # of the change of an angle over a stride
 SCALE_SD = 0.078  # of the scale common to all strides: people differ so much, whether their legs are measured or not [14 legs of 7 people]
 CALIBRATED_SD = 0.025  # the same after a walk of known length: it changes by 2 to 3 % with a person's speed
 OWN_SD_M = 0.04  # of one stride, besides
 EDGE_SD_M = 0.08  # of an edge of a walk
 BLIND_SD_M = 0.4  # of a stride that this leg does not show
-# Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
-REST_SD_RAD_S = math.radians(1.9)
-UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`
 LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
@@ -66,11 +59,9 @@ class StrideEstimator:
         """`sign`: of the gyros of thigh and shank, where it is known from the same recording."""
         self.settings = settings or StrideSettings()
         self.swings = Swings(sign)
-        self.bias = (GyroBias(), GyroBias())
         self.revised = False  # whether the signs were decided anew
         self._grid = AngleGrid()
-        self._level = Level()
-        self._rested = Level()  # when the standing under way began
+        self._angles = LegAngles(self._grid)
         self._moved = 0  # grid samples with a moving shank
         self._done = 0  # grid samples searched for swings and rest
         self._bout = Bout(0, stood=False)
@@ -79,6 +70,11 @@ class StrideEstimator:
         self._strides: list[Stride] = []
         self._keep = 0  # first grid index still needed
         self._confirmed = sign is not None  # whether strides have confirmed the signs
+
+    @property
+    def bias(self) -> tuple[GyroBias, GyroBias]:
+        """Errors of the gyros of thigh and shank."""
+        return self._angles.bias
 
     @property
     def counts(self) -> LegCounts:
@@ -142,7 +138,8 @@ class StrideEstimator:
         span_s = t_s - t0
         length = pace * span_s if span_s < BRIDGED_S else 0.0
         self._add_stride(t0, t_s, length, UNWATCHED_M_S * min(span_s, LONGEST_DOUBT_S), 0.0, Flag.GAP)
-        self._done, self._level = 0, Level()
+        self._done = 0
+        self._angles.forget_level()
         self._bout, self._still_since, self._peak, self._keep = Bout(0, stood=False), None, (0.0, 0), 0
 
     def _advance(self, until: int) -> None:
@@ -191,12 +188,8 @@ class StrideEstimator:
             if first > self._bout.begin and self._bout.peaks:
                 self._end_bout(first, stands=True)
             self._still_since = first
-            thigh, upright = self._angles(first, k)
-            self._rested = Level(float(thigh[-1]), float(upright[-1]), k, self._level.moved(0.0, 0.0, k).variance)
-        for bias, sign, rate in zip(self.bias, self.swings.sign, rates.mean(axis=0).tolist(), strict=True):
-            bias.learn(sign * rate, REST_SD_RAD_S)
-        rested = self._rested.standing((k - self._still_since) / GRID_HZ)
-        self._level = Level(rested.thigh, rested.shank, k, rested.variance)
+            self._angles.begin_rest(self.swings.sign, first, k)
+        self._angles.learn_rest(self.swings.sign, rates.mean(axis=0), (k - self._still_since) / GRID_HZ, k)
         self._bout = Bout(k, stood=True, pace_m_s=0.0)
 
     def _end_standing(self, k: int) -> None:
@@ -217,9 +210,9 @@ class StrideEstimator:
         previous = bout.peaks[-2]
         bout.cycle = k - previous
         if len(bout.peaks) > 2 or not bout.stood:
-            self._learn_closure(previous, k)
-        self._correct_level(previous, k)
-        thigh, shank = self._angles(previous, k)
+            self._angles.learn_closure(self.swings.sign, previous, k)
+        self._angles.correct_level(self.swings.sign, previous, k)
+        thigh, shank = self._angles.between(self.swings.sign, previous, k)
         length, rise, flags, sd = self._stride(thigh, shank)
         bout.pace_m_s = length * GRID_HZ / bout.cycle
         bout.blind = flags & (Flag.UNSEEN | Flag.BACKWARD)
@@ -228,7 +221,7 @@ class StrideEstimator:
             self._add_edge(bout.begin, previous, edge)
             length = max(length - less, 0.0)
         self._add_stride(self._grid.time(previous), self._grid.time(k), length, sd, rise, flags)
-        self._level = self._level.moved(float(thigh[-1]), float(shank[-1]), k)
+        self._angles.level = self._angles.level.moved(float(thigh[-1]), float(shank[-1]), k)
         self._keep = previous if self._confirmed else bout.peaks[max(-CONFIRMING - 1, -len(bout.peaks))]
         self._confirm_signs(k)
 
@@ -247,7 +240,8 @@ class StrideEstimator:
             if old != new:
                 bias.flip()
         self.swings, self.revised = anew, True
-        self._bout, self._level, self._peak = Bout(k, stood=False), Level(index=k), (0.0, 0)
+        self._bout, self._peak = Bout(k, stood=False), (0.0, 0)
+        self._angles.forget_level(k)
 
     def _stride(self, thigh: Floats, shank: Floats) -> tuple[float, float, Flag, float]:
         """Length, rise, flags and sd of the stride with these angles (n,), from mid swing to mid swing."""
@@ -256,7 +250,7 @@ class StrideEstimator:
         phase = np.arange(len(shank)) / cycle - strike / cycle
         stance = phase[strike:], thigh[strike:], shank[strike:]
         rise = travel(*stance, self.settings.segments, struck=None, rolls=False).stride()[1]
-        stairs = stairs_flag(*_knees(*stance), 0.5 * rise)
+        stairs = stairs_flag(*knees(*stance), 0.5 * rise)
         way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
         length = way.stride()[0]
         trailing = (np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank))
@@ -274,26 +268,6 @@ class StrideEstimator:
             return length, STAIRS_RISE_M if Flag.STAIRS_UP in stairs else -STAIRS_RISE_M, stairs, 2.0 * OWN_SD_M
         return length, 0.0, pace_flag(length * GRID_HZ / cycle, self.settings.segments), OWN_SD_M
 
-    def _learn_closure(self, begin: int, end: int) -> None:
-        """Update the gyros' errors by the change of the angles over a stride, which is 0 but for bias and leak."""
-        span_s, grid = (end - begin) / GRID_HZ, self._grid
-        turned = (grid.yaw[end] - grid.yaw[begin]) / span_s
-        for bias, sign, angle in zip(self.bias, self.swings.sign, (grid.thigh, grid.shank), strict=True):
-            bias.learn(sign * (angle[end] - angle[begin]) / span_s, CLOSURE_SD_RAD / span_s, turned)
-
-    def _correct_level(self, begin: int, end: int) -> None:
-        """Correct the level by the mean angles of a stride; a shorter one is nearer to standing, and on stairs they are others."""
-        thigh, shank = self._angles(begin, end)
-        strike = leg_swings.heel_strike_index(shank)
-        phase = (np.arange(strike, len(shank)) - strike) / (len(shank) - 1)
-        self._level = Level(float(thigh[0]), float(shank[0]), begin, self._level.variance)
-        if climbs(*_knees(phase, thigh[strike:], shank[strike:])):
-            return
-        share = min(float(np.ptp(shank)) / UPRIGHT_RANGE_RAD, 1.0)
-        usual = (s + share * (m - s) for s, m in zip(STANDING_RAD, MEAN_RAD, strict=True))
-        off = tuple(u - float(angle.mean()) for u, angle in zip(usual, (thigh, shank), strict=True))
-        self._level = self._level.corrected((off[0], off[1]), MEAN_SD_RAD)
-
     def _begin_piece(self, peak: int, strike: int | None) -> tuple[float, float]:
         """Travel (m) from the beginning of the walk to its first mid swing, and by how much less the stride after it is than in a steady walk.
 
@@ -301,7 +275,7 @@ class StrideEstimator:
         """
         bout = self._bout
         span, pace = peak - bout.begin, bout.pace_m_s or 0.0
-        thigh, shank = self._angles(bout.begin, peak)
+        thigh, shank = self._angles.between(self.swings.sign, bout.begin, peak)
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
         off = leg_swings.toe_off_index(rate, span - 1, 0)
         phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
@@ -350,7 +324,7 @@ class StrideEstimator:
         """Travel (m) from the last mid swing to the end of the walk, less what the stride before it was counted too long."""
         bout, span = self._bout, end - peak
         pace = bout.pace_m_s or 0.0
-        thigh, shank = self._angles(peak, end)
+        thigh, shank = self._angles.between(self.swings.sign, peak, end)
         strike = leg_swings.heel_strike_index(shank)
         phase = (np.arange(strike, len(shank)) - strike) / bout.cycle
         last = len(phase) - 1
@@ -372,22 +346,6 @@ class StrideEstimator:
         length, sd = (0.0, BLIND_SD_M) if blind else (max(length, 0.0), EDGE_SD_M)
         self._add_stride(self._grid.time(begin), self._grid.time(end), length, sd, 0.0, Flag.EDGE | blind)
 
-    def _angles(self, begin: int, end: int) -> tuple[Floats, Floats]:
-        """Angles (n,) of thigh and shank at grid indices begin..end, from the level with the present biases.
-
-        A turn between these indices is taken as even for its leak, so that the pelvis' rotation to and fro adds nothing.
-        """
-        level, grid = self._level, self._grid
-        indices = np.arange(begin, end + 1)
-        yaw = np.linspace(grid.yaw[begin], grid.yaw[end], len(indices)) - grid.yaw[level.index]
-        found = []
-        for turned, sign, bias, start in zip(
-            (grid.thigh, grid.shank), self.swings.sign, self.bias, (level.thigh, level.shank), strict=True
-        ):
-            angle = sign * (np.array(turned[begin : end + 1]) - turned[level.index])
-            found.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
-        return found[0], found[1]
-
     def _add_stride(self, t0: float, t1: float, length: float, sd: float, rise: float, flags: Flag) -> None:
         """Report a stride."""
         scale_sd = CALIBRATED_SD if self.settings.calibrated else SCALE_SD
@@ -395,13 +353,13 @@ class StrideEstimator:
 
     def _drop(self) -> None:
         """Drop grid values that are no longer needed."""
-        k = min(self._keep, self._level.index)
+        k = min(self._keep, self._angles.level.index)
         if k < FORGET:
             return
         self._keep = 0
         self._grid.drop(k)
         self._done -= k
-        self._level, self._rested = (replace(level, index=level.index - k) for level in (self._level, self._rested))
+        self._angles.drop(k)
         bout = self._bout
         bout.begin -= k
         bout.toe_off -= k
@@ -409,8 +367,3 @@ class StrideEstimator:
         if self._still_since is not None:
             self._still_since -= k
         self._peak = (self._peak[0], self._peak[1] - k)
-
-
-def _knees(phase: Floats, thigh: Floats, shank: Floats) -> tuple[float, float]:
-    """Flexion of the knee (rad) at the strike and half a stride later, from angles (n,) at phases (n,)."""
-    return knee_at(phase, thigh, shank, wanted_phase=0.02), knee_at(phase, thigh, shank, wanted_phase=0.5)
