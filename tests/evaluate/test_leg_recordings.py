@@ -76,3 +76,11 @@ def test_the_left_leg_that_was_lifted_before_the_walk(recordings: list[LegRecord
     strides = [s for s in strides_of(left, StrideSettings()) if s.t_start_s > begin_s]
     assert not any(Flag.BACKWARD in s.flags for s in strides)
     assert sum(s.length_m for s in strides) == pytest.approx(left.walked_m(begin_s, end_s), rel=0.06)
+
+
+@needs_data("legs_qmt")
+def test_a_scale_of_a_fast_walk_holds_in_a_slower_one(recordings: list[LegRecording]) -> None:
+    after = [row for r in recordings for row in rows_of(r) if row["known"] == SCALE]
+    assert len(after) == 2
+    assert np.mean([abs(row["error_percent"]) for row in after]) < 3.5
+    assert sum(row["stairs"] for row in after) == 0

@@ -30,9 +30,8 @@ UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, 
 class LegAngles:
     """`bias`: errors of the gyros of thigh and shank. `level`: the angles at one grid index."""
 
-    def __init__(self, grid: AngleGrid, bias: tuple[GyroBias, GyroBias] | None = None) -> None:
-        """`bias`: where the gyros' errors are known from the same recording."""
-        self.bias = bias or (GyroBias(), GyroBias())
+    def __init__(self, grid: AngleGrid) -> None:
+        self.bias = (GyroBias(), GyroBias())
         self.level = Level()
         self._rested = Level()  # when the standing under way began
         self._grid = grid

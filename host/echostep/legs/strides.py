@@ -22,7 +22,7 @@ from echostep.legs import swing_detection as leg_swings
 from echostep.legs.angle_grid import AngleGrid, Sample
 from echostep.legs.edges import SPEED_S, Swing, leaving_share, speed
 from echostep.legs.gyro_bias import GyroBias
-from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, travel
+from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, Travel, travel
 from echostep.legs.leg_angles import LegAngles, knees
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.swing_detection import GRID_HZ, Swings
@@ -31,6 +31,7 @@ from echostep.legs.walking_bout import Bout, pace_flag, stairs_flag
 # The source of a value without a citation is not recorded.
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
 UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0  # growth of the sd in a gap, and for how long it grows
+FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; people run above [Alexander 1989]
 SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
 LONGEST_ON_STAIRS_M = 1.0  # length of a stride
@@ -252,6 +253,8 @@ class StrideEstimator:
         rise = travel(*stance, self.settings.segments, struck=None, rolls=False).stride()[1]
         stairs = stairs_flag(*knees(*stance), 0.5 * rise)
         way = travel(*stance, self.settings.segments, struck=None if stairs else 0.0, rolls=not stairs)
+        if not stairs:
+            way = travel(*stance, self.settings.segments, speed=self._relative_speed(way, cycle))
         length = way.stride()[0]
         trailing = (np.interp(TOE_OFF, phase, angle) for angle in (thigh, shank))
         self._bout.trail_m = -self.settings.segments.ankle_ahead_m(*trailing)
@@ -267,6 +270,11 @@ class StrideEstimator:
             length = STAIRS_M + STAIRS_WEIGHT * (length - STAIRS_M)
             return length, STAIRS_RISE_M if Flag.STAIRS_UP in stairs else -STAIRS_RISE_M, stairs, 2.0 * OWN_SD_M
         return length, 0.0, pace_flag(length * GRID_HZ / cycle, self.settings.segments), OWN_SD_M
+
+    def _relative_speed(self, way: Travel, cycle: int) -> float:
+        """Relative speed of a stride of `cycle` grid samples; by unscaled lengths, so that lengths are linear in their scale."""
+        segments = self.settings.segments
+        return min(segments.relative_speed(way.stride()[0] / segments.scale * GRID_HZ / cycle), FASTEST)
 
     def _begin_piece(self, peak: int, strike: int | None) -> tuple[float, float]:
         """Travel (m) from the beginning of the walk to its first mid swing, and by how much less the stride after it is than in a steady walk.

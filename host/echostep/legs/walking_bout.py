@@ -21,7 +21,6 @@ BENT_RAD = math.radians(25.0)
 EXTENDS_RAD, BENDS_RAD = math.radians(30.0), math.radians(20.0)
 LEAST_RISE_M = 0.04  # in half a stride; a step is 0.15 to 0.2 m high [DIN 18065]
 PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
-GRAVITY_M_S2 = 9.81
 
 
 @dataclass(slots=True)
@@ -63,5 +62,5 @@ def stairs_flag(knee_at_strike: float, knee_half_later: float, rise_m: float) ->
 
 def pace_flag(speed_m_s: float, lengths: LegLengths) -> Flag:
     """Slow or fast, relative to the length of the leg [Froude 1868; Alexander 1989]."""
-    relative = speed_m_s / math.sqrt(GRAVITY_M_S2 * (lengths.thigh_m + lengths.to_ankle_m))
+    relative = lengths.relative_speed(speed_m_s)
     return Flag.SLOW if relative < PACES[0] else Flag.FAST if relative > PACES[1] else Flag.NONE

@@ -9,7 +9,9 @@ carries stays where it is, and the hips move against it. So the way is that of t
 `walker` does it the other way round: it places feet and trunk and asks which legs join them.
 
 Joint curves every 5 % of the stride, degrees, read from [Winter 2009; Perry 1992; Kadaba 1990]; slow and fast walking scale them as in
-[Winter 1991; Murray 1984; Bovi 2011]: with speed the hips' excursion and the knee's flexion under load grow, and the stride takes less time.
+[Winter 1991; Murray 1984; Bovi 2011]: with speed the hips' excursion and the knee's flexion under load grow, and the stride takes less time. The
+foot pushes off farther and earlier: with speed the greatest plantarflexion grows from 10 to 22 degrees, and toe off comes from 65 to 60 percent of
+the stride [Schwartz 2008, read from memory].
 """
 
 from __future__ import annotations
@@ -25,6 +27,12 @@ from echostep.simulation.people.leg_angles import HALF_PELVIS_M, KNEE_DEG, THIGH
 RATE_HZ = 500
 ANKLE_DEG = (1, -3, -1, 3, 6, 8, 10, 11, 12, 13, 9, -2, -14, -16, -7, -2, 1, 2, 2, 2)  # dorsiflexion
 LOADED = 0.30  # of the stride: until then the knee's flexion is that under load
+PUSHES = (
+    0.28,
+    0.48,
+    0.66,
+    0.82,
+)  # of the stride: begin and end of the rise and of the fall of what the pace does to the push-off
 DOUBLE = 0.12  # of the stride on both feet, twice [Perry 1992]
 LONGEST_STEP_S = 1.0
 CARRY_M = 0.004  # a point so much above the other carries a third as much
@@ -33,18 +41,23 @@ START = 0.55  # of the stride's time, from standing to the whole movement: the f
 
 @dataclass(frozen=True, slots=True)
 class WalkingPace:
-    """Pace of walking: `hip` and `load` scale the hip's excursion and the knee's flexion under load, `swing` that in the swing, `stride_s`."""
+    """Pace of walking: `hip` and `load` scale the hip's excursion and the knee's flexion under load, `swing` that in the swing, `stride_s`.
+
+    `push` scales the ankle's plantarflexion at push-off, `late` is by how much of a stride it comes later.
+    """
 
     hip: float
     load: float
     swing: float
     stride_s: float
+    push: float
+    late: float
 
 
 SLOW, NATURAL, FAST = (
-    WalkingPace(0.78, 0.55, 0.93, 1.42),
-    WalkingPace(1.0, 1.0, 1.0, 1.10),
-    WalkingPace(1.14, 1.25, 1.03, 0.97),
+    WalkingPace(0.78, 0.55, 0.93, 1.42, 0.65, 0.025),
+    WalkingPace(1.0, 1.0, 1.0, 1.10, 1.0, 0.0),
+    WalkingPace(1.14, 1.25, 1.03, 0.97, 1.3, -0.02),
 )
 
 
@@ -127,11 +140,20 @@ def _angles(
     knee = (
         series(KNEE_DEG, phase) * person.knee * (manner.swing + (manner.load - manner.swing) * np.minimum(loaded, 1.0))
     )
-    ankle = person.ankle * series(ANKLE_DEG, phase) + math.radians(person.ankle_deg)
+    ankle = person.ankle * _ankle(manner, phase) + math.radians(person.ankle_deg)
     thigh = moves * (thigh + math.radians(person.thigh_deg))
     knee = np.maximum(moves * knee, 0.0) + math.radians(3.0)
     shank = thigh - knee
     return thigh, shank, shank + moves * ankle + (1.0 - moves) * (knee - thigh)
+
+
+def _ankle(manner: WalkingPace, phase: Floats) -> Floats:
+    """Dorsiflexion (n,), rad, with a push-off that is farther and later by the pace."""
+    part = phase % 1.0
+    pushes = _ease((part - PUSHES[0]) / (PUSHES[1] - PUSHES[0])) * _ease((PUSHES[3] - part) / (PUSHES[3] - PUSHES[2]))
+    curve = series(ANKLE_DEG, phase - manner.late * pushes)
+    found: Floats = np.where(curve < 0.0, curve * (1.0 + (manner.push - 1.0) * pushes), curve)
+    return found
 
 
 def _points(person: JointGaitPerson, angles: tuple[Floats, Floats, Floats]) -> Floats:
