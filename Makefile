@@ -8,7 +8,7 @@ ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
-TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev
+TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev openscad
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -46,7 +46,7 @@ real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path,
 	$(BIN)/python tools/real_walk.py --out out/real
 
 test: $(READY) ## run every test
-	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools, Mosquitto, Chromium and clang: tests that need them are skipped and named."
+	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools, Mosquitto, Chromium, clang and OpenSCAD: tests that need them are skipped and named."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
 	$(MAKE) --quiet check
 	$(BIN)/python -m pytest -q -n auto --dist loadfile
@@ -129,6 +129,10 @@ kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of i
 flips: $(READY) ## flip 314 random bits of a recording, one at a time: what becomes of the track, and what the replay says
 	PYTHONPATH=tests $(BIN)/python tools/flip_recording.py
 
+hardware: $(READY) ## the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
+	@tools/apt.sh openscad || echo "OpenSCAD is not installed, and this user may not install it."
+	$(BIN)/python tools/boxes.py
+
 flash: ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
 	@tools/flash.sh "$(PORT)"
 
@@ -138,4 +142,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips docs site licences lock audit flash clean
+.PHONY: operation help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean
