@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The pages that are made from the code and from tables, written or compared (`make docs`, `make check`).
 
-In: the installed package, firmware/hardware. Out: host/docs/*.md, report.schema.json, tables of firmware/README.md, wiring drawings.
+In: the installed package, firmware/hardware. Out: host/docs/*.md, report.schema.json, tables of firmware/README.md, wiring
+drawings, schematics.
 `--check` writes nothing and exits 1 when one is stale. Owns nothing.
 """
 
@@ -26,7 +27,7 @@ def pages() -> dict[Path, str]:
         "python": python,
     }
     texts = {DOCS / f"{name}.md": module.page() for name, module in made.items()} | {teams.SCHEMA: schema()}
-    return texts | {hardware.README: hardware.page()} | hardware.drawings()
+    return texts | {hardware.README: hardware.page()} | hardware.drawings() | hardware.schematics()
 
 
 def main() -> int:

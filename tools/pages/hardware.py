@@ -12,6 +12,7 @@ from typing import Any
 
 from hardware import HARDWARE
 from hardware.drawing import drawing
+from hardware.kicad import schematic
 from hardware.wearing import wearing
 from hardware.wiring import POWER, Board, boards
 from pages import END
@@ -40,6 +41,11 @@ def drawings() -> dict[Path, str]:
     """The drawings by their paths: wiring of each board, where everything is worn."""
     made = {f"wiring-{board.name}": drawing(board) for board in boards()} | {"wearing": wearing()}
     return {HARDWARE / "drawings" / f"{name}.svg": text for name, text in made.items()}
+
+
+def schematics() -> dict[Path, str]:
+    """The schematic of each board by its path."""
+    return {HARDWARE / "schematic" / f"{board.name}.kicad_sch": schematic(board) for board in boards()}
 
 
 def parts() -> list[Row]:
