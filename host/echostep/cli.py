@@ -289,16 +289,18 @@ def replay(
 
 @app.command("map")
 def map_command(
-    recording: Annotated[Path, typer.Argument(metavar="WALK", help="A recorded walk (.mcap).")],
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="WALK...", help="Recorded walks (.mcap) through one building.")
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help="Draw plan and path there (PNG, SVG).")
     ] = None,
 ) -> None:
-    """Draw the plan of a building from a recorded walk."""
+    """Draw the plan of a building from recorded walks."""
     from echostep.commands import mapping
 
-    mapping.map_recording(recording, out, picture)
+    mapping.map_recordings(recordings, out, picture)
 
 
 @app.command()

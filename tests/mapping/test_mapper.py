@@ -42,7 +42,7 @@ def mapped(walk: SimulatedWalk) -> Mapped:
 
 def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     """Every drawn wall is one, within 0.2 m at nine of ten places; both corridors are there; the plan has no faults."""
-    plan, path = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
+    plan, (path,) = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
     truth = np.column_stack([np.interp(mapped.graph.nodes.t_s, walk.truth[:, 0], walk.truth[:, k]) for k in (1, 2)])
     assert np.sqrt(np.mean(np.sum((path - truth) ** 2, axis=1))) < 0.25
     walls = plan.levels[0].walls

@@ -1,60 +1,89 @@
 # SPDX-License-Identifier: MIT
-"""`echostep map`: the plan of a building from a recorded walk.
+"""`echostep map`: the plan of a building from recorded walks.
 
-In: a recording. Out: plan.json, a picture, what was found in words. Owns nothing.
+In: recordings. Out: plan.json, a picture, what was found in words. Owns nothing.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.mapping.directions import LEAST_EVIDENCE
-from echostep.mapping.mapper import Mapped, map_walk
-from echostep.mapping.picture import draw_picture
+from echostep.mapping.joining import Join, join_walks
+from echostep.mapping.mapper import Mapped, drawn, solve_walk
+from echostep.mapping.picture import check_kind, draw_picture
 from echostep.mapping.plan import plan_of
-from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
-from echostep.session.metadata import recorded_start
+from echostep.session.metadata import START_LIMIT_M, recorded_start
 from echostep.session.options import TrackingOptions
 from echostep.session.progress import bar, with_bar
 from echostep.session.replay import tracker_of
+from echostep.session.skipped import skipped
 
 LEAST_WAY_M = 3.0  # of path that shows a wall
+WALK_START = "0,0,90"  # of the walk that is drawn: the recorded start moves the drawing afterwards
 
 
-def map_recording(path: Path, out: Path, picture: Path | None) -> None:
-    """Draw the building of a recorded walk; raises EchostepError when there is no walk in it, or no wall was heard."""
-    recording = open_recording(path)
-    segments = segments_of(recording)
-    with bar(f"drawing {path.name}") as show:
-        mapped = map_walk(segments, show)
-    start = recorded_start(recording.metadata, path)
-    plan, walked_m = plan_of(mapped, start if isinstance(start, Pose) else _origin(), path.stem)
+def map_recordings(paths: Sequence[Path], out: Path, picture: Path | None) -> None:
+    """Draw the building of recorded walks; raises EchostepError when one is no walk, has no certain place on the others, or no wall was heard."""
+    _check_files(paths, out, picture)
+    recordings = [open_recording(path) for path in paths]
+    walks = [(str(recording.path), _solved(recording)) for recording in recordings]
+    joins: tuple[Join, ...] = ()
+    if len(walks) > 1:
+        with bar(f"joining {len(walks)} walks") as show:
+            mapped, joins = join_walks(walks, show)
+    else:
+        mapped = drawn(walks[0][1])
+    plan, walked_m = plan_of(mapped, _start_of(recordings[0]), paths[0].stem)
     if not plan.is_drawn:
         raise EchostepError(
-            f"{path}: no walls were heard beside the path: is a ranger covered, or was it walked outside?"
+            f"{paths[0]}: no walls were heard beside the path: is a ranger covered, or was it walked outside?"
         )
     save_plan(plan, out)
     if picture is not None:
         draw_picture(picture, plan, walked_m)
-    for line in described(mapped, plan):
-        console.print(line, markup=False, highlight=False)
-    console.print(f"{out}: check and mend it with echostep plan edit {out}", markup=False, highlight=False)
+    for line in [*described(mapped, plan), *(_join_line(join) for join in joins)]:
+        _say(line)
+    _say(f"{out}: check and mend it with echostep plan edit {out}")
+
+
+def _solved(recording: Recording) -> Mapped:
+    """The path of one recording, corrected."""
+    segments = segments_of(recording)
+    with bar(f"drawing {recording.path.name}") as show:
+        return solve_walk(segments, show)
+
+
+def _check_files(paths: Sequence[Path], out: Path, picture: Path | None) -> None:
+    """Raises EchostepError where what is written would replace a recording, a walk is given twice, or the picture is of no known kind."""
+    walks = [path.resolve() for path in paths]
+    for k, path in enumerate(paths):
+        if walks[k] in walks[:k]:
+            raise EchostepError(f"{path}: this walk is given twice")
+    for written in (out, picture):
+        if written is not None and written.resolve() in walks:
+            raise EchostepError(f"{written}: this is the recording: give the result another name")
+    if picture is not None:
+        check_kind(picture)
 
 
 def segments_of(recording: Recording) -> list[MeasuredSegment]:
-    """The path of a recording with its pings; raises EchostepError when it has no steps or no echo."""
-    front_end: FrontEnd = tracker_of(recording, NO_PLAN, TrackingOptions(None)).front_end
+    """The path of a recording with its pings, as far as it is readable; raises EchostepError when it has no steps or no echo."""
+    tracker = tracker_of(recording, NO_PLAN, TrackingOptions(None, start=WALK_START, seed=0))
     portions = with_bar(recording.portions(), f"reading {recording.path.name}", lambda: recording.fraction)
-    pieces = [piece for portion in portions for piece in front_end.process(portion)]
+    pieces = [piece for portion in portions for piece in tracker.front_end.process(portion)]
+    for line in skipped(recording, tracker.streams):
+        _say(line)
     segments = [piece for piece in pieces if isinstance(piece, MeasuredSegment)]
     way_m = sum(math.hypot(s.segment.dx_m, s.segment.dy_m) for s in segments)
     if way_m < LEAST_WAY_M:
@@ -64,10 +93,24 @@ def segments_of(recording: Recording) -> list[MeasuredSegment]:
     return segments
 
 
-def _origin() -> Pose:
-    """Where the map begins without a plan."""
+def _start_of(recording: Recording) -> Pose:
+    """Where the drawing begins: at the recorded start if it is a pose, else at the origin of a map without a plan."""
     assert NO_PLAN.start is not None
-    return NO_PLAN.start
+    try:
+        start = recorded_start(recording.metadata, recording.path)
+    except EchostepError:
+        _say(f"{recording.path}: its recorded start is damaged: the drawing begins at the origin")
+        return NO_PLAN.start
+    if not isinstance(start, Pose):
+        return NO_PLAN.start
+    if not all(abs(value) < START_LIMIT_M for value in (start.x_m, start.y_m, start.heading_rad)):
+        _say(f"{recording.path}: its recorded start is out of range: the drawing begins at the origin")
+        return NO_PLAN.start
+    return start
+
+
+def _say(line: str) -> None:
+    console.print(line, markup=False, highlight=False)
 
 
 def described(mapped: Mapped, plan: Plan) -> list[str]:
@@ -77,7 +120,7 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
     opened = sum(door.state == "open" for door in doors)
     lines = [
         f"{len(walls)} walls, {length_m:.0f} m, to {100.0 * (plan.uncertainty_m or 0.0):.0f} cm (1 sd) beside the path of"
-        f" {mapped.graph.nodes.way_m[-1]:.0f} m; {len(doors)} openings, {opened} walked through"
+        f" {_walked_m(mapped):.0f} m; {len(doors)} openings, {opened} walked through"
     ]
     if mapped.directions.evidence >= LEAST_EVIDENCE:
         lines.append("walls have two directions at right angles: the heading is corrected by them")
@@ -90,3 +133,17 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
     else:
         lines.append("no place was passed twice: the drift of the foot is in the drawing")
     return lines
+
+
+def _walked_m(mapped: Mapped) -> float:
+    """Length of all paths."""
+    return float(sum(np.hypot(*np.diff(path, axis=0).T).sum() for path in mapped.drawing.paths_m))
+
+
+def _join_line(join: Join) -> str:
+    """How a walk was joined, in words."""
+    least = min(closure.log_odds for closure in join.closures) / math.log(10.0)
+    return (
+        f"{join.name} joined on {join.place.common_m:.0f} m of common wall, odds of its place 10^{join.place.log_odds / math.log(10.0):.0f};"
+        f" {len(join.closures)} returns between the walks, each with odds of 10^{least:.0f} or better"
+    )

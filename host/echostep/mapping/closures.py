@@ -36,8 +36,8 @@ def pieces(graph: Graph, which: Ints) -> Pieces:
     return Pieces(centre[which, 0], centre[which, 1], normal[which], f.half_m[which], f.sd_rad[which], range_m)
 
 
-def find_closure(graph: Graph, begin: int, end: int) -> Closure | None:
-    """The closure of the stretch of nodes [begin, end), if there is one."""
+def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure | None:
+    """The closure of the stretch of nodes [begin, end) with what was passed before `until_m` of the path, if there is one."""
     f, way_m = graph.fragments, graph.nodes.way_m
     new = np.flatnonzero((f.node >= begin) & (f.node < end) & (f.half_m > 0.25))
     if len(new) < 2:
@@ -45,7 +45,7 @@ def find_closure(graph: Graph, begin: int, end: int) -> Closure | None:
     node = (begin + end) // 2
     centre, _ = graph.places()
     at = graph.pose[node, :2]
-    older = np.flatnonzero((way_m[f.node] < way_m[begin] - APART_M) & (f.half_m > 0.25))
+    older = np.flatnonzero((way_m[f.node] < until_m) & (f.half_m > 0.25))
     if len(older) < LEAST_OLD:
         return None
     away = np.hypot(*(centre[older] - at).T)

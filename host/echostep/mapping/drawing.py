@@ -26,23 +26,25 @@ PASSAGE_M = 5.0  # of path, between two passages
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of each across its line; `path_m` (k, 2): the corrected path."""
+    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of each across its line; `paths_m`: the corrected path (k, 2) of each
+    walk.
+    """
 
     walls: Floats
     sd_m: Floats
-    path_m: Floats
+    paths_m: tuple[Floats, ...]
 
 
 def draw(graph: Graph, pings: Pings) -> Drawing:
     """The walls that the echoes of a walk show."""
-    poses, path = ping_poses(graph, pings), graph.pose[:, :2]
+    poses, paths = ping_poses(graph, pings), graph.paths()
     way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
     lines = find_lines(graph)
     free = np.ones(len(poses), np.bool_)
     aligned = lines.aligned if lines.aligned.any() else np.ones(len(lines.rho_m), np.bool_)
     straight = _selected(lines, aligned)
     cells = cell_counts(straight, poses, pings.range_m, free, ahead)
-    add_crossings(straight, path, cells)
+    add_crossings(straight, paths, cells)
     every = np.ones(len(straight.rho_m), np.bool_)
     runs = _without_lone(
         find_runs(cells, every), straight, straight.aligned | ~lines.aligned.any(), poses, way_m, cells.of
@@ -52,17 +54,17 @@ def draw(graph: Graph, pings: Pings) -> Drawing:
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
         more = cell_counts(askew, poses, pings.range_m, free, ahead)
-        add_crossings(askew, path, more)
+        add_crossings(askew, paths, more)
         none = np.zeros(len(askew.rho_m), np.bool_)
         found = _without_lone(find_runs(more, none), askew, none, poses, way_m, more.of)
         kept = sorted({run.line for run in found})
         both = joined(straight, _selected(askew, np.isin(np.arange(len(none)), kept)))
         runs += [run._replace(line=len(straight.rho_m) + kept.index(run.line)) for run in found]
         cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
-        add_crossings(both, path, cells)
+        add_crossings(both, paths, cells)
         straight = both
     walls, sd = segments_of(straight, runs, cells)
-    return Drawing(walls, sd, path)
+    return Drawing(walls, sd, paths)
 
 
 def _without_lone(runs: list[Run], lines: Lines, aligned: Bools, poses: Floats, way_m: Floats, of: Ints) -> list[Run]:

@@ -8,6 +8,7 @@ perpendicular, so one ping says something about one cell of each line within its
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -73,8 +74,13 @@ def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, strai
     return Cells(heard, passed, first, count, of)
 
 
-def add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
-    """Cells of lines through which the path (n, 2) leads are open, half a trunk to either side."""
+def add_crossings(lines: Lines, paths_m: Sequence[Floats], cells: Cells) -> None:
+    """Cells of lines through which a path (n, 2) leads are open, half a trunk to either side."""
+    for path_m in paths_m:
+        _add_crossings(lines, path_m, cells)
+
+
+def _add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
     for line in range(len(cells.size)):
         c, s = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line])
         off, along = c * path_m[:, 0] + s * path_m[:, 1] - lines.rho_m[line], c * path_m[:, 1] - s * path_m[:, 0]

@@ -63,9 +63,9 @@ class Graph:
     base_rad: float | None = None
     factor: SuperLU | None = None
 
-    def solve(self) -> None:
+    def solve(self, rounds: int = ROUNDS) -> None:
         """Gauss-Newton from the present poses."""
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             rows = _Rows()
             self._add_path(rows)
             self._add_walls(rows)
@@ -94,6 +94,10 @@ class Graph:
         found = self.factor.solve(right)
         covariance: Floats = found[3 * new : 3 * new + 3] - found[3 * old : 3 * old + 3]
         return 0.5 * (covariance + covariance.T)
+
+    def paths(self) -> tuple[Floats, ...]:
+        """The path (k, 2) of each walk."""
+        return tuple(np.split(self.pose[:, :2], self.nodes.begins[1:]))
 
     def places(self) -> tuple[Floats, Floats]:
         """Centres (f, 2) and normals (f,) of all fragments, in the map."""
@@ -165,17 +169,16 @@ class Graph:
         rows.add(weight * off, [(first + 2 * np.arange(len(off)), weight)])
 
     def _add_closures(self, rows: _Rows) -> None:
-        for closure in self.closures:
-            difference = self.pose[closure.new] - self.pose[closure.old] - closure.between
-            value, vector = np.linalg.eigh(closure.information)
-            for k in range(3):
-                if value[k] > 1e-9:
-                    w = math.sqrt(value[k]) * vector[:, k]
-                    rows.add(
-                        np.array([float(w @ difference)]),
-                        [(np.array([3 * closure.new + j]), w[j : j + 1]) for j in range(3)]
-                        + [(np.array([3 * closure.old + j]), -w[j : j + 1]) for j in range(3)],
-                    )
+        if not self.closures:
+            return
+        old, new = np.array([(closure.old, closure.new) for closure in self.closures]).T
+        difference = self.pose[new] - self.pose[old] - np.stack([closure.between for closure in self.closures])
+        value, vector = np.linalg.eigh(np.stack([closure.information for closure in self.closures]))
+        which, axis = np.nonzero(value > 1e-9)
+        w = np.sqrt(value[which, axis])[:, None] * vector[which, :, axis]
+        entries = [(3 * new[which] + j, w[:, j]) for j in range(3)]
+        entries += [(3 * old[which] + j, -w[:, j]) for j in range(3)]
+        rows.add((w * difference[which]).sum(1), entries)
 
 
 class _Rows:

@@ -1,34 +1,35 @@
 # SPDX-License-Identifier: MIT
-"""A walk drawn: path and echoes -> fragments -> local walls -> loop closures -> the corrected path and its walls.
+"""A walk drawn: path and echoes -> fragments -> local walls -> loop closures -> the corrected path and its walls. Several walks become one drawing.
 
-In: measured segments of one walk on one storey. Out: `Mapped`. Owns the order of the stages.
+In: measured segments of walks on one storey. Out: `Mapped`. Owns the order of the stages.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.mapping.association import KNOWN_M, associate
-from echostep.mapping.closures import STRETCH_M, find_closure
+from echostep.mapping.closures import APART_M, STRETCH_M, find_closure
 from echostep.mapping.directions import LEAST_EVIDENCE, Directions, find_directions
 from echostep.mapping.drawing import Drawing, draw
 from echostep.mapping.fragments import Fragments, find_fragments
-from echostep.mapping.graph import Closure, Graph, Walls, contradicted
+from echostep.mapping.graph import ROUNDS, Closure, Graph, Walls, contradicted
 from echostep.mapping.nodes import Nodes, Pings, nodes_of
 from echostep.path import MeasuredSegment
 
 LOCAL_ROUNDS, GLOBAL_ROUNDS = 2, 3  # of association and solution, before the closures and after them
+FAR_M = 0.2  # shift by a closure, up to which one round of Gauss-Newton is enough before the next one
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The solved `graph` of a walk, its `pings`, what is drawn, whether the building has two directions, and closures that were undone."""
+    """The solved `graph` of all walks, its `pings`, what is drawn, whether the (first) walk shows two directions, and closures that were undone."""
 
     graph: Graph
     pings: Pings
@@ -39,17 +40,32 @@ class Mapped:
 
 def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
     """Draw one walk; `progress` is told the share that is done."""
+    return drawn(solve_walk(segments, progress))
+
+
+def drawn(solved: Mapped) -> Mapped:
+    """The same with its walls."""
+    return replace(solved, drawing=draw(solved.graph, solved.pings))
+
+
+def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
+    """The corrected path of one walk; nothing is drawn yet."""
     nodes, pings = nodes_of(segments)
     fragments = find_fragments(nodes, pings)
     directions = find_directions(nodes, fragments)
     graph = _new_graph(nodes, fragments, directions)
     for _ in range(LOCAL_ROUNDS):
         _associate(graph)
-    undone = _close_loops(graph, progress)
+    undone = close_loops(graph, progress)
+    undone += settle(graph)
+    return Mapped(graph, pings, Drawing(np.zeros((0, 4)), np.zeros(0), graph.paths()), directions, tuple(undone))
+
+
+def settle(graph: Graph) -> list[Closure]:
+    """Find walls and path anew by turns, now that the loops are closed. Returns the closures that are undone by it."""
     for _ in range(GLOBAL_ROUNDS):
         _associate(graph)
-    undone += _undo(graph)
-    return Mapped(graph, pings, draw(graph, pings), directions, tuple(undone))
+    return _undo(graph)
 
 
 def _new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
@@ -85,16 +101,21 @@ def _anchored(graph: Graph) -> Bools:
     return found
 
 
-def _close_loops(graph: Graph, progress: Progress) -> list[Closure]:
-    """Match stretch after stretch with what is older; a closure bends the path before the next stretch is matched. Returns those undone."""
-    way_m, begin, undone = graph.nodes.way_m, 0, []
+def close_loops(graph: Graph, progress: Progress, first: int = 0) -> list[Closure]:
+    """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched.
+
+    With `first`, the first node of a walk that was solved before: with what the walks before it passed. Returns closures that are undone.
+    """
+    way_m, begin, undone = graph.nodes.way_m, first, []
     while begin < len(way_m) - 1:
-        progress(float(way_m[begin] / max(way_m[-1], 1e-9)))
+        progress(float((way_m[begin] - way_m[first]) / max(way_m[-1] - way_m[first], 1e-9)))
         end = int(np.searchsorted(way_m, way_m[begin] + STRETCH_M))
         end = min(max(end, begin + 1), len(way_m) - 1)
-        if (closure := find_closure(graph, begin, end)) is not None:
+        until_m = (way_m[first] if first else way_m[begin]) - APART_M
+        if (closure := find_closure(graph, begin, end, until_m)) is not None:
+            moved = graph.pose[closure.new] - graph.pose[closure.old] - closure.between
             graph.closures.append(closure)
-            graph.solve()
+            graph.solve(ROUNDS if np.hypot(*moved[:2]) > FAR_M else 1)
             undone += _undo(graph)
         begin = end
     progress(1.0)

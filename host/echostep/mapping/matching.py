@@ -74,7 +74,7 @@ def _add_older(fits: Floats, free: Floats, piece: Piece, old: Pieces, j: int, sh
     """Raise `fits` and lower `free` (shifts, shifts) by what the older fragment j says of a fragment at each shift."""
     n, old_half = len(shifts_m), old.half_m[j]
     ex, ey = piece.x_m - old.x_m[j], piece.y_m - old.y_m[j]
-    reach = piece.half_m + old_half + old.range_m[j] + CHANCE_M + 1.5 * shifts_m[n - 1]
+    reach = piece.half_m + old_half + max(old.range_m[j], CHANCE_M) + 1.5 * shifts_m[n - 1]
     if ex * ex + ey * ey > reach * reach:
         return
     c, s = math.cos(old.normal_rad[j]), math.sin(old.normal_rad[j])
@@ -82,18 +82,24 @@ def _add_older(fits: Floats, free: Floats, piece: Piece, old: Pieces, j: int, sh
     sd = math.sqrt(OFF_SD_RAD**2 + piece.sd_rad**2 + old.sd_rad[j] ** 2)
     angle = normal(turned, sd) * 2.0 * CHANCE_RAD if abs(turned) < CHANCE_RAD else 0.0
     half = piece.half_m * abs(math.cos(turned))  # along the older wall
+    # The ratio of the fit is above 1, and counts, within `near` of the older wall only.
+    peak = 2.0 * CHANCE_M * angle * normal(0.0, OFF_SD_M)
+    near = min(OFF_SD_M * math.sqrt(2.0 * math.log(peak)), CHANCE_M) if peak > 1.0 else 0.0
     for a in range(n):
         for b in range(n):
             fx, fy = ex + shifts_m[a], ey + shifts_m[b]
             off, along = c * fx + s * fy, -s * fx + c * fy
+            fitting, freed = abs(off) < near, -old.range_m[j] + FREE_M < off < -FREE_M
+            if not fitting and not freed:
+                continue
             common = min(along + half, old_half) - max(along - half, -old_half)
             if common <= 0.0:
                 continue
             shared = min(common / max(2.0 * min(half, old_half), LEAST_HALF_M), 1.0)
-            chance = 2.0 * CHANCE_M * angle if abs(off) < CHANCE_M else 0.0
-            value = math.log(OUTLIER + (1.0 - OUTLIER) * normal(off, OFF_SD_M) * chance)
-            fits[a, b] = max(fits[a, b], shared * value)
-            if -old.range_m[j] + FREE_M < off < -FREE_M:
+            if fitting:
+                value = math.log(OUTLIER + (1.0 - OUTLIER) * normal(off, OFF_SD_M) * 2.0 * CHANCE_M * angle)
+                fits[a, b] = max(fits[a, b], shared * value)
+            if freed:
                 free[a, b] = min(free[a, b], shared * FREE_RATIO)
 
 

@@ -19,6 +19,7 @@ from echostep.path import MeasuredSegment
 STILL_M, STILL_RAD = 0.01, math.radians(0.5)  # a segment that moves and turns less belongs to the node before it
 # Growth of the path's error per square root of a metre beside the step's own covariance, as the particle filter has it [particles.py]
 MOVE_SD, TURN_SD_RAD = 0.03, math.radians(0.3)
+LEAST_SD_M = 0.005  # of a turn on the spot: the trunk moves over the foot
 RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
 
 
@@ -26,7 +27,7 @@ RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's 
 class Nodes:
     """`t_s` (n,), `pose` (n, 3): x, y, heading by odometry; standard deviations (n - 1,) of the way from each node to the next.
 
-    `height_m` (n,): of the foot above the start; `way_m` (n,): length of the path so far.
+    `way_m` (n,): length of the path so far. `begins`: the first node of each walk.
     """
 
     t_s: Floats
@@ -34,6 +35,7 @@ class Nodes:
     sd_m: Floats
     turn_sd_rad: Floats
     way_m: Floats
+    begins: tuple[int, ...] = (0,)
 
     def __len__(self) -> int:
         return len(self.t_s)
@@ -78,7 +80,7 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
             rows.append((s.t1_s, x + s.dx_m, y + s.dy_m, heading + turn, way + length))
             sds.append(
                 (
-                    math.hypot(s.sd_m, MOVE_SD * math.sqrt(length)),
+                    math.hypot(s.sd_m, LEAST_SD_M, MOVE_SD * math.sqrt(length)),
                     math.hypot(s.turn_sd_rad, TURN_SD_RAD * math.sqrt(length)),
                 )
             )

@@ -6,6 +6,7 @@ In: a plan, a path. Out: a file. Owns the colours.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,23 +16,22 @@ from echostep.errors import EchostepError
 from echostep.plan.drawing import DOOR, OBSTACLE, WALL
 from echostep.plan.model import Level, Plan
 
-WALKED = "#0072b2"
+WALKERS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9")
 TRUE = "#e69f00"
 WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest height by width
 TRUNK_M = 0.5  # width of the floor that a person walks on
 
 
-def draw_picture(path: Path, plan: Plan, walked_m: Floats, built: Level | None = None) -> None:
-    """Draw the first level of a plan and the path (n, 2), over the true walls where they are known. Raises EchostepError."""
+def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Floats], built: Level | None = None) -> None:
+    """Draw the first level of a plan and the path (n, 2) of each walk, over the true walls where they are known. Raises EchostepError."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-    if path.suffix.casefold() not in (".png", ".svg"):
-        raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
+    check_kind(path)
     level = plan.levels[0]
     points = np.concatenate(
-        [level.walls.reshape(-1, 2), walked_m] + ([] if built is None else [built.walls.reshape(-1, 2)])
+        [level.walls.reshape(-1, 2), *walked_m] + ([] if built is None else [built.walls.reshape(-1, 2)])
     )
     low, high = points.min(0) - 0.5, points.max(0) + 0.5
     shape = min((high[1] - low[1]) / (high[0] - low[0]), HIGHEST)
@@ -39,8 +39,10 @@ def draw_picture(path: Path, plan: Plan, walked_m: Floats, built: Level | None =
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     points_m = 72.0 * WIDE_IN / (high[0] - low[0])
-    axes.plot(*walked_m.T, color=WALKED, alpha=0.12, linewidth=TRUNK_M * points_m, solid_capstyle="round")
-    axes.plot(*walked_m.T, color=WALKED, linewidth=0.7, label="path")
+    for k, path_m in enumerate(walked_m):
+        colour = WALKERS[k % len(WALKERS)]
+        axes.plot(*path_m.T, color=colour, alpha=0.12, linewidth=TRUNK_M * points_m, solid_capstyle="round")
+        axes.plot(*path_m.T, color=colour, linewidth=0.7, label=f"path {k + 1}" if len(walked_m) > 1 else "path")
     if built is not None:
         axes.add_collection(LineCollection(_lines(built.walls), colors=TRUE, linewidths=3.0, label="true walls"))
         for outline in built.obstacles:
@@ -56,6 +58,12 @@ def draw_picture(path: Path, plan: Plan, walked_m: Floats, built: Level | None =
         figure.savefig(path)
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+
+
+def check_kind(path: Path) -> None:
+    """Raises EchostepError unless the file's name is that of a kind of picture that can be drawn."""
+    if path.suffix.casefold() not in (".png", ".svg"):
+        raise EchostepError(f"{path}: cannot draw this kind of picture: give a name that ends in .png or .svg")
 
 
 def _lines(segments: Floats) -> list[Floats]:

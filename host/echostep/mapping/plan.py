@@ -25,8 +25,8 @@ COURSE_M, STRAIGHT = 4.0, 0.97  # the first heading is the course of so much of 
 SQUARE_RAD = math.radians(6.0)
 
 
-def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Floats]:
-    """The plan with the first pose of the walk at `start`, and the path (n, 2) on it."""
+def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, tuple[Floats, ...]]:
+    """The plan with the first pose of the first walk at `start`, and the path (n, 2) of each walk on it."""
     first = mapped.graph.pose[0]
     turn = _turn(mapped, start.heading_rad)
     c, s = math.cos(turn), math.sin(turn)
@@ -36,13 +36,14 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Floats]:
         found: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
         return found
 
-    path = moved(mapped.drawing.path_m)
+    paths = tuple(moved(path) for path in mapped.drawing.paths_m)
     walls = np.round(moved(mapped.drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
     long = np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > LEAST_M
     level = Level("0", 0.0, walls[long])
-    level = replace(level, doors=_doors(level, path))
+    level = replace(level, doors=_doors(level, paths))
     sd = math.sqrt(float(np.mean(mapped.drawing.sd_m[long] ** 2))) if long.any() else None
-    return Plan(name, (level,), start, "", uncertainty_m=None if sd is None else round(sd, ROUND)), path
+    start = replace(start, level=0)
+    return Plan(name, (level,), start, "", uncertainty_m=None if sd is None else round(sd, ROUND)), paths
 
 
 def _turn(mapped: Mapped, heading_rad: float) -> float:
@@ -64,9 +65,9 @@ def _turn(mapped: Mapped, heading_rad: float) -> float:
     return turn
 
 
-def _doors(level: Level, path: Floats) -> tuple[Door, ...]:
-    """The openings of a level, with what the path (n, 2) says of them."""
-    walked = shapely.LineString(path)
+def _doors(level: Level, paths: tuple[Floats, ...]) -> tuple[Door, ...]:
+    """The openings of a level, with what the paths (n, 2) say of them."""
+    walked = shapely.MultiLineString([path for path in paths if len(path) > 1])
     return tuple(
         replace(door, state="open") if shapely.LineString((door.line[:2], door.line[2:])).intersects(walked) else door
         for door in door_gaps(level)

@@ -21,6 +21,7 @@ from echostep.evaluate.anywhere.sites import Site, plan_of
 from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.evaluate.noplan import sites
 from echostep.evaluate.noplan.footslam import footslam
+from echostep.evaluate.noplan.joined import again, joined_row, joined_summary, strangers_row, walked_pair
 from echostep.evaluate.noplan.judgement import closure_columns, known_start, path_columns, true_path, wall_columns
 from echostep.evaluate.noplan.walks import walked
 from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
@@ -34,16 +35,26 @@ SPEED_M_S = 0.93  # of a tour with its pauses and turns, as simulated
 SECOND_M = 150.0  # way of the second person
 MINUTES = (10, 60)
 SITES = ("office", "corridors", "westport")
+JOINED_MIN = 5  # of each of two walks
+STRANGERS = {"office": "corridors", "corridors": "westport", "westport": "office"}  # another building
 COLUMNS = {
     "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "foot_m": "foot alone", "footslam_m": "FootSLAM", "wall_median_m": "walls m",
     "wall95_m": "95 %", "drawn_pc": "drawn %", "absent_pc": "not there %", "closures": "closures", "wrong": "wrong", "map_s": "s",
+}  # fmt: skip
+JOINED_COLUMNS = {
+    "name": "row", "joined": "joined", "misplaced": "misplaced", "runs": "runs", "joined_rmse_m": "RMSE m", "worst_rmse_m": "worst",
+    "drawn_pc": "drawn %", "closures": "closures", "wrong": "wrong",
 }  # fmt: skip
 SECOND_COLUMNS = {"name": "row", "mean_m": "mean m", "worst_m": "worst mean m", "lost": "lost", "runs": "runs"}
 
 
 def names_of(data: Path | None) -> list[str]:
     """Names of the rows; without the recordings there is no westport-house."""
-    return [f"{site}/{minutes}min" for minutes in MINUTES for site in SITES if data or site != "westport"]
+    known = [site for site in SITES if data or site != "westport"]
+    pairs = [f"{kind}/{site}" for kind in ("joined", "strangers") for site in known]
+    if not data:
+        pairs.remove("strangers/corridors")
+    return [f"{site}/{minutes}min" for minutes in MINUTES for site in known] + pairs
 
 
 def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: int, seed: int) -> list[Row]:
@@ -51,10 +62,23 @@ def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: in
     rows = []
     for name in names:
         kind, minutes = name.split("/")
+        if kind in ("joined", "strangers"):
+            rows.append(_pair_row(name, seed, data))
+            continue
         site = _site(kind, seed, 60.0 * SPEED_M_S * int(minutes.removesuffix("min")), data)
         picture = pictures / f"{name.replace('/', '-')}.png" if seed == first else None
         rows += drawn_rows(name, site, seed, picture)
     return rows
+
+
+def _pair_row(name: str, seed: int, data: Path | None) -> Row:
+    """Two walks of JOINED_MIN through one building, or through two."""
+    pairing, kind = name.split("/")
+    length_m = 60.0 * SPEED_M_S * JOINED_MIN
+    site = _site(kind, seed, length_m, data)
+    if pairing == "joined":
+        return joined_row(name, walked_pair(site, again(site, length_m, seed), seed), seed)
+    return strangers_row(name, walked_pair(site, _site(STRANGERS[kind], seed, length_m, data), seed), seed)
 
 
 def _site(kind: str, seed: int, length_m: float, data: Path | None) -> Site:
@@ -82,7 +106,7 @@ def drawn_rows(name: str, site: Site, seed: int, picture: Path | None) -> list[R
     if picture is not None:
         picture.parent.mkdir(parents=True, exist_ok=True)
         plan = plan_of(name, walls)
-        draw_picture(picture, plan, frame.to_map(pose[:, :2]), walk.built.levels[0])
+        draw_picture(picture, plan, [frame.to_map(pose[:, :2])], walk.built.levels[0])
     sd_m = float(np.sqrt(np.mean(mapped.drawing.sd_m**2)))
     return [row, {"name": f"second/{name}", "seed": seed} | _second(site, walls, sd_m, seed)]
 
@@ -107,10 +131,7 @@ def _second(site: Site, walls: Floats, sd_m: float, seed: int) -> Row:
 
 def _summaries(rows: list[Row]) -> list[Row]:
     """Means over the runs; of the errors also the worst."""
-    return [
-        _second_summary(group) if group[0]["name"].startswith("second/") else _summary(group)
-        for group in rows_by_name(rows)
-    ]
+    return [SUMMARIES.get(group[0]["name"].split("/")[0], _summary)(group) for group in rows_by_name(rows)]
 
 
 def _summary(group: list[Row]) -> Row:
@@ -139,11 +160,20 @@ def _second_summary(group: list[Row]) -> Row:
     }
 
 
+SUMMARIES = {"second": _second_summary, "joined": joined_summary, "strangers": joined_summary}
+
+
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     first = [row for row in rows if "rmse_m" in row]
     second = [row for row in rows if "mean_m" in row]
+    pairs = [row for row in rows if "joined" in row]
     title = f"Drawn without a plan: {request.runs} simulated walks a row"
-    return [Table(title, first, COLUMNS), Table("Another person, tracked on the drawing", second, SECOND_COLUMNS)]
+    tables = [
+        Table(title, first, COLUMNS),
+        Table("Another person, tracked on the drawing", second, SECOND_COLUMNS),
+        Table("Two walks of unknown start, of one building and of two", pairs, JOINED_COLUMNS),
+    ]
+    return [table for table in tables if table.rows]
 
 
 def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study:
