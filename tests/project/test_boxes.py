@@ -18,7 +18,7 @@ needs_openscad = pytest.mark.skipif(
 )
 PRINTER_MM = 180.0  # bed of a small printer
 BOARDS_MM = {  # boards that lie side by side in each box: length, width together, height with plugs and joints
-    "belt_box": (81.0, 51.0, 15.0),
+    "belt_box": (81.0, 51.0 + 8.0, 26.0),
     "ranger_holder": (45.0, 20.0, 15.0),
     "imu_clip": (25.4, 17.78, 10.0),
     "ankle_box": (48.0, 18.0 + 17.78, 12.0),

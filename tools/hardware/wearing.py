@@ -76,7 +76,7 @@ def _side(pen: Pen, x: float) -> None:
     _label(
         pen, x + 80, 592, ("calf gyro", "outer side of the shank, below the knee;", "its axis across the body"), GYRO
     )
-    _label(pen, x + 80, 660, ("MTx", "firmly on the instep, under the laces"), MTX)
+    _label(pen, x + 80, 660, ("MTx or foot board", "firmly on the instep, under the laces"), MTX)
     _label(pen, x + 80, 400, ("rangers", "one on each hip, see the other view"), RANGER)
     _label(pen, x - 96, 250, ("host", "laptop or phone", "in the backpack"), HOST, "end")
     _label(
@@ -122,8 +122,8 @@ def _behind(pen: Pen, x: float) -> None:
     _device(pen, x, 402, 46, 34, BELT)
     _device(pen, x + 54, 478, 12, 30, GYRO)
     _device(pen, x + 52, 604, 12, 30, GYRO)
-    _label(pen, x - 250, 300, ("left ranger, 0x70", "looks straight to the left"), RANGER)
-    _label(pen, x + 110, 300, ("right ranger, 0x71", "looks straight to the right"), RANGER)
+    _label(pen, x - 250, 300, ("left ranger", "looks straight to the left"), RANGER)
+    _label(pen, x + 110, 300, ("right ranger", "looks straight to the right"), RANGER)
     _label(pen, x - 250, 500, ("compass", "20 cm from keys, phone,", "buckle and batteries"), BELT)
     _label(pen, x + 110, 500, ("55 degrees wide", "keep arms, bag and jacket", "out of both cones"), RANGER)
     _label(pen, x - 250, 600, ("barometer", "a hole in the box, foam", "over it against wind"), BELT)
