@@ -19,6 +19,7 @@ from pages import END
 
 README = HARDWARE.parent / "README.md"
 KITS = {"papers": "parts of the papers", "2026": "parts of 2026"}
+SEEN = {"maker": "maker", "lists": "lists", "memory": "**memory**", "any": "-"}
 Row = dict[str, Any]
 
 
@@ -56,15 +57,14 @@ def parts() -> list[Row]:
 
 def parts_table(kit: str) -> str:
     """What to order for a kit, and its cost as an order of magnitude."""
-    head = "| role | part | order | bus, supply | count | EUR each | sold by | number seen in |\n" + "|---" * 8 + "|\n"
+    head = "| role | part | order | sold by | bus, supply | count | EUR each | number seen |\n" + "|---" * 8 + "|\n"
     body, total = "", 0
     for row in (row for row in parts() if kit in row["kits"]):
         count = row["count"][kit]
         total += count * row["eur"]
-        board = row["order"] if row["board"] == "itself" else f"{row['board']}: {row['order']}"
-        seen = "**from memory, check before ordering**" if row["source"] == "memory" else row["source"]
+        seen = SEEN[row["source"]]
         bus = ", ".join(text for text in (row["bus"], row["supply"]) if text)
-        cells = (row["role"], row["part"], board, bus, count, row["eur"], row["sold"], seen)
+        cells = (row["role"], row["part"], row["order"], row["sold"], bus, count, row["eur"], seen)
         body += f"| {' | '.join(str(cell) for cell in cells)} |\n"
     return head + body + f"\nTogether about {_rounded(total)} EUR.\n"
 
