@@ -20,7 +20,7 @@ static inline bool ticks_reached(uint32_t now, uint32_t due)
 	return (int32_t)(now - due) >= 0;
 }
 
-/* A rising edge of the SyncOut input. */
+/* A rising edge of the SyncOut input, which on a foot board is the data-ready line of its part. */
 struct clock_edge {
 	uint32_t ticks;  /* captured by the timer itself */
 	uint16_t edge;   /* edges since the start */
@@ -50,7 +50,7 @@ enum chip { CHIP_THIGH, CHIP_CALF, CHIP_BELT, CHIP_PRESSURE };
 enum spi_protocol {
 	SPI_ADIS16100, /* mode 2, 2 MHz */
 	SPI_SCP1000,   /* mode 0, 250 kHz */
-	SPI_MODE3,     /* 2 MHz: BMP390, LSM6DSO */
+	SPI_MODE3,     /* 2 MHz: BMP390, LSM6DSO, ICM-20649 */
 };
 void spi_select(enum chip chip, enum spi_protocol protocol);
 uint8_t spi_exchange(uint8_t out);

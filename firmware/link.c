@@ -27,6 +27,7 @@ static uint16_t *dropped(uint8_t id)
 		return &status.dropped_ping;
 	case MSG_GYROS:
 	case MSG_MOTION:
+	case MSG_FOOT:
 		return &status.dropped_gyros;
 	case MSG_PRESSURE:
 		return &status.dropped_pressure;

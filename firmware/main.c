@@ -4,6 +4,7 @@
 #include "board.h"         /* start, clock, USB, sleep */
 #include "compass.h"       /* sensor */
 #include "configuration.h" /* carries out `configure` */
+#include "foot.h"          /* sensor of a foot board */
 #include "gyros.h"         /* sensor */
 #include "link.h"          /* messages to and from the host */
 #include "parts.h"         /* sent once a second */
@@ -14,7 +15,7 @@
 #include "supply.h"        /* voltage */
 
 #define VERSION_MAJOR 1
-#define VERSION_MINOR 3
+#define VERSION_MINOR 4
 #define VERSION_PATCH 0
 
 #define SLEEP_MAX_TICKS (5u * TICKS_PER_MS) /* a stuck bus is noticed within this time */
@@ -75,6 +76,8 @@ static void send_subscribed_reports(void)
 		send_board_health();
 	if (link_wants(REPORTS_PARTS))
 		parts_send();
+	if (link_wants(REPORTS_FOOT))
+		foot_send_health();
 }
 
 static void send_identity_and_configuration(void)
@@ -175,10 +178,11 @@ static void receive_commands(void)
 		board_bootloader();
 }
 
-static void send_edge(void)
+/* An edge is a sample of the foot's part, or a SyncOut pulse. */
+static void take_edge(void)
 {
 	struct clock_edge e;
-	if (!clock_take_edge(&e) || !configuration_reads(SENSORS_SYNC))
+	if (!clock_take_edge(&e) || foot_take(&e) || !configuration_reads(SENSORS_SYNC))
 		return;
 	status.dropped_sync = (uint16_t)(status.dropped_sync + e.missed);
 	struct msg_sync m = { e.ticks, e.edge };
@@ -216,6 +220,8 @@ static uint32_t run_sensors(void)
 	wake = earlier(wake, ranger_run(now));
 	restart_enter(CRASH_PLACE_GYROS);
 	wake = earlier(wake, gyros_run(now));
+	if (foot_run(now))
+		send_configuration();
 	restart_enter(CRASH_PLACE_COMPASS);
 	wake = earlier(wake, compass_run(now));
 	restart_enter(CRASH_PLACE_PRESSURE);
@@ -244,7 +250,7 @@ int main(void)
 		restart_enter(CRASH_PLACE_COMMANDS);
 		handle_port_opening();
 		receive_commands();
-		send_edge();
+		take_edge();
 		uint32_t wake = run_sensors();
 		restart_enter(CRASH_PLACE_USB);
 		usb_run(); /* the messages just made */

@@ -216,6 +216,32 @@ uint8_t msg_pack_magnetic(uint8_t *out, const struct msg_magnetic *m)
 	return (uint8_t)(end - out);
 }
 
+uint8_t msg_pack_foot(uint8_t *out, const struct msg_foot *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put16(end, m->sample);
+	end = put16(end, (uint16_t)m->rate_x);
+	end = put16(end, (uint16_t)m->rate_y);
+	end = put16(end, (uint16_t)m->rate_z);
+	end = put16(end, (uint16_t)m->acceleration_x);
+	end = put16(end, (uint16_t)m->acceleration_y);
+	end = put16(end, (uint16_t)m->acceleration_z);
+	return (uint8_t)(end - out);
+}
+
+uint8_t msg_pack_foot_health(uint8_t *out, const struct msg_foot_health *m)
+{
+	uint8_t *end = out;
+	end = put32(end, m->ticks);
+	end = put8(end, m->foot_state);
+	end = put8(end, m->fault);
+	end = put16(end, m->errors);
+	end = put16(end, m->missed);
+	end = put16(end, (uint16_t)m->temperature);
+	return (uint8_t)(end - out);
+}
+
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
 	if (length != MSG_CLOCK_QUERY_SIZE)

@@ -21,6 +21,7 @@
 #define MSG_BOARD_HEALTH_INVALID ((uint16_t)0)
 #define MSG_MOTION_INVALID ((int16_t)-32768)
 #define MSG_MAGNETIC_INVALID ((int16_t)-32768)
+#define MSG_FOOT_HEALTH_TEMPERATURE_INVALID ((int16_t)-32768)
 
 enum {
 	MSG_IDENTITY = 0x01,
@@ -37,6 +38,8 @@ enum {
 	MSG_PARTS = 0x0C,
 	MSG_MOTION = 0x0D,
 	MSG_MAGNETIC = 0x0E,
+	MSG_FOOT = 0x0F,
+	MSG_FOOT_HEALTH = 0x10,
 	MSG_IDENTIFY = 0x81,
 	MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83,
@@ -59,6 +62,8 @@ enum {
 	MSG_PARTS_SIZE = 21,
 	MSG_MOTION_SIZE = 40,
 	MSG_MAGNETIC_SIZE = 10,
+	MSG_FOOT_SIZE = 18,
+	MSG_FOOT_HEALTH_SIZE = 12,
 	MSG_IDENTIFY_SIZE = 0,
 	MSG_CLOCK_QUERY_SIZE = 2,
 	MSG_CONFIGURE_SIZE = 5,
@@ -179,10 +184,17 @@ enum {
 };
 
 enum {
+	FOOT_STATE_SOUGHT = 0,
+	FOOT_STATE_STARTING = 1,
+	FOOT_STATE_RUNNING = 2,
+};
+
+enum {
 	REPORTS_BOARD_HEALTH = 1,
 	REPORTS_PARTS = 2,
 	REPORTS_MOTION = 4,
 	REPORTS_MAGNETIC = 8,
+	REPORTS_FOOT = 16,
 };
 
 /* Firmware version and schema. Sent when the port opens, when asked for, and once a second. Layout and CRC seed of this message
@@ -368,6 +380,31 @@ struct msg_magnetic {
 	int16_t z; /* 1/6842 gauss, -32768: invalid */
 };
 uint8_t msg_pack_magnetic(uint8_t *out, const struct msg_magnetic *m);
+
+/* One sample of the ICM-20649 on a foot, by a foot board of firmware 1.4 and newer: 225 a second, by the part's own clock. */
+struct msg_foot {
+	uint32_t ticks; /* 0.5 us */
+	uint16_t sample;
+	int16_t rate_x; /* 1/8.2 deg/s */
+	int16_t rate_y; /* 1/8.2 deg/s */
+	int16_t rate_z; /* 1/8.2 deg/s */
+	int16_t acceleration_x; /* 1/1024 g */
+	int16_t acceleration_y; /* 1/1024 g */
+	int16_t acceleration_z; /* 1/1024 g */
+};
+uint8_t msg_pack_foot(uint8_t *out, const struct msg_foot *m);
+
+/* The part on the foot: sent with `foot`, in answer to subscribe and then once a second, by a board that has found one since its
+ * start. Such a board reads nothing else: its `configuration` has no sensors. */
+struct msg_foot_health {
+	uint32_t ticks; /* 0.5 us */
+	uint8_t foot_state;
+	uint8_t fault;
+	uint16_t errors;
+	uint16_t missed;
+	int16_t temperature; /* 1/333.87 degC, -32768: invalid */
+};
+uint8_t msg_pack_foot_health(uint8_t *out, const struct msg_foot_health *m);
 
 /* Request for identity and configuration. Its CRC seed is the fixed one, as identity's. */
 /* identify has no fields. */

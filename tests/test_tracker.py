@@ -164,7 +164,7 @@ def test_noise_on_both_ports_is_survived() -> None:
     assert off is not None
     assert off.max_m < 1.5
     assert tracker.front_end.board.counts.rejected > 50
-    assert tracker.front_end.mtx.counts.bad_checksum > 10
+    assert tracker.front_end.foot_source.counts.bad_checksum > 10
 
 
 def test_strange_ports_and_pure_noise_are_counted() -> None:

@@ -41,7 +41,7 @@ def replay(path: Path, plan_path: Path) -> tuple[Spent, float]:
     recording, front_end = open_recording(path), tracker.front_end
     for stage, owner, name in (
         ("board frames", front_end.board, "frames"),
-        ("MTx samples", front_end.mtx, "feed_batch"),
+        ("foot samples", front_end.foot_source, "read"),
         ("timeline", front_end.timeline, "times"),
         ("foot and path", front_end, "_track_foot"),
         ("all of the front end", front_end, "process"),

@@ -109,6 +109,10 @@ MtxPort = Annotated[
     str | None,
     typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the board's leg gyros are used."),
 ]
+FootPort = Annotated[
+    str | None,
+    typer.Option("--foot", metavar="PORT", help="Serial port of a foot board, in the place of an MTx."),
+]
 Foxglove = Annotated[
     str | None,
     typer.Option(
@@ -206,6 +210,7 @@ def live(
     plan: OptionalPlan = None,
     board: BoardPort = None,
     mtx: MtxPort = None,
+    foot: FootPort = None,
     out: Out = Path("out/live"),
     start: Start = None,
     start_sd: StartSd = None,
@@ -224,21 +229,22 @@ def live(
     keep: Keep = None,
     foxglove: Foxglove = None,
 ) -> None:
-    """Track a wearer live and record everything. Without an MTx the board's leg gyros are used."""
+    """Track a wearer live and record everything. With nothing on the foot the board's leg gyros are used."""
     from echostep.session import live as live_run
     from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, foxglove=_foxglove(foxglove))
     tracking = TrackingOptions(plan, start, start_sd, settings, seed, guide)
-    board, mtx = _ports(board, mtx)
-    live_run.live(tracking, PortOptions(board, mtx, beacons, seconds, keep), output)
+    board, mtx, foot = _ports(board, mtx, foot)
+    live_run.live(tracking, PortOptions(board, mtx, beacons, seconds, keep, foot), output)
 
 
 @app.command()
 def record(
     board: BoardPort = None,
     mtx: MtxPort = None,
+    foot: FootPort = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
         "out/recording.mcap"
     ),
@@ -250,8 +256,8 @@ def record(
     from echostep.session import live as live_run
     from echostep.session.options import PortOptions
 
-    board, mtx = _ports(board, mtx)
-    live_run.record(PortOptions(board, mtx, beacons, seconds, keep), out)
+    board, mtx, foot = _ports(board, mtx, foot)
+    live_run.record(PortOptions(board, mtx, beacons, seconds, keep, foot), out)
 
 
 @app.command()
@@ -460,15 +466,16 @@ def decode(
 def doctor(
     board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
     mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 6.0,
     udev: Annotated[bool, typer.Option("--udev", help="Only print the udev rules.")] = False,
 ) -> None:
-    """Check ports, board and MTx, and say what to do about each fault. Exit status 1 when there is a fault."""
+    """Check ports, boards and MTx, and say what to do about each fault. Exit status 1 when there is a fault."""
     from echostep.commissioning import doctor as examination
 
     if udev:
         typer.echo(examination.rules_text(), nl=False)
-    elif not examination.run(board, mtx, seconds):
+    elif not examination.run(board, mtx, seconds, foot):
         raise typer.Exit(1)
 
 
@@ -528,15 +535,18 @@ def _foxglove(text: str | None) -> FoxgloveAddress | None:
     return None if text is None else parse_address(text)
 
 
-def _ports(board: str | None, mtx: str | None) -> tuple[str, str | None]:
-    """The given ports; without the board's, both are searched for and printed."""
+def _ports(board: str | None, mtx: str | None, foot: str | None) -> tuple[str, str | None, str | None]:
+    """The given ports of board, MTx and foot board; without the board's, all are searched for and printed."""
     if board is not None:
-        return board, mtx
+        return board, mtx, foot
     from echostep.commissioning.port_search import find_ports
 
-    found = find_ports(mtx)
-    typer.echo(f"Ports: --board {found.board}" + (f" --mtx {found.mtx}" if found.mtx else "; no MTx was found"))
-    return found.board, found.mtx
+    found = find_ports(mtx, foot)
+    options = {"board": found.board, "mtx": found.mtx, "foot": found.foot}
+    typer.echo("Ports: " + " ".join(f"--{name} {path}" for name, path in options.items() if path))
+    if not found.mtx and not found.foot:
+        typer.echo("Neither an MTx nor a foot board was found.")
+    return found.board, found.mtx, found.foot
 
 
 def _page_address(headless: bool, page: bool | None, host: str, port: int | None) -> Address | None:

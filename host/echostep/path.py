@@ -57,6 +57,7 @@ class MeasuredSegment:
     """A path segment with the pings triggered since the segment before it, oldest first.
 
     `t_s`, `ranger` (0 looks left, 1 right) and `range_m` (NaN: no echo) are (n,). `height_m` (k,): heights by pressure in the same time.
+    `ranger_part`: kind of ranger of the last ping, as the board has named it [protocol/messages.toml, part]; 0: not named, or no ping.
     """
 
     segment: PathSegment
@@ -64,6 +65,7 @@ class MeasuredSegment:
     ranger: Ints
     range_m: Floats
     height_m: Floats = field(default_factory=lambda: np.zeros(0))
+    ranger_part: int = 0
 
     @property
     def without_pings(self) -> MeasuredSegment:
@@ -76,7 +78,8 @@ class MeasuredSegment:
         share = (s.t1_s - t_s) / (s.t1_s - s.t0_s)
         rest = replace(s, t0_s=t_s, dx_m=share * s.dx_m, dy_m=share * s.dy_m, heading0_rad=s.heading_rad(t_s))
         kept = self.t_s >= t_s
-        return MeasuredSegment(rest, self.t_s[kept], self.ranger[kept], self.range_m[kept], self.height_m)
+        pings = (self.t_s[kept], self.ranger[kept], self.range_m[kept])
+        return MeasuredSegment(rest, *pings, self.height_m, self.ranger_part)
 
 
 @dataclass(frozen=True, slots=True)

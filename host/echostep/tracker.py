@@ -16,9 +16,10 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
-from echostep.board.findings import BoardReports
+from echostep.board.findings import BoardReports, Finding
 from echostep.board.frames import FrameCounts
 from echostep.board.gateway import BeaconReading, Gateway, GatewayCounts
+from echostep.board.health import board_findings
 from echostep.board.messages import Identity, Status
 from echostep.errors import EchostepError
 from echostep.legs.heading import CompassErrors
@@ -29,13 +30,14 @@ from echostep.localization.estimate import Estimate, Right, estimate, unobserved
 from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.particle_kernels import systematic
 from echostep.localization.plausibility import STATED
+from echostep.localization.ranger_models import echo_of
 from echostep.localization.start import Start
 from echostep.odometry.alarm import Alarm, WearerAlarm
 from echostep.odometry.front_end import FrontEnd, FrontEndCounts
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
-from echostep.ports.chunks import GATEWAY, Chunk, Portion, portion_of
+from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
 from echostep.ports.teammate import TEAM
 from echostep.settings import Settings
 from echostep.walls.level_sheet import lay_out_levels
@@ -79,7 +81,8 @@ class TrackerState:
 class StreamState:
     """Counts of each input stream since the start, and the newest reports of the board.
 
-    `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples.
+    `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples. `mtx`: also of a foot board's samples;
+    `foot_reports`: of a foot board about itself, None where an MTx is worn.
     """
 
     board: FrameCounts
@@ -92,6 +95,18 @@ class StreamState:
     status: Status | None
     identity: Identity | None
     reports: BoardReports
+    foot_reports: BoardReports | None
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Findings on the boards, the most severe first."""
+        of_foot = board_findings(self.foot_reports) if self.foot_reports else []
+        return sorted([*board_findings(self.reports), *of_foot], key=lambda finding: -finding.severity)
+
+    @property
+    def foot_name(self) -> str:
+        """What is worn on the foot."""
+        return "MTx" if self.foot_reports is None else "foot board"
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +154,7 @@ class Tracker:
         self._before: BeforeCheckIn | None = None  # the newest check-in, while it can be undone
         self._check_in: CheckIn | None = None  # the newest
         self._check_in_s = -math.inf  # its time: the path before it does not move the cloud
+        self._ranger_part = 0  # named by the board [protocol/messages.toml, part]
         self._segment: PathSegment | None = None  # the newest
         self._estimate: Estimate | None = None  # the newest
         self._published_s = -math.inf  # time of the newest published estimate
@@ -170,7 +186,7 @@ class Tracker:
         front_end, reports = self.front_end, self.front_end.reports
         return StreamState(
             board=front_end.board.counts,
-            mtx=front_end.mtx.counts,
+            mtx=front_end.foot_source.counts,
             gateway=replace(self.gateway.counts),
             front_end=front_end.counts,
             pings=front_end.pings,
@@ -179,6 +195,7 @@ class Tracker:
             status=front_end.status,
             identity=front_end.identity,
             reports=replace(reports, gyros=dict(reports.gyros)),
+            foot_reports=replace(front_end.foot_source.board.reports) if front_end.foot_source.port == FOOT else None,
         )
 
     def particles(self, most: int) -> Particles | None:
@@ -250,6 +267,7 @@ class Tracker:
     def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
         """Localization: propagate by the segment, reweight by pings and beacon readings. Of a segment before a check-in only its heading counts."""
         segment = measured.segment
+        self._ranger_part = measured.ranger_part or self._ranger_part
         self.filter = self.filter or self._first_filter(segment.heading0_rad)
         last, self._segment = self._segment, segment
         if last is not None and segment.step != last.step:
@@ -266,6 +284,7 @@ class Tracker:
             if segment.t1_s <= self._check_in_s:
                 return []
             measured = measured.after(self._check_in_s)
+        self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
         self._estimate = self.filter.update(measured, readings)
         return [self._publish(measured, self._estimate)]
 
@@ -332,10 +351,12 @@ class Tracker:
         self._rng.bit_generator.state = before.random_state
         waiting: list[BeaconReading] = []
         for measured, readings in before.since:
+            self._ranger_part = measured.ranger_part or self._ranger_part
             self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
             if self.filter is None:
                 waiting += readings
             else:
+                self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
                 self._estimate = self.filter.update(measured, readings)
         self._readings = (waiting + self._readings)[-MAX_READINGS:]
         if self._segment is None or self._estimate is None:
@@ -378,5 +399,6 @@ class Tracker:
         """A filter about a start; `searching`: particles of a search, where not the settings' number."""
         s = self.settings
         cloud = s.cloud if searching is None else replace(s.cloud, searching=searching)
-        settings = FilterSettings(cloud, s.echo, s.climb, s.beacons, self.plan.uncertainty_m or 0.0)
+        echo = echo_of(self._ranger_part, s.echo)
+        settings = FilterSettings(cloud, echo, s.climb, s.beacons, self.plan.uncertainty_m or 0.0)
         return MapFilter(self._building, start, walk_heading_rad, rng, settings)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT
+from board_runs import ROOT, needs_twin
 from command_line import echostep
+from echostep.board.findings import Severity
 from echostep.commissioning import port_search
 from echostep.commissioning.doctor import examine
 from echostep.commissioning.port_search import find_ports
@@ -23,6 +25,7 @@ from echostep.recording.reading import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT
 from players import babbling_port, pseudo_terminal, python_board
+from waiting import PATIENCE_S
 from xsens.test_xsens_startup import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
@@ -111,6 +114,59 @@ def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyP
     assert done.returncode == 2
     for words in (f"{mtx}: an MTx", f"{silent}: something else", "/dev/none: there is no such port", "--board"):
         assert words in done.stderr
+
+
+@contextmanager
+def two_boards(folder: Path) -> Iterator[tuple[str, str]]:
+    """The ports of a belt board and a foot board, real firmware in two simulators."""
+    command = [sys.executable, str(ROOT / "tools/twin/run.py"), "--kit", "2026", "--out", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
+        try:
+            assert twin.stdout is not None
+            board, foot = (twin.stdout.readline().split()[1] for _ in range(2))
+            yield board, foot
+        finally:
+            twin.send_signal(signal.SIGINT)
+            twin.wait(timeout=PATIENCE_S)
+
+
+@needs_twin
+def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with two_boards(tmp_path) as (board, foot):
+        seen = [PortSeen(port, Role.BOARD, "", number) for port, number in ((foot, "17"), (board, "4"))]
+        monkeypatch.setattr(port_search, "list_seen", lambda: seen)
+        swapped = echostep("record", "--board", foot, "--foot", board, "--out", tmp_path / "a.mcap", "--seconds", 30)
+        live = echostep("live", "--plan", PLAN, "--headless", "--out", tmp_path / "live", "--seconds", 14)
+        monkeypatch.setattr("echostep.commissioning.doctor.list_seen", lambda: seen)
+        report = examine(None, None, 3.0)
+    assert swapped.returncode == 2
+    assert f"the ports are swapped: give --board {board} --foot {foot}" in swapped.stderr
+    assert live.returncode == 0, live.stderr
+    assert f"Ports: --board {board} --foot {foot}" in live.stdout
+    assert {chunk.port for chunk in open_recording(tmp_path / "live/walk.mcap").chunks()} == {"board", "foot"}
+    echostep("replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--out", tmp_path / "again", "--headless")
+    track = (tmp_path / "live/track.csv").read_bytes()
+    assert track.count(b"\n") > 10
+    assert (tmp_path / "again/track.csv").read_bytes() == track
+    text = "\n".join(report.lines)
+    assert f"board     {board}: firmware 1.4.0" in text
+    assert f"foot board {foot}: firmware 1.4.0" in text
+    assert "foot      ICM-20649, identity 0xE1, running, 24 degC" in text
+    assert "several" not in text
+    assert not [f for f in report.findings if "foot" in f.subject and f.severity is Severity.FAULT]  # the wearer walks
+
+
+@needs_twin
+def test_a_foot_board_alone_at_the_boards_port_is_named(tmp_path: Path) -> None:
+    with two_boards(tmp_path) as (_, foot):
+        done = echostep("record", "--board", foot, "--out", tmp_path / "a.mcap", "--seconds", 30)
+    assert f"{foot} is the foot board, not the sensor board: name its port with --foot {foot}" in done.stderr
+
+
+def test_an_mtx_and_a_foot_board_are_not_worn_together() -> None:
+    done = echostep("record", "--board", "a", "--mtx", "b", "--foot", "c")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "only one of them is on the foot" in done.stderr
 
 
 def test_random_bytes_are_no_device() -> None:

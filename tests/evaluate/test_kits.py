@@ -24,6 +24,6 @@ def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> Non
     assert all(np.array_equal(walk.heading_rad, walks[0].heading_rad) for walk in walks)
 
 
-def test_settings_of_pulse_rangers_are_read_from_the_file_that_ships() -> None:
+def test_the_tracker_and_the_simulation_agree_on_the_reach_of_pulse_rangers() -> None:
     kind = kits.kinds()["pulse"]
     assert (kind.echo.maximum_m, kind.acoustics.maximum_m) == (4.5, 4.5)

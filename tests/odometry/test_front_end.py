@@ -76,7 +76,7 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
     return found, (
         ours.counts,
         ours.board.counts,
-        ours.mtx.counts,
+        ours.foot_source.counts,
         ours.status,
         ours.identity,
         ours.timeline.synchronised,
@@ -99,7 +99,7 @@ def test_the_recorded_walk_has_all_that_matters() -> None:
     assert any(p.segment.unobserved for p in passages)
     assert ours.counts.unknown_ports > 5
     assert ours.board.counts.rejected > 10
-    assert ours.mtx.counts.bad_checksum > 5
+    assert ours.foot_source.counts.bad_checksum > 5
     assert ours.status is not None
     assert ours.identity is not None
 

@@ -104,7 +104,7 @@ static void on_select(struct spi_device *self, bool on)
 		g->answer = convert(g);
 	}
 	g->count = 0;
-	if (!on || kit_of_2026((enum place)(PLACE_THIGH + g->channel_of_row)))
+	if (!on || !kit_of_papers((enum place)(PLACE_THIGH + g->channel_of_row)))
 		return;
 	g->garbled = spi_hertz() > MAX_HERTZ || !FALLING_EDGE(spi_mode());
 	if (spi_hertz() > MAX_HERTZ)
@@ -124,7 +124,7 @@ static uint8_t on_exchange(struct spi_device *self, uint8_t out)
 	}
 	g->incoming = (uint16_t)(g->incoming << 8 | out);
 	g->count++;
-	if (kit_of_2026((enum place)(PLACE_THIGH + g->channel_of_row)))
+	if (!kit_of_papers((enum place)(PLACE_THIGH + g->channel_of_row)))
 		return 0xFF;
 	return g->fault == ABSENT ? 0xFF : g->fault == ZEROS ? 0 : in;
 }

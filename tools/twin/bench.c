@@ -20,7 +20,7 @@
 #define NORTH_COUNTS 1368 /* 0.2 gauss to the north, level */
 
 struct row row;
-struct axes motion[3];
+struct axes motion[3], motion_before[3];
 int16_t field[3];
 
 static enum pair { NONE, RANGERS, THIGH_CALF, THIGH_BELT, CALF_BELT, PAIRS } swapped;
@@ -108,10 +108,10 @@ static bool read_all(int fd, void *into, size_t length)
 	return true;
 }
 
-/* With a pulse ranger on the left, its echo line is where SyncOut would be. */
+/* With a pulse ranger on the left, its echo line is where SyncOut would be; on a foot board it is the data-ready line. */
 static void set_sync(bool level)
 {
-	if (!kit_of_2026(PLACE_RANGER_LEFT))
+	if (kit_of_papers(PLACE_RANGER_LEFT))
 		drive_pin('D', 4, level);
 }
 
@@ -135,7 +135,7 @@ static avr_cycle_count_t sync_rise(avr_t *a, avr_cycle_count_t when, void *param
 	(void)when;
 	(void)param;
 	set_sync(true);
-	if (!kit_of_2026(PLACE_RANGER_LEFT))
+	if (kit_of_papers(PLACE_RANGER_LEFT))
 		bench_trace("sync");
 	avr_cycle_timer_register(a, SYNC_PULSE, sync_fall, NULL);
 	return 0;
@@ -246,6 +246,7 @@ static void advance(const uint8_t *rows, uint32_t length, bool extended)
 	if (length % size)
 		fail("a record of rows has %u bytes, not a multiple of %u", length, size);
 	for (uint32_t offset = 0; offset < length; offset += size) {
+		memcpy(motion_before, motion, sizeof motion);
 		if (extended) {
 			take_extended_row(rows + offset);
 		} else {

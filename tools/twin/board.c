@@ -31,6 +31,7 @@ static void power_devices(void)
 	lis3mdl_power();
 	lsm6dso_power();
 	pulse_power();
+	icm20649_power();
 }
 
 static void fill(unsigned from, unsigned size)
@@ -77,6 +78,7 @@ static void start_program(void)
 	scp1000_resume();
 	bmp390_resume();
 	pulse_resume();
+	icm20649_resume();
 	adis16100_resume();
 	usb_host_start();
 }

@@ -35,6 +35,11 @@ avr_cycle_count_t clock_cycles(unsigned us)
 	return (avr_cycle_count_t)(us * cycles / 1000.0);
 }
 
+double clock_fraction(void)
+{
+	return ((double)avr->cycle - begin) / cycles;
+}
+
 uint64_t time_ns(void)
 {
 	double since = (double)avr->cycle - begin;

@@ -17,7 +17,7 @@ static bool on_start(struct twi_device *self, bool read)
 {
 	fresh = !read;
 	self->stretch = fault == STRETCH ? STRETCHED : 0;
-	return fault != ABSENT && !kit_of_2026(PLACE_COMPASS);
+	return fault != ABSENT && kit_of_papers(PLACE_COMPASS);
 }
 
 static bool on_write(struct twi_device *self, uint8_t byte)

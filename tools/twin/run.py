@@ -22,32 +22,38 @@ import tty
 from collections.abc import Callable, Iterator
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echostep.commands.beacon_player import simulate_gateway
-from echostep.plan.model import load_plan
+from echostep.plan.model import Plan, load_plan
 from echostep.simulation.devices.beacon_gateway import SPACING_M
 from echostep.simulation.devices.board import Sent
+from echostep.simulation.devices.foot_board import FootBoardPort
 from echostep.simulation.devices.mtx_setup import MtxDevice
+from echostep.simulation.kits import Kit
 from echostep.simulation.rehearsal import Act, Rehearsal
-from echostep.simulation.scenario import Scenario, demo_scenario
-from echostep.simulation.stimulus import NO_SYNC, ROW
+from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
+from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]
 BLOCK_MS, IDLE_MS = 10, 50
+FOOT_BOARD = 2  # seed of the one on the foot
 LATE_S = 0.5  # a delay behind real time that is reported
 
 
 class PtyBoard:
     """The twin with its port on a pseudo terminal: rows in, the firmware's bytes to the program that has the port open."""
 
-    def __init__(self) -> None:
-        self._child = subprocess.Popen(TWIN, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    def __init__(self, seed: int = 1) -> None:
+        """`seed`: which of all boards it is."""
+        command = [*TWIN, "--seed", str(seed)]
+        self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         assert self._child.stdin
         assert self._child.stdout
         assert self._child.stderr
@@ -65,10 +71,11 @@ class PtyBoard:
             raise SystemExit("the twin made no port")
         return found[1].decode()
 
-    def advance(self, rows: object) -> Sent:
+    def advance(self, rows: NDArray[Any]) -> Sent:
         """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""
-        body = rows.tobytes()  # type: ignore[attr-defined]
-        self._in.write(b"R" + len(body).to_bytes(4, "little") + body)
+        body = rows.tobytes()
+        kind = b"E" if rows.dtype == EXTENDED_ROW else b"R"
+        self._in.write(kind + len(body).to_bytes(4, "little") + body)
         self._in.flush()
         while True:
             head = self._out.read(5)
@@ -187,6 +194,45 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
         yield now_s
 
 
+def play_2026(plan: Plan, seed: int, board: PtyBoard, foot_board: PtyBoard, truth: Path) -> None:
+    """Wait for an opening of the board's port, then play one walk with both boards of 2026 in real time."""
+    scenario = Scenario(plan, DEMO_WAYPOINTS, seed, board, kit=Kit.OF_2026, foot_board=foot_board)
+    foot = scenario.foot
+    assert isinstance(foot, FootBoardPort)
+    while not board.is_open:
+        board.advance(scenario.sensors.rows(0, IDLE_MS))
+        foot_board.advance(foot.sensors.rows(0, IDLE_MS))
+        time.sleep(IDLE_MS * 1e-3)
+    scenario.write_truth(truth, board.t_s)
+    due_s = time.monotonic()
+    for start in range(0, len(scenario.walk.t_s), BLOCK_MS):
+        board.advance(scenario.sensors.rows(start, start + BLOCK_MS))
+        foot_board.advance(foot.sensors.rows(start, start + BLOCK_MS))
+        due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
+        time.sleep(max(0.0, due_s - time.monotonic()))
+
+
+def run_2026(seed: int, out: Path, *, once: bool) -> int:
+    """Play the two boards of 2026 until Ctrl-C."""
+    boards = PtyBoard(), PtyBoard(FOOT_BOARD)
+    with as_file(files("echostep") / "plans" / "demo.json") as path:
+        plan = load_plan(path)
+        out.mkdir(parents=True, exist_ok=True)
+        print(f"board {boards[0].port}\nfoot  {boards[1].port}\n\nIn another terminal:\n"
+              f"  .venv/bin/echostep live --plan {path} --board {boards[0].port} --foot {boards[1].port}\n\nCtrl-C ends.", flush=True)  # fmt: skip
+    try:
+        while True:
+            play_2026(plan, seed, *boards, out / "truth.csv")
+            if once:
+                break
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for board in boards:
+            board.close()
+    return 0
+
+
 def rehearse(rehearsal: Rehearsal, board: PtyBoard, mtx: PtyMtx) -> None:
     """Act what `echostep calibrate` asks for, the next act at each opening of the board's port, in real time, until Ctrl-C."""
     act, at_ms, was_open = Act.WALK, 0, False
@@ -212,10 +258,15 @@ def main() -> int:
     parser.add_argument("--once", action="store_true", help="end after one walk")
     parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
     parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
+    parser.add_argument(
+        "--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: a foot board too"
+    )
     parser.add_argument("--still", action="store_true", help="a wearer who does what echostep calibrate asks")
     options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
+    if options.kit == Kit.OF_2026.value:
+        return run_2026(options.seed, options.out, once=options.once)
     with as_file(files("echostep") / "plans" / "demo.json") as path:
         plan = load_plan(path)
         board = PtyBoard()

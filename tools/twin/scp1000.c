@@ -28,7 +28,7 @@ static int16_t temperature;
 static void set_ready(bool on)
 {
 	ready = on;
-	drive_pin('E', 6, !kit_of_2026(PLACE_PRESSURE) && (fault == DRDY_STUCK || (on && fault != DRDY_LOW && fault != ABSENT && fault != ZEROS)));
+	drive_pin('E', 6, kit_of_papers(PLACE_PRESSURE) && (fault == DRDY_STUCK || (on && fault != DRDY_LOW && fault != ABSENT && fault != ZEROS)));
 }
 
 static avr_cycle_count_t sample(avr_t *a, avr_cycle_count_t when, void *param)
@@ -68,7 +68,7 @@ static void on_select(struct spi_device *self, bool on)
 {
 	(void)self;
 	count = 0;
-	if (!on || kit_of_2026(PLACE_PRESSURE))
+	if (!on || !kit_of_papers(PLACE_PRESSURE))
 		return;
 	garbled = spi_hertz() > MAX_HERTZ || spi_mode() != 0;
 	if (spi_hertz() > MAX_HERTZ)
@@ -94,7 +94,7 @@ static void restart(void)
 
 static uint8_t exchange(uint8_t out)
 {
-	if (kit_of_2026(PLACE_PRESSURE))
+	if (!kit_of_papers(PLACE_PRESSURE))
 		return 0xFF;
 	if (fault == ABSENT || fault == ZEROS)
 		return fault == ABSENT ? 0xFF : 0;

@@ -103,7 +103,7 @@ static bool on_start(struct twi_device *self, bool read)
 {
 	struct ranger *r = (struct ranger *)self;
 
-	if (kit_of_2026((enum place)(PLACE_RANGER_LEFT + r->side)) || r->absent || r->refuses || (r->mute && r->listening) || avr->cycle < r->busy_until)
+	if (!kit_of_papers((enum place)(PLACE_RANGER_LEFT + r->side)) || r->absent || r->refuses || (r->mute && r->listening) || avr->cycle < r->busy_until)
 		return false;
 	if (r->listening)
 		finish(r);

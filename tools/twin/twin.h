@@ -28,8 +28,8 @@ struct row {
 
 /* The same millisecond for parts of three and more axes, in the axes that are printed on them. */
 struct axes {
-	int16_t rate[3];  /* LSM6DSO counts: 0.035 deg/s */
-	int16_t force[3]; /* 0.244 mg */
+	int16_t rate[3];  /* LSM6DSO counts: 0.035 deg/s; in the first place of a foot board: 1/8.2 deg/s */
+	int16_t force[3]; /* 0.244 mg; 1/1024 g */
 } __attribute__((packed));
 
 struct extended_row {
@@ -43,7 +43,8 @@ struct extended_row {
 
 extern avr_t *avr;
 extern struct row row;       /* the millisecond under way */
-extern struct axes motion[3];
+extern struct axes motion[3];        /* of a foot board: those of the thigh are the foot's, in counts of an ICM-20649 */
+extern struct axes motion_before[3]; /* of the millisecond before */
 extern int16_t field[3];
 extern uint64_t random_state; /* for everything that varies from part to part */
 
@@ -61,6 +62,7 @@ void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t wri
 uint64_t time_ns(void);                          /* simulated */
 avr_cycle_count_t clock_next_millisecond(void);  /* begins one; returns its end */
 avr_cycle_count_t clock_cycles(unsigned us);     /* of true time */
+double clock_fraction(void);                     /* of the millisecond under way */
 bool clock_fault(const char *value);
 
 /* bench.c: the bytes that the board sends, and traces of its buses for tests. */
@@ -153,13 +155,18 @@ void lsm6dso_power(void);
 bool lsm6dso_fault(const char *name, const char *value);
 void lis3mdl_power(void);
 bool lis3mdl_fault(const char *name, const char *text);
+void icm20649_power(void);
+void icm20649_resume(void);
+bool icm20649_fault(const char *name, const char *value);
 void bmp390_power(void);
 void bmp390_resume(void);
 bool bmp390_fault(const char *name, const char *value);
 
 /* kit.c: which part is in which place. */
 enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_COMPASS, PLACE_THIGH, PLACE_CALF, PLACE_BELT, PLACE_PRESSURE, PLACES };
+bool kit_of_papers(enum place place);
 bool kit_of_2026(enum place place);
+bool kit_has_foot(void); /* a foot board, with nothing else */
 bool kit_fault(const char *name, const char *value);
 
 /* pty.c: the port as a pseudo terminal, which exists while the board is plugged in. */

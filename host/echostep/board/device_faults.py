@@ -27,6 +27,7 @@ from echostep.board.findings import (
 from echostep.board.messages import (
     GYRO_HEALTH_INVALID,
     Fault,
+    FootState,
     Gyro,
     GyroHealth,
     Healthy,
@@ -35,7 +36,7 @@ from echostep.board.messages import (
     Status,
     Wiring,
 )
-from echostep.board.part_faults import MIXED_RANGERS, SIX_AXES_RESPONSES, SIX_AXES_TESTS, part_text
+from echostep.board.part_faults import MIXED_RANGERS, SIX_AXES_RESPONSES, SIX_AXES_TESTS, foot_text, part_text
 
 TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; by reason
 UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; by reason
@@ -169,6 +170,19 @@ def gyro_findings(reports: BoardReports) -> list[Finding]:
             findings.append(Finding(severity, name, what + _response_text(health, proper), remedy))
         findings += _temperature_findings(name, health)
     return findings
+
+
+def foot_findings(reports: BoardReports) -> list[Finding]:
+    """A finding on the part of a foot board that does not run."""
+    foot = reports.foot
+    if foot is None or foot.foot_state == FootState.RUNNING or not foot.errors:
+        return []
+    return [Finding(Severity.FAULT, "foot sensor (ICM-20649)", *foot_text(Fault(foot.fault)))]
+
+
+def foot_celsius(counts: int) -> float:
+    """Temperature in degC of an ICM-20649 [DS-000192, table 1: 333.87 counts per degC, 0 at 21 degC]."""
+    return 21.0 + counts / 333.87
 
 
 def _is_unmoved(health: GyroHealth) -> bool:

@@ -12,6 +12,7 @@ from enum import IntEnum
 from echostep.board.messages import (
     BoardHealth,
     Configuration,
+    FootHealth,
     GyroHealth,
     Healthy,
     Identity,
@@ -95,6 +96,7 @@ class BoardReports:
     usual_supply_mv: int = 0  # highest voltage so far
     gyros: dict[int, GyroHealth] = field(default_factory=dict)
     parts: Parts | None = None
+    foot: FootHealth | None = None  # of a foot board
 
     def add(self, message: Message) -> None:
         """Keep a message if it is a report; after a restart of the board there is no previous status."""
@@ -107,6 +109,8 @@ class BoardReports:
             self.usual_supply_mv = max(self.usual_supply_mv, message.supply_mv)
         elif isinstance(message, Parts):
             self.parts = message
+        elif isinstance(message, FootHealth):
+            self.foot = message
         elif isinstance(message, GyroHealth):
             self.gyros[message.gyro] = message
         elif isinstance(message, Status):
@@ -115,7 +119,9 @@ class BoardReports:
 
     @property
     def sensors(self) -> Sensors:
-        """The sensors that are switched on; all of them before the first `Configuration`."""
+        """The sensors that are switched on; all of them before the first `Configuration`, none on a foot board."""
+        if self.foot is not None:
+            return Sensors(0)
         return Sensors(0xFF if self.configuration is None else self.configuration.sensors)
 
 

@@ -8,8 +8,9 @@ single devices are in `device_faults`, those for restarts and supply in `restart
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
-from echostep.board.device_faults import device_findings, gyro_celsius, gyro_findings
+from echostep.board.device_faults import device_findings, foot_findings, gyro_celsius, gyro_findings
 from echostep.board.findings import (
     DEVICES,
     NAMES,
@@ -49,13 +50,15 @@ _STREAMS = {  # by message: subject and unit of a finding, devices
 
 def board_findings(reports: BoardReports) -> list[Finding]:
     """Findings by the board's reports, the most severe first; empty without problems or before the first report."""
-    findings = restart_findings(reports) + supply_findings(reports) + gyro_findings(reports)
+    findings = restart_findings(reports) + supply_findings(reports) + gyro_findings(reports) + foot_findings(reports)
     if reports.status is not None:
         findings += (
             device_findings(reports, reports.status)
             + _intermittent_findings(reports)
             + _loss_findings(reports.status, reports.previous_status)
         )
+    if reports.foot is not None:
+        findings = [replace(f, subject="foot board") if f.subject == "board" else f for f in findings]
     return sorted(findings, key=lambda finding: -finding.severity)
 
 

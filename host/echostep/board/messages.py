@@ -130,11 +130,18 @@ class Wiring(IntEnum):
     MIXED_RANGERS = 1
 
 
+class FootState(IntEnum):
+    SOUGHT = 0
+    STARTING = 1
+    RUNNING = 2
+
+
 class Reports(IntFlag):
     BOARD_HEALTH = 1
     PARTS = 2
     MOTION = 4
     MAGNETIC = 8
+    FOOT = 16
 
 
 _IDENTITY = struct.Struct("<IIBBBB")
@@ -629,6 +636,72 @@ class Magnetic(NamedTuple):
         return cls._make(_MAGNETIC.unpack(body))
 
 
+_FOOT = struct.Struct("<IHhhhhhh")
+
+
+class Foot(NamedTuple):
+    """One sample of the ICM-20649 on a foot, by a foot board of firmware 1.4 and newer: 225 a second, by the part's own clock."""
+
+    ticks: int  # 0.5 us
+    sample: int
+    rate_x: int  # 1/8.2 deg/s
+    rate_y: int  # 1/8.2 deg/s
+    rate_z: int  # 1/8.2 deg/s
+    acceleration_x: int  # 1/1024 g
+    acceleration_y: int  # 1/1024 g
+    acceleration_z: int  # 1/1024 g
+
+    @property
+    def id(self) -> int:
+        return 0x0F
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _FOOT.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> Foot:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 18:
+            raise ValueError(f"foot: {len(body)} bytes, expected 18")
+        return cls._make(_FOOT.unpack(body))
+
+
+_FOOT_HEALTH = struct.Struct("<IBBHHh")
+FOOT_HEALTH_TEMPERATURE_INVALID = -32768
+
+
+class FootHealth(NamedTuple):
+    """The part on the foot: sent with `foot`, in answer to subscribe and then once a second, by a board that has found one since its start."""
+
+    ticks: int  # 0.5 us
+    foot_state: int
+    fault: int
+    errors: int
+    missed: int
+    temperature: int  # 1/333.87 degC, -32768 = invalid
+
+    @property
+    def id(self) -> int:
+        return 0x10
+
+    def pack(self) -> bytes:
+        """Bytes of the body; raises struct.error when a value does not fit its type."""
+        return _FOOT_HEALTH.pack(*self)
+
+    @classmethod
+    def unpack(cls, body: bytes) -> FootHealth:
+        """Values of a body; raises ValueError when length or an enumeration is wrong."""
+        if len(body) != 12:
+            raise ValueError(f"foot_health: {len(body)} bytes, expected 12")
+        message = cls._make(_FOOT_HEALTH.unpack(body))
+        if message.foot_state >= 3:
+            raise ValueError(f"foot_health: foot_state {message.foot_state} is unknown")
+        if message.fault >= 10:
+            raise ValueError(f"foot_health: fault {message.fault} is unknown")
+        return message
+
+
 _IDENTIFY = struct.Struct("<")
 
 
@@ -800,6 +873,8 @@ Message = (
     | Parts
     | Motion
     | Magnetic
+    | Foot
+    | FootHealth
     | Identify
     | ClockQuery
     | Configure
@@ -823,6 +898,8 @@ BY_ID: dict[int, type[Message]] = {
     0x0C: Parts,
     0x0D: Motion,
     0x0E: Magnetic,
+    0x0F: Foot,
+    0x10: FootHealth,
     0x81: Identify,
     0x82: ClockQuery,
     0x83: Configure,
@@ -997,6 +1074,28 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("z", "<i2"),
         ]
     ),
+    0x0F: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("sample", "<u2"),
+            ("rate_x", "<i2"),
+            ("rate_y", "<i2"),
+            ("rate_z", "<i2"),
+            ("acceleration_x", "<i2"),
+            ("acceleration_y", "<i2"),
+            ("acceleration_z", "<i2"),
+        ]
+    ),
+    0x10: np.dtype(
+        [
+            ("ticks", "<u4"),
+            ("foot_state", "u1"),
+            ("fault", "u1"),
+            ("errors", "<u2"),
+            ("missed", "<u2"),
+            ("temperature", "<i2"),
+        ]
+    ),
     0x81: np.dtype([]),
     0x82: np.dtype([("token", "<u2")]),
     0x83: np.dtype(
@@ -1045,6 +1144,8 @@ GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x0C, 10, 9),  # parts.part_pressure
     (0x0C, 11, 9),  # parts.part_foot
     (0x0C, 20, 1),  # parts.wiring
+    (0x10, 4, 2),  # foot_health.foot_state
+    (0x10, 5, 9),  # foot_health.fault
     (0x83, 1, 1),  # configure.schedule
     (0x83, 4, 1),  # configure.pressure_mode
 )

@@ -36,11 +36,19 @@ _LIS3MDL = {
     Fault.NO_ANSWER: ("does not answer at I2C address 0x1C or 0x1E", "check its plug and 5 V, SDA (D2) and SCL (D3)"),
     Fault.NEVER_READY: ("has no new field", "it may have lost its supply for a moment: check its plug and 5 V"),
 }
+_ICM20649 = {
+    Fault.NO_ANSWER: ("does not answer", f"{_SPI} and its chip select (D8)"),
+    Fault.NEVER_READY: (
+        "answers, but its data-ready line does not pulse",
+        "check the wire from its INT1 to D4; else it may have lost its supply for a moment: check its plug",
+    ),
+}
 _TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {
     Part.BMP390: _BMP390,
     Part.PULSE: _PULSE,
     Part.LSM6DSO: _LSM6DSO,
     Part.LIS3MDL: _LIS3MDL,
+    Part.ICM20649: _ICM20649,
 }
 _WANTED = {
     Healthy.PRESSURE: "0x60 is a BMP390",
@@ -58,6 +66,11 @@ MIXED_RANGERS = (
     "one is an SRF02 and the other one a pulse ranger, which is not used: beam, range and resolution differ",
     "plug in two of one kind",
 )
+
+
+def foot_text(fault: Fault) -> tuple[str, str]:
+    """What is wrong with the part of a foot board and the remedy."""
+    return _ICM20649.get(fault, (f"failed ({fault.name.lower().replace('_', ' ')})", _SPI))
 
 
 def part_text(part: Part, identity: int, device: Healthy, fault: Fault) -> tuple[str, str] | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from echostep.board.messages import BoardHealth, Identity, Message, Reports, Subscribe
 
-SUBSCRIBE = Subscribe(Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC)
+SUBSCRIBE = Subscribe(Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC | Reports.FOOT)
 FIRST_VERSION = (1, 2)  # of the firmware that knows `Subscribe`
 
 

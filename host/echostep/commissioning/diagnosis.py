@@ -53,33 +53,46 @@ class Diagnosis:
 def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the board at this port."""
     reports = probed.reports
-    if probed.stale_firmware:
-        what, _, _ = probed.stale_firmware.partition(";")
-        report.findings.append(Finding(Severity.FAULT, "board", what, f"flash it: echostep flash --port {port}"))
+    found = stale_firmware(probed, port, "board") or silence(probed, port, "board")
+    if found is not None or reports.identity is None:
+        report.findings += [found] if found else []
         return
-    if reports.identity is None:
-        report.findings.append(_silent(probed, port))
-        return
-    i = reports.identity
-    report.lines.append(
-        f"board     {port}: firmware {i.version_major}.{i.version_minor}.{i.version_patch}, schema 0x{SCHEMA_HASH:08X} as this host"
-    )
-    report.lines += _supply_lines(reports) + _device_lines(probed) + _rate_lines(probed)
-    report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(i, port)
+    report.lines += board_lines("board", probed, port) + _device_lines(probed) + _rate_lines(probed)
+    report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(reports.identity, port)
     if probed.rates_hz:
         report.findings += rate_findings(reports, probed.rates_hz)
     else:
         what, remedy = "has just started: its rates are not known yet", "run echostep doctor again"
         report.findings.append(Finding(Severity.NOTE, "board", what, remedy))
+    clock_diagnosis(report, probed, "board")
+
+
+def stale_firmware(probed: ProbeResult, port: str, subject: str) -> Finding | None:
+    """A finding on a board whose firmware does not fit."""
+    what, _, _ = probed.stale_firmware.partition(";")
+    return Finding(Severity.FAULT, subject, what, f"flash it: echostep flash --port {port}") if what else None
+
+
+def board_lines(subject: str, probed: ProbeResult, port: str) -> list[str]:
+    """Firmware and supply of a board."""
+    i = probed.reports.identity
+    if i is None:
+        return []
+    version = f"firmware {i.version_major}.{i.version_minor}.{i.version_patch}, schema 0x{SCHEMA_HASH:08X} as this host"
+    return [f"{subject:10}{' ' * (len(subject) > 9)}{port}: {version}", *_supply_lines(probed.reports)]
+
+
+def clock_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None:
+    """Add facts and findings on a board's clock."""
     drift = drift_of(probed)
     if drift is None and probed.replies:
         report.lines.append("clock     too few answers for its rate")
     elif drift is None:
         what, remedy = "answers no clock queries", "it receives nothing: unplug it and plug it in again"
-        report.findings.append(Finding(Severity.FAULT, "board", what, remedy))
+        report.findings.append(Finding(Severity.FAULT, subject, what, remedy))
     else:
         report.lines.append(f"clock     {describe(drift)}")
-        report.findings += _clock_findings(drift)
+        report.findings += _clock_findings(drift, subject)
 
 
 def _supply_lines(reports: BoardReports) -> list[str]:
@@ -99,7 +112,10 @@ def _version_findings(identity: Identity, port: str) -> list[Finding]:
     return [Finding(Severity.NOTE, "board", what, f"flash it: echostep flash --port {port}")]
 
 
-def _silent(probed: ProbeResult, port: str) -> Finding:
+def silence(probed: ProbeResult, port: str, subject: str) -> Finding | None:
+    """A finding on a board that has not said who it is."""
+    if probed.reports.identity is not None:
+        return None
     if not probed.bytes_of[BOARD]:
         what, remedy = (
             f"{port} is silent",
@@ -108,7 +124,7 @@ def _silent(probed: ProbeResult, port: str) -> Finding:
     else:
         what = f"{probed.bytes_of[BOARD]} bytes came from {port}, but no valid frame of the board"
         remedy = "name the board's port with --board, or flash it: echostep flash"
-    return Finding(Severity.FAULT, "board", what, remedy)
+    return Finding(Severity.FAULT, subject, what, remedy)
 
 
 def _device_lines(probed: ProbeResult) -> list[str]:
@@ -180,15 +196,15 @@ def describe(drift: Drift) -> str:
     )
 
 
-def _clock_findings(drift: Drift) -> list[Finding]:
+def _clock_findings(drift: Drift, subject: str) -> list[Finding]:
     findings = []
     if abs(drift.ppm) - 3.0 * drift.sd_ppm > DRIFT_MAX_PPM:
         what = f"its clock is off by {drift.ppm:.0f} ± {drift.sd_ppm:.0f} ppm"
         remedy = "times stay consistent, speeds are wrong by the same factor; use a board with a 16 MHz crystal"
-        findings.append(Finding(Severity.WARNING, "board", what, remedy))
+        findings.append(Finding(Severity.WARNING, subject, what, remedy))
     if drift.answer_s > ANSWER_MAX_S:
         what = f"it answers only after {1e3 * drift.answer_s:.0f} ms"
-        findings.append(Finding(Severity.WARNING, "board", what, "this computer is busy, or a USB hub is in between"))
+        findings.append(Finding(Severity.WARNING, subject, what, "this computer is busy, or a USB hub is in between"))
     return findings
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep doctor`: checks the ports, the board and the MTx, and prints each fault with its remedy.
+"""`echostep doctor`: checks the ports, the boards and the MTx, and prints each fault with its remedy.
 
 In: ports by name, or those found on this computer. Out: a report as text. Owns nothing.
 """
@@ -11,7 +11,9 @@ from rich.text import Text
 
 from echostep.board.health import Finding, Severity
 from echostep.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
+from echostep.commissioning.foot_diagnosis import judge_foot_board
 from echostep.commissioning.listening_bar import listening_bar
+from echostep.commissioning.port_search import listen
 from echostep.commissioning.probe import probe
 from echostep.commissioning.serial_ports import (
     BOARD_NAME,
@@ -27,7 +29,7 @@ from echostep.commissioning.serial_ports import (
     rules_text,
 )
 from echostep.errors import EchostepError
-from echostep.ports.chunks import BOARD, MTX
+from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.recording.device import sender, wrong_device
 
 PROBE_S = 6.0
@@ -36,39 +38,50 @@ STYLES = {Severity.NOTE: "cyan", Severity.WARNING: "yellow", Severity.FAULT: "bo
 __all__ = ["examine", "rules_text", "run"]
 
 
-def run(board: str | None, mtx: str | None, seconds: float) -> bool:
+def run(board: str | None, mtx: str | None, seconds: float, foot: str | None = None) -> bool:
     """Check everything and print the report; returns whether there is no warning and no fault."""
     console = Console(soft_wrap=True, highlight=False)
     with listening_bar("Looking at the ports and listening: stand still", seconds, console):
-        report = examine(board, mtx, seconds)
+        report = examine(board, mtx, seconds, foot)
     print_report(report, console)
     return report.fine
 
 
-def examine(board: str | None, mtx: str | None, seconds: float = PROBE_S) -> Diagnosis:
+def examine(board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: str | None = None) -> Diagnosis:
     """Check everything; ports that are None are searched for."""
     report = Diagnosis()
     seen = list_seen()
     report.lines += [f"port      {port.name}: {port.role.value} ({port.text})" for port in seen]
-    ports = {
-        BOARD: board or find(seen, Role.BOARD, BOARD_NAME),
-        MTX: mtx or find(seen, Role.MTX, MTX_NAME),
-    }
+    board, foot = _boards(seen, board, foot)
+    ports = {BOARD: board, MTX: mtx or find(seen, Role.MTX, MTX_NAME), FOOT: foot}
     usable = {name: port for name, port in ports.items() if port is not None and _usable(report, name, port)}
     if ports[BOARD] is None:
         report.findings.append(_no_board(seen))
-    if ports[MTX] is None:
+    if ports[MTX] is None and foot is None:
         report.findings.append(_no_mtx())
-    report.findings += _several_boards(seen, ports[BOARD])
+    report.findings += _several_boards(seen, board, foot)
+    at_ankle = usable.pop(FOOT, None)
     if usable:
         _probe_devices(report, usable, seconds)
+    if at_ankle is not None:
+        _probe_foot_board(report, at_ankle, seconds)
     report.findings += rules_findings()
     report.findings.sort(key=lambda finding: -finding.severity)
     return report
 
 
+def _boards(seen: list[PortSeen], board: str | None, foot: str | None) -> tuple[str | None, str | None]:
+    """The ports of belt board and foot board; several boards are told apart by what comes from them."""
+    paths = [port.path for port in seen if port.role is Role.BOARD and port.path not in (board, foot)]
+    if len(paths) + (board is not None) + (foot is not None) < 2 or not paths:
+        return board or find(seen, Role.BOARD, BOARD_NAME), foot
+    devices, _ = listen(paths)
+    belts, ankles = ([path for path in paths if devices.get(path) == device] for device in (BOARD, FOOT))
+    return board or (belts[0] if belts else None), foot or (ankles[0] if ankles else None)
+
+
 def _usable(report: Diagnosis, name: str, port: str) -> bool:
-    subject = "board" if name == BOARD else "MTx"
+    subject = {BOARD: "board", MTX: "MTx", FOOT: "foot board"}[name]
     no_access = access_findings(subject, port)
     report.findings += no_access or holder_findings(subject, port)
     if name == MTX and not no_access:
@@ -86,17 +99,18 @@ def _no_board(seen: list[PortSeen]) -> Finding:
     return Finding(Severity.FAULT, "board", what, remedy)
 
 
-def _several_boards(seen: list[PortSeen], chosen: str | None) -> list[Finding]:
+def _several_boards(seen: list[PortSeen], *chosen: str | None) -> list[Finding]:
     boards = [port.name for port in seen if port.role is Role.BOARD]
-    if len(boards) < 2:
+    examined = [path for path in chosen if path is not None]
+    if len(boards) <= max(len(examined), 1):
         return []
-    what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {chosen}"
+    what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {' and '.join(examined)}"
     return [Finding(Severity.NOTE, "board", what, "name the other one with --board")]
 
 
 def _no_mtx() -> Finding:
-    what = "no MTx is plugged in: only the legs can be tracked"
-    return Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx")
+    what = "neither an MTx nor a foot board is plugged in: only the legs can be tracked"
+    return Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot")
 
 
 def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float) -> None:
@@ -108,14 +122,26 @@ def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float) -> 
         return
     for notice in probed.notices:
         report.findings.append(Finding(Severity.WARNING, "ports", notice, "check the cable and its plugs"))
-    if wrong := [name for name in ports if sender(probed.first_bytes.get(name, b"")) not in (None, name)]:
-        what, _, remedy = wrong_device(wrong[0], ports).partition(": ")
+    devices = {name: sender(probed.first_bytes.get(name, b"")) for name in ports}
+    if wrong := [(name, device) for name, device in devices.items() if device is not None and device != name]:
+        what, _, remedy = wrong_device(*wrong[0], ports).partition(": ")
         report.findings.append(Finding(Severity.FAULT, "ports", what, remedy))
         return
     if BOARD in ports:
         judge_board(report, probed, ports[BOARD])
     if MTX in ports:
         judge_mtx(report, probed, with_board=BOARD in ports)
+
+
+def _probe_foot_board(report: Diagnosis, port: str, seconds: float) -> None:
+    try:
+        probed = probe({BOARD: port}, seconds)
+    except EchostepError as error:
+        report.findings.append(Finding(Severity.FAULT, "foot board", str(error), "unplug it and plug it in again"))
+        return
+    for notice in probed.notices:
+        report.findings.append(Finding(Severity.WARNING, "foot board", notice, "check the cable and its plugs"))
+    judge_foot_board(report, probed, port)
 
 
 def print_report(report: Diagnosis, console: Console) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ports of the board and the MTx, found by what comes from them.
+"""The ports of the boards and the MTx, found by what comes from them.
 
 In: the USB serial ports of this computer. Out: the ports' paths; EchostepError that lists what each port is. Owns the ports while it listens;
 it writes nothing to them. A port that is silent counts by its USB identifiers.
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from echostep.commissioning.probe import BAUD
 from echostep.commissioning.serial_ports import PortSeen, Role, list_seen
 from echostep.errors import EchostepError
-from echostep.ports.chunks import BOARD, MTX
+from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.device import LISTENED_BYTES, sender
 
@@ -23,29 +23,35 @@ ROLES = {Role.BOARD: BOARD, Role.MTX: MTX}
 
 @dataclass(frozen=True, slots=True)
 class FoundPorts:
-    """Paths; `mtx` None: there is none."""
+    """Paths; `mtx`, `foot` None: there is none. At most one of these is not None."""
 
     board: str
     mtx: str | None
+    foot: str | None
 
 
-def find_ports(mtx: str | None = None) -> FoundPorts:
-    """Both ports, or the board's when the MTx's is given; raises EchostepError when there is no board, or more than one of a kind."""
-    seen = [port for port in list_seen() if port.path != mtx]
-    found, notes = _listen([port.path for port in seen])
+def find_ports(mtx: str | None = None, foot: str | None = None) -> FoundPorts:
+    """The board's port and, unless it is given, that of what is on the foot; raises EchostepError without a board, or with two of a kind."""
+    seen = [port for port in list_seen() if port.path not in (mtx, foot)]
+    found, notes = listen([port.path for port in seen])
     for port in seen:
         if port.path not in found and port.path not in notes and port.role in ROLES:
             found[port.path] = ROLES[port.role]
-    boards, others = ([path for path, device in found.items() if device == kind] for kind in (BOARD, MTX))
+    boards, mtxs, feet = ([path for path, device in found.items() if device == kind] for kind in (BOARD, MTX, FOOT))
     if len(boards) != 1:
         what = "several boards are plugged in" if boards else "no sensor board was found"
         raise EchostepError(f"{what}{_listed(seen, found, notes)}: name its port with --board; see echostep doctor")
-    if len(others) > 1 and mtx is None:
-        raise EchostepError(f"several MTx{_listed(seen, found, notes)}: name its port with --mtx")
-    return FoundPorts(boards[0], mtx or (others[0] if others else None))
+    if mtx is not None or foot is not None:
+        return FoundPorts(boards[0], mtx, foot)
+    if len(mtxs) + len(feet) > 1:
+        what = "several MTx" if not feet else "several foot boards" if not mtxs else "an MTx and a foot board"
+        raise EchostepError(
+            f"{what}{_listed(seen, found, notes)}: name the port of the one on the foot with --mtx or --foot"
+        )
+    return FoundPorts(boards[0], mtxs[0] if mtxs else None, feet[0] if feet else None)
 
 
-def _listen(paths: list[str]) -> tuple[dict[str, str], dict[str, str]]:
+def listen(paths: list[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Which device each port has, by its bytes; and why a port could not be opened."""
     opened: list[SerialPorts] = []
     found: dict[str, str] = {}
@@ -76,7 +82,7 @@ def _listed(seen: list[PortSeen], found: dict[str, str], notes: dict[str, str]) 
     """What each port is, in brackets."""
     if not seen:
         return " (no USB serial port is plugged in)"
-    words = {BOARD: "a board", MTX: "an MTx"}
+    words = {BOARD: "a board", MTX: "an MTx", FOOT: "a foot board"}
     listed = [
         f"{port.name}: {notes.get(port.path) or words.get(found.get(port.path, ''), 'something else')}" for port in seen
     ]

@@ -20,6 +20,7 @@ from echostep.board.messages import (
     ClockQuery,
     ClockReply,
     Compass,
+    Foot,
     Gyros,
     Identify,
     Magnetic,
@@ -68,6 +69,7 @@ class ProbeResult:
     gyros: list[Gyros] = field(default_factory=list)
     compass: list[Compass] = field(default_factory=list)
     axes: list[Motion | Magnetic] = field(default_factory=list)  # in the order of their arrival
+    foot: list[Foot] = field(default_factory=list)  # of a foot board
     replies: list[tuple[float, float, int]] = field(default_factory=list)
     bytes_of: Counter[str] = field(default_factory=Counter)
     first_bytes: dict[str, bytes] = field(default_factory=dict)  # by port, as many as tell the device
@@ -211,6 +213,8 @@ class _Probe:
             result.gyros.append(message)
         elif isinstance(message, Compass):
             result.compass.append(message)
+        elif isinstance(message, Foot):
+            result.foot.append(message)
         elif isinstance(message, Motion | Magnetic):
             result.axes.append(message)
 

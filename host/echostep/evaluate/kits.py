@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 
+from echostep.board.messages import Part
 from echostep.evaluate.girard2011 import COLUMNS, MethodOutput, default, girard
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.echo_likelihood import EchoSettings
+from echostep.localization.ranger_models import ECHO_OF
 from echostep.papers.girard2011 import GirardSettings
-from echostep.settings import parse_settings
 from echostep.simulation.people.marker_walk import MarkerWalk, lay_markers, walk_markers
 from echostep.simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics
 from echostep.simulation.world.sites import SimulatedSite, furnished, otb
@@ -37,8 +37,7 @@ class RangerKind:
 @cache
 def kinds() -> dict[str, RangerKind]:
     """The kinds of rangers by the names of their rows; `pulse, as SRF02` is a pulse ranger whose settings were forgotten."""
-    text = (files("echostep") / "firmware" / "kit-2026.toml").read_text()
-    echo = parse_settings(text, "kit-2026.toml").echo
+    echo = ECHO_OF[Part.PULSE]
     paper = GirardSettings()
     narrow = replace(paper, aperture_rad=PULSE_CONE_RAD, maximum_m=echo.maximum_m)
     return {

@@ -44,6 +44,8 @@ class Noise(NamedTuple):
     rest_m_s: float = 0.005  # sd of a resting foot's velocity
     kept_s: float = 0.1  # correlation time of that velocity error: samples within it carry no more information
     flat_m: float = 0.01  # sd of a level floor's height from step to step
+    accel_bias: float = 0.3  # m/s2, sd of an axis when the foot is levelled
+    gyro_bias: float = 0.005  # rad/s, the same
 
 
 class Nav(NamedTuple):

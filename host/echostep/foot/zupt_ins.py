@@ -55,7 +55,6 @@ IMPATIENT_S = 3.0  # after so long without such a moment, any sample that may be
 STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
 UNSURE_YAW_RAD2_S = 1.0
 DOUBT_S = 0.1  # of stances against the innovation gate: the level is wrong
-ACCEL_BIAS_M_S2, GYRO_BIAS_RAD_S = 0.3, 0.005
 FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, kerb or ramp
 
 
@@ -168,7 +167,7 @@ def _find_level(s: ZuptState, nav: Nav, window: SampleWindow, sample: Sample, ev
 @lean_kernel
 def _start_navigation(s: ZuptState, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
     """Start navigation at this sample; the unobserved time goes into the position's covariance."""
-    ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, GYRO_BIAS_RAD_S, ACCEL_BIAS_M_S2)
+    ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, nav.noise.gyro_bias, nav.noise.accel_bias)
     lost_s = s.lost_s + s.waited_s if s.lost_s > 0.0 else 0.0
     for i in range(3):
         nav.P[POS + i, POS + i] = (WALK_M_S * lost_s) ** 2

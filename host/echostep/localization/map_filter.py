@@ -20,7 +20,7 @@ from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.beacon_model import BeaconSettings
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model
 from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.level_changes import ClimbSettings, HeightChange
@@ -96,9 +96,7 @@ class MapFilter:
         self._settings = settings or FilterSettings()
         self._building = building
         self._rng = rng
-        sd_m, cloud_settings = math.hypot(self._settings.echo.sd_m, self._settings.plan_sd_m), self._settings.cloud
-        self._model = echo_model(replace(self._settings.echo, sd_m=sd_m))
-        self._blurred = echo_model(replace(self._settings.echo, sd_m=math.hypot(sd_m, cloud_settings.rough_m)))
+        self._model, self._blurred = _echo_models(self._settings)
         self._pings = UsablePings(building.background(self._model), self._settings.echo.correlation_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
@@ -112,6 +110,18 @@ class MapFilter:
         self._gaps = Gaps()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
+
+    @property
+    def echo(self) -> EchoSettings:
+        """What the rangers may report."""
+        return self._settings.echo
+
+    def hear_by(self, echo: EchoSettings) -> None:
+        """From now on the pings are those of rangers with these settings."""
+        if echo != self._settings.echo:
+            self._settings = replace(self._settings, echo=echo)
+            self._model, self._blurred = _echo_models(self._settings)
+            self._pings.hear_by(self._building.background(self._model), echo.correlation_m)
 
     @property
     def cloud(self) -> Cloud:
@@ -296,6 +306,13 @@ class MapFilter:
         """Weight of the tracked cloud outside of the building; 0 where walls enclose no floor."""
         indoors, cloud = self._building.indoors, self.cloud
         return 0.0 if indoors is None else float(cloud.weight @ ~indoors.holds(cloud.x_m, cloud.y_m))
+
+
+def _echo_models(s: FilterSettings) -> tuple[EchoModel, EchoModel]:
+    """The echo model with the plan's error, and the one for scattered clouds."""
+    sd_m = math.hypot(s.echo.sd_m, s.plan_sd_m)
+    blurred_m = math.hypot(sd_m, s.cloud.rough_m)
+    return echo_model(replace(s.echo, sd_m=sd_m)), echo_model(replace(s.echo, sd_m=blurred_m))
 
 
 def _move(segment: PathSegment) -> Move:

@@ -32,6 +32,11 @@ class UsablePings:
         self._ranges = RangeMemory(background)
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
+    def hear_by(self, background: Background, correlation_m: float) -> None:
+        """Go on with rangers of another kind."""
+        self._correlation_m = correlation_m
+        self._ranges = RangeMemory(background)
+
     @property
     def silent_m(self) -> float:
         """Length of the path since the last ping."""

@@ -7,7 +7,7 @@ timeline, the foot and leg odometry, and the synchronizer.
 The output depends on the chunks alone: on their bytes and arrival times, not on how many of them come in one portion, nor on where bytes that arrived
 together were cut. Every decision is taken message by message, at the message that makes it possible.
 
-Indices: `frame_row` counts the board's frames of a portion, `sample_index` the MTx samples, `message_index` both together in order of arrival.
+Indices: `frame_row` counts the board's frames of a portion, `sample_index` the foot's samples, `message_index` both together in order of arrival.
 """
 
 from __future__ import annotations
@@ -41,18 +41,19 @@ from echostep.foot.trunk_path import GaitSettings, TrunkPath
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, WearerSettings
 from echostep.odometry.foot_legs_handover import FootLegsHandover
+from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
 from echostep.odometry.stillness import Stillness
-from echostep.odometry.synchronizer import HEIGHT, Synchronizer
+from echostep.odometry.synchronizer import HEIGHT, PART, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.check_in import PERSON
-from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk, Portion, portion_of
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.ports.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
-from echostep.xsens import MTDATA, MtBatch, MtSample, MtxReader, encode_frame, pack_mtdata
+from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
 _IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-IDENTITY, PING, SYNC, STATUS, PRESSURE = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure))
+IDENTITY, PING, SYNC, STATUS, PRESSURE, PARTS = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure, Parts))
 _REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)]
 _TIMED = np.array([i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)])  # the body begins so
 
@@ -78,9 +79,10 @@ class FrontEnd:
     ) -> None:  # fmt: skip
         """`iron`: errors of the compass, when it was calibrated."""
         self.board = BoardReader()
-        self.mtx = MtxReader()
+        self.foot_source = FootSource()
         self.timeline = Timeline(mtx)
         self.foot = Foot(foot)
+        self._foot_settings = foot
         self.alignment = Alignment()
         self.path = TrunkPath(gait)
         self.handover = FootLegsHandover(wearer or WearerSettings(), iron)
@@ -91,6 +93,7 @@ class FrontEnd:
         self.stillness = Stillness()
         self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
+        self._ranger_parts = np.zeros((1, 2), np.int64)  # left, right, by the newest report
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings())
         self._synchronizer = Synchronizer()
         self._unknown_ports = 0
@@ -117,14 +120,14 @@ class FrontEnd:
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
         """Segments and dropouts that a portion completes; raises StaleFirmwareError when the board has another schema."""
         self._count_unknown_ports(portion)
-        # Decode: bytes of each port -> board frames, MTx samples.
-        from_board, from_mtx = portion.of(BOARD), portion.of(MTX)
-        frames, batch = self.board.frames(from_board.received), self.mtx.feed_batch(from_mtx.received)
-        if not len(frames.id) and not len(batch.counter):
+        # Decode: bytes of each port -> board frames, the foot's samples.
+        from_board = portion.of(BOARD)
+        frames, samples = self.board.frames(from_board.received), self._read_foot(portion)
+        if not len(frames.id) and not len(samples.value):
             return []
         # Time: ticks, sample counters and arrival times -> t_s of every message.
         board = _board_arrivals(frames, from_board.rows_of(frames.end), portion.t_arrival_ns)
-        mtx = _mtx_arrivals(batch, from_mtx.rows_of(batch.end), portion.t_arrival_ns)
+        mtx = _foot_arrivals(samples, portion.t_arrival_ns)
         times = self.timeline.times(board, mtx)
         self._count_bad_times(board, times)
         self._advance_clock(times)
@@ -133,8 +136,8 @@ class FrontEnd:
         self._collect_pings(frames, times)
         leg_blocks = self._gyro_blocks.cut(frames, times)
         self.stillness.add_legs([block for _, block in leg_blocks])
-        # Foot: MTx samples -> segments of the trunk's path.
-        foot_segments = self._track_foot(batch, times)
+        # Foot: its samples -> segments of the trunk's path.
+        foot_segments = self._track_foot(samples, times)
         # Handover: segments of foot and legs -> segments of one path.
         observed_s = self._merge_paths(foot_segments, leg_blocks, times)
         # Synchronize: segments and pings -> segments with their pings.
@@ -147,9 +150,18 @@ class FrontEnd:
         ping = Chunk(BOARD, 0, encode(Ping(0, 0, Outcome.ECHO, 5_000), 0))
         other.process(portion_of([ping, Chunk(MTX, 0, encode_frame(MTDATA, pack_mtdata(sample)))]))
 
+    def _read_foot(self, portion: Portion) -> FootSamples:
+        """The foot's samples. When the first chunk shows that a foot board is worn, its clock and its part's noise are used."""
+        unknown = self.foot_source.port is None
+        samples = self.foot_source.read(portion)
+        if unknown and self.foot_source.port == FOOT:
+            self.timeline.expect_foot_board()
+            self.foot = Foot(self._foot_settings, ICM20649_NOISE)
+        return samples
+
     def _count_unknown_ports(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, GATEWAY, PERSON, TEAM):
+            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:
@@ -178,7 +190,8 @@ class FrontEnd:
         self.pings += len(ping_row)
         t_s = times.board_s[ping_row] + self._ranger.delay_s
         usable = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
-        ping_values = np.column_stack([t_s, pings["ranger"], ranges(pings, self._ranger)])[usable]
+        which = pings["ranger"] + PART * self._parts_of(frames, ping_row, pings["ranger"])
+        ping_values = np.column_stack([t_s, which, ranges(pings, self._ranger)])[usable]
         height_row, samples = frames.rows(PRESSURE)
         height_m, height_s = heights(samples), times.board_s[height_row]
         valid = ~np.isnan(height_s) & ~np.isnan(height_m)
@@ -188,15 +201,24 @@ class FrontEnd:
         values = np.concatenate([ping_values, height_values])[order]
         self._synchronizer.add_pings(times.board_message_index[frame_row[order]], values)
 
-    def _track_foot(self, batch: MtBatch, times: Times) -> list[tuple[int, list[PathSegment]]]:
+    def _parts_of(self, frames: Frames, ping_row: Ints, ranger: Ints) -> Ints:
+        """The part (n,) that the board's newest report before each ping names in its ranger's place; 0 before the first."""
+        report_row, reports = frames.rows(PARTS)
+        named = np.column_stack([reports["part_ranger_left"], reports["part_ranger_right"]]).astype(np.int64)
+        known = np.concatenate([self._ranger_parts, named])
+        self._ranger_parts = known[-1:]
+        found: Ints = known[np.searchsorted(report_row, ping_row), ranger]
+        return found
+
+    def _track_foot(self, samples: FootSamples, times: Times) -> list[tuple[int, list[PathSegment]]]:
         """Segments from the foot odometry, each group with the index of the message that completed it."""
         completed: list[tuple[int, list[PathSegment]]] = []
         timed = np.flatnonzero(~np.isnan(times.mtx_s))
         if not len(timed):
             return completed
         t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
-        self.stillness.add_foot(t_s, batch.gyro[timed], batch.accel[timed])
-        foot = self.foot.track(t_s, batch.accel[timed], batch.gyro[timed], batch.mag[timed])
+        self.stillness.add_foot(t_s, samples.gyro[timed], samples.accel[timed])
+        foot = self.foot.track(t_s, samples.accel[timed], samples.gyro[timed], samples.mag[timed])
         begin = 0
         for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):
             completed += self._standing_segments(foot, t_s, message_index, begin, sample_index)
@@ -252,9 +274,9 @@ def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arri
     return Arrivals(ticks, chunk_row, t_arrival_ns[chunk_row], kind)
 
 
-def _mtx_arrivals(batch: MtBatch, chunk_row: Ints, t_arrival_ns: Ints) -> Arrivals:
-    """The MTx samples for the timeline; `chunk_row` (n,): row of the chunk that completed each."""
-    return Arrivals(batch.counter, chunk_row, t_arrival_ns[chunk_row], np.full(len(chunk_row), PLAIN))
+def _foot_arrivals(samples: FootSamples, t_arrival_ns: Ints) -> Arrivals:
+    """The foot's samples for the timeline."""
+    return Arrivals(samples.value, samples.row, t_arrival_ns[samples.row], np.full(len(samples.row), PLAIN))
 
 
 def _newest_timed(frames: Frames, times: Times, identifier: int) -> bytes | None:

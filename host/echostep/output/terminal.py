@@ -22,7 +22,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.arrays import Octets
-from echostep.board.health import Finding, Severity, board_findings
+from echostep.board.health import Finding, Severity
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Level
 from echostep.tracker import Tracker
@@ -168,18 +168,17 @@ def describe(e: Estimate | None) -> str:
 
 
 def health(tracker: Tracker) -> str:
-    """Counts of rejected, lost and dropped frames, the time source of the MTx, and the beacons, as a line of text."""
+    """Counts of rejected, lost and dropped frames, the time source of the foot's samples, and the beacons, as a line of text."""
     streams = tracker.streams
     board, status = streams.board, streams.status
     dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
     sync = "SyncOut" if streams.synchronised else "arrival times"
+    foot = f"{streams.foot_name} on {sync}"
     heard = f"   {tracker.gateway.describe()}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""
-    return (
-        f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   MTx on {sync}{heard}"
-    )
+    return f"board: {board.good} frames, {board.rejected} bad, {board.lost} lost, {dropped} dropped   {foot}{heard}"
 
 
 def findings(tracker: Tracker) -> list[Finding]:
     """The most severe findings on the board, at most MAX_FINDINGS."""
-    found = board_findings(tracker.streams.reports)
+    found = tracker.streams.findings
     return [finding for finding in found if finding.severity > Severity.NOTE][:MAX_FINDINGS]

@@ -66,7 +66,7 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
             for portion in with_progress(recording, f"tracking {path.name}"):
                 estimates += tracker.take(portion)
             if not estimates:
-                raise EchostepError(f"{path}: no estimate: the foot never stood still, or no MTx bytes came")
+                raise EchostepError(f"{path}: no estimate: the foot never stood still, or no bytes of its sensor came")
             FORMATS[out.suffix](out, TrackOnPlan(estimates, plan, moments_of(recording, tracker, estimates)))
     except (OSError, sqlite3.Error) as error:
         raise EchostepError(f"{out}: cannot write: {getattr(error, 'strerror', None) or error}") from error

@@ -33,7 +33,7 @@ from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.path import MeasuredSegment
 from echostep.ports.arrival_clock import now_ns
-from echostep.ports.chunks import BOARD, MTX, Portion
+from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
 
 # By reason, all of them:
@@ -173,7 +173,7 @@ class LivePage:
         """The arrival clock: time of the newest chunk, or the host's clock when a portion is empty."""
         if len(portion.t_arrival_ns):
             self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
-            if BOARD in portion.ports or MTX in portion.ports:
+            if {BOARD, MTX, FOOT} & set(portion.ports):
                 self._sensors_ns = self._arrived_ns
         else:
             self._arrived_ns = max(self._arrived_ns, now_ns())

@@ -18,6 +18,7 @@ from echostep.jit import kernel
 # Names of the ports.
 BOARD = "board"
 MTX = "mtx"
+FOOT = "foot"  # a second board, at the ankle, in the place of an MTx
 GATEWAY = "gateway"
 
 LATEST_NS = 1 << 62  # a later arrival time (damage in a recording) is replaced by this one; by reason

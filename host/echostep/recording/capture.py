@@ -17,7 +17,7 @@ from typing import Any
 from echostep.board.frames import BoardReader
 from echostep.board.messages import BY_ID, Message
 from echostep.errors import EchostepError
-from echostep.ports.chunks import BOARD, MTX
+from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
 from echostep.xsens import FrameReader, MtMessage, MtxReader
@@ -35,13 +35,14 @@ class Decoder:
     """Bytes of named ports -> messages; the readers count good and damaged frames. `tracked` counts what the tracker would make of the MT's bytes."""
 
     board: BoardReader = field(default_factory=BoardReader)
+    foot: BoardReader = field(default_factory=BoardReader)
     mt: MessageReader = field(default_factory=MessageReader)
     tracked: MtxReader = field(default_factory=MtxReader)
 
     def feed(self, port: str, received: bytes, *, ended: bool = False) -> list[Message | MtMessage]:
-        """Messages completed by these bytes; none for a port that is neither the board's nor the MT's. `ended`: no byte follows."""
-        if port == BOARD:
-            return list(self.board.feed(received))
+        """Messages completed by these bytes; none for a port that is neither a board's nor the MT's. `ended`: no byte follows."""
+        if port in (BOARD, FOOT):
+            return list((self.board if port == BOARD else self.foot).feed(received))
         if port != MTX:
             return []
         self.tracked.feed_batch(received)

@@ -16,8 +16,8 @@ from echostep.xsens.reader import MtxCounts
 
 
 def summary(decoder: Decoder) -> list[str]:
-    """A line on the board's frames, lines on the MT's frames, on the format of legacy data, and on what the tracker would use."""
-    lines = [*_board_lines(decoder.board.counts)]
+    """A line on each board's frames, lines on the MT's frames, on the format of legacy data, and on what the tracker would use."""
+    lines = [*_board_lines("Board", decoder.board.counts), *_board_lines("Foot board", decoder.foot.counts)]
     if decoder.mt.names:
         lines += [_frames_line(decoder.mt), *_format_lines(decoder.mt), *_gap_lines(decoder.mt), _tracker_line(decoder)]
     elif decoder.mt.counts.skipped_bytes:
@@ -40,8 +40,8 @@ def _reasons(counts: tuple[tuple[int, str], ...]) -> str:
     return _joined([f"{count} {reason}" for count, reason in counts if count])
 
 
-def _board_lines(counts: FrameCounts) -> Iterator[str]:
-    """The board's frames; nothing when there were none, good or bad."""
+def _board_lines(name: str, counts: FrameCounts) -> Iterator[str]:
+    """The frames of a board; nothing when there were none, good or bad."""
     if not counts.good and not counts.rejected:
         return
     reasons = _reasons(
@@ -53,7 +53,7 @@ def _board_lines(counts: FrameCounts) -> Iterator[str]:
         )
     )
     rejected = f", {counts.rejected} were rejected ({reasons})" if counts.rejected else ", none was rejected"
-    yield f"Board: {counted(counts.good, 'frame')} read{rejected}; by the sequence numbers {counts.lost} never came."
+    yield f"{name}: {counted(counts.good, 'frame')} read{rejected}; by the sequence numbers {counts.lost} never came."
 
 
 def _frames_line(reader: MessageReader) -> str:

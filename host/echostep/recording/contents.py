@@ -15,7 +15,7 @@ from rich.progress import Progress
 
 from echostep.board.messages import BY_ID, SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
-from echostep.ports.chunks import BOARD, LATEST_NS, MTX
+from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
 from echostep.recording.arrival_order import ArrivalOrder
 from echostep.recording.capture import Decoder
 from echostep.recording.mcap_records import port_of
@@ -99,6 +99,8 @@ class Contents:
         try:
             if port == BOARD:
                 self._decode_board(bytes(undecoded))
+            elif port == FOOT:
+                self.decoder.foot.frames(bytes(undecoded))
             elif port == MTX:
                 self.decoder.tracked.feed_batch(bytes(undecoded))
         except EchostepError as error:
@@ -162,6 +164,9 @@ def _port_lines(contents: Contents) -> list[str]:
     if MTX in contents.ports:
         rate = f" ({mtx.good / contents.seconds:.1f}/s)" if contents.seconds > 0.0 else ""
         lines.append(f"  MTx samples: {mtx.good}{rate}, {mtx.bad_checksum} bad checksums")
+    if FOOT in contents.ports:
+        foot = contents.decoder.foot.counts
+        lines.append(f"  foot board frames: {foot.good} good, {foot.rejected} bad, {foot.lost} lost")
     if contents.derived:
         lines.append("  derived: " + ", ".join(f"{name} {count}" for name, count in sorted(contents.derived.items())))
     return lines

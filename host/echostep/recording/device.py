@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which device sent these bytes: the sensor board or an MTx.
+"""Which device sent these bytes: the sensor board, a foot board or an MTx.
 
 In: the first bytes of a port. Out: the name of the port that such a device belongs to; words about a device at the wrong one. Owns nothing.
 """
@@ -8,32 +8,42 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from echostep.board.frames import BoardReader, StaleFirmwareError
-from echostep.ports.chunks import BOARD, MTX
+from echostep.board.frames import BoardReader, Frames, StaleFirmwareError
+from echostep.board.messages import BY_ID, Configuration, Foot, FootHealth
+from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.xsens import FrameReader
 
-DEVICES = {BOARD: "the sensor board", MTX: "the MTx"}
+DEVICES = {BOARD: "the sensor board", MTX: "the MTx", FOOT: "the foot board"}
+_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 LEAST_FRAMES = 3  # by reason: one of 256 wrong frames of an MTx passes its checksum
 LISTENED_BYTES = 1 << 14  # by which a device has sent so many frames: half a second of a board, two of an MTx
 
 
 def sender(received: bytes) -> str | None:
-    """`BOARD` or `MTX`; None while neither is certain. A board whose firmware does not fit is a board."""
+    """`BOARD`, `FOOT` or `MTX`; None while none is certain. A board whose firmware does not fit is a board."""
     reader = BoardReader()
     try:
-        reader.frames(received)
+        frames = reader.frames(received)
     except StaleFirmwareError:
         return BOARD
     if reader.counts.good >= LEAST_FRAMES:
-        return BOARD
+        return FOOT if _is_of_foot(frames) else BOARD
     return MTX if not reader.counts.good and len(FrameReader().feed(received)) >= LEAST_FRAMES else None
 
 
-def wrong_device(name: str, urls: Mapping[str, str]) -> str:
-    """What to do when the port `name` has the other device."""
-    other = MTX if name == BOARD else BOARD
+def _is_of_foot(frames: Frames) -> bool:
+    """Whether a board has a foot's sensor; such a board reads no other one [protocol/README.md, foot_health]."""
+    if any(len(frames.rows(_IDS[kind])[0]) for kind in (Foot, FootHealth)):
+        return True
+    configurations = frames.rows(_IDS[Configuration])[1]
+    return len(configurations) > 0 and configurations[-1]["sensors"] == 0
+
+
+def wrong_device(name: str, other: str, urls: Mapping[str, str]) -> str:
+    """What to do when the port `name` has the device `other`."""
     what = f"{urls[name]} is {DEVICES[other]}, not {DEVICES[name]}"
     if other not in urls:
         return f"{what}: name its port with --{other} {urls[name]}, and the other device's with --{name}"
     right = {name: urls[other], other: urls[name]}
-    return f"{what}: the ports are swapped: give --{BOARD} {right[BOARD]} --{MTX} {right[MTX]}"
+    swapped = " ".join(f"--{device} {right[device]}" for device in DEVICES if device in right)
+    return f"{what}: the ports are swapped: give {swapped}"

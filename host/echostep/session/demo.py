@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -29,7 +29,6 @@ from echostep.session.progress import progress_line
 from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
-from echostep.settings import parse_settings
 from echostep.simulation.devices.beacon_gateway import with_beacons
 from echostep.simulation.devices.board import Board, BoardProcess, PythonBoard
 from echostep.simulation.kits import Kit
@@ -41,6 +40,7 @@ from echostep.tracker import Tracker
 WATCHED_SPEED = 4.0  # times real time, on a terminal; by reason: a walk of 90 s is seen in 22 s
 WATCHED_PORTION = 16  # chunks that are tracked together in a run that is watched: 20 ms of the walk; by reason: no step is shown later
 UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run; by reason: fewer calls
+FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
 TOUR_CORNER_M = 0.3  # how far corners are cut on a tour; by reason: doors of any plan are passed without touching them
 
 
@@ -67,9 +67,11 @@ def demo(options: DemoOptions, output: OutputOptions) -> None:
     waypoints = DEMO_WAYPOINTS if options.plan_path is None else room_tour(plan)
     if options.kit is Kit.OF_2026 and options.board_command is None:
         raise EchostepError("the kit of 2026 needs the real firmware in the simulator: make demo KIT=2026")
-    with closing(_board(options)) as board:
+    with ExitStack() as stack:
+        board = stack.enter_context(closing(_board(options)))
+        foot_board = stack.enter_context(closing(_foot_board(options))) if options.kit is Kit.OF_2026 else None
         output = replace(output, folder=output_folder(output.folder))
-        _track(board, plan, waypoints, options, output)
+        _track((board, foot_board), plan, waypoints, options, output)
 
 
 def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
@@ -78,26 +80,32 @@ def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
     return as_file(files("echostep") / "plans" / "demo.json") if path is None else nullcontext(path)
 
 
-def _settings_of(kit: Kit) -> str:
-    """Settings (TOML) that fit the kit's rangers; none for the papers'."""
-    return (files("echostep") / "firmware" / "kit-2026.toml").read_text() if kit is Kit.OF_2026 else ""
-
-
 def _board(options: DemoOptions) -> Board:
     command = options.board_command
     player = "the real firmware in the simulator" if command else "the Python board, not the real firmware"
     board = BoardProcess(shlex.split(command)) if command else PythonBoard(seed=options.seed)
-    parts = "of 2026, not built yet" if options.kit is Kit.OF_2026 else "of the papers, the default"
+    parts = (
+        "of 2026, not built yet, and a second one is on the foot"
+        if options.kit is Kit.OF_2026
+        else "of the papers, the default"
+    )
     console.print(f"A simulated walk in a simulated building; the sensor board is {player}, with the parts {parts}.")
     return board
 
 
+def _foot_board(options: DemoOptions) -> Board:
+    return BoardProcess([*shlex.split(options.board_command or ""), "--seed", str(FOOT_BOARD)])
+
+
 def _track(
-    board: Board, plan: Plan, waypoints: Sequence[Waypoint], options: DemoOptions, output: OutputOptions
+    boards: tuple[Board, Board | None],
+    plan: Plan,
+    waypoints: Sequence[Waypoint],
+    options: DemoOptions,
+    output: OutputOptions,
 ) -> None:
     start = start_of(plan, waypoints)
-    settings_toml = _settings_of(options.kit)
-    tracker = Tracker(plan, start, seed=options.seed, settings=parse_settings(settings_toml, "the kit's settings"))
+    tracker = Tracker(plan, start, seed=options.seed)
     speed = options.speed or (WATCHED_SPEED if console.is_terminal and output.watched else None)
     title = "echostep demo (simulated" + (f", {speed:g} x real time)" if speed else ")")
     end = _place_text(plan, waypoints) if options.guide else None
@@ -105,12 +113,10 @@ def _track(
         session.prepare()
         with progress_line("Simulating the walk"):
             person = Person() if options.plan_path is None else Person(corner_m=TOUR_CORNER_M)
-            scenario = Scenario(plan, waypoints, options.seed, board, person, kit=options.kit)
+            scenario = Scenario(plan, waypoints, options.seed, boards[0], person, kit=options.kit, foot_board=boards[1])
         scenario.write_truth(output.folder / "truth.csv")
         session.show_truth(TruePath.of(scenario.truth, plan))
-        metadata = run_metadata(
-            plan, start, options.seed, "simulated walk, simulated sensors", settings_toml, SIMULATED
-        )
+        metadata = run_metadata(plan, start, options.seed, "simulated walk, simulated sensors", source=SIMULATED)
         with start_recording(output.folder / "walk.mcap", metadata) as recorder:
             chunks = with_beacons(scenario, plan, options.seed) if options.guide else scenario.chunks()
             portions = _portions(chunks, session, recorder, speed)

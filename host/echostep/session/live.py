@@ -16,10 +16,11 @@ from pathlib import Path
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
+from echostep.errors import EchostepError
 from echostep.interruption import raise_lost
 from echostep.page.live import LivePage
 from echostep.ports.arrival_clock import SleepWatch, now_ns
-from echostep.ports.chunks import BOARD, GATEWAY, MTX, Chunk
+from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_team
@@ -39,7 +40,7 @@ from echostep.tracker import Tracker
 from echostep.xsens.reader import warm_up
 from echostep.xsens.startup import MtxStart
 
-BAUD = {BOARD: 115200, MTX: 115200, GATEWAY: 115200}
+BAUD = dict.fromkeys((BOARD, MTX, FOOT, GATEWAY), 115200)
 
 
 def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -> None:
@@ -54,7 +55,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
     session.prepare()
     folder = output_folder(output.folder)
     with closing(_open_ports(ports)) as opened:
-        opened.send(BOARD, encode(Identify(), 0))
+        _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         with session:
             with start_recording(folder / "walk.mcap", metadata, ports.keep) as recorder:
@@ -71,7 +72,7 @@ def record(ports: PortOptions, out: Path) -> None:
     warm_up()
     byte_count: Counter[str] = Counter()
     with closing(_open_ports(ports)) as opened:
-        opened.send(BOARD, encode(Identify(), 0))
+        _identify(opened)
         metadata = version_metadata() | clock_metadata() | {"note": "recorded without tracking"}
         with start_recording(out, metadata, ports.keep) as recorder, suppress(KeyboardInterrupt):
             chunks = _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds)
@@ -81,9 +82,8 @@ def record(ports: PortOptions, out: Path) -> None:
                     byte_count[chunk.port] += len(chunk.data)
         print_notices(recorder.notices)
     from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
-    console.print(
-        f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {byte_count[MTX]} from the MTx{from_gateway}"
-    )
+    foot = f"{byte_count[FOOT]} from the foot board" if ports.foot else f"{byte_count[MTX]} from the MTx"
+    console.print(f"{recorder.path}: {byte_count[BOARD]} bytes from the board, {foot}{from_gateway}")
 
 
 def _passed(seconds: float | None) -> Callable[[], float | None]:
@@ -92,8 +92,17 @@ def _passed(seconds: float | None) -> Callable[[], float | None]:
     return lambda: None if seconds is None else (time.monotonic() - began_s) / max(seconds, 1e-3)
 
 
+def _identify(ports: SerialPorts) -> None:
+    """Ask each board who it is."""
+    for name in (BOARD, FOOT):
+        if name in ports.names:
+            ports.send(name, encode(Identify(), 0))
+
+
 def _open_ports(options: PortOptions) -> SerialPorts:
-    urls = {BOARD: options.board, MTX: options.mtx, GATEWAY: options.beacons}
+    if options.mtx is not None and options.foot is not None:
+        raise EchostepError("--mtx and --foot: only one of them is on the foot: give that one")
+    urls = {BOARD: options.board, MTX: options.mtx, FOOT: options.foot, GATEWAY: options.beacons}
     return SerialPorts({name: url for name, url in urls.items() if url is not None}, BAUD)
 
 
@@ -126,14 +135,15 @@ def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | N
 
 
 def _with_subscription(chunks: Iterable[Chunk | None], ports: SerialPorts) -> Iterator[Chunk | None]:
-    """The same chunks, while the board is asked for its optional messages at the start and whenever it has restarted."""
-    board, subscription = BoardReader(), Subscription()
+    """The same chunks, while each board is asked for its optional messages at the start and whenever it has restarted."""
+    boards = {name: (BoardReader(), Subscription()) for name in (BOARD, FOOT)}
     for chunk in chunks:
-        if chunk is not None and chunk.port == BOARD:
+        if chunk is not None and chunk.port in boards:
+            board, subscription = boards[chunk.port]
             with suppress(StaleFirmwareError):  # the tracker reports it
                 for message in board.feed(chunk.data):
                     if subscription.is_due(message):
-                        ports.send(BOARD, encode(SUBSCRIBE, 0))
+                        ports.send(chunk.port, encode(SUBSCRIBE, 0))
         yield chunk
 
 

@@ -55,3 +55,4 @@ class PortOptions:
     beacons: str | None = None
     seconds: float | None = None  # None: until Ctrl-C
     keep: int | None = None  # recordings to keep in the folder; None: all
+    foot: str | None = None  # of a foot board, in the place of an MTx

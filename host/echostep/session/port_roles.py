@@ -30,7 +30,7 @@ def with_role_check(chunks: Iterable[Chunk | None], urls: Mapping[str, str]) -> 
             continue
         due[chunk.port] = 2 * len(received)
         device = sender(bytes(received))
-        if device not in (None, chunk.port):
-            raise EchostepError(wrong_device(chunk.port, urls))
+        if device is not None and device != chunk.port:
+            raise EchostepError(wrong_device(chunk.port, device, urls))
         if device or len(received) > LISTENED_BYTES:
             del unknown[chunk.port]

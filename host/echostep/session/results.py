@@ -53,7 +53,7 @@ def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result
     failure = failure or _draw(folder, tracker, guided, result, deviation)
     if not result.estimates:
         console.print(
-            "No estimate: the foot never stood still, or no MTx bytes came; without an MTx, no stride was seen."
+            "No estimate: the foot never stood still, or no bytes of its sensor came; without one, no stride was seen."
         )
         return
     if not failure:

@@ -32,7 +32,10 @@ def skipped(recording: Recording, streams: StreamState) -> list[str]:
         (front_end.bad_times, f"{front_end.bad_times} messages had impossible times and were dropped"),
         (front_end.unknown_ports, f"{front_end.unknown_ports} chunks came from unknown ports"),
         (streams.board.rejected, f"{streams.board.rejected} damaged frames of the board were dropped"),
-        (streams.mtx.bad_checksum, f"{streams.mtx.bad_checksum} damaged messages of the MTx were dropped"),
+        (
+            streams.mtx.bad_checksum,
+            f"{streams.mtx.bad_checksum} damaged messages of the {streams.foot_name} were dropped",
+        ),
     ]
     lines = [f"{recording.path}: {text}" for applies, text in facts if applies]
     damaged = recording.altered or recording.damaged_bytes or recording.truncated

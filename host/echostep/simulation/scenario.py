@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A simulated run: a walk through a building with a board and an MTx.
+"""A simulated run: a walk through a building with a board, and an MTx or a foot board.
 
-In: a plan, waypoints, a seed, a board. Out: the chunks of both ports in order of arrival, and the truth. Owns the board.
+In: a plan, waypoints, a seed, a board or two. Out: the chunks of both ports in order of arrival, and the truth. Owns the boards.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from echostep.board.subscription import SUBSCRIBE
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.simulation.devices.board import Board
+from echostep.simulation.devices.foot_board import FootBoardPort, foot_rng
 from echostep.simulation.devices.kit_2026 import Kit2026Sensors
 from echostep.simulation.devices.mtx import MtxModel, stream
 from echostep.simulation.kits import Kit
@@ -43,9 +44,9 @@ class Scenario:
     def __init__(
         self, plan: Plan, waypoints: Sequence[Waypoint], seed: int, board: Board,
         person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
-        kit: Kit = Kit.PAPERS,
+        kit: Kit = Kit.PAPERS, foot_board: Board | None = None,
     ) -> None:  # fmt: skip
-        """`configure` is sent to the board before it starts."""
+        """`configure` is sent to the board before it starts; `foot_board` plays the one on the foot, in the place of an MTx."""
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
         magnetism = MagneticField(streams[3])
         self.walk = walk(waypoints, person or Person(), streams[0])
@@ -53,6 +54,7 @@ class Scenario:
         kind = Kit2026Sensors if kit is Kit.OF_2026 else BoardSensors
         self.sensors: BoardSensors | Kit2026Sensors = kind(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)
         self._board = board
+        self.foot = None if foot_board is None else FootBoardPort(self.walk, foot_rng(seed), foot_board)
         if kit is Kit.OF_2026:
             board.fault("kit=2026")
             board.send(encode(SUBSCRIBE, 0))
@@ -72,12 +74,14 @@ class Scenario:
 
     def chunks(self) -> Iterator[Chunk]:
         """Chunks of both ports in order of arrival, those of a block as soon as the board has lived through it."""
-        mtx = self._mtx_chunks()
+        mtx = self._mtx_chunks() if self.foot is None else iter(())
         coming: list[Chunk] = []
         following = next(mtx, None)
         for start in range(0, len(self.walk.t_s), BLOCK_MS):
             self.fraction = start / len(self.walk.t_s)
             coming += self._board_chunks(start, start + BLOCK_MS)
+            if self.foot is not None:
+                coming += self.foot.chunks(start, start + BLOCK_MS, START_NS)
             now_ns = START_NS + (start + BLOCK_MS) * 1_000_000
             while following is not None and following.t_arrival_ns <= now_ns:
                 coming.append(following)
@@ -94,8 +98,10 @@ class Scenario:
         np.savetxt(path, table, delimiter=",", header="t_s,x,y,heading_rad,z", comments="", fmt="%.6f")
 
     def close(self) -> None:
-        """Switch the board off."""
+        """Switch the boards off."""
         self._board.close()
+        if self.foot is not None:
+            self.foot.board.close()
 
     def _board_chunks(self, start: int, stop: int) -> list[Chunk]:
         """The board's bytes of these milliseconds as a USB host gets them, those of one instant together."""

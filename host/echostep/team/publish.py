@@ -18,7 +18,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
-from echostep.board.health import board_findings
 from echostep.errors import EchostepError
 from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus
 from echostep.plan.model import Level, Plan
@@ -160,7 +159,7 @@ class ReportHistory:
             lost=board.lost + mtx.lost,
             dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
             synchronised=state.synchronised,
-            findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in board_findings(state.reports)[:4]),
+            findings=tuple(printable(f"{f.subject} {f.what}", 100) for f in state.findings[:4]),
         )
 
 

@@ -4,7 +4,8 @@
 In: board messages and MTx samples with their time of arrival, many at once. Out: `t_s`, seconds of the board's clock since its first reset
 (without a board: of the MTx's counter). Owns every clock; no other module converts time, and none here waits for a timer.
 
-The board's ticks are the clock. SyncOut edges tie MTx samples to it if connected, else the lower envelopes of both ports' arrival times.
+The board's ticks are the clock. SyncOut edges tie MTx samples to it if connected, else the lower envelopes of both ports' arrival times. Samples of
+a foot board come in the place of the MTx's: their value is the ticks of that board's own clock.
 A device that restarts gets a new epoch, set by arrival times.
 """
 
@@ -78,6 +79,12 @@ class Timeline:
         self._board = clocks.new_clock(TICK_S, 1 << 32)
         self._mtx = clocks.new_clock(1.0 / timing.rate_hz, 1 << 16)
         self._edges = sync.new_edges(1.0 / timing.rate_hz)
+        self._foot_latency_s = timing.latency_s
+
+    def expect_foot_board(self) -> None:
+        """From now on the foot's samples are those of a foot board; to be called before the first one."""
+        self._mtx = clocks.new_clock(TICK_S, 1 << 32)
+        self._foot_latency_s = BOARD_LATENCY_S
 
     @property
     def synchronised(self) -> bool:
@@ -115,7 +122,7 @@ class Timeline:
             np.empty(nb + nm),
             np.empty(nb + nm),
         )
-        _assign_times(self._board, self._mtx, self._edges, self.timing.latency_s, board, mtx, times)
+        _assign_times(self._board, self._mtx, self._edges, self._foot_latency_s, board, mtx, times)
         return times
 
 

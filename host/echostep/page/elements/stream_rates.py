@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from echostep.board.health import Severity, board_findings
+from echostep.board.health import Severity
 from echostep.tracker import StreamState, Tracker
 
 WINDOW_NS = 2_000_000_000  # over which rates are averaged
@@ -21,7 +21,8 @@ class StreamRates:
     """Rates over the last two seconds (None: not known yet), and counts since the start. The field names are keys of the frame's JSON.
 
     `lost`: messages that did not arrive. `rejected`: bytes or messages with wrong contents. `late_pings`: pings that came after their segment.
-    `wrong`: what is wrong with the board or a stream and what to do, as text; empty when nothing is.
+    `wrong`: what is wrong with the board or a stream and what to do, as text; empty when nothing is. `foot`: what is worn on the foot; its samples
+    are counted in `mtx_hz`.
     """
 
     mtx_hz: float | None
@@ -32,6 +33,7 @@ class StreamRates:
     synchronised: bool
     check_ins: int
     wrong: str
+    foot: str = "MTx"
 
 
 class StreamRateMeter:
@@ -55,6 +57,7 @@ class StreamRateMeter:
             synchronised=streams.synchronised,
             check_ins=tracker.state.check_ins,
             wrong=_advice(streams, mtx_hz, pings_hz),
+            foot=streams.foot_name,
         )
 
     def _rates_hz(self, samples: int, pings: int, t_ns: int) -> tuple[float | None, float | None]:
@@ -73,8 +76,8 @@ class StreamRateMeter:
 def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None) -> str:
     """The gravest finding and what to do about it."""
     if mtx_hz == 0.0:
-        return "the MTx is silent: look at its plug and its power"
-    findings = [finding for finding in board_findings(streams.reports) if finding.severity > Severity.NOTE]
+        return f"the {streams.foot_name} is silent: look at its plug and its power"
+    findings = [finding for finding in streams.findings if finding.severity > Severity.NOTE]
     if not findings and pings_hz == 0.0:
         return "no pings: look at the board's plug and at the rangers"
     return str(findings[0]) if findings else ""

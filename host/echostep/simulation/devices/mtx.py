@@ -112,7 +112,7 @@ def measure(
     count = int((walk.t_s[-1] - 2.0 * FIRST_S) / period)
     t: Floats = FIRST_S + period * np.arange(1, count, dtype=np.float64)
     mounting = rotations(np.array([model.mounting_rpy_rad]))[0]
-    force, rate = (_means(v, t, period) for v in specific_force_and_rate(walk, mounting))
+    force, rate = (means(v, t, period) for v in specific_force_and_rate(walk, mounting))
     root = math.sqrt(model.rate_hz)
     accel = (
         force
@@ -159,7 +159,7 @@ def _followed(wanted: Floats, kept: float, value: float) -> Floats:
     return found
 
 
-def _means(values: Floats, t: NDArray[Any], period: float) -> Floats:
+def means(values: Floats, t: NDArray[Any], period: float) -> Floats:
     """Mean of 1 kHz values (n, 3) over the interval that ends at each t, exactly by the running integral."""
     integral = np.vstack([np.zeros(3), np.cumsum(values, axis=0)]) / RATE_HZ
     grid = np.arange(len(integral)) / RATE_HZ - 0.5 / RATE_HZ

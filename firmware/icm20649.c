@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: MIT */
+#include "icm20649.h"
+#include "messages.h" /* FAULT_* */
+
+/* Registers and values [ICM-20649 data sheet DS-000192, chapters 7 to 10]. Of user bank 0: */
+#define REGISTER_WHO_AM_I 0x00u
+#define REGISTER_USER_CTRL 0x03u
+#define REGISTER_PWR_MGMT_1 0x06u
+#define REGISTER_INT_ENABLE_1 0x11u
+#define REGISTER_ACCEL_XOUT_H 0x2Du /* forces, rates, temperature: 16 bits each, high byte first */
+#define REGISTER_BANK_SEL 0x7Fu     /* of every bank */
+/* Of user bank 2: */
+#define REGISTER_GYRO_SMPLRT_DIV 0x00u
+#define REGISTER_GYRO_CONFIG_1 0x01u
+#define REGISTER_ACCEL_SMPLRT_DIV_2 0x11u
+#define REGISTER_ACCEL_CONFIG 0x14u
+
+#define READ_FLAG 0x80u
+#define BANK_0 0x00u
+#define BANK_2 0x20u
+#define SPI_ONLY 0x10u
+#define DEVICE_RESET 0x80u
+#define SLEEP 0x40u
+#define BEST_CLOCK 0x01u
+#define RAW_DATA_READY 0x01u      /* INT1 rises for 50 us with each sample */
+#define DIVIDER 4u                /* 1125 Hz / (1 + 4) = 225 Hz */
+#define GYRO_120_HZ_4000_DPS 0x17u /* low pass 2, full scale 3, low pass on */
+#define ACCEL_111_HZ_30_G 0x17u
+#define NO_REPLY (-1) /* MISO is pulled up: an absent chip reads as ones */
+
+static void begin(enum chip chip, uint8_t first_byte)
+{
+	spi_select(chip, SPI_MODE3);
+	(void)spi_exchange(first_byte);
+}
+
+static void write8(enum chip chip, uint8_t address, uint8_t value)
+{
+	begin(chip, address);
+	(void)spi_exchange(value);
+	spi_release();
+}
+
+static uint8_t read8(enum chip chip, uint8_t address)
+{
+	begin(chip, READ_FLAG | address);
+	uint8_t value = spi_exchange(0);
+	spi_release();
+	return value;
+}
+
+/* When the processor was reset while it wrote settings, bank 2 is still selected, and has the divider at this address. */
+uint8_t icm20649_identity(enum chip chip)
+{
+	uint8_t identity = read8(chip, REGISTER_WHO_AM_I);
+	if (identity != DIVIDER)
+		return identity;
+	write8(chip, REGISTER_BANK_SEL, BANK_0);
+	return read8(chip, REGISTER_WHO_AM_I);
+}
+
+/* Two registers, since another part's reply may be like one of them by chance. */
+bool icm20649_answers(enum chip chip)
+{
+	return icm20649_identity(chip) == ICM20649_IDENTITY && (read8(chip, REGISTER_PWR_MGMT_1) & (uint8_t)~SLEEP) == BEST_CLOCK;
+}
+
+void icm20649_reset(enum chip chip)
+{
+	write8(chip, REGISTER_PWR_MGMT_1, DEVICE_RESET);
+}
+
+void icm20649_start(enum chip chip)
+{
+	static const uint8_t settings[][2] = {
+		{ REGISTER_PWR_MGMT_1, BEST_CLOCK },
+		{ REGISTER_USER_CTRL, SPI_ONLY },
+		{ REGISTER_BANK_SEL, BANK_2 },
+		{ REGISTER_GYRO_SMPLRT_DIV, DIVIDER },
+		{ REGISTER_GYRO_CONFIG_1, GYRO_120_HZ_4000_DPS },
+		{ REGISTER_ACCEL_SMPLRT_DIV_2, DIVIDER },
+		{ REGISTER_ACCEL_CONFIG, ACCEL_111_HZ_30_G },
+		{ REGISTER_BANK_SEL, BANK_0 },
+		{ REGISTER_INT_ENABLE_1, RAW_DATA_READY },
+	};
+	for (uint8_t n = 0; n < sizeof settings / sizeof *settings; n++)
+		write8(chip, settings[n][0], settings[n][1]);
+}
+
+static int16_t read_word(void)
+{
+	uint8_t high = spi_exchange(0), low = spi_exchange(0);
+	return (int16_t)(uint16_t)((uint16_t)(high << 8) | low);
+}
+
+uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out)
+{
+	bool replies = false;
+	begin(chip, READ_FLAG | REGISTER_ACCEL_XOUT_H);
+	for (uint8_t k = 0; k < ICM20649_AXES; k++) {
+		out->axes[k] = read_word();
+		replies = replies || (out->axes[k] != NO_REPLY && out->axes[k] != 0);
+	}
+	out->temperature = read_word();
+	spi_release();
+	return replies ? FAULT_NONE : FAULT_NO_ANSWER;
+}

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""The foot board: frames of its port -> samples of the foot's motion sensor.
+
+In: bytes of the port. Out: samples in SI units with the ticks of the board's clock. Owns the reader, the board's reports about itself, the counts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Ints
+from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
+from echostep.board.findings import BoardReports
+from echostep.board.frames import BoardReader
+from echostep.board.messages import BY_ID, BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
+
+_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
+FOOT = _IDS[Foot]
+_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, BoardHealth, Parts, FootHealth)]
+_AXES = ("x", "y", "z")
+
+
+class FootFrames(NamedTuple):
+    """Samples (n,): `ticks` of the foot board's clock; `accel` m/s2, `gyro` rad/s (n, 3) in the part's axes; `end` of each in the bytes just fed."""
+
+    ticks: Ints
+    accel: Floats
+    gyro: Floats
+    end: Ints
+
+
+class FootBoardReader:
+    """Samples of a byte stream; malformed frames are counted and raise no error."""
+
+    def __init__(self) -> None:
+        self.reader = BoardReader()
+        self.reports = BoardReports()
+        self.samples = 0
+
+    @property
+    def lost(self) -> int:
+        """Frames that never came, and samples that the board could not read in time."""
+        health = self.reports.foot
+        return self.reader.counts.lost + (0 if health is None else health.missed)
+
+    def feed(self, received: bytes) -> FootFrames:
+        """Samples completed by these bytes; raises StaleFirmwareError when the board has another schema."""
+        frames = self.reader.frames(received)
+        for identifier in _REPORTS:
+            for row in frames.rows(identifier)[1]:
+                self.reports.add(BY_ID[identifier].unpack(row.tobytes()))
+        frame_row, found = frames.rows(FOOT)
+        self.samples += len(found)
+        rates = np.column_stack([found[f"rate_{axis}"] for axis in _AXES])
+        forces = np.column_stack([found[f"acceleration_{axis}"] for axis in _AXES])
+        return FootFrames(
+            found["ticks"].astype(np.int64), ICM20649_M_S2 * forces, ICM20649_RAD_S * rates, frames.end[frame_row]
+        )
