@@ -17,7 +17,9 @@ from echostep.localization.metrics import errors, load_truth
 from echostep.output.track_plot import write_track
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import portion_of
+from echostep.scorecard import csv_columns
 from echostep.scorecard.card import Scorecard, score
+from echostep.scorecard.csv_columns import read_csv
 from echostep.scorecard.definitions import METRICS
 from echostep.scorecard.matching import GAP_S
 from echostep.scorecard.track_columns import load_path
@@ -242,6 +244,18 @@ WRONG = {
 def test_what_is_wrong_is_named(text: str, tmp_path: Path) -> None:
     with pytest.raises(EchostepError, match=WRONG[text]):
         scored(tmp_path, text, STANDING)
+
+
+def test_lines_and_rows_of_a_hostile_file_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    long = written(tmp_path / "long.csv", "t_s,x_m,y_m\n0,0," + "1" * 20_000 + "\n")
+    with pytest.raises(EchostepError, match=r"long\.csv: line 2 is longer than 10000 characters"):
+        read_csv(long)
+    quoted = written(tmp_path / "quoted.csv", 't_s,x_m,y_m\n0,0,"' + "1\n" * 100_000)
+    with pytest.raises(EchostepError, match="not a CSV file"):
+        read_csv(quoted)
+    monkeypatch.setattr(csv_columns, "MOST_ROWS", 3)
+    with pytest.raises(EchostepError, match="more than 3 rows"):
+        read_csv(written(tmp_path / "many.csv", "t_s,x_m,y_m\n" + "0,0,0\n" * 4))
 
 
 def test_other_delimiters_capitals_and_a_mark_before_the_names(tmp_path: Path) -> None:

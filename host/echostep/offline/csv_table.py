@@ -17,24 +17,14 @@ from typing import TextIO, TypeVar
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.csv_lines import CsvLimits
 from echostep.errors import EchostepError
 
-LONGEST_LINE = 10_000  # characters; by reason: no line of numbers is longer
-EARLY_ROWS = 2000  # rows after which a file of garbage is given up
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number; by reason: nanoseconds since 1970 have 19 digits
 TIME_UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))  # per second
 
 Result = TypeVar("Result")
-
-
-@dataclass(frozen=True, slots=True)
-class CsvLimits:
-    """`line_chars`: a longer line is an error. `lines`: reading stops after so many. `early_rows`: rows after which garbage is given up, or None."""
-
-    line_chars: int = LONGEST_LINE
-    lines: int | None = None
-    early_rows: int | None = EARLY_ROWS
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,22 +44,6 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
         raise EchostepError(f"{path}: cannot read the samples: {error.strerror}") from error
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
-
-
-def header_of(first_line: str) -> tuple[list[str], str]:
-    """Names of the columns in the first line, and the separator: the most frequent of comma, semicolon and tab."""
-    separator = max(",;\t", key=first_line.count)
-    return [name.strip().strip('"') for name in first_line.split(separator)], separator
-
-
-def lines_of(file: TextIO, limits: CsvLimits, first: int = 1) -> Iterator[str]:
-    """Lines of bounded length, the next one being number `first`; raises ValueError for a longer one."""
-    number = first - 1
-    while (limits.lines is None or number < limits.lines) and (line := file.readline(limits.line_chars)):
-        number += 1
-        if len(line) == limits.line_chars:
-            raise ValueError(f"line {number} is longer than {limits.line_chars} characters: is this a CSV file?")
-        yield line
 
 
 def read_rows(

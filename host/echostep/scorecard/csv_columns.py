@@ -11,14 +11,16 @@ import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.csv_lines import CsvLimits, lines_of, separator_of
 from echostep.errors import EchostepError
 
-DELIMITERS = ",;\t"
+MOST_ROWS = 1_000_000  # of a track, by reason: eight hours at 30 positions a second
 SHOWN = 40  # characters of a wrong cell that an error repeats
 
 
@@ -71,15 +73,21 @@ def read_csv(path: Path) -> CsvColumns:
     """Read a file; raises EchostepError. Empty lines are skipped; a # before the names is, too."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            first = file.readline()
-            delimiter = max(DELIMITERS, key=first.count)
+            lines = lines_of(file, CsvLimits())
+            first = next(lines, "")
+            delimiter = separator_of(first)
             names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
-            reader = csv.reader(file, delimiter=delimiter)
-            read = [(reader.line_num + 1, tuple(cell.strip() for cell in row)) for row in reader if any(row)]
+            reader = csv.reader(lines, delimiter=delimiter)
+            rows = ((reader.line_num + 1, tuple(cell.strip() for cell in row)) for row in reader if any(row))
+            read = list(islice(rows, MOST_ROWS + 1))
     except OSError as error:
         raise EchostepError(f"{path}: cannot read it: {error.strerror or error}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise EchostepError(f"{path}: not a CSV file in UTF-8: {error}") from error
+    except ValueError as error:
+        raise EchostepError(f"{path}: {error}") from error
+    if len(read) > MOST_ROWS:
+        raise EchostepError(f"{path}: more than {MOST_ROWS} rows: cut it into parts")
     if not any(names):
         raise EchostepError(f"{path}:1: the names of the columns are expected in the first line")
     for line, row in read:
