@@ -99,8 +99,8 @@ def python_board(shape: Callable[[NDArray[Any], int], None] = some_noise) -> Ite
 
 
 @contextlib.contextmanager
-def twin_board(*faults: str) -> Iterator[str]:
-    """The port of the real firmware in the twin, in real time, with these faults thrown from the start."""
+def twin_board(*faults: str, rows: Callable[[int], NDArray[Any]] = quiet_rows) -> Iterator[str]:
+    """The port of the real firmware in the twin, in real time, with these faults thrown from the start; its inputs, by milliseconds."""
     board = importlib.import_module("run").PtyBoard()
     for fault in faults:
         board.fault(fault)
@@ -108,7 +108,7 @@ def twin_board(*faults: str) -> Iterator[str]:
 
     def step() -> None:
         nonlocal due_s
-        board.advance(quiet_rows(5))
+        board.advance(rows(5))
         due_s = max(due_s + 0.005, time.monotonic() - 0.5)
         time.sleep(max(0.0, due_s - time.monotonic()))
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from board_runs import ROOT, needs_twin
 from command_line import echostep
+from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from hardware.lanes import lanes
 from hardware.nets import problems
 from hardware.wiring import Board, Device, boards, pins
@@ -155,6 +159,14 @@ def guide_step(number: int) -> list[str]:
     return [line.strip() for line in shown.splitlines() if line.strip()]
 
 
+def standing_foot(milliseconds: int) -> NDArray[Any]:
+    """Inputs of a foot board at rest, in counts: 1 g along z, a rate of one count."""
+    rows = np.zeros(milliseconds, EXTENDED_ROW)
+    rows["row"]["sync_us"], rows["row"]["temperature"] = NO_SYNC, 400
+    rows["motion"]["rate"][:, 0], rows["motion"]["force"][:, 0] = (1, 0, 0), (0, 0, 1_024)
+    return rows
+
+
 LEGS = ("imu_thigh=absent", "imu_calf=absent")
 RANGERS = ("pulse_left=absent", "pulse_right=absent")
 
@@ -183,3 +195,15 @@ def test_a_step_of_the_guide_shows_what_the_doctor_prints(step: int, faults: tup
         else:
             assert shown in lines, (shown, printed)
     assert guide_step(step)
+
+
+@needs_twin
+def test_the_step_of_the_foot_board_shows_what_the_doctor_prints() -> None:
+    with twin_board("kit=2026") as board_port, twin_board("kit=foot", rows=standing_foot) as port:
+        printed = echostep("doctor", "--board", board_port, "--foot", port, "--seconds", 5).stdout
+    foot, rates = guide_step(8)
+    assert foot in printed, printed
+    (rate,) = re.findall(r"foot ([\d.]+)/s", rates)
+    (measured,) = re.findall(r"foot ([\d.]+)/s", printed)
+    assert float(measured) == pytest.approx(float(rate), rel=0.05)
+    assert rates.partition(";")[2] in printed
