@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echostep.evaluate import kits
+from echostep.evaluate import kit_feet, kits
 from echostep.evaluate.report import rows_by_name
 from echostep.simulation.world.sites import otb
 
@@ -13,8 +13,10 @@ from echostep.simulation.world.sites import otb
 def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> None:
     rows = kits.one_run(3)
     names = [row["name"] for row in rows]
-    assert len(set(names)) == 9
-    assert all(len(row["errors_m"]) == 52 for row in rows)
+    of_rangers = [row for row in rows if not row["name"].startswith("foot alone")]
+    assert len(set(names)) == 9 + 8
+    assert len(of_rangers) == 9
+    assert all(len(row["errors_m"]) == 52 for row in of_rangers)
     means = {row["name"]: float(np.mean(row["errors_m"])) for row in rows}
     assert means["default, SRF02"] < 0.13  # what the paper's system reached with ranging [Girard 2011, Table 1]
     assert means["default, pulse"] < 0.13
@@ -27,3 +29,15 @@ def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> Non
 def test_the_tracker_and_the_simulation_agree_on_the_reach_of_pulse_rangers() -> None:
     kind = kits.kinds()["pulse"]
     assert (kind.echo.maximum_m, kind.acoustics.maximum_m) == (4.5, 4.5)
+
+
+def test_a_foot_board_is_as_good_as_an_mtx_on_the_same_steps() -> None:
+    rows = [kit_feet.rows(seed) for seed in (1, 2, 3)]
+    means = {
+        row["name"]: float(np.mean([np.mean(of_seed[k]["errors_m"]) for of_seed in rows]))
+        for k, row in enumerate(rows[0])
+    }
+    assert all(len(row["errors_m"]) > 20 for of_seed in rows for row in of_seed)
+    for pace in kit_feet.PACES:
+        assert means[f"foot alone, {pace}, foot board, calibrated"] < 2.0 * means[f"foot alone, {pace}, MTx 18 g"] + 0.1
+    assert max(means.values()) < 3.0

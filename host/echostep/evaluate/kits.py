@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""`echostep evaluate kits`: the 52 steps of Girard with the rangers of either kit; the kit of 2026 was not built yet.
+"""`echostep evaluate kits`: the 52 steps of Girard with the rangers and the feet of either kit; the kit of 2026 was not built yet.
 
 In: seeds. Out: rows: errors and coverage of the paper's filter and of the default one with SRF02 and with pulse rangers, on the same steps.
-Everything here is simulated: building, walker, sensors. The foot is the same in all rows: the foot board does not exist yet.
+Everything here is simulated: building, walker, sensors. In the rows of the rangers the foot is the same; `kit_feet` has those of the feet.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from echostep.board.messages import Part
+from echostep.evaluate import kit_feet
 from echostep.evaluate.girard2011 import COLUMNS, MethodOutput, default, girard
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
 from echostep.evaluate.study import Study, StudyRequest
@@ -58,7 +59,7 @@ def one_run(seed: int) -> list[Row]:
         site = furnished(seed)
         walk = _walk(site, seed, kind)
         rows.append(_row(f"default, furniture, {name}", seed, walk, list(default(site, walk, seed, kind.echo))))
-    return rows
+    return rows + kit_feet.rows(seed)
 
 
 def _walk(site: SimulatedSite, seed: int, kind: RangerKind) -> MarkerWalk:
@@ -78,7 +79,7 @@ def _summary(runs: list[Row]) -> Row:
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    title = f"Position error in metres by kind of ranger, {request.runs} simulated runs; pulse rangers: not built yet"
+    title = f"Position error in metres by kind of ranger, and of the foot alone, {request.runs} simulated runs; pulse rangers: not built yet"
     return [Table(title, sorted(rows, key=lambda row: row["name"].split(", ")[:-1]), COLUMNS)]
 
 

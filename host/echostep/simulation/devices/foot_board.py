@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from echostep.arrays import Floats
 from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
 from echostep.board.frames import encode
 from echostep.board.subscription import SUBSCRIBE
@@ -75,6 +76,24 @@ class FootBoardSensors:
             noisy = values[at] + INTERPOLATED * noise * self._rng.standard_normal((len(at), 3))
             rows["motion"][name][:, 0] = np.clip(np.rint(noisy / unit), -limit, limit)
         return rows
+
+
+def measure_foot(
+    walk: Walk, rng: np.random.Generator, model: FootBoardModel | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """Samples of a whole walk without a board: t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s."""
+    m = model or FootBoardModel()
+    t_s: Floats = np.arange(10.0 * m.period_s, walk.t_s[-1] - 0.05, m.period_s)
+    mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
+    force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
+    found = []
+    for true, bias, noise, unit, limit in (
+        (force, m.accel_bias_m_s2, m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
+        (rate, m.gyro_bias_rad_s, m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
+    ):
+        noisy = true + bias * rng.standard_normal(3) + noise * rng.standard_normal(true.shape)
+        found.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
+    return t_s, found[0], found[1]
 
 
 class FootBoardPort:
