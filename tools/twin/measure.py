@@ -23,7 +23,7 @@ from echostep.board.frames import BoardReader, encode
 from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.kits import Kit
-from echostep.simulation.stimulus import NO_SYNC, ROW
+from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
@@ -161,16 +161,53 @@ def _of_2026(result: RunResult, span: float) -> list[tuple[str, str, str, bool]]
     ]
 
 
+def foot_rows() -> np.ndarray:
+    """Rows of one second of a foot that stands."""
+    table = np.zeros(1000, EXTENDED_ROW)
+    table["row"]["sync_us"], table["row"]["temperature"] = NO_SYNC, 480
+    table["motion"]["force"][:, 0, 2] = 1024
+    return table
+
+
+def foot_figures(seconds: int) -> list[tuple[str, str, str, bool]]:
+    """(what, measured, limit, passed) of the foot board."""
+    board, reader, result, second = BoardProcess(TWIN), BoardReader(), RunResult(), foot_rows()
+    board.fault("kit=foot")
+    stamps: list[int] = []
+    for k in track(range(seconds), "the foot board"):
+        if k == 1:
+            board.send(encode(SUBSCRIBE, 0))
+        for t_ns, sent in board.advance(second):
+            for message in reader.feed(sent):
+                add_message(result, message, t_ns)
+                if isinstance(message, m.Foot) and t_ns >= SETTLED_S * 1e9:
+                    stamps.append(message.ticks)
+    board.close()
+    assert result.status is not None
+    worst, sd = stamp_errors(stamps, [t for t, text in board.trace if text == "foot"])
+    rate, lost, memory = len(stamps) / (seconds - SETTLED_S), reader.counts.lost, result.status.memory_used
+    return [
+        ("foot samples/s", f"{rate:.1f}", "225 within 1 %", abs(rate / 225.0 - 1.0) < 0.0105),
+        ("worst stamp of a sample", f"{worst:.1f} us (sd {sd:.2f})", "<= 20 us", worst <= 20.0),
+        (f"frames lost in {seconds / 60:.0f} min", str(lost), "0", lost == 0),
+        ("static RAM and deepest stack", f"{memory} B", "< 2200 B", memory < 2200),
+    ]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--minutes", type=float, default=10.0, help="simulated minutes")
     seconds = max(5, round(60 * parser.parse_args().minutes))
     passed = True
-    for kit in Kit:
-        parts = "the papers" if kit is Kit.PAPERS else f"{kit.value}, not built yet"
-        title = f"The real firmware in the twin, parts of {parts} (simulated hardware)"
+    tables = {
+        "parts of the papers": lambda: figures(seconds, Kit.PAPERS),
+        "parts of 2026, not built yet": lambda: figures(seconds, Kit.OF_2026),
+        "the foot board of 2026, not built yet": lambda: foot_figures(seconds),
+    }
+    for parts, measure in tables.items():
+        title = f"The real firmware in the twin, {parts} (simulated hardware)"
         table = Table("figure", "measured", "limit", "", title=title)
-        for what, measured, limit, good in figures(seconds, kit):
+        for what, measured, limit, good in measure():
             table.add_row(what, measured, limit, "PASS" if good else "FAIL")
             passed = passed and good
         Console().print(table)
