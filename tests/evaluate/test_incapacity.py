@@ -20,10 +20,10 @@ def test_every_wearer_who_cannot_move_is_told_within_35_s() -> None:
 
 def test_a_wearer_who_answers_is_seldom_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(incapacity, "DAY_S", 3600.0)
-    row = work_day(1.0, 1.0, "day", 1)
+    row = work_day(1.0, 1.0, True, "day", 1)
     assert row["asked"] > 0
     assert row["maydays"] == 0
-    deaf = work_day(1.0, 0.0, "deaf", 1)
+    deaf = work_day(1.0, 0.0, False, "deaf", 1)
     assert deaf["maydays"] > 0  # the figure of the table means something
 
 

@@ -23,12 +23,25 @@ from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry.alarm import AlarmKind, WearerAlarm
-from echostep.odometry.stillness import Stillness
+from echostep.odometry.stillness import WINDOW_S, Stillness
 
 RATE_HZ = 100.0
 GYRO_NOISE, ACCEL_NOISE = math.radians(0.1) * 10.0, 0.04  # rad/s, m/s2: an MTx at 100 Hz, by its manual
 LEG_NOISE = math.radians(0.5)  # rad/s, an ADIS16100
 BREATH_HZ, BREATH_RAD_S = 0.3, math.radians(1.5)  # of a belt on a wearer who lies
+# Sway of a wearer who stands or crouches, rad/s: standard deviation within half a second, each axis of the foot, thigh, shank. Medians of quiet
+# standing in public recordings (Voisard's MTw on feet, legs of qmt: 15 to 25 s each), less the sensors' noise.
+SWAY_RAD_S = (0.0015, 0.0015, 0.0015, 0.004, 0.006)
+SWAY_HZ, SWAY_SPREAD, SWAY_TONES = (
+    (0.3, 2.5),
+    0.5,
+    6,
+)  # range; of the logarithm of its size, from one movement to the next, by reason; sinusoids
+TWITCH_PAUSE_S, TWITCH_S, TWITCH_RAD_S = (
+    5.0,
+    (0.1, 0.4),
+    (0.02, 0.08),
+)  # of every second wearer who cannot move, by reason
 PORTION_S = 0.25  # that comes at once
 TOLD_S = 35.0  # within which a wearer who cannot move is told
 DAY_S = 8.0 * 3600.0
@@ -49,22 +62,41 @@ class SimulatedWearer:
         self.rng, self.legs, self.t_s = rng, legs, 0.0
         self.stillness, self.alarm = Stillness(), WearerAlarm()
         self._axis = self._up = np.array([0.0, 0.0, 1.0])
+        self._draw_sway()
 
-    def live(self, seconds: float, moves_s: Sequence[float], *, lies: bool = False) -> None:
-        """So many seconds with movements at these times from now on."""
+    def _draw_sway(self) -> None:
+        """Amplitudes (5, k), frequencies (k,) and phases (5, k) of the sway up to the next movement."""
+        self._sway_hz = self.rng.uniform(*SWAY_HZ, SWAY_TONES)
+        self._phase = self.rng.uniform(0.0, math.tau, (len(SWAY_RAD_S), SWAY_TONES))
+        within = 0.5 * (1.0 - np.sinc(self._sway_hz * WINDOW_S) ** 2)  # variance of a unit sinusoid in a window
+        size = math.exp(SWAY_SPREAD * self.rng.standard_normal())
+        self._sway_rad_s = size * np.array(SWAY_RAD_S)[:, None] / math.sqrt(within.sum())
+
+    def live(self, seconds: float, moves_s: Sequence[float], *, lies: bool = False, twitches: bool = False) -> None:
+        """So many seconds with movements at these times from now on; one who `lies` breathes and does not sway."""
         t_s = self.t_s + np.arange(1, round(seconds * RATE_HZ) + 1) / RATE_HZ
         moved = np.zeros(len(t_s))
+        sway = np.zeros((len(SWAY_RAD_S), len(t_s)))
+        if not lies:
+            tones = np.sin(math.tau * self._sway_hz[:, None] * t_s + self._phase[:, :, None])
+            sway = (self._sway_rad_s[:, :, None] * tones).sum(axis=1)
+        elif twitches and self.rng.random() < seconds / TWITCH_PAUSE_S:
+            width_s, begin_s = self.rng.uniform(*TWITCH_S), self.t_s + self.rng.uniform(0.0, seconds)
+            near = (t_s > begin_s) & (t_s < begin_s + width_s)
+            moved[near] += self.rng.uniform(*TWITCH_RAD_S) * np.sin(np.pi * (t_s[near] - begin_s) / width_s)
         for move_s in moves_s:
             width_s, size = self.rng.uniform(0.15, 0.5), 0.6 * math.exp(0.6 * self.rng.standard_normal())
             near = np.abs(t_s - self.t_s - move_s) < width_s
             moved[near] += size * np.sin(np.pi * (t_s[near] - self.t_s - move_s) / width_s)
         if len(moves_s):  # between movements a foot keeps its orientation
             self._axis, self._up = (v / np.linalg.norm(v) for v in self.rng.standard_normal((2, 3)))
-        gyro = moved[:, None] * self._axis + GYRO_NOISE * self.rng.standard_normal((len(t_s), 3))
+            self._draw_sway()
+        gyro = moved[:, None] * self._axis + sway[:3].T + GYRO_NOISE * self.rng.standard_normal((len(t_s), 3))
         accel = 3.0 * moved[:, None] * self._up + ACCEL_NOISE * self.rng.standard_normal((len(t_s), 3))
         self.stillness.add_foot(t_s, gyro, accel + 9.81 * self._up)
         if self.legs:
             thigh, shank, belt = 0.6 * moved + LEG_NOISE * self.rng.standard_normal((3, len(t_s)))
+            thigh, shank = thigh + sway[3], shank + sway[4]
             belt += BREATH_RAD_S * np.sin(2.0 * np.pi * BREATH_HZ * t_s) if lies else 0.0
             self.stillness.add_legs([GyroBlock(t_s, thigh, shank, belt, np.full(len(t_s), np.nan))])
         self.t_s = float(t_s[-1])
@@ -82,23 +114,23 @@ class SimulatedWearer:
 
 
 def incapacitated(seed: int) -> Row:
-    """A wearer who walks, crouches or stands, falls within 2 s and then does not move but breathe."""
+    """A wearer who walks, crouches or stands, falls within 2 s and then does not move but breathe; each second one twitches."""
     rng = np.random.default_rng([seed, 1])
     wearer = SimulatedWearer(rng, legs=bool(seed % 2))
     wearer.walk(rng.uniform(5.0, 40.0))
-    wearer.live(rng.uniform(0.0, 15.0), [])  # stands or crouches before
+    wearer.live(rng.uniform(0.1, 15.0), [])  # stands or crouches before
     began_s, fall_s = wearer.t_s, rng.uniform(0.2, 2.0)
     wearer.live(fall_s, np.arange(0.0, fall_s, 0.1).tolist())
     while wearer.kind is not AlarmKind.MAYDAY and wearer.t_s - began_s < 60.0:
-        wearer.live(PORTION_S, [], lies=True)
+        wearer.live(PORTION_S, [], lies=True, twitches=bool(seed // 2 % 2))
     told_s = wearer.t_s - began_s if wearer.kind is AlarmKind.MAYDAY else math.inf
     return {"name": "cannot move", "seed": seed, "told_s": told_s, "told": float(told_s <= TOLD_S)}
 
 
-def work_day(pauses: float, answered: float, name: str, seed: int) -> Row:
-    """Eight hours of walking, crawling, crouching and waiting; movements `pauses` times as seldom as assumed."""
+def work_day(pauses: float, answered: float, legs: bool, name: str, seed: int) -> Row:
+    """Eight hours of walking, crawling, crouching and waiting; movements `pauses` times as seldom as assumed. `legs`: with leg gyros."""
     rng = np.random.default_rng([seed, 2])
-    wearer = SimulatedWearer(rng, legs=False)
+    wearer = SimulatedWearer(rng, legs=legs)
     asked = maydays = 0
     while wearer.t_s < DAY_S:
         activity = str(rng.choice(list(SPANS_S)))
@@ -150,12 +182,13 @@ def _of_recording(name: str, stillness: Stillness, t_s: Floats) -> Row:
 
 
 DAYS: dict[str, Callable[[int], Row]] = {
-    name: partial(work_day, pauses, answered, name)
-    for name, pauses, answered in (
-        ("day, each question answered", 1.0, 1.0),
-        (f"day, {100.0 * ANSWERED:.0f} % answered", 1.0, ANSWERED),
-        ("the same, movements half as often", 2.0, ANSWERED),
-        ("day, no question heard", 1.0, 0.0),
+    name: partial(work_day, pauses, answered, legs, name)
+    for name, pauses, answered, legs in (
+        ("day, each question answered", 1.0, 1.0, True),
+        (f"day, {100.0 * ANSWERED:.0f} % answered", 1.0, ANSWERED, True),
+        ("the same, movements half as often", 2.0, ANSWERED, True),
+        ("day, no question heard", 1.0, 0.0, True),
+        (f"foot alone, {100.0 * ANSWERED:.0f} % answered", 1.0, ANSWERED, False),
     )
 }
 

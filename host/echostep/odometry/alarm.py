@@ -22,6 +22,7 @@ from echostep.odometry.stillness import WINDOW_S, Window
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 WALKED_STEPS = 3  # of the foot: the wearer walks. By reason: a helper who turns a wearer over makes fewer
 OVER_S = 30.0  # an alarm that has ended is told as over for so long
+SWAY_S = 120.0  # so long after the last movement sway alone keeps the question back, by reason: longer than a foot is not moved by chance
 GAP_S = 2.0  # a longer time without samples is no time without motion
 MARGIN_S = WINDOW_S  # how late windows of the other sensor may come
 MOST_CHANGES = 1000  # that are kept
@@ -61,6 +62,7 @@ class WearerAlarm:
         self._number = 0
         self._seen_s = math.nan  # end of the newest window
         self._motion_s = math.nan  # end of the last one with motion; later after a tap
+        self._moved_s = math.nan  # the same, without sway
         self._steps: deque[float] = deque(maxlen=WALKED_STEPS)  # times of the last ones
         self._mayday_s = math.nan  # when the last mayday began
 
@@ -77,9 +79,11 @@ class WearerAlarm:
 
     def _pass(self, window: Window) -> None:
         if math.isnan(self._seen_s):
-            self._seen_s = self._motion_s = window.end_s
+            self._seen_s = self._motion_s = self._moved_s = window.end_s
         gap_s = window.end_s - self._seen_s
         if window.moved:
+            self._motion_s = self._moved_s = max(window.end_s, self._motion_s)
+        elif window.sways and window.end_s - self._moved_s <= SWAY_S:
             self._motion_s = max(window.end_s, self._motion_s)
         elif gap_s > GAP_S:
             self._motion_s += gap_s
@@ -93,7 +97,7 @@ class WearerAlarm:
 
     def answer(self, t_s: float, *, ends_help: bool) -> None:
         """The wearer has tapped. `ends_help`: the tap says that all is well; another one says only that the wearer is conscious."""
-        self._motion_s = self._time(t_s)
+        self._motion_s = self._moved_s = self._time(t_s)
         if self.alarm and (ends_help or self.alarm.reason is AlarmReason.STILL):
             self._end(self._time(t_s))
 

@@ -4,7 +4,7 @@
 In: samples of the foot's MTx and of the leg gyros, with their times. Out: windows, with or without motion. Owns the extremes of the unfinished ones.
 A window of half a second has motion when the range of a channel (largest less smallest sample) exceeds its limit: so a slow bias, gravity and the
 orientation in which a wearer lies do not matter, and the result does not depend on how samples are cut into portions. Pings are not used: they change
-when others walk by.
+when others walk by. A window below these limits may still show that a living wearer stands or crouches on the foot (`sway.py`).
 """
 
 from __future__ import annotations
@@ -15,42 +15,49 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.arrays import Bools, Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
+from echostep.odometry.sway import SHORT, SwayWindows
 
 WINDOW_S = 0.5
 # Limits by reason: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
 # public recordings: 0.04 rad/s, 0.16 m/s2). A foot that is lifted, turned or shifted exceeds them several times; breathing turns no shoe.
 FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
 LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range of 0.05 rad/s, breathing turns a belt by less than 0.03 rad/s
+# Sway counts when most windows of the last seconds have it: a twitch of a wearer who is unconscious is a window or two.
+SWAY_WINDOWS, LEAST_SWAYING = 10, 8
 MOST_WINDOWS = 100_000  # that wait to be read, half a day; beyond it the oldest are dropped
 
 
 class Window(NamedTuple):
-    """Half a second of one sensor that ends at `end_s`; `moved`: there was motion."""
+    """Half a second of one sensor that ends at `end_s`; `moved`: there was motion. `sways`: none, but sway for some time."""
 
     end_s: float
     moved: bool
+    sways: bool = False
 
 
 class MotionWindows:
     """Windows of one sensor: `add` takes samples and returns the windows that they complete."""
 
-    def __init__(self, limits: Floats) -> None:
-        """`limits` (c,): of the range of each channel."""
+    def __init__(self, limits: Floats, swaying: int = 0) -> None:
+        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros by which sway is judged."""
         self._limits = limits
         self._index = -1  # of the unfinished window
         self._low, self._high = np.full(len(limits), np.inf), np.full(len(limits), -np.inf)
+        self._sway = SwayWindows(swaying) if swaying else None
+        self._swayed: deque[bool] = deque(maxlen=SWAY_WINDOWS)
 
     def add(self, t_s: Floats, values: Floats) -> list[Window]:
         """Windows completed by samples `values` (n, c) at `t_s` (n,); samples of an earlier window are skipped."""
         index = np.floor(t_s / WINDOW_S).astype(np.int64)
         kept = index >= self._index
-        index, values = index[kept], values[kept]
+        t_s, index, values = t_s[kept], index[kept], values[kept]
         if not len(index):
             return []
         begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
         low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
+        sways = self._sways(t_s, index, values)
         index = index[begins]
         if index[0] == self._index:
             low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
@@ -59,16 +66,31 @@ class MotionWindows:
             low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
         self._index, self._low, self._high = int(index[-1]), low[-1], high[-1]
         moved: list[bool] = np.any((high - low)[:-1] > self._limits, axis=1).tolist()
-        ends_s = WINDOW_S * (index[:-1] + 1.0)
-        return [Window(*row) for row in zip(ends_s.tolist(), moved, strict=True)]
+        ends_s: list[float] = (WINDOW_S * (index[:-1] + 1.0)).tolist()
+        return [self._window(*row) for row in zip(ends_s, moved, sways[:-1].tolist(), strict=True)]
+
+    def _sways(self, t_s: Floats, index: Ints, values: Floats) -> Bools:
+        """Whether the windows sway that the samples touch, and before them the last one, when it is complete."""
+        if self._sway is None:
+            return np.zeros(len(np.unique(index)) + (0 <= self._index != index[0]), np.bool_)
+        before = self._sway.restart() if 0 <= self._index != index[0] else np.zeros(0, np.bool_)
+        part = np.clip(SHORT * (t_s / WINDOW_S - index), 0, SHORT - 1).astype(np.int64)
+        return np.r_[before, self._sway.add(index, part, values[:, : self._sway.channels])]
+
+    def _window(self, end_s: float, moved: bool, sways: bool) -> Window:
+        """A finished window: it counts as swaying when most of those before it did so too, up to a movement."""
+        self._swayed.append(sways and not moved)
+        return Window(end_s, moved, self._swayed[-1] and sum(self._swayed) >= LEAST_SWAYING)
 
 
 class Stillness:
     """Windows of foot and legs. A sensor counts from its first motion on: one that has never moved is not worn."""
 
     def __init__(self) -> None:
-        self._foot = MotionWindows(np.array([FOOT_RAD_S] * 3 + [FOOT_M_S2] * 3))
-        self._legs = MotionWindows(np.array([LEG_RAD_S] * 3))
+        self._foot = MotionWindows(np.array([FOOT_RAD_S] * 3 + [FOOT_M_S2] * 3), 3)
+        self._legs = MotionWindows(
+            np.array([LEG_RAD_S] * 3), 2
+        )  # sway of thigh and shank: a belt turns with each breath
         self._worn: set[MotionWindows] = set()
         self._windows: deque[Window] = deque(maxlen=MOST_WINDOWS)
 
