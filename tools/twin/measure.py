@@ -10,6 +10,7 @@ import argparse
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -199,7 +200,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0, help="simulated minutes")
     seconds = max(5, round(60 * parser.parse_args().minutes))
     passed = True
-    tables = {
+    tables: dict[str, Callable[[], list[tuple[str, str, str, bool]]]] = {
         "parts of the papers": lambda: figures(seconds, Kit.PAPERS),
         "parts of 2026, not built yet": lambda: figures(seconds, Kit.OF_2026),
         "the foot board of 2026, not built yet": lambda: foot_figures(seconds),
