@@ -299,6 +299,10 @@ def map_command(
         list[Path], typer.Argument(metavar="WALK...", help="Recorded walks (.mcap) through one building.")
     ],
     out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
+    plan: Annotated[
+        Path | None,
+        typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
+    ] = None,
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help="Draw plan and path there (PNG, SVG).")
     ] = None,
@@ -306,7 +310,7 @@ def map_command(
     """Draw the plan of a building from recorded walks."""
     from echostep.commands import mapping
 
-    mapping.map_recordings(recordings, out, picture)
+    mapping.map_recordings(recordings, plan, out, picture)
 
 
 @app.command()

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.arrays import Floats
 from echostep.commands.mapping import segments_of
 from echostep.errors import EchostepError
+from echostep.evaluate.anywhere.sites import plan_of
+from echostep.evaluate.anywhere.tours import clearance_m
 from echostep.evaluate.anywhere.walks import CORNER_M, SimulatedWalk, simulate
 from echostep.evaluate.noplan.joined import again, joined_row
 from echostep.evaluate.noplan.judgement import known_start, path_columns, true_path
@@ -22,6 +25,7 @@ from echostep.mapping.mapper import Mapped, solve_walk
 from echostep.mapping.placing import Place, find_place
 from echostep.path import MeasuredSegment
 from echostep.plan.model import NO_PLAN, load_plan
+from echostep.plan.writer import save_plan
 from echostep.recording.reading import open_recording
 from echostep.session.metadata import run_metadata
 from echostep.session.recording import start_recording
@@ -137,3 +141,38 @@ def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder
     assert load_plan(folder / "both.json").is_drawn
     twice = echostep("map", "a.mcap", "./a.mcap", "-o", "both.json", cwd=folder)
     assert (twice.returncode, "given twice" in twice.stderr) == (2, True)
+
+
+def test_an_old_plan_is_completed_and_corrected(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:
+    """A plan without two of its walls, and with one across the corridor that was never built: the two come back, the third is doubtful."""
+    built = walks[0].built
+    level = built.levels[0]
+    length = np.hypot(*(level.walls[:, 2:] - level.walls[:, :2]).T)
+    seen = np.array([_seen(wall, walks) for wall in level.walls])
+    lacking = np.argsort(-length * seen)[:2]
+    path = np.column_stack([walks[0].truth[:, 1], walks[0].truth[:, 2]])
+    x, y = path[len(path) // 2]
+    false = np.array([[x - 0.8, y, x + 0.8, y]])
+    old = replace(level, walls=np.concatenate([np.delete(level.walls, lacking, 0), false]), obstacles=())
+    save_plan(replace(built, levels=(old,)), folder / "old.json")
+    done = echostep("map", "a.mcap", "--plan", "old.json", "-o", "new.json", "--picture", "new.png", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "m doubtful" in done.stdout
+    new = load_plan(folder / "new.json").levels[0]
+    for wall in level.walls[lacking]:
+        middle = 0.5 * (wall[:2] + wall[2:])
+        assert clearance_m(*middle.tolist(), old.solid) > 0.5
+        assert clearance_m(*middle.tolist(), new.walls) < 0.2
+    assert clearance_m(x, y, new.walls) > 0.3
+    assert clearance_m(x, y, new.doubtful) < 0.1
+    assert np.hypot(*(new.doubtful[:, 2:] - new.doubtful[:, :2]).T).sum() < 4.0
+    corridor = np.array([[0.0, 0.0, 40.0, 0.0], [0.0, 2.0, 40.0, 2.0], [0.0, 0.0, 0.0, 2.0]])
+    save_plan(plan_of("corridor", corridor), folder / "corridor.json")
+    refused = echostep("map", "a.mcap", "--plan", "corridor.json", "-o", "other.json", cwd=folder)
+    assert (refused.returncode, "is it another building" in refused.stderr) == (2, True)
+
+
+def _seen(wall: Floats, walks: tuple[SimulatedWalk, ...]) -> bool:
+    """Whether the middle of a wall was passed within 1.5 m on the first walk."""
+    middle = 0.5 * (wall[:2] + wall[2:])
+    return bool((np.hypot(*(walks[0].truth[:, 1:3] - middle).T) < 1.5).any())

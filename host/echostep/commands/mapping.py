@@ -8,17 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.mapping.completion import complete
 from echostep.mapping.directions import LEAST_EVIDENCE
 from echostep.mapping.joining import Join, join_walks
+from echostep.mapping.known_plan import plan_as_walk
 from echostep.mapping.mapper import Mapped, drawn, solve_walk
 from echostep.mapping.picture import check_kind, draw_picture
 from echostep.mapping.plan import plan_of
 from echostep.path import MeasuredSegment
+from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import Recording, open_recording
@@ -29,32 +34,68 @@ from echostep.session.progress import bar, with_bar
 from echostep.session.replay import tracker_of
 from echostep.session.skipped import skipped
 
+PLAN_SD_M = 0.05  # of the walls of a plan that does not state it
 LEAST_WAY_M = 3.0  # of path that shows a wall
 WALK_START = "0,0,90"  # of the walk that is drawn: the recorded start moves the drawing afterwards
 
 
-def map_recordings(paths: Sequence[Path], out: Path, picture: Path | None) -> None:
-    """Draw the building of recorded walks; raises EchostepError when one is no walk, has no certain place on the others, or no wall was heard."""
+def map_recordings(paths: Sequence[Path], plan_path: Path | None, out: Path, picture: Path | None) -> None:
+    """Draw the building of recorded walks, or complete a plan of it; raises EchostepError.
+
+    When one is no walk, has no certain place on the others or on the plan, or no wall was heard.
+    """
     _check_files(paths, out, picture)
+    known = None if plan_path is None else open_limited(plan_path)
     recordings = [open_recording(path) for path in paths]
     walks = [(str(recording.path), _solved(recording)) for recording in recordings]
+    if known is None:
+        plan, walked_m, lines = _drawn(walks, _start_of(recordings[0]), paths[0].stem)
+    else:
+        plan, walked_m, lines = _completed(known, str(plan_path), walks)
+    save_plan(plan, out)
+    if picture is not None:
+        draw_picture(picture, plan, walked_m)
+    for line in [*lines, f"{out}: check and mend it with echostep plan edit {out}"]:
+        _say(line)
+
+
+Walks = Sequence[tuple[str, Mapped]]
+Result = tuple[Plan, tuple[Floats, ...], list[str]]
+
+
+def _drawn(walks: Walks, start: Pose, name: str) -> Result:
+    """The plan that the walks show, their paths on it, and what was found."""
     joins: tuple[Join, ...] = ()
     if len(walks) > 1:
         with bar(f"joining {len(walks)} walks") as show:
             mapped, joins = join_walks(walks, show)
     else:
         mapped = drawn(walks[0][1])
-    plan, walked_m = plan_of(mapped, _start_of(recordings[0]), paths[0].stem)
+    plan, walked_m = plan_of(mapped, start, name)
     if not plan.is_drawn:
         raise EchostepError(
-            f"{paths[0]}: no walls were heard beside the path: is a ranger covered, or was it walked outside?"
+            f"{walks[0][0]}: no walls were heard beside the path: is a ranger covered, or was it walked outside?"
         )
-    save_plan(plan, out)
-    if picture is not None:
-        draw_picture(picture, plan, walked_m)
-    for line in [*described(mapped, plan), *(_join_line(join) for join in joins)]:
-        _say(line)
-    _say(f"{out}: check and mend it with echostep plan edit {out}")
+    return plan, walked_m, [*described(mapped, plan), *(_join_line(join) for join in joins)]
+
+
+def _completed(known: Plan, name: str, walks: Walks) -> Result:
+    """The plan, completed and corrected on the level that the walks fit."""
+    refused: list[EchostepError] = []
+    for k, level in enumerate(known.levels):
+        try:
+            with bar(f"placing {len(walks)} walks on {level.name}") as show:
+                mapped, joins = join_walks(
+                    [(name, plan_as_walk(level, known.uncertainty_m or PLAN_SD_M)), *walks], show
+                )
+        except EchostepError as error:
+            refused.append(error)
+            continue
+        done = complete(level, mapped.graph, mapped.pings, mapped.drawing)
+        levels = tuple(done.level if i == k else other for i, other in enumerate(known.levels))
+        found = f"{name}, {level.name}: {done.new_m:.0f} m of wall added, {done.doubtful_m:.0f} m doubtful: echoes passed them"
+        return replace(known, levels=levels), mapped.drawing.paths_m, [found, *(_join_line(join) for join in joins)]
+    raise refused[0]
 
 
 def _solved(recording: Recording) -> Mapped:

@@ -96,8 +96,8 @@ class Graph:
         return 0.5 * (covariance + covariance.T)
 
     def paths(self) -> tuple[Floats, ...]:
-        """The path (k, 2) of each walk."""
-        return tuple(np.split(self.pose[:, :2], self.nodes.begins[1:]))
+        """The path (k, 2) of each walk; nodes before the first walk are those of a plan."""
+        return tuple(np.split(self.pose[:, :2], self.nodes.begins)[1:])
 
     def places(self) -> tuple[Floats, Floats]:
         """Centres (f, 2) and normals (f,) of all fragments, in the map."""

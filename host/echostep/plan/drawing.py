@@ -140,6 +140,7 @@ def _draw_level(axes: Any, plan: Plan, level_index: int, view: View, findings: S
     _draw_areas(axes, level, connectors)
     _lines(axes, level.walls, view, WALL, 0.9)
     _lines(axes, level.windows, view, WINDOW, 0.9)
+    _lines(axes, level.doubtful, view, OBSTACLE, 0.9)
     _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
     if plan.start is not None and plan.start.level == level_index:
         _draw_start(axes, plan.start)

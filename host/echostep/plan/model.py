@@ -54,7 +54,10 @@ class Door:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2)."""
+    """One level: `walls` (n, 4) and `windows` (k, 4) are x0, y0, x1, y1 in map metres; doors are gaps in them; obstacles are outlines (m, 2).
+
+    `doubtful` (d, 4): walls of an older plan that echoes passed; they block nothing.
+    """
 
     name: str
     height_m: float
@@ -63,6 +66,7 @@ class Level:
     doors: tuple[Door, ...] = ()
     windows: Floats = field(default_factory=_no_segments)
     obstacles: tuple[Floats, ...] = ()
+    doubtful: Floats = field(default_factory=_no_segments)
 
     @property
     def solid(self) -> Floats:
@@ -197,6 +201,7 @@ def _level(row: Any, where: str) -> Level:
         doors=tuple(_door(door, f"{where}.doors[{i}]") for i, door in enumerate(doors)),
         windows=segments(row.get("windows", []), f"{where}.windows"),
         obstacles=tuple(outline(corners, f"{where}.obstacles[{i}]") for i, corners in enumerate(obstacles)),
+        doubtful=segments(row.get("doubtful", []), f"{where}.doubtful"),
     )
 
 

@@ -90,6 +90,7 @@ def north_up(plan: Plan) -> Plan:
             level,
             walls=turn(level.walls),
             windows=turn(level.windows),
+            doubtful=turn(level.doubtful),
             obstacles=tuple(turn(corners) for corners in level.obstacles),
             doors=tuple(replace(door, line=_four(turn, door.line)) for door in level.doors),
             rooms=tuple(

@@ -43,6 +43,8 @@ def _level(level: Level) -> dict[str, Any]:
     tree: dict[str, Any] = {"name": level.name, "height_m": level.height_m, "walls": level.walls.tolist()}
     if len(level.windows):
         tree["windows"] = level.windows.tolist()
+    if len(level.doubtful):
+        tree["doubtful"] = level.doubtful.tolist()
     if level.doors:
         tree["doors"] = [_door(door) for door in level.doors]
     if level.obstacles:
