@@ -160,9 +160,9 @@ def test_an_old_plan_is_completed_and_corrected(walks: tuple[SimulatedWalk, ...]
     assert "m doubtful" in done.stdout
     new = load_plan(folder / "new.json").levels[0]
     for wall in level.walls[lacking]:
-        middle = 0.5 * (wall[:2] + wall[2:])
-        assert clearance_m(*middle.tolist(), old.solid) > 0.5
-        assert clearance_m(*middle.tolist(), new.walls) < 0.2
+        x_m, y_m = (0.5 * (wall[:2] + wall[2:])).tolist()
+        assert clearance_m(x_m, y_m, old.solid) > 0.5
+        assert clearance_m(x_m, y_m, new.walls) < 0.2
     assert clearance_m(x, y, new.walls) > 0.3
     assert clearance_m(x, y, new.doubtful) < 0.1
     assert np.hypot(*(new.doubtful[:, 2:] - new.doubtful[:, :2]).T).sum() < 4.0
