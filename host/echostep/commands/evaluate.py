@@ -139,6 +139,21 @@ def legs_command(
     run_study(study, StudyRequest(runs if folder is None else 1, seed, json, out, scheduler))
 
 
+@app.command()
+def gaits(
+    runs: Annotated[int, typer.Option("--runs", help="Courses in each manner.", min=1)] = 20,
+    seed: Seed = 1,
+    json: Json = None,
+    out: Out = Path("out/gaits"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Walking, hurrying, crawling, sidestepping, stairs and ladders, by the foot alone and by one leg alone (simulated)."""
+    from echostep.evaluate.gaits.study import STUDY
+    from echostep.evaluate.study import StudyRequest, run_study
+
+    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
+
+
 @app.command("floors")
 def floors_command(
     runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,

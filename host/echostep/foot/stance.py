@@ -29,6 +29,7 @@ CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a f
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
+GRAVITY_ALONE_M_S2 = 1.0  # of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4; by reason
 LASTING_S = 0.15  # no swing is calm for so long: the stance is accepted, the velocity is corrected
 OVERDUE_S = 2.0  # no swing lasts so long
 PART_S, PARTS = 0.1, 5  # gyro bias: a rest is averaged in parts of this duration, so many for an update
@@ -93,6 +94,13 @@ def mean_force(window: SampleWindow) -> Vector:
         slot = (newest - k) % RING
         x, y, z = x + window.accel[slot, 0], y + window.accel[slot, 1], z + window.accel[slot, 2]
     return x / n, y / n, z / n
+
+
+@lean_kernel
+def feels_gravity_alone(window: SampleWindow) -> bool:
+    """Whether the size of the mean specific force is that of gravity, whatever the level: `activity` hardly shows a smooth acceleration."""
+    force = mean_force(window)
+    return abs(math.sqrt(ins.dot(force, force)) - ins.GRAVITY_M_S2) < GRAVITY_ALONE_M_S2
 
 
 @lean_kernel

@@ -224,7 +224,7 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Sam
     dt, t_s, _, gyro = sample
     rate2, force2 = stance.activity(window, nav.gyro_bias)
     stillness = stance.stillness_statistic(rate2, force2)
-    s.lasting_s = s.lasting_s + dt if stillness < stance.CALM else 0.0
+    s.lasting_s = s.lasting_s + dt if stillness < stance.CALM and stance.feels_gravity_alone(window) else 0.0
     if stillness > 1.0:
         return False
     expected = stance.rolling_velocity(nav, gyro, s.height_m)

@@ -70,7 +70,13 @@ class LegCounts:
 
 
 def distance_sd_m(strides: Iterable[Stride]) -> float:
-    """Standard deviation (m) of the sum of lengths: scale errors add linearly, independent errors in squares."""
+    """Standard deviation (m) of the sum of lengths: independent errors add in squares, errors of the scale linearly.
+
+    So do those of strides whose length is unknown: strides sideways, backward or on the knees are alike.
+    """
     each = list(strides)
+    unknown = [bool(s.flags & (Flag.UNSEEN | Flag.BACKWARD)) for s in each]
     common = sum(s.length_m * s.scale_sd for s in each)
-    return math.sqrt(common**2 + sum(s.length_sd_m**2 for s in each))
+    blind = sum(s.length_sd_m for s, blind in zip(each, unknown, strict=True) if blind)
+    own = sum(s.length_sd_m**2 for s, blind in zip(each, unknown, strict=True) if not blind)
+    return math.sqrt(common**2 + blind**2 + own)

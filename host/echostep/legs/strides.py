@@ -9,8 +9,8 @@ A stride goes from mid swing to mid swing. Before the first and after the last m
 reported, too. A gyro does not measure the vertical (`level`). Its bias is its rate at rest, and the change of its angle over a stride, less
 what leaks into it from a turn (`gyro_bias`).
 
-Two gyros in the sagittal plane of one leg do not give the length of strides sideways, backward or in place: these are flagged, their length is 0,
-and their standard deviation covers the possible length.
+Two gyros in the sagittal plane of one leg do not give the length of strides sideways, backward or in place, or of crawling: these are flagged, their
+length is 0, and their standard deviation covers the possible length.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ from echostep.legs.walking_bout import Bout, pace_flag, stairs_flag
 
 # The source of a value without a citation is not recorded.
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
-UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0  # growth of the sd in a gap, and for how long it grows
+UNWATCHED_M_S, LONGEST_DOUBT_S = (
+    0.4,
+    600.0,
+)  # growth of the sd in a gap or without a swing, and for how long it grows in a gap
 FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; people run above [Alexander 1989]
 SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
@@ -171,6 +174,20 @@ class StrideEstimator:
         peaks = self._bout.peaks
         if peaks and k - peaks[-1] > leg_swings.LONGEST_CYCLE:
             self._end_bout(k, stands=True)
+        if not peaks and self._still_since is None:
+            self._pass_without_swing(k - leg_swings.STILL)
+
+    def _pass_without_swing(self, end: int) -> None:
+        """Report the time of a longest stride up to a grid index before which no rest can begin any more, if the thigh moved without a swing."""
+        begin, thigh = end - leg_swings.LONGEST_CYCLE, self._grid.thigh
+        if begin < self._bout.begin or (begin - self._bout.begin) % leg_swings.LONGEST_CYCLE != 0:
+            return
+        rates = self.swings.sign[0] * np.diff(thigh[begin : end + 1]) * GRID_HZ - self.bias[0].value
+        if float(np.abs(rates).mean()) < leg_swings.MOVING_RAD_S:
+            return
+        span_s = leg_swings.LONGEST_CYCLE / GRID_HZ
+        self._add_stride(self._grid.time(begin), self._grid.time(end), 0.0, UNWATCHED_M_S * span_s, 0.0, Flag.UNSEEN)
+        self._bout.begin = self._keep = end
 
     def _watch_rest(self, k: int) -> None:
         """Detect standing: it ends a bout, measures the gyros' biases and the level."""
