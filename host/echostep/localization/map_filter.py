@@ -14,7 +14,7 @@ from statistics import median
 
 import numpy as np
 
-from echostep.angles import mean_angle, wrap
+from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
@@ -37,7 +37,6 @@ SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports 
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
 HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
-BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
 COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
 SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
 COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
@@ -98,7 +97,7 @@ class MapFilter:
         self._building = building
         self._rng = rng
         self._model, self._blurred = _echo_models(self._settings)
-        self._pings = UsablePings(building.background(self._model), self._settings.echo)
+        self._pings = UsablePings(building.background(self._model), self._settings.echo.correlation_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
         prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
@@ -122,7 +121,7 @@ class MapFilter:
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = _echo_models(self._settings)
-            self._pings.hear_by(self._building.background(self._model), echo)
+            self._pings.hear_by(self._building.background(self._model), echo.correlation_m)
 
     @property
     def cloud(self) -> Cloud:
@@ -317,10 +316,7 @@ def _echo_models(s: FilterSettings) -> tuple[EchoModel, EchoModel]:
 
 
 def _move(segment: PathSegment) -> Move:
-    """The segment's way; when the wearer turns, the trunk goes round the foot that was measured."""
-    turn_rad = wrap(segment.heading1_rad - segment.heading0_rad)
-    sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(turn_rad)) * BESIDE_M)
-    return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd)
+    return Move(segment.dx_m, segment.dy_m, segment.sd_m, segment.turn_sd_rad, segment.scale_sd)
 
 
 def _height_change(measured: MeasuredSegment) -> HeightChange:

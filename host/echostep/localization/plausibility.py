@@ -4,7 +4,7 @@
 In: of each ping the log of its density under the cloud and without it (`background`). Out: a probability. Owns the log-odds.
 
 A hidden Markov model of two states, right and wrong [Rabiner 1989, forward algorithm]. If the cloud is right, echoes have the density that it
-foretells. If it is wrong, the wearer is anywhere: then a view goes on as it was, or changes to any in the building (`background`). So a cloud gains
+foretells. If it is wrong, the wearer is anywhere: then an echo is like the one before, or as anywhere in the building (`unplanned`). So a cloud gains
 nothing by foretelling that a corridor goes on, but by foretelling where it ends. On every metre a right cloud may become wrong (carried, a wall that
 is not on the plan, a door that is a wall): WRONG_PER_M.
 """
