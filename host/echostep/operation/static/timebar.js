@@ -3,21 +3,33 @@
 
 const $ = (id) => document.getElementById(id);
 const SKIP_S = 10;
+const ANSWER_MS = 2000, NEAR_S = 1;  // a place that was asked for is shown until the server is there, or for so long
 
 export class TimeBar {
   // `send(kind, fields)`: sends a request to the server
   constructor(send) {
-    Object.assign(this, { send, holding: false, last: null });
+    Object.assign(this, { send, holding: false, last: null, asked: null });
     $('play').onclick = () => send('play', { playing: !this.last?.playing });
     $('back').onclick = () => this.skip(-SKIP_S);
     $('on').onclick = () => this.skip(SKIP_S);
-    $('now').onclick = () => { send('now'); $('time').focus(); };
+    $('now').onclick = () => { this.asked = null; send('now'); $('time').focus(); };
     $('times').onchange = () => send('speed', { times: Number($('times').value) });
-    $('time').oninput = () => { this.holding = true; send('seek', { t_s: Number($('time').value) }); };
+    $('time').oninput = () => { this.holding = true; this.seek(Number($('time').value)); };
     $('time').onchange = () => { this.holding = false; };
   }
 
-  skip(by) { if (this.last) this.send('seek', { t_s: Math.min(Math.max(this.last.t_s + by, 0), this.last.end_s) }); }
+  skip(by) { if (this.last) this.seek(Math.min(Math.max(this.last.t_s + by, 0), this.last.end_s)); }
+
+  seek(t_s) {
+    this.asked = { t_s, until: performance.now() + ANSWER_MS };
+    this.send('seek', { t_s });
+  }
+
+  // Whether the server has not yet gone to the place that was asked for: keys pressed meanwhile go on from there.
+  isOnItsWay(t_s) {
+    if (this.asked && (Math.abs(t_s - this.asked.t_s) < NEAR_S || performance.now() > this.asked.until)) this.asked = null;
+    return this.asked !== null;
+  }
 
   get isPast() { return Boolean(this.last && !this.last.now); }
 
@@ -36,7 +48,7 @@ export class TimeBar {
     if (!time) return;
     const { t_s, end_s, playing, times, now, live, open_alarms } = time, bar = $('time');
     bar.max = end_s;
-    if (!this.holding) bar.value = t_s;
+    if (!this.holding && !this.isOnItsWay(t_s)) bar.value = t_s;
     const day = new Date(1000 * unix_s).toLocaleTimeString('en-GB'), behind = live ? `${minutes(end_s - t_s)} ago` : `${minutes(t_s)} of ${minutes(end_s)}`;
     const text = now ? `${day}, now` : `${day}, ${behind}`;
     put($('clock'), text);
