@@ -49,8 +49,7 @@ static float t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11; /* PAR_T1
 /* The first byte of a reply is a dummy. */
 static void read(uint8_t address, uint8_t *bytes, uint8_t length)
 {
-	spi_select(CHIP_PRESSURE, protocol);
-	(void)spi_exchange(READ_FLAG | address);
+	(void)spi_begin(CHIP_PRESSURE, protocol, READ_FLAG | address);
 	(void)spi_exchange(0);
 	for (uint8_t n = 0; n < length; n++)
 		bytes[n] = spi_exchange(0);
@@ -66,10 +65,7 @@ static uint8_t read8(uint8_t address)
 
 static void write8(uint8_t address, uint8_t value)
 {
-	spi_select(CHIP_PRESSURE, protocol);
-	(void)spi_exchange(address);
-	(void)spi_exchange(value);
-	spi_release();
+	spi_write(CHIP_PRESSURE, protocol, address, value);
 }
 
 /* An SCP1000 takes both reads for the same register, so that two different bytes are not from it. The write has no effect on it. */

@@ -52,9 +52,10 @@ enum spi_protocol {
 	SPI_SCP1000,   /* mode 0, 250 kHz */
 	SPI_MODE3,     /* 2 MHz: BMP390, LSM6DSO, ICM-20649 */
 };
-void spi_select(enum chip chip, enum spi_protocol protocol);
+uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first_byte); /* selects; the chip's byte while it gets the first one */
 uint8_t spi_exchange(uint8_t out);
 void spi_release(void);
+void spi_write(enum chip chip, enum spi_protocol protocol, uint8_t address, uint8_t value); /* a whole transfer of two bytes */
 bool spi_pressure_ready(void); /* level of the SCP1000's DRDY */
 
 /* Self-test inputs of the gyros; one pin drives the input of all three. */

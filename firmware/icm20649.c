@@ -28,22 +28,9 @@
 #define ACCEL_111_HZ_30_G 0x17u
 #define NO_REPLY (-1) /* MISO is pulled up: an absent chip reads as ones */
 
-static void begin(enum chip chip, uint8_t first_byte)
-{
-	spi_select(chip, SPI_MODE3);
-	(void)spi_exchange(first_byte);
-}
-
-static void write8(enum chip chip, uint8_t address, uint8_t value)
-{
-	begin(chip, address);
-	(void)spi_exchange(value);
-	spi_release();
-}
-
 static uint8_t read8(enum chip chip, uint8_t address)
 {
-	begin(chip, READ_FLAG | address);
+	(void)spi_begin(chip, SPI_MODE3, READ_FLAG | address);
 	uint8_t value = spi_exchange(0);
 	spi_release();
 	return value;
@@ -55,7 +42,7 @@ uint8_t icm20649_identity(enum chip chip)
 	uint8_t identity = read8(chip, REGISTER_WHO_AM_I);
 	if (identity != DIVIDER)
 		return identity;
-	write8(chip, REGISTER_BANK_SEL, BANK_0);
+	spi_write(chip, SPI_MODE3, REGISTER_BANK_SEL, BANK_0);
 	return read8(chip, REGISTER_WHO_AM_I);
 }
 
@@ -67,7 +54,7 @@ bool icm20649_answers(enum chip chip)
 
 void icm20649_reset(enum chip chip)
 {
-	write8(chip, REGISTER_PWR_MGMT_1, DEVICE_RESET);
+	spi_write(chip, SPI_MODE3, REGISTER_PWR_MGMT_1, DEVICE_RESET);
 }
 
 void icm20649_start(enum chip chip)
@@ -84,7 +71,7 @@ void icm20649_start(enum chip chip)
 		{ REGISTER_INT_ENABLE_1, RAW_DATA_READY },
 	};
 	for (uint8_t n = 0; n < sizeof settings / sizeof *settings; n++)
-		write8(chip, settings[n][0], settings[n][1]);
+		spi_write(chip, SPI_MODE3, settings[n][0], settings[n][1]);
 }
 
 static int16_t read_word(void)
@@ -96,7 +83,7 @@ static int16_t read_word(void)
 uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out)
 {
 	bool replies = false;
-	begin(chip, READ_FLAG | REGISTER_ACCEL_XOUT_H);
+	(void)spi_begin(chip, SPI_MODE3, READ_FLAG | REGISTER_ACCEL_XOUT_H);
 	for (uint8_t k = 0; k < ICM20649_AXES; k++) {
 		out->axes[k] = read_word();
 		replies = replies || (out->axes[k] != NO_REPLY && out->axes[k] != 0);

@@ -21,23 +21,10 @@
 #define SAMPLE_OFFSET 2u /* bytes of STATUS and of the reserved register */
 #define SAMPLE_WORDS (1u + LSM6DSO_AXES)
 
-static void begin(enum chip chip, uint8_t first_byte)
-{
-	spi_select(chip, SPI_MODE3);
-	(void)spi_exchange(first_byte);
-}
-
-static void write8(enum chip chip, uint8_t address, uint8_t value)
-{
-	begin(chip, address);
-	(void)spi_exchange(value);
-	spi_release();
-}
-
 /* An ADIS16100 that takes these 24 clocks for a frame returns another second byte than a zero, or the same byte twice. */
 bool lsm6dso_answers(enum chip chip)
 {
-	begin(chip, READ_FLAG | REGISTER_BEFORE_WHO_AM_I);
+	(void)spi_begin(chip, SPI_MODE3, READ_FLAG | REGISTER_BEFORE_WHO_AM_I);
 	uint8_t before = spi_exchange(0), identity = spi_exchange(0);
 	spi_release();
 	return before == 0 && identity == LSM6DSO_IDENTITY;
@@ -48,7 +35,7 @@ void lsm6dso_start(enum chip chip)
 	static const uint8_t settings[] = {
 		CTRL1_XL_1667_HZ_8_G, CTRL2_G_1667_HZ_1000_DPS, CTRL3_C_WHOLE_SAMPLES, CTRL4_C_SPI_ONLY_FILTER, 0, CTRL6_C_50_HZ,
 	};
-	begin(chip, REGISTER_CTRL1_XL); /* the addresses count up from the start: the default of IF_INC */
+	(void)spi_begin(chip, SPI_MODE3, REGISTER_CTRL1_XL); /* the addresses count up from the start: the default of IF_INC */
 	for (uint8_t n = 0; n < sizeof settings; n++)
 		(void)spi_exchange(settings[n]);
 	spi_release();
@@ -62,7 +49,7 @@ static int16_t read_word(void)
 
 uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)
 {
-	begin(chip, READ_FLAG | REGISTER_STATUS);
+	(void)spi_begin(chip, SPI_MODE3, READ_FLAG | REGISTER_STATUS);
 	uint8_t flags = spi_exchange(0), reserved = spi_exchange(0);
 	out->temperature = read_word();
 	for (uint8_t k = 0; k < LSM6DSO_AXES; k++)
@@ -75,5 +62,5 @@ uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)
 
 void lsm6dso_excite(enum chip chip, enum excitation excitation)
 {
-	write8(chip, REGISTER_CTRL5_C, excitation == EXCITE_ST1 ? CTRL5_C_NEGATIVE : excitation == EXCITE_ST2 ? CTRL5_C_POSITIVE : 0);
+	spi_write(chip, SPI_MODE3, REGISTER_CTRL5_C, excitation == EXCITE_ST1 ? CTRL5_C_NEGATIVE : excitation == EXCITE_ST2 ? CTRL5_C_POSITIVE : 0);
 }

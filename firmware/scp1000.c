@@ -39,8 +39,7 @@ static uint32_t deadline; /* of the start, or of the next sample */
 
 static uint8_t read8(uint8_t address)
 {
-	spi_select(CHIP_PRESSURE, SPI_SCP1000);
-	(void)spi_exchange((uint8_t)(address << 2));
+	(void)spi_begin(CHIP_PRESSURE, SPI_SCP1000, (uint8_t)(address << 2));
 	uint8_t value = spi_exchange(0);
 	spi_release();
 	return value;
@@ -48,8 +47,7 @@ static uint8_t read8(uint8_t address)
 
 static uint16_t read16(uint8_t address)
 {
-	spi_select(CHIP_PRESSURE, SPI_SCP1000);
-	(void)spi_exchange((uint8_t)(address << 2));
+	(void)spi_begin(CHIP_PRESSURE, SPI_SCP1000, (uint8_t)(address << 2));
 	uint8_t high = spi_exchange(0), low = spi_exchange(0);
 	spi_release();
 	return (uint16_t)((uint16_t)(high << 8) | low);
@@ -57,10 +55,7 @@ static uint16_t read16(uint8_t address)
 
 static void write8(uint8_t address, uint8_t value)
 {
-	spi_select(CHIP_PRESSURE, SPI_SCP1000);
-	(void)spi_exchange((uint8_t)((unsigned)address << 2 | WRITE_FLAG));
-	(void)spi_exchange(value);
-	spi_release();
+	spi_write(CHIP_PRESSURE, SPI_SCP1000, (uint8_t)((unsigned)address << 2 | WRITE_FLAG), value);
 }
 
 uint32_t scp1000_start(uint32_t now)

@@ -36,7 +36,7 @@ void spi_start(void)
 	DDRF |= ST1 | ST2; /* low */
 }
 
-void spi_select(enum chip chip, enum spi_protocol protocol)
+uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first_byte)
 {
 	SPCR = protocols[protocol].control;
 	SPSR = protocols[protocol].status;
@@ -44,6 +44,7 @@ void spi_select(enum chip chip, enum spi_protocol protocol)
 		PORTD &= (uint8_t)~PRESSURE_SELECT;
 	else
 		PORTB &= (uint8_t)~(uint8_t)(BIT(PB4) << chip);
+	return spi_exchange(first_byte);
 }
 
 uint8_t spi_exchange(uint8_t out)
@@ -58,6 +59,13 @@ void spi_release(void)
 {
 	PORTB |= GYRO_SELECTS;
 	PORTD |= PRESSURE_SELECT;
+}
+
+void spi_write(enum chip chip, enum spi_protocol protocol, uint8_t address, uint8_t value)
+{
+	(void)spi_begin(chip, protocol, address);
+	(void)spi_exchange(value);
+	spi_release();
 }
 
 bool spi_pressure_ready(void)
