@@ -65,7 +65,7 @@ def test_a_turn_and_a_stop_in_motion_capture(recordings: list[LegRecording]) -> 
         assert not any(s.flags & (Flag.STAIRS_UP | Flag.STAIRS_DOWN | Flag.BACKWARD | Flag.UNSEEN) for s in strides)
         last = [s for s in strides if Flag.STANDING not in s.flags][-1]
         assert last.length_m == pytest.approx(recording.walked_m(last.t_start_s, last.t_end_s), abs=0.2)
-        assert sum(s.length_m for s in strides) == pytest.approx(7.8, rel=0.12)
+        assert sum(s.length_m for s in strides) == pytest.approx(7.8, rel=0.05)
 
 
 @needs_data("legs_qmt")
@@ -75,12 +75,12 @@ def test_the_left_leg_that_was_lifted_before_the_walk(recordings: list[LegRecord
     assert left.walked_m(begin_s, end_s) == pytest.approx(73.0, abs=2.0)
     strides = [s for s in strides_of(left, StrideSettings()) if s.t_start_s > begin_s]
     assert not any(Flag.BACKWARD in s.flags for s in strides)
-    assert sum(s.length_m for s in strides) == pytest.approx(left.walked_m(begin_s, end_s), rel=0.06)
+    assert sum(s.length_m for s in strides) == pytest.approx(left.walked_m(begin_s, end_s), rel=0.05)
 
 
 @needs_data("legs_qmt")
 def test_a_scale_of_a_fast_walk_holds_in_a_slower_one(recordings: list[LegRecording]) -> None:
     after = [row for r in recordings for row in rows_of(r) if row["known"] == SCALE]
     assert len(after) == 2
-    assert np.mean([abs(row["error_percent"]) for row in after]) < 3.5
+    assert np.mean([abs(row["error_percent"]) for row in after]) < 3.0
     assert sum(row["stairs"] for row in after) == 0

@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
+from echostep.legs.angle_grid import AngleGrid
 from echostep.legs.edges import Swing, leaving_share
 from echostep.legs.gyro_bias import GyroBias
+from echostep.legs.leg_angles import LegAngles
+from echostep.legs.leg_side import HALF_PELVIS_M, about_trunk, leg_left_m
 from echostep.legs.level import Level
 from echostep.legs.mounting import walking_axis
 from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.legs.walking_bout import stairs_flag
 from echostep.offline.leg_csv import LegSamples
-from echostep.offline.leg_track import about_trunk, leg_left_m, track_default
+from echostep.offline.leg_track import track_default
 from echostep.simulation.people.walker import Person, Walk, Waypoint, walk
 from foot_walks import any_rotation
 
@@ -110,10 +113,40 @@ def test_motion_before_the_walk_does_not_fix_the_signs(walked: Walk) -> None:
 def test_the_side_of_the_leg_is_found_by_the_pelvis_and_counts_in_turns(walked: Walk) -> None:
     t_s, thigh, shank = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s))
     strides, heading = tuple(_strides(t_s, thigh, shank, None)), walked.heading_rad[::10]  # of the right leg
-    assert leg_left_m(strides, t_s, heading) == -leg_left_m(strides, t_s, -heading) == -0.09
+    assert leg_left_m(strides, t_s, heading) == -leg_left_m(strides, t_s, -heading)
+    assert -HALF_PELVIS_M <= leg_left_m(strides, t_s, heading) < -0.95 * HALF_PELVIS_M
     assert leg_left_m(strides, t_s, np.zeros_like(t_s)) == 0.0
     trunk = about_trunk(strides, t_s, heading)  # a turn to the left: the right leg is outside
     assert sum(s.length_m for s in strides) - sum(s.length_m for s in trunk) == pytest.approx(
         0.09 * math.pi / 2, abs=0.03
     )
     assert about_trunk(strides, t_s, np.zeros_like(t_s)) is strides
+
+
+def test_a_weak_twist_of_the_belt_decides_the_side_in_part(walked: Walk) -> None:
+    t_s, thigh, shank = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s))
+    strides, heading = tuple(_strides(t_s, thigh, shank, None)), walked.heading_rad[::10]
+    weak, clear = leg_left_m(strides, t_s, 0.1 * heading), leg_left_m(strides, t_s, heading)
+    assert clear < 0.9 * clear < weak < 0.1 * clear < 0.0
+    assert leg_left_m(strides[:3], t_s, heading) < 0.0  # few strides count, too
+
+
+def test_a_turn_by_a_leak_that_is_not_known_makes_the_level_uncertain() -> None:
+    """Half a turn with a sensor tilted by 17 degrees leaks 54 degrees into the pitch: the next strides must be able to mend that."""
+    assert _level_sd_deg(0.0, learnt=False) < 10.0
+    assert _level_sd_deg(math.pi, learnt=False) > 54.0
+    assert _level_sd_deg(math.pi, learnt=True) < 10.0
+
+
+def _level_sd_deg(turn_rad: float, *, learnt: bool) -> float:
+    """Standard deviation of a level known to 4 degrees after a second in which the trunk turns; `learnt`: the leak is known from turns before."""
+    grid = AngleGrid()
+    for k in range(101):
+        grid.add(0.01 * k, 0.3 * turn_rad, 0.3 * turn_rad, turn_rad)
+    angles = LegAngles(grid)
+    for bias in angles.bias if learnt else ():
+        for turn in (math.pi, 0.0) * 20:
+            bias.learn(0.3 * turn, math.radians(1.0), turn)
+    angles.level = Level(variance=math.radians(4.0) ** 2)
+    angles.move_level((1.0, 1.0), len(grid) - 1)
+    return math.degrees(math.sqrt(angles.level.variance))

@@ -44,6 +44,11 @@ class AngleGrid:
     def __len__(self) -> int:
         return len(self.thigh)
 
+    @property
+    def columns(self) -> tuple[list[float], list[float], list[float]]:
+        """Angles of thigh, shank and trunk."""
+        return self.thigh, self.shank, self.yaw
+
     def time(self, k: int) -> float:
         """Time (s) of a grid index."""
         return self._origin_s + k / GRID_HZ

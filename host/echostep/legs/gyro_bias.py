@@ -43,6 +43,10 @@ class GyroBias:
         limit = math.sqrt(self.variance * self.leak_variance)
         self.covariance = min(max(self.covariance, -limit), limit)
 
+    def drift_variance(self, span_s: float, turn_rad: float) -> float:
+        """Variance (rad2) of the angle integrated over a time, in which the trunk has turned, by what is not known of bias and leak."""
+        return self.variance * span_s**2 + 2.0 * self.covariance * span_s * turn_rad + self.leak_variance * turn_rad**2
+
     def flip(self) -> None:
         """The same gyro with the other sign."""
         self.value, self.leak = -self.value, -self.leak

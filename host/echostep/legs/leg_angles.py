@@ -21,10 +21,19 @@ from echostep.legs.swing_detection import GRID_HZ, heel_strike_index
 from echostep.legs.walking_bout import climbs
 
 Signs = tuple[float, float]
-CLOSURE_SD_RAD = math.radians(2.5)  # of the change of an angle over a stride; by reason
+# Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one; by reason.
+CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
 # Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)
 UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`
+
+
+class StrideMean:
+    """Mean angles (thigh, shank, yaw) of a stride between two grid indices; `first`: of a walk."""
+
+    def __init__(self, begin: int, end: int, grid: AngleGrid, *, first: bool) -> None:
+        self.begin, self.end, self.first = begin, end, first
+        self.angles = tuple(math.fsum(column[begin:end]) / (end - begin) for column in grid.columns)
 
 
 class LegAngles:
@@ -35,6 +44,7 @@ class LegAngles:
         self.level = Level()
         self._rested = Level()  # when the standing under way began
         self._grid = grid
+        self._mean: StrideMean | None = None  # of the stride before
 
     def between(self, signs: Signs, begin: int, end: int) -> tuple[Floats, Floats]:
         """Angles (n,) of thigh and shank at grid indices begin..end, from the level with the present biases.
@@ -52,10 +62,19 @@ class LegAngles:
             found.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
         return found[0], found[1]
 
-    def begin_rest(self, signs: Signs, first: int, k: int) -> None:
-        """The leg has stood from grid index `first` to `k`."""
-        thigh, shank = self.between(signs, first, k)
-        self._rested = Level(float(thigh[-1]), float(shank[-1]), k, self.level.moved(0.0, 0.0, k).variance)
+    def move_level(self, signs: Signs, k: int) -> None:
+        """Take the level to grid index k by integration; it is known the less, the longer the way and the wider the turn to there."""
+        if k == self.level.index:
+            return
+        thigh, shank = self.between(signs, k, k)
+        span_s, turn = (k - self.level.index) / GRID_HZ, self._grid.yaw[k] - self._grid.yaw[self.level.index]
+        drift = max(bias.drift_variance(span_s, turn) for bias in self.bias)
+        self.level = self.level.moved(float(thigh[0]), float(shank[0]), k, drift)
+
+    def begin_rest(self, signs: Signs, k: int) -> None:
+        """The leg has come to stand at grid index k."""
+        self.move_level(signs, k)
+        self._rested = self.level
 
     def learn_rest(self, signs: Signs, rates: Floats, rested_s: float, k: int) -> None:
         """Update gyros' errors and level by the mean rates (2,) of a leg that has stood for `rested_s` until grid index k."""
@@ -64,19 +83,31 @@ class LegAngles:
         rested = self._rested.standing(rested_s)
         self.level = Level(rested.thigh, rested.shank, k, rested.variance)
 
-    def learn_closure(self, signs: Signs, begin: int, end: int) -> None:
-        """Update the gyros' errors by the change of the angles over a stride, which is 0 but for bias and leak."""
-        span_s, grid = (end - begin) / GRID_HZ, self._grid
-        turned = (grid.yaw[end] - grid.yaw[begin]) / span_s
-        for bias, sign, angle in zip(self.bias, signs, (grid.thigh, grid.shank), strict=True):
-            bias.learn(sign * (angle[end] - angle[begin]) / span_s, CLOSURE_SD_RAD / span_s, turned)
+    def learn_closure(self, signs: Signs, begin: int, end: int, *, first: bool) -> None:
+        """Update the gyros' errors by a stride: its mean angles are those of the stride before, but for bias and leak.
+
+        Mid swing is the moment of the fastest turn, so that angles there scatter with its time; means do not. The first stride of a walk (`first`),
+        and one after a gap, has none before it: its angles at both ends are compared.
+        """
+        before, self._mean = self._mean, StrideMean(begin, end, self._grid, first=first)
+        if before is None or before.end != begin:
+            span_s, sd = (end - begin) / GRID_HZ, FIRST_CLOSURE_SD_RAD
+            thigh, shank, yaw = ((c[end] - c[begin]) / span_s for c in self._grid.columns)
+        else:
+            span_s = 0.5 * (end - before.begin) / GRID_HZ
+            sd = FIRST_CLOSURE_SD_RAD if before.first else CLOSURE_SD_RAD
+            thigh, shank, yaw = (
+                (new - old) / span_s for new, old in zip(self._mean.angles, before.angles, strict=True)
+            )
+        for bias, sign, rate in zip(self.bias, signs, (thigh, shank), strict=True):
+            bias.learn(sign * rate, sd / span_s, yaw)
 
     def correct_level(self, signs: Signs, begin: int, end: int) -> None:
         """Correct the level by the mean angles of a stride; a shorter one is nearer to standing, and on stairs they are others."""
         thigh, shank = self.between(signs, begin, end)
         strike = heel_strike_index(shank)
         phase = (np.arange(strike, len(shank)) - strike) / (len(shank) - 1)
-        self.level = Level(float(thigh[0]), float(shank[0]), begin, self.level.variance)
+        self.move_level(signs, begin)
         if climbs(*knees(phase, thigh[strike:], shank[strike:])):
             return
         share = min(float(np.ptp(shank)) / UPRIGHT_RANGE_RAD, 1.0)
@@ -87,9 +118,13 @@ class LegAngles:
     def forget_level(self, k: int = 0) -> None:
         """Nothing is known of the level from grid index k on."""
         self.level = Level(index=k)
+        self._mean = None
 
     def drop(self, k: int) -> None:
         """Forget the first k grid points."""
+        if self._mean is not None:
+            self._mean.begin -= k
+            self._mean.end -= k
         self.level, self._rested = (replace(level, index=level.index - k) for level in (self.level, self._rested))
 
 

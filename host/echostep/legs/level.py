@@ -17,7 +17,7 @@ BRIEF_SD_RAD, BRIEF_S = math.radians(12.0), 1.0  # of a shorter rest: it may be 
 MEAN_SD_RAD = math.radians(
     8.0
 )  # of people's mean angles [offsets of sagittal angles: Kadaba 1990], which all strides share
-STRIDE_SD_RAD = math.radians(1.5)  # growth in a stride: bias, soft tissue
+STRIDE_SD_RAD = math.radians(1.5)  # growth in a stride: soft tissue
 UNKNOWN_SD_RAD = math.radians(20.0)  # before anything is known
 
 
@@ -30,9 +30,9 @@ class Level:
     index: int = 0
     variance: float = UNKNOWN_SD_RAD**2
 
-    def moved(self, thigh: float, shank: float, index: int) -> Level:
-        """The level at a later index, where integration finds these angles."""
-        return Level(thigh, shank, index, self.variance + STRIDE_SD_RAD**2)
+    def moved(self, thigh: float, shank: float, index: int, drift: float) -> Level:
+        """The level at a later index, where integration finds these angles; `drift`: variance (rad2) of what the gyros' errors have added."""
+        return Level(thigh, shank, index, self.variance + STRIDE_SD_RAD**2 + drift)
 
     def corrected(self, off: tuple[float, float], sd: float) -> Level:
         """Kalman update by the differences `off` (thigh, shank) of the usual angles from those found, with this sd."""

@@ -168,9 +168,12 @@ class StrideEstimator:
         peak, peak_index = self._peak
         if peak > 0.0 and rate < SWING_END * peak:
             self._peak = (0.0, 0)
-            if not self._bout.peaks or peak_index - self._bout.peaks[-1] >= leg_swings.SHORTEST_CYCLE:
+            first = max(peak_index - leg_swings.HALF_SWING, 0)
+            rates = self.swings.sign[1] * np.diff(self._grid.shank[first : k + 1]) * GRID_HZ - self.bias[1].value
+            middle = first + leg_swings.mid_swing_index(rates, peak_index - first)
+            if not self._bout.peaks or middle - self._bout.peaks[-1] >= leg_swings.SHORTEST_CYCLE:
                 self.swings.add_peak(peak)
-                self._add_swing(peak_index)
+                self._add_swing(middle)
         peaks = self._bout.peaks
         if peaks and k - peaks[-1] > leg_swings.LONGEST_CYCLE:
             self._end_bout(k, stands=True)
@@ -206,7 +209,7 @@ class StrideEstimator:
             if first > self._bout.begin and self._bout.peaks:
                 self._end_bout(first, stands=True)
             self._still_since = first
-            self._angles.begin_rest(self.swings.sign, first, k)
+            self._angles.begin_rest(self.swings.sign, k)
         self._angles.learn_rest(self.swings.sign, rates.mean(axis=0), (k - self._still_since) / GRID_HZ, k)
         self._bout = Bout(k, stood=True, pace_m_s=0.0)
 
@@ -227,8 +230,7 @@ class StrideEstimator:
             return
         previous = bout.peaks[-2]
         bout.cycle = k - previous
-        if len(bout.peaks) > 2 or not bout.stood:
-            self._angles.learn_closure(self.swings.sign, previous, k)
+        self._angles.learn_closure(self.swings.sign, previous, k, first=len(bout.peaks) == 2)
         self._angles.correct_level(self.swings.sign, previous, k)
         thigh, shank = self._angles.between(self.swings.sign, previous, k)
         length, rise, flags, sd = self._stride(thigh, shank)
@@ -239,7 +241,7 @@ class StrideEstimator:
             self._add_edge(bout.begin, previous, edge)
             length = max(length - less, 0.0)
         self._add_stride(self._grid.time(previous), self._grid.time(k), length, sd, rise, flags)
-        self._angles.level = self._angles.level.moved(float(thigh[-1]), float(shank[-1]), k)
+        self._angles.move_level(self.swings.sign, k)
         self._keep = previous if self._confirmed else bout.peaks[max(-CONFIRMING - 1, -len(bout.peaks))]
         self._confirm_signs(k)
 

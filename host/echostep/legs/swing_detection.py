@@ -34,6 +34,8 @@ LEAD_WEIGHT = 0.25  # of the thigh's lead in the score of the relative sign
 BACKWARD_LEAD = -0.1  # lead of the thigh below which the walk goes backward
 LAGS = range(5, 26, 5)  # of the shank behind the thigh
 TREND_S = 1.2  # running mean subtracted from the angles
+HALF_SWING = int(0.3 * GRID_HZ)  # longest before the peak of a swing; by reason: a swing takes 0.4 s
+TOP_SHARE = 0.5  # of the peak: above it the rate belongs to the top of a swing; by reason
 FOREMOST_SHARE = 0.2  # the shank is near its foremost angle within this share of its turn since mid swing
 STOPPED_SHARE = 0.05  # rate of a shank that has stopped, over the rate at mid swing
 LATEST_STRIKE_S = 0.45  # after mid swing
@@ -126,6 +128,21 @@ def is_still(rates: Floats) -> bool:
     """Whether a leg stands during these rates (n, 2)."""
     calm = bool((np.ptp(rates, axis=0) < STILL_RANGE_RAD_S).all())
     return calm and bool((np.abs(rates.mean(axis=0)) < STILL_MEAN_RAD_S).all())
+
+
+def mid_swing_index(shank: Floats, peak: int) -> int:
+    """Index of mid swing in the shank's rates (n,) about a peak: the centroid of the rate above TOP_SHARE of the peak's.
+
+    The peak itself jumps: a swing often has two tops, 0.06 s apart, and either can be the higher one.
+    """
+    rate = smooth(shank)
+    above = rate - TOP_SHARE * rate[min(peak, len(rate) - 1)]
+    low = np.flatnonzero(above <= 0.0)
+    before, after = low[low < peak], low[low > peak]
+    begin = int(before[-1]) + 1 if len(before) else 0
+    weight = np.clip(above[begin : int(after[0]) if len(after) else None], 0.0, None)
+    total = float(weight.sum())
+    return begin + round(float((weight * np.arange(len(weight))).sum()) / total) if total > 0.0 else peak
 
 
 def heel_strike_index(shank: Floats) -> int:

@@ -17,8 +17,8 @@ from typing import TextIO, TypeVar
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.csv_lines import CsvLimits
 from echostep.errors import EchostepError
+from echostep.offline.csv_lines import CsvLimits
 
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number; by reason: nanoseconds since 1970 have 19 digits

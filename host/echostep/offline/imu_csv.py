@@ -17,9 +17,9 @@ from typing import TextIO
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.csv_lines import CsvLimits, header_of, lines_of
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
+from echostep.offline.csv_lines import CsvLimits, header_of, lines_of
 from echostep.offline.csv_table import number_of, open_samples, read_rows
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 

@@ -15,9 +15,9 @@ from typing import TextIO
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.csv_lines import LONGEST_LINE, CsvLimits, header_of, lines_of
 from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.mounting import walking_axis
+from echostep.offline.csv_lines import LONGEST_LINE, CsvLimits, header_of, lines_of
 from echostep.offline.csv_table import open_samples, rate_complaint, read_rows
 from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ, missing_share, sorted_by_time
 

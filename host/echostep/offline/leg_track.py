@@ -15,6 +15,7 @@ from echostep.arrays import Bools, Floats
 from echostep.legs import swing_detection as leg_swings
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.heading import Heading
+from echostep.legs.leg_side import about_trunk
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples
@@ -25,18 +26,6 @@ START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read fr
 TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning: 28 degrees in 1.1 s
 SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged: strides take about 1 s
 STANDING_MARGIN_S = 0.2  # left out at either end of standing: a leg may move there
-HALF_PELVIS_M = 0.09  # of a leg from the middle of the trunk, as in `WearerSettings`
-LANDS, TWIST_POINTS = (
-    0.18,
-    50,
-)  # phase of the strike after mid swing: half of the swing, which is 38 % of a stride [Perry 1992]
-LEAST_STRIDE_M = 0.5  # of a stride whose pelvis turns visibly
-STRAIGHT_RAD = math.radians(15.0)  # largest turn of a stride that shows it: a turn hides the twist
-FEWEST_TWISTS, LEAST_TWIST_RAD, CLEAR_TWIST = (
-    4,
-    math.radians(1.0),
-    4.0,
-)  # strides, mean, and mean over its own sd, that show the side
 # Least turning that shows the sign of the belt's gyro: far above the compass's errors (8 degrees).
 SIGN_TURN_RAD = math.radians(30.0)
 FEWEST_READINGS = 20  # of the compass that show it: single outliers do not decide
@@ -140,37 +129,6 @@ def with_turns(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tup
         turns = span > SHORTEST_TURN_S and abs(h1 - h0) / span > TURNING_RAD_S
         flagged.append(replace(stride, flags=stride.flags | Flag.TURNING) if turns else stride)
     return tuple(flagged)
-
-
-def about_trunk(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> tuple[Stride, ...]:
-    """The strides of the trunk instead of those of this leg's hip, which goes farther on the outside of a turn and less far inside."""
-    left_m = leg_left_m(strides, t_s, heading)
-    if left_m == 0.0:
-        return strides
-    moved = []
-    for stride in strides:
-        h0, h1 = np.interp([stride.t_start_s, stride.t_end_s], t_s, heading)
-        length = max(stride.length_m + left_m * float(h1 - h0), 0.0) if stride.length_m > 0.0 else 0.0
-        moved.append(replace(stride, length_m=length))
-    return tuple(moved)
-
-
-def leg_left_m(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> float:
-    """How far to the left of the trunk this leg is: the pelvis turns forward with the leg that lands [Perry 1992]; 0 where this is not clear.
-
-    A stride begins at mid swing, so the pelvis is turned to the left about at LANDS of it when the leg is the right one.
-    """
-    phase = np.linspace(0.0, 1.0, TWIST_POINTS)
-    wave, twists = np.cos(2.0 * np.pi * (phase - LANDS)), []
-    for stride in (s for s in strides if s.length_m > LEAST_STRIDE_M and not s.flags & (Flag.EDGE | Flag.GAP)):
-        angle = np.interp(stride.t_start_s + phase * (stride.t_end_s - stride.t_start_s), t_s, heading)
-        if abs(angle[-1] - angle[0]) < STRAIGHT_RAD:
-            twist = angle - np.linspace(angle[0], angle[-1], len(angle))
-            twists.append(2.0 * float((twist * (wave - wave.mean())).mean()))
-    if len(twists) < FEWEST_TWISTS:
-        return 0.0
-    mean, sd = float(np.median(twists)), float(np.std(twists)) / math.sqrt(len(twists))
-    return 0.0 if abs(mean) < max(LEAST_TWIST_RAD, CLEAR_TWIST * sd) else -math.copysign(HALF_PELVIS_M, mean)
 
 
 def standing(strides: tuple[Stride, ...], t_s: Floats) -> Bools:

@@ -19,8 +19,8 @@ import numpy as np
 from echostep.arrays import Bools, Floats, Ints
 from echostep.barometer.altitude import COLDEST_C, HIGHEST_PA, LOWEST_PA, WARMEST_C, Pressures
 from echostep.barometer.floor_filter import Floors
-from echostep.csv_lines import CsvLimits, header_of, lines_of
 from echostep.errors import EchostepError
+from echostep.offline.csv_lines import CsvLimits, header_of, lines_of
 from echostep.offline.csv_table import MOST_BAD, open_samples, rate_complaint, read_rows
 
 COLUMNS = ("t_s", "pressure_pa")
