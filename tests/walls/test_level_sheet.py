@@ -147,10 +147,15 @@ def naive_climb(
     connector = next((c for c in holds if c), None)
     gain = 0.0
     if connector is not None:
+        ends = [plan.levels[k].height_m for k in connector.levels]
+        low, high = min(ends) - s.landing_sd_m, max(ends) + s.landing_sd_m
         if connector.kind != "lift":
             z += rise.felt_m
+            beyond = z - float(np.clip(z, low, high))
+            gain -= min(0.5 * beyond**2 / (s.flat_sd_m**2 + rise.felt_sd_m**2), s.unlikely)
+            z -= beyond
         elif math.isfinite(rise.height_sd_m):
-            z = rise.height_m - lag
+            z = float(np.clip(rise.height_m - lag, low, high))
         level = min(connector.levels, key=lambda k: abs(plan.levels[k].height_m - z))
     else:
         gain -= min(0.5 * rise.felt_m**2 / (s.flat_sd_m**2 + rise.felt_sd_m**2), s.unlikely)

@@ -4,9 +4,10 @@
 In: particles after a move, and the `HeightChange` over it. Out: heights, log-weights, and levels (the level shows in x on the sheet). Owns nothing.
 
 On a level a particle has the height of that level, and a rise of the foot is unlikely. Only in a connector the height changes: on stairs and ramps
-by the foot's rise, or by pressure without a foot; in a lift by pressure. A particle that leaves a connector must have the height of the level it
-enters. Weather slowly shifts the height by pressure, so each particle estimates this offset, `lag`: a Kalman filter of one state, whose variance is
-the same for all particles [Schoen et al. 2005, the linear part of a marginalised particle filter].
+by the foot's rise, or by pressure without a foot; in a lift by pressure. It ends at the lowest and the highest level that the connector serves: a
+rise beyond is as unlikely as one on a level. A particle that leaves a connector must have the height of the level it enters. Weather slowly shifts
+the height by pressure, so each particle estimates this offset, `lag`: a Kalman filter of one state, whose variance is the same for all particles
+[Schoen et al. 2005, the linear part of a marginalised particle filter].
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.jit import kernel
 from echostep.localization.particle_kernels import Move, ParticleArrays
-from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, level_on_sheet, nearest_level
+from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, end_of_connector, level_on_sheet, nearest_level
 
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
@@ -103,8 +104,11 @@ def change_levels(
         if connector >= 0:
             if sheet.kind[connector] != LIFT and has_foot:
                 z[i] += change.felt_m + change.felt_sd_m * noise[i]
+                beyond = z[i] - end_of_connector(z[i], connector, model.landing_sd_m, sheet)
+                log_weight[i] -= min(0.5 * (beyond / flat_sd) ** 2, model.unlikely)
+                z[i] -= beyond
             elif knows_lag:
-                z[i] = change.height_m - lag[i]
+                z[i] = end_of_connector(change.height_m - lag[i], connector, model.landing_sd_m, sheet)
             new_level = nearest_level(z[i], connector, sheet)
             x[i] += (new_level - level) * sheet.pitch_m
             level = new_level

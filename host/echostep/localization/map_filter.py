@@ -24,6 +24,8 @@ from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_
 from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.level_changes import ClimbSettings, HeightChange
+from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
+from echostep.localization.meetings import CONTRADICTIONS, MeetingEffect, MeetingMemory, moved_probability
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, CloudSettings, Evidence
 from echostep.localization.plausibility import STATED, Plausibility
@@ -32,6 +34,7 @@ from echostep.localization.start import Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
+from echostep.ports.meeting import Meeting
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, by reason
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
@@ -47,11 +50,12 @@ AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce, by re
 DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
 BELIEVED = 0.99  # of the tracked one, above which the plan supports it
-GATHERED = 0.3  # of a search's that has just gathered: what it found by the table has yet to foretell echoes
+GATHERED = 0.7  # of one that has just gathered anywhere, if the plan fits: it has yet to foretell echoes
 FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
 REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
 WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
-FOUND_WITHIN_M = 40.0  # path after which a search that has found nothing begins anew
+FOUND_WITHIN_M = 40.0  # path after which a search of one level that has found nothing begins anew
+LEVEL_M = 20.0  # the same for each level more: storeys are often alike but for their doors
 PLAN_FITS = 0.99  # prior and greatest probability that the plan is that of the building
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 FAILS = 0.05  # probability that a search fails although the plan fits, over that if it does not: unknown starts are found within 40 m
@@ -100,14 +104,15 @@ class MapFilter:
         self._pings = UsablePings(building.background(self._model), self._settings.echo.correlation_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
-        prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
+        self._plan = Plausibility(PLAN_FITS)
+        prior = (STATED if stated else self._gathered) if building.has_walls else BY_DEFINITION
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
-        self._plan = Plausibility(PLAN_FITS)
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
+        self._met = MeetingMemory()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
 
@@ -146,6 +151,42 @@ class MapFilter:
             right = self._right()
         return self._estimate(segment, right)
 
+    def meet(self, meeting: Meeting) -> MeetingEffect:
+        """Weigh the clouds by where a teammate is who stands beside the wearer, and decide which of them is tracked.
+
+        Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
+        one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing.
+        """
+        area_m2 = self._building.floor.area_m2
+        refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
+        if refusal is not None:
+            return refusal
+        fits = [weigh(each.cloud, meeting, area_m2) for each in self._clouds()]
+        plausibility, wrong = self.tracked.plausibility, WRONG[meeting.status]
+        if fits[0] >= FITS:
+            plausibility.raise_to(min(fits[0], 1.0 - wrong))
+            self._met.agree()
+            return MeetingEffect.USED
+        count = self._met.contradict(self._pings.path_m)
+        moved = moved_probability(plausibility.probability, meeting, count)
+        is_alone = count < CONTRADICTIONS and plausibility.probability >= DOUBTED
+        if meeting.range_m is not None or is_alone or moved < FITS:
+            return MeetingEffect.CONTRADICTS
+        self._met.agree()
+        self._track_from(meeting, moved, search_fits=fits[-1] >= FITS)
+        return MeetingEffect.MOVED
+
+    def _track_from(self, meeting: Meeting, right: float, *, search_fits: bool) -> None:
+        """Track the search from now on if it agrees with a meeting, otherwise a new cloud about the teammate, with any heading."""
+        if self.search is not None and search_fits:
+            self.tracked = self.search
+            self.tracked.plausibility = Plausibility(right)
+        else:
+            at = start_at(meeting)
+            start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
+            self.tracked = Hypothetical(self._new_cloud(start, 0.0), Plausibility(right), is_stated=True)
+        self.search, self._is_elsewhere = None, False
+
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
         for each in self._clouds():
@@ -154,6 +195,17 @@ class MapFilter:
     def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
         s, b = self._settings, self._building
         return Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
+
+    @property
+    def _found_within_m(self) -> float:
+        """Path within which a search finds."""
+        sheet = self._building.sheet
+        return FOUND_WITHIN_M + (0.0 if sheet is None else LEVEL_M * (len(sheet.height_m) - 1))
+
+    @property
+    def _gathered(self) -> float:
+        """Probability that a cloud from anywhere is right when it has just gathered: on a wrong plan none is."""
+        return GATHERED * self._plan.probability
 
     @property
     def _plan_supports(self) -> bool:
@@ -221,7 +273,7 @@ class MapFilter:
         rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
         each.plausibility.update(evidence.log_pings - rival, evidence.log_path, path_m)
         if not judged:
-            each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))
+            each.plausibility.limit(min(most, self._gathered) if cloud.rescues else max(most, self._gathered))
 
     def _clouds(self) -> list[Hypothetical]:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
@@ -244,7 +296,7 @@ class MapFilter:
         `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
         """
         tracked, search = self.tracked, self.search
-        if tracked.cloud.is_coarse and self._pings.path_m - self._search_m > FOUND_WITHIN_M:
+        if tracked.cloud.is_coarse and self._pings.path_m - self._search_m > self._found_within_m:
             self._plan.add(math.log(FAILS))
             self.tracked = self._new_search(Start(), walk_heading_rad)
         elif search is None:
@@ -273,7 +325,7 @@ class MapFilter:
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m = self._pings.path_m
-        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
+        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(self._gathered))
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
@@ -287,7 +339,7 @@ class MapFilter:
         """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing for long."""
         if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
             return True
-        return self._pings.path_m - self._search_m > FOUND_WITHIN_M
+        return self._pings.path_m - self._search_m > self._found_within_m
 
     def _estimate(self, segment: PathSegment, right: Right) -> Estimate:
         """The estimate at the end of a segment."""

@@ -280,6 +280,12 @@ class Cloud:
         if self.sheet and change and math.isfinite(change.height_sd_m):
             set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
 
+    def reweight(self, log_factor: Floats) -> None:
+        """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight."""
+        self.log_weight = self.log_weight + log_factor
+        self.log_weight -= self.log_weight.max()
+        self.resample_if_needed()
+
     def set_minimum_size(self, factor: float) -> None:
         """From the next resampling on, keep at least `factor` times the usual number of particles."""
         self._minimum_size = int(factor * self._settings.size)

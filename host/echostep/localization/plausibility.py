@@ -58,6 +58,10 @@ class Plausibility:
         """Let the probability be at most `most`."""
         self.log_odds = min(self.log_odds, log_odds(most))
 
+    def raise_to(self, least: float) -> None:
+        """Let the probability be at least `least`."""
+        self.log_odds = max(self.log_odds, log_odds(least))
+
     def doubt(self, share: float) -> None:
         """Move this share of the probability of right to wrong."""
         self._forget(share)

@@ -115,6 +115,16 @@ def nearest_level(z: float, c: int, s: LevelSheet) -> int:
 
 
 @kernel
+def end_of_connector(z: float, c: int, margin: float, s: LevelSheet) -> float:
+    """The height z within connector `c`: no further than a margin beyond the lowest and the highest level that it serves."""
+    low, high = np.inf, -np.inf
+    for k in range(len(s.height_m)):
+        if s.serves[c, k]:
+            low, high = min(low, s.height_m[k]), max(high, s.height_m[k])
+    return min(max(z, low - margin), high + margin)
+
+
+@kernel
 def _inside(x: float, y: float, corners: Floats, first: int, beyond: int) -> bool:
     """Whether a polygon, corners[first:beyond], holds a point: a ray from it to the east crosses an odd number of sides."""
     odd = False

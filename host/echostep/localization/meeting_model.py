@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""How a meeting weighs the particles of a cloud.
+
+In: a cloud, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it. Owns the model and its constants.
+
+If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
+range_sd_m^2); the teammate's own covariance is added to both. With probability `wrong` (another name was tapped, the teammate is sure of a wrong
+place, the range is a reflection) the meeting says nothing: then the teammate is anywhere on the floor.
+
+The teammate's errors may be this wearer's own: both use one plan, and positions may have gone round the team in earlier meetings. The correlation is
+not known, so the two are fused by covariance intersection [Julier and Uhlmann 1997, A Non-divergent Estimation Algorithm in the Presence of Unknown
+Correlations], which is consistent for any: the inverse covariance becomes omega A + (1 - omega) B, A of the cloud, B of the meeting. Particles carry
+the prior already, so their weights are multiplied by (meeting / prior)^(1 - omega), the prior taken as a normal distribution. omega minimises the
+determinant; a cloud that knows every direction better than the meeting has omega = 1 and does not change, by a bit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.localization.estimate import LOST_M, TAIL, ellipse95
+from echostep.localization.particles import Cloud
+from echostep.ports.check_in import MOST_SD_M, CheckIn
+from echostep.ports.meeting import Meeting
+
+# All by reason.
+SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
+MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
+WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which it tells no more than the building does
+LEAST_SD_M = 0.1  # of a radio range: what bodies and antennas add
+WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by what the teammate's tracker says
+SAME_FLOOR_M = 1.5  # difference of height within one level
+LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
+FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
+FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
+LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
+
+
+def carries_position(meeting: Meeting) -> bool:
+    """Whether the teammate knows its place: its tracker does not say lost, its 95 % radius is below LOST_M, and the report is not too old."""
+    radius_m = ellipse95(meeting.xx_m2, meeting.xy_m2, meeting.yy_m2).major_m
+    (xx, xy), (_, yy) = covariance(meeting).tolist()
+    return meeting.status in WRONG and radius_m <= LOST_M and ellipse95(xx, xy, yy).major_m <= WIDEST_M
+
+
+def covariance(meeting: Meeting) -> Floats:
+    """Covariance (2, 2) of the wearer's place given the meeting (m2): the teammate's with heavier tails, its way since the report, the offset."""
+    own = np.array([[meeting.xx_m2, meeting.xy_m2], [meeting.xy_m2, meeting.yy_m2]])
+    offset_m2 = (MOVED_M_S * meeting.age_s) ** 2 + (SIDE_SD_M**2 if meeting.range_m is None else 0.0)
+    found: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
+    return found
+
+
+def start_at(meeting: Meeting) -> CheckIn:
+    """Where a wearer is of whom nothing else is known: about the teammate, within the radio's range, facing anywhere."""
+    range_m = 0.0 if meeting.range_m is None else meeting.range_m
+    sd_m = math.sqrt(0.5 * float(np.trace(covariance(meeting))) + 0.5 * range_m**2)
+    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)
+
+
+def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -> Floats:
+    """Log of the density (n,) of a right meeting for a wearer at `place` (n, 2): per m2 after a tap, per metre by radio."""
+    away, spread = place - [meeting.x_m, meeting.y_m], covariance(meeting)
+    other = (1.0 - meeting.level_probability) / max(levels - 1, 1)
+    log_level = np.log(np.maximum(np.where(on_level, meeting.level_probability, other), 1e-12))
+    if meeting.range_m is None:
+        square = np.einsum("ni,ij,nj->n", away, np.linalg.inv(spread), away)
+        log_normal = -0.5 * square - math.log(2.0 * math.pi) - 0.5 * math.log(np.linalg.det(spread))
+    else:
+        distance = np.hypot(away[:, 0], away[:, 1])
+        variance = _range_variance(meeting, away, spread)
+        log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * np.log(2.0 * math.pi * variance)
+    found: Floats = log_normal + log_level
+    return found
+
+
+def information(meeting: Meeting, mean: Floats) -> Floats:
+    """Inverse covariance (2, 2) of the wearer's place by the meeting; of a radio range only along the line from the teammate to `mean` (2,)."""
+    spread = covariance(meeting)
+    if meeting.range_m is None:
+        inverse: Floats = np.asarray(np.linalg.inv(spread), np.float64)
+        return inverse
+    away = (mean - [meeting.x_m, meeting.y_m])[None]
+    along = _along(away)[0]
+    found: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
+    return found
+
+
+def best_omega(own: Floats, other: Floats) -> float:
+    """The share of one's own information (2, 2) that minimises the fused determinant: det(omega A + (1 - omega) B) is a parabola."""
+    a, b = float(np.linalg.det(own)), float(np.linalg.det(other))
+    c = float(own[0, 0] * other[1, 1] + own[1, 1] * other[0, 0] - own[0, 1] * other[1, 0] - own[1, 0] * other[0, 1])
+    curvature = a - c + b
+    if curvature >= 0.0:
+        return 1.0 if a >= b else 0.0
+    return min(max((2.0 * b - c) / (2.0 * curvature), 0.0), 1.0)
+
+
+def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
+    """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
+    place = np.column_stack([cloud.map_x_m, cloud.y_m])
+    if cloud.sheet is None:
+        on_level, levels = np.full(len(place), meeting.level == 0), 1
+    else:
+        heights = cloud.sheet.height_m
+        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < SAME_FLOOR_M, len(heights)
+    log_met, weight = log_density(meeting, place, on_level, levels), cloud.weight
+    wrong = WRONG[meeting.status]
+    anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
+    density = (1.0 - wrong) * float(weight @ np.exp(log_met))
+    right = density / (density + wrong * anywhere)
+    mean = weight @ place
+    spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
+    own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
+    omega = best_omega(own, information(meeting, mean))
+    if omega < 1.0 and right >= FITS:  # a cloud elsewhere is left alone
+        away = place - mean
+        log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
+        factor = (1.0 - omega) * (log_met - log_prior)
+        factor -= factor.max()
+        factor -= math.log(float(weight @ np.exp(factor)))
+        # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
+        cloud.reweight(np.log(np.maximum(right * np.exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))
+    return right
+
+
+def _along(away: Floats) -> Floats:
+    """Unit vectors (n, 2); east where there is no direction."""
+    distance = np.hypot(away[:, 0], away[:, 1])[:, None]
+    found: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
+    return found
+
+
+def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
+    """Variance (n,) of a radio range, with the teammate's own along the line to each place."""
+    along = _along(away)
+    found: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + LEAST_SD_M**2
+    return found
