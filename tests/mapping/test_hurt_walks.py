@@ -153,7 +153,7 @@ def hostile() -> dict[str, list[MeasuredSegment]]:
 @pytest.mark.parametrize("name", hostile())
 def test_walks_that_no_foot_makes_are_drawn_or_empty(name: str) -> None:
     """No number in the plan is infinite or not a number, and it is read back."""
-    plan, (path,) = plan_of(map_walk(hostile()[name]), Pose(0.0, 0.0, HEADING_RAD), name)
+    plan, ((path,),) = plan_of(map_walk(hostile()[name]), Pose(0.0, 0.0, HEADING_RAD), name)
     assert np.isfinite(path).all()
     assert np.isfinite(plan.levels[0].walls).all()
     if plan.is_drawn:

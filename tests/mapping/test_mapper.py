@@ -16,6 +16,7 @@ from echostep.evaluate.anywhere.sites import Site
 from echostep.evaluate.anywhere.tours import clearance_m
 from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
 from echostep.mapping.graph import Closure, contradicted
+from echostep.mapping.growing import GrowingMap
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.plan import plan_of
 from echostep.plan.check import check_plan
@@ -42,7 +43,7 @@ def mapped(walk: SimulatedWalk) -> Mapped:
 
 def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     """Every drawn wall is one, within 0.2 m at nine of ten places; both corridors are there; the plan has no faults."""
-    plan, (path,) = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
+    plan, ((path,),) = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
     truth = np.column_stack([np.interp(mapped.graph.nodes.t_s, walk.truth[:, 0], walk.truth[:, k]) for k in (1, 2)])
     assert np.sqrt(np.mean(np.sum((path - truth) ** 2, axis=1))) < 0.25
     walls = plan.levels[0].walls
@@ -130,3 +131,22 @@ def test_a_recording_without_a_walk_is_refused(tmp_path: Path) -> None:
     refused = echostep("map", recorder.path, "-o", "plan.json", cwd=tmp_path)
     assert (refused.returncode, "of steps in it" in refused.stderr) == (2, True)
     assert not (tmp_path / "plan.json").exists()
+
+
+def test_a_walk_that_is_drawn_while_it_goes_on_becomes_the_same(walk: SimulatedWalk, mapped: Mapped) -> None:
+    """In ten stretches: the same path and about as much wall; a drawing of the first has less."""
+    growing, count = GrowingMap(), len(walk.segments)
+    grown = [growing.grow(walk.segments[k * count // 10 : (k + 1) * count // 10]) for k in range(10)]
+    lengths = [float(np.hypot(*(m.drawing.walls[:, 2:] - m.drawing.walls[:, :2]).T).sum()) for m in (*grown, mapped)]
+    assert lengths[-2] == pytest.approx(lengths[-1], rel=0.15)
+    assert lengths[2] < 0.7 * lengths[-1]
+    assert grown[-1].graph.closures
+    apart = grown[-1].graph.pose[:, :2] - mapped.graph.pose[:, :2]
+    assert np.sqrt(np.mean(np.sum(apart**2, axis=1))) < 0.15
+
+
+def test_without_an_echo_only_the_path_is_drawn(walk: SimulatedWalk) -> None:
+    silent = [replace(m, range_m=np.full(len(m.range_m), np.nan)) for m in walk.segments[:60]]
+    grown = GrowingMap().grow(silent)
+    assert not len(grown.drawing.walls)
+    assert len(grown.drawing.paths_m[0]) > 20

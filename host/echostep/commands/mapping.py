@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.mapping.completion import complete
 from echostep.mapping.directions import LEAST_EVIDENCE
@@ -21,7 +20,7 @@ from echostep.mapping.joining import Join, join_walks
 from echostep.mapping.known_plan import plan_as_walk
 from echostep.mapping.mapper import Mapped, drawn, solve_walk
 from echostep.mapping.picture import check_kind, draw_picture
-from echostep.mapping.plan import plan_of
+from echostep.mapping.plan import Walked, plan_of
 from echostep.path import MeasuredSegment
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
@@ -60,7 +59,7 @@ def map_recordings(paths: Sequence[Path], plan_path: Path | None, out: Path, pic
 
 
 Walks = Sequence[tuple[str, Mapped]]
-Result = tuple[Plan, tuple[Floats, ...], list[str]]
+Result = tuple[Plan, Walked, list[str]]
 
 
 def _drawn(walks: Walks, start: Pose, name: str) -> Result:
@@ -94,7 +93,8 @@ def _completed(known: Plan, name: str, walks: Walks) -> Result:
         done = complete(level, mapped.graph, mapped.pings, mapped.drawing)
         levels = tuple(done.level if i == k else other for i, other in enumerate(known.levels))
         found = f"{name}, {level.name}: {done.new_m:.0f} m of wall added, {done.doubtful_m:.0f} m doubtful: echoes passed them"
-        return replace(known, levels=levels), mapped.drawing.paths_m, [found, *(_join_line(join) for join in joins)]
+        walked_m = tuple(mapped.drawing.paths_m if i == k else () for i in range(len(levels)))
+        return replace(known, levels=levels), walked_m, [found, *(_join_line(join) for join in joins)]
     raise refused[0]
 
 
@@ -156,13 +156,17 @@ def _say(line: str) -> None:
 
 def described(mapped: Mapped, plan: Plan) -> list[str]:
     """What was drawn, in words."""
-    walls, doors = plan.levels[0].walls, plan.levels[0].doors
+    walls = np.concatenate([level.walls for level in plan.levels])
+    doors = [door for level in plan.levels for door in level.doors]
     length_m = float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
     opened = sum(door.state == "open" for door in doors)
     lines = [
         f"{len(walls)} walls, {length_m:.0f} m, to {100.0 * (plan.uncertainty_m or 0.0):.0f} cm (1 sd) beside the path of"
         f" {_walked_m(mapped):.0f} m; {len(doors)} openings, {opened} walked through"
     ]
+    if len(plan.levels) > 1:
+        heights = ", ".join(f"{level.height_m:+.1f}" for level in plan.levels)
+        lines.append(f"{len(plan.levels)} storeys at {heights} m, {len(plan.connectors)} stairs")
     if mapped.directions.evidence >= LEAST_EVIDENCE:
         lines.append("walls have two directions at right angles: the heading is corrected by them")
     closures = mapped.graph.closures
@@ -178,7 +182,7 @@ def described(mapped: Mapped, plan: Plan) -> list[str]:
 
 def _walked_m(mapped: Mapped) -> float:
     """Length of all paths."""
-    return float(sum(np.hypot(*np.diff(path, axis=0).T).sum() for path in mapped.drawing.paths_m))
+    return float(sum(np.hypot(*np.diff(path, axis=0).T).sum() for path in mapped.graph.paths()))
 
 
 def _join_line(join: Join) -> str:

@@ -17,6 +17,7 @@ from echostep.jit import inline_kernel, kernel
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.graph import Walls
 from echostep.mapping.nodes import Nodes
+from echostep.mapping.storeys import STAIRS
 
 APART_M = 0.15  # of a fragment's middle from the line of its wall: three standard deviations of either
 TURNED_RAD = math.radians(6.0)
@@ -25,16 +26,27 @@ KNOWN_M = 15.0  # of path, over which odometry alone tells one wall from another
 SMALL_M = 0.5  # a shorter fragment begins no wall: a corner or an edge seems to be one
 
 
-def associate(nodes: Nodes, fragments: Fragments, centre_m: Floats, normal_rad: Floats, anchored: Bools) -> Walls:
-    """The walls of all fragments, each at the mean of its pieces; those of one piece too. `anchored` (f,): the place is known by a closure."""
+def associate(
+    nodes: Nodes, fragments: Fragments, centre_m: Floats, normal_rad: Floats, anchored: Bools, storey: Ints
+) -> Walls:
+    """The walls of all fragments, each at the mean of its pieces; those of one piece too. `anchored` (f,): the place is known by a closure.
+
+    `storey` (f,): a wall is on one; fragments on stairs are of none.
+    """
     order = np.lexsort((-fragments.half_m, fragments.node))
     long = order[fragments.half_m[order] * 2.0 >= SMALL_M]
     short = order[fragments.half_m[order] * 2.0 < SMALL_M]
-    order = np.concatenate([long, short])
     way_m = nodes.way_m[fragments.node]
     placed = _Placed(centre_m, normal_rad, fragments.half_m, fragments.sd_rad, way_m, anchored)
-    of, normal, rho = _associate(order, len(long), placed)
-    return Walls(normal, rho, of)
+    of, normals, rhos, count = np.full(len(order), -1, np.int64), [], [], 0
+    for k in range(int(storey.max(initial=STAIRS)) + 1):
+        longs = long[storey[long] == k]
+        found, normal, rho = _associate(np.concatenate([longs, short[storey[short] == k]]), len(longs), placed)
+        of = np.where(found < 0, of, found + count)
+        normals.append(normal)
+        rhos.append(rho)
+        count += len(normal)
+    return Walls(np.concatenate([*normals, np.zeros(0)]), np.concatenate([*rhos, np.zeros(0)]), of)
 
 
 class _Placed(NamedTuple):
@@ -53,7 +65,7 @@ def _associate(order: Ints, longs: int, p: _Placed) -> tuple[Ints, Floats, Float
     """Wall of each fragment, and normal and rho of each wall; the first `longs` of `order` may begin one."""
     centre, normal, half, sd_rad, way, anchored = p
     n = len(order)
-    of = np.full(n, -1, np.int64)
+    of = np.full(len(half), -1, np.int64)
     w_normal, w_sum, w_rho = np.zeros(n), np.zeros(n), np.zeros(n)
     w_low, w_high, w_way = np.zeros(n), np.zeros(n), np.zeros(n)
     w_x, w_y = np.zeros(n), np.zeros(n)

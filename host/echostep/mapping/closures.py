@@ -39,13 +39,14 @@ def pieces(graph: Graph, which: Ints) -> Pieces:
 def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure | None:
     """The closure of the stretch of nodes [begin, end) with what was passed before `until_m` of the path, if there is one."""
     f, way_m = graph.fragments, graph.nodes.way_m
-    new = np.flatnonzero((f.node >= begin) & (f.node < end) & (f.half_m > 0.25))
+    node = (begin + end) // 2
+    usable = (f.half_m > 0.25) & (graph.storey_of(f.node) == graph.storey_of(np.array([node])))
+    new = np.flatnonzero((f.node >= begin) & (f.node < end) & usable)
     if len(new) < 2:
         return None
-    node = (begin + end) // 2
     centre, _ = graph.places()
     at = graph.pose[node, :2]
-    older = np.flatnonzero((way_m[f.node] < until_m) & (f.half_m > 0.25))
+    older = np.flatnonzero((way_m[f.node] < until_m) & usable)
     if len(older) < LEAST_OLD:
         return None
     away = np.hypot(*(centre[older] - at).T)

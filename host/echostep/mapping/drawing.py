@@ -6,7 +6,7 @@ In: a graph, its pings. Out: `Drawing`. Owns the order: first the lines that hav
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -27,7 +27,7 @@ PASSAGE_M = 5.0  # of path, between two passages
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of each across its line; `paths_m`: the corrected path (k, 2) of each
-    walk.
+    walk, or each piece of it on this storey.
     """
 
     walls: Floats
@@ -35,9 +35,31 @@ class Drawing:
     paths_m: tuple[Floats, ...]
 
 
-def draw(graph: Graph, pings: Pings) -> Drawing:
-    """The walls that the echoes of a walk show."""
-    poses, paths = ping_poses(graph, pings), graph.paths()
+def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
+    """The walls that the echoes of a walk show, on each storey."""
+    storeys = graph.storeys
+    if storeys is None:
+        return (_drawn(graph, pings, graph.paths()),)
+    found = []
+    for k in range(len(storeys.height_m)):
+        on = storeys.of == k
+        of = np.where(on[graph.fragments.node], graph.walls.of, -1)
+        own = on[pings.node]
+        paths = tuple(piece for path in graph.paths() for piece in pieces_on(path, on))
+        part = replace(graph, walls=replace(graph.walls, of=of))
+        found.append(_drawn(part, Pings(*(getattr(pings, f.name)[own] for f in fields(pings))), paths))
+    return tuple(found)
+
+
+def pieces_on(path: Floats, on: Bools) -> list[Floats]:
+    """The pieces (k, 2) of a path (n, 2) whose nodes are `on` (n,) a storey."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
+    return [path[a:b] for a, b in edges.reshape(-1, 2)]
+
+
+def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
+    """The walls that these pings show, beside these paths."""
+    poses = ping_poses(graph, pings)
     way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
     lines = find_lines(graph)
     free = np.ones(len(poses), np.bool_)

@@ -20,6 +20,7 @@ from echostep.arrays import Floats, Ints
 from echostep.mapping.directions import ALIGNED, DIRECTION_SD_RAD, RIGHT_RAD
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.nodes import Nodes
+from echostep.mapping.storeys import Storeys
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
 HUBER = 2.0  # standard deviations from which a fragment counts less
@@ -53,7 +54,10 @@ class Closure:
 
 @dataclass
 class Graph:
-    """`pose` (n, 3), `walls`: the newest solution. `base_rad`: one of the two directions of the building; None: it has none."""
+    """`pose` (n, 3), `walls`: the newest solution. `base_rad`: one of the two directions of the building; None: it has none.
+
+    `storeys`: None where all nodes are on one.
+    """
 
     nodes: Nodes
     fragments: Fragments
@@ -62,6 +66,7 @@ class Graph:
     closures: list[Closure] = field(default_factory=list)
     base_rad: float | None = None
     factor: SuperLU | None = None
+    storeys: Storeys | None = None
 
     def solve(self, rounds: int = ROUNDS) -> None:
         """Gauss-Newton from the present poses."""
@@ -94,6 +99,10 @@ class Graph:
         found = self.factor.solve(right)
         covariance: Floats = found[3 * new : 3 * new + 3] - found[3 * old : 3 * old + 3]
         return 0.5 * (covariance + covariance.T)
+
+    def storey_of(self, node: Ints) -> Ints:
+        """The storey of each of these nodes (k,)."""
+        return np.zeros(len(node), np.int64) if self.storeys is None else self.storeys.of[node]
 
     def paths(self) -> tuple[Floats, ...]:
         """The path (k, 2) of each walk; nodes before the first walk are those of a plan."""

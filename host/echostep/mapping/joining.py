@@ -35,6 +35,11 @@ def join_walks(
     walks: Sequence[tuple[str, Mapped]], progress: Progress = lambda _share: None
 ) -> tuple[Mapped, tuple[Join, ...]]:
     """One drawing in the map of the first walk; raises EchostepError where a walk has no certain place on the others."""
+    for name, walk in walks:
+        if (storeys := walk.graph.storeys) is not None:
+            raise EchostepError(
+                f"{name}: leads over {len(storeys.height_m)} storeys; walks are joined, or fitted to a plan, on one only: draw it by itself"
+            )
     (first, whole), *left = walks
     joins: list[Join] = []
     while left:
@@ -67,7 +72,7 @@ def _joined(whole: Mapped, walk: Mapped, name: str) -> tuple[Mapped, Join] | str
     graph, first = merged(whole.graph, walk.graph, place), len(whole.graph.nodes)
     tie = graph.closures[-1]
     undone = settle(graph)
-    undone += close_loops(graph, lambda _share: None, first)
+    undone += close_loops(graph, lambda _share: None, first, float(graph.nodes.way_m[first]))
     undone += settle(graph)
     between = tuple(c for c in graph.closures if c.old < first <= c.new and c is not tie)
     if len(between) < LEAST_CLOSURES or not any(c is tie for c in graph.closures):

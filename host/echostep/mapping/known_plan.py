@@ -12,7 +12,6 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.mapping.directions import RIGHT_RAD, Directions
-from echostep.mapping.drawing import Drawing
 from echostep.mapping.fragments import SD_M, SD_RAD, Fragments
 from echostep.mapping.graph import Graph, Walls
 from echostep.mapping.mapper import Mapped
@@ -47,7 +46,7 @@ def plan_as_walk(level: Level, sd_m: float) -> Mapped:
     nothing, integers = np.zeros(0), np.zeros(0, np.int64)
     pings = Pings(np.zeros((0, 2)), nothing, nothing, integers, integers, nothing)
     directions = Directions(graph.base_rad or 0.0, np.zeros(n), np.ones(n), 0.0)
-    return Mapped(graph, pings, Drawing(np.zeros((0, 4)), nothing, ()), directions, ())
+    return Mapped(graph, pings, (), directions, ())
 
 
 def _pieces(walls: Floats) -> Floats:

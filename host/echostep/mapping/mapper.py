@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A walk drawn: path and echoes -> fragments -> local walls -> loop closures -> the corrected path and its walls. Several walks become one drawing.
 
-In: measured segments of walks on one storey. Out: `Mapped`. Owns the order of the stages.
+In: measured segments of walks. Out: `Mapped`. Owns the order of the stages.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from echostep.mapping.drawing import Drawing, draw
 from echostep.mapping.fragments import Fragments, find_fragments
 from echostep.mapping.graph import ROUNDS, Closure, Graph, Walls, contradicted
 from echostep.mapping.nodes import Nodes, Pings, nodes_of
+from echostep.mapping.storeys import STAIRS, find_storeys
 from echostep.path import MeasuredSegment
 
 LOCAL_ROUNDS, GLOBAL_ROUNDS = 2, 3  # of association and solution, before the closures and after them
@@ -29,13 +30,24 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """The solved `graph` of all walks, its `pings`, what is drawn, whether the (first) walk shows two directions, and closures that were undone."""
+    """The solved `graph` of all walks, its `pings`, what is drawn of each storey, whether the (first) walk shows two directions, closures undone."""
 
     graph: Graph
     pings: Pings
-    drawing: Drawing
+    drawings: tuple[Drawing, ...]
     directions: Directions
     undone: tuple[Closure, ...]
+
+    @property
+    def first_storey(self) -> int:
+        """That on which the first level stretch of path is."""
+        storeys = self.graph.storeys
+        return 0 if storeys is None else int(storeys.of[storeys.of != STAIRS][0])
+
+    @property
+    def drawing(self) -> Drawing:
+        """What is drawn of the first storey."""
+        return self.drawings[self.first_storey]
 
 
 def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
@@ -45,7 +57,7 @@ def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _s
 
 def drawn(solved: Mapped) -> Mapped:
     """The same with its walls."""
-    return replace(solved, drawing=draw(solved.graph, solved.pings))
+    return replace(solved, drawings=draw(solved.graph, solved.pings))
 
 
 def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
@@ -53,22 +65,23 @@ def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda 
     nodes, pings = nodes_of(segments)
     fragments = find_fragments(nodes, pings)
     directions = find_directions(nodes, fragments)
-    graph = _new_graph(nodes, fragments, directions)
+    graph = new_graph(nodes, fragments, directions)
+    graph.storeys = find_storeys(segments, nodes)
     for _ in range(LOCAL_ROUNDS):
-        _associate(graph)
+        find_walls(graph)
     undone = close_loops(graph, progress)
     undone += settle(graph)
-    return Mapped(graph, pings, Drawing(np.zeros((0, 4)), np.zeros(0), graph.paths()), directions, tuple(undone))
+    return Mapped(graph, pings, (), directions, tuple(undone))
 
 
 def settle(graph: Graph) -> list[Closure]:
     """Find walls and path anew by turns, now that the loops are closed. Returns the closures that are undone by it."""
     for _ in range(GLOBAL_ROUNDS):
-        _associate(graph)
+        find_walls(graph)
     return _undo(graph)
 
 
-def _new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
+def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
     """The graph with its path as the building's directions correct it, where it has any."""
     none = Walls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
     if directions.evidence < LEAST_EVIDENCE:
@@ -81,8 +94,10 @@ def _new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gr
     return Graph(nodes, fragments, pose, none, base_rad=directions.base_rad)
 
 
-def _associate(graph: Graph) -> None:
-    graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph))
+def find_walls(graph: Graph) -> None:
+    """Find which fragments are of one wall, and solve."""
+    storey = graph.storey_of(graph.fragments.node)
+    graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), storey)
     graph.solve()
 
 
@@ -101,17 +116,17 @@ def _anchored(graph: Graph) -> Bools:
     return found
 
 
-def close_loops(graph: Graph, progress: Progress, first: int = 0) -> list[Closure]:
+def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:
     """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched.
 
-    With `first`, the first node of a walk that was solved before: with what the walks before it passed. Returns closures that are undone.
+    `before_m`: only with what was passed before this length of path: by the walks before. Returns closures that are undone.
     """
     way_m, begin, undone = graph.nodes.way_m, first, []
     while begin < len(way_m) - 1:
         progress(float((way_m[begin] - way_m[first]) / max(way_m[-1] - way_m[first], 1e-9)))
         end = int(np.searchsorted(way_m, way_m[begin] + STRETCH_M))
         end = min(max(end, begin + 1), len(way_m) - 1)
-        until_m = (way_m[first] if first else way_m[begin]) - APART_M
+        until_m = min(way_m[begin], before_m) - APART_M
         if (closure := find_closure(graph, begin, end, until_m)) is not None:
             moved = graph.pose[closure.new] - graph.pose[closure.old] - closure.between
             graph.closures.append(closure)

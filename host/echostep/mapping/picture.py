@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,29 +17,44 @@ from echostep.errors import EchostepError
 from echostep.plan.drawing import DOOR, OBSTACLE, WALL
 from echostep.plan.model import Level, Plan
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 WALKERS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9")
 TRUE = "#e69f00"
 WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest height by width
 TRUNK_M = 0.5  # width of the floor that a person walks on
 
 
-def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Floats], built: Level | None = None) -> None:
-    """Draw the first level of a plan and the path (n, 2) of each walk, over the true walls where they are known. Raises EchostepError."""
+def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], built: Level | None = None) -> None:
+    """Draw each level and the paths (n, 2) on it, over the true walls where they are known. Raises EchostepError."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
     check_kind(path)
-    level = plan.levels[0]
-    points = np.concatenate(
-        [level.walls.reshape(-1, 2), *walked_m] + ([] if built is None else [built.walls.reshape(-1, 2)])
-    )
-    low, high = points.min(0) - 0.5, points.max(0) + 0.5
-    shape = min((high[1] - low[1]) / (high[0] - low[0]), HIGHEST)
+    points = [paths for paths_of in walked_m for paths in paths_of]
+    points += [level.walls.reshape(-1, 2) for level in (*plan.levels, *(() if built is None else (built,)))]
+    low, high = np.concatenate(points).min(0) - 0.5, np.concatenate(points).max(0) + 0.5
+    count = len(plan.levels)
+    shape = min(count * (high[1] - low[1]) / (high[0] - low[0]), HIGHEST)
     figure = Figure(figsize=(WIDE_IN, WIDE_IN * shape + 0.4), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    points_m = 72.0 * WIDE_IN / (high[0] - low[0])
+    for k, level in enumerate(reversed(plan.levels)):
+        axes = figure.add_subplot(count, 1, k + 1, aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        _draw_level(axes, level, walked_m[count - 1 - k], built)
+        if count > 1:
+            axes.set_title(f"storey {level.name}, {level.height_m:+.1f} m", fontsize="small")
+    try:
+        figure.savefig(path)
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
+
+
+def _draw_level(axes: Axes, level: Level, walked_m: Sequence[Floats], built: Level | None) -> None:
+    from matplotlib.collections import LineCollection
+
+    low, high = axes.get_xlim()
+    points_m = 72.0 * WIDE_IN / (high - low)
     for k, path_m in enumerate(walked_m):
         colour = WALKERS[k % len(WALKERS)]
         axes.plot(*path_m.T, color=colour, alpha=0.12, linewidth=TRUNK_M * points_m, solid_capstyle="round")
@@ -54,10 +70,6 @@ def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Floats], built: Leve
     )
     axes.legend(loc="upper right", fontsize="small")
     axes.set(xlabel="x, m", ylabel="y, m")
-    try:
-        figure.savefig(path)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror or error}") from error
 
 
 def check_kind(path: Path) -> None:

@@ -16,6 +16,7 @@ import shapely
 from echostep.arrays import Floats
 from echostep.mapping.directions import right_angles_off
 from echostep.mapping.mapper import Mapped
+from echostep.mapping.stairs import connector, wells_of, with_wells
 from echostep.plan.gaps import door_gaps
 from echostep.plan.model import Door, Level, Plan, Pose
 
@@ -25,8 +26,11 @@ COURSE_M, STRAIGHT = 4.0, 0.97  # the first heading is the course of so much of 
 SQUARE_RAD = math.radians(6.0)
 
 
-def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, tuple[Floats, ...]]:
-    """The plan with the first pose of the first walk at `start`, and the path (n, 2) of each walk on it."""
+Walked = tuple[tuple[Floats, ...], ...]  # of each level: the path (n, 2) of each walk, or its pieces there
+
+
+def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
+    """The plan with the first pose of the first walk at `start`, and what was walked of each level; heights are above the first storey."""
     first = mapped.graph.pose[0]
     turn = _turn(mapped, start.heading_rad)
     c, s = math.cos(turn), math.sin(turn)
@@ -36,14 +40,21 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, tuple[Floats,
         found: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
         return found
 
-    paths = tuple(moved(path) for path in mapped.drawing.paths_m)
-    walls = np.round(moved(mapped.drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
-    long = np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > LEAST_M
-    level = Level("0", 0.0, walls[long])
-    level = replace(level, doors=_doors(level, paths))
-    sd = math.sqrt(float(np.mean(mapped.drawing.sd_m[long] ** 2))) if long.any() else None
-    start = replace(start, level=0)
-    return Plan(name, (level,), start, "", uncertainty_m=None if sd is None else round(sd, ROUND)), paths
+    storeys, first_storey = mapped.graph.storeys, mapped.first_storey
+    heights = np.zeros(1) if storeys is None else storeys.height_m - storeys.height_m[first_storey]
+    wells = [] if storeys is None else wells_of(storeys, moved(mapped.graph.pose[:, :2]))
+    walked = tuple(tuple(moved(path) for path in drawing.paths_m) for drawing in mapped.drawings)
+    levels, variances = [], []
+    for k, drawing in enumerate(mapped.drawings):
+        walls = np.round(moved(drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
+        long = np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > LEAST_M
+        level = Level(str(k - first_storey), round(float(heights[k]), 1), walls[long])
+        levels.append(with_wells(replace(level, doors=_doors(level, walked[k])), k, wells))
+        variances += (drawing.sd_m[long] ** 2).tolist()
+    sd = round(math.sqrt(float(np.mean(variances))), ROUND) if variances else None
+    connectors = tuple(connector(well, number) for number, well in enumerate(wells, 1))
+    plan = Plan(name, tuple(levels), replace(start, level=first_storey), "", connectors, uncertainty_m=sd)
+    return plan, walked
 
 
 def _turn(mapped: Mapped, heading_rad: float) -> float:

@@ -106,7 +106,7 @@ def drawn_rows(name: str, site: Site, seed: int, picture: Path | None) -> list[R
     if picture is not None:
         picture.parent.mkdir(parents=True, exist_ok=True)
         plan = plan_of(name, walls)
-        draw_picture(picture, plan, [frame.to_map(pose[:, :2])], walk.built.levels[0])
+        draw_picture(picture, plan, [[frame.to_map(pose[:, :2])]], walk.built.levels[0])
     sd_m = float(np.sqrt(np.mean(mapped.drawing.sd_m**2)))
     return [row, {"name": f"second/{name}", "seed": seed} | _second(site, walls, sd_m, seed)]
 

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""A walk that is drawn while it goes on.
+
+In: measured segments as they come. Out: `Mapped` of all so far. Owns the solution so far: what was solved stays as it is until an echo moves it,
+so a stretch costs one solution, not all of them again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.mapping.directions import find_directions
+from echostep.mapping.drawing import draw
+from echostep.mapping.fragments import find_fragments
+from echostep.mapping.graph import Graph
+from echostep.mapping.mapper import Mapped, close_loops, find_walls, new_graph
+from echostep.mapping.nodes import nodes_of
+from echostep.mapping.storeys import find_storeys
+from echostep.path import MeasuredSegment
+
+
+class GrowingMap:
+    """Call `grow` with each stretch of a walk."""
+
+    def __init__(self) -> None:
+        self._segments: list[MeasuredSegment] = []
+        self._solved: Graph | None = None
+
+    def grow(self, segments: Sequence[MeasuredSegment]) -> Mapped:
+        """The drawing of all segments so far, of which these are new.
+
+        Once it shows that the building has two directions, or other ones, all is solved anew.
+        """
+        self._segments += segments
+        nodes, pings = nodes_of(self._segments)
+        fragments = find_fragments(nodes, pings)
+        directions = find_directions(nodes, fragments)
+        graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
+        graph.storeys = find_storeys(self._segments, nodes)
+        if solved is not None and solved.base_rad == graph.base_rad:
+            first = len(solved.nodes) - 1
+            graph.pose = _continued(solved.pose, graph.pose)
+            graph.closures = solved.closures
+        find_walls(graph)
+        known = len(graph.closures)
+        undone = close_loops(graph, lambda _share: None, first)
+        if undone or len(graph.closures) != known:
+            find_walls(graph)
+        self._solved = graph
+        return Mapped(graph, pings, draw(graph, pings), directions, tuple(undone))
+
+
+def _continued(solved: Floats, pose: Floats) -> Floats:
+    """Poses (n, 3) of which the first (m, 3) are solved; the others follow the last of these as they follow it in `pose`."""
+    last, from_ = solved[-1], pose[len(solved) - 1]
+    turn = last[2] - from_[2]
+    c, s = math.cos(turn), math.sin(turn)
+    moved = (pose[:, :2] - from_[:2]) @ np.array([[c, s], [-s, c]]) + last[:2]
+    continued = np.column_stack([moved, pose[:, 2] + turn])
+    continued[: len(solved)] = solved
+    return continued
