@@ -11,6 +11,7 @@ import pytest
 from board_runs import ROOT
 from echostep.odometry.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
 from echostep.odometry.stillness import Window
+from echostep.odometry.wearer_signs import StepTaken
 from echostep.plan.model import load_plan
 from echostep.ports.check_in import PERSON, Call, CheckIn
 from echostep.ports.chunks import Chunk, portion_of
@@ -26,7 +27,7 @@ def walked(until_s: float = 10.0) -> WearerAlarm:
     """A wearer who has walked until then."""
     alarm = WearerAlarm()
     for k in range(5):
-        alarm.step(1.0 + k)
+        alarm.add([StepTaken(1.0 + k)])
     alarm.add(windows(0.0, until_s, moved=True))
     return alarm
 
@@ -71,13 +72,12 @@ def test_a_mayday_ends_by_three_steps_or_by_a_tap_but_not_by_a_movement() -> Non
     alarm.add(windows(10.0, END_STILL_S, moved=False))
     alarm.add(windows(END_STILL_S, 65.0, moved=True))  # turned over by a helper
     for t_s in (61.0, 62.0):
-        alarm.step(t_s)
+        alarm.add([StepTaken(t_s)])
     alarm.add(windows(65.0, 66.0, moved=True))
     assert state(alarm) == (MAYDAY, STILL)
-    alarm.step(66.5)
-    alarm.add(windows(66.0, 67.0, moved=True))
-    assert alarm.alarm == Alarm(OVER, STILL, 1, 67.0)
-    alarm.add(windows(67.0, 67.0 + OVER_S + 1.0, moved=True))
+    alarm.add([StepTaken(66.5)])
+    assert alarm.alarm == Alarm(OVER, STILL, 1, 66.0)
+    alarm.add(windows(66.0, 66.0 + OVER_S + 1.0, moved=True))
     assert state(alarm) is None
 
     alarm = walked(10.0)
@@ -98,7 +98,7 @@ def test_help_can_be_asked_for_at_any_time_and_walking_does_not_end_it(t_s: floa
     alarm.call_for_help(t_s)
     assert state(alarm) == (MAYDAY, HELP)
     for k in range(10):
-        alarm.step(6.0 + k)
+        alarm.add([StepTaken(6.0 + k)])
     alarm.add(windows(5.0, 16.0, moved=True))
     alarm.answer(16.0, ends_help=False)  # a check-in on the map
     assert state(alarm) == (MAYDAY, HELP)

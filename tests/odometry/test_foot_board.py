@@ -131,3 +131,15 @@ def test_the_first_device_on_the_foot_is_used_and_named() -> None:
     assert tracker.streams.foot_name == "foot board"
     assert tracker.streams.mtx.good > 100
     assert tracker.streams.findings == []
+
+
+def test_the_belt_of_the_real_firmware_tells_an_upright_trunk_and_no_fall() -> None:
+    tracker, tilts_deg = Tracker(PLAN, seed=1), []
+    chunks = walk().chunks
+    for k in range(0, len(chunks), 500):
+        tracker.take(portion_of(chunks[k : k + 500]))
+        tilts_deg.append(math.degrees(tracker.front_end.signs.falls.trunk_tilt_rad(tracker.front_end.newest_s)))
+    known = [tilt for tilt in tilts_deg if not math.isnan(tilt)]
+    assert len(known) > 0.5 * len(tilts_deg)
+    assert max(known) < 20.0
+    assert not tracker.alarm.changes

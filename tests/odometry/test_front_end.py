@@ -80,6 +80,7 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
         ours.status,
         ours.identity,
         ours.timeline.synchronised,
+        ours.signs.pop(),
     )
 
 

@@ -26,13 +26,13 @@ def test_windows_do_not_depend_on_how_samples_are_cut(cuts: list[int], seed: int
     t_s, values = samples(10.0, (2.3, 7.75), seed)
     whole, cut = MotionWindows(np.array([0.5])), MotionWindows(np.array([0.5]))
     edges = [0, *sorted(cuts), len(t_s)]
-    parts = [cut.add(t_s[a:b], values[a:b]) for a, b in zip(edges, edges[1:], strict=False)]
-    assert [window for part in parts for window in part] == whole.add(t_s, values)
+    parts = [(a, cut.add(t_s[a:b], values[a:b])) for a, b in zip(edges, edges[1:], strict=False)]
+    assert [(a + k, window) for a, part in parts for k, window in part] == whole.add(t_s, values)
 
 
 def test_a_window_with_a_movement_has_moved_and_no_other() -> None:
     t_s, values = samples(10.0, (2.3, 7.75))
-    windows = MotionWindows(np.array([0.5])).add(t_s, values)
+    windows = [window for _, window in MotionWindows(np.array([0.5])).add(t_s, values)]
     assert [window.end_s for window in windows if window.moved] == [2.5, 8.0]
     assert windows[-1] == Window(9.5, False)  # the last half second is not over
 
@@ -41,16 +41,14 @@ def test_samples_of_an_earlier_window_are_skipped() -> None:
     windows = MotionWindows(np.array([0.5]))
     windows.add(np.array([5.0]), np.zeros((1, 1)))
     assert not windows.add(np.array([1.0, 2.0]), np.ones((2, 1)))
-    assert windows.add(np.array([5.6]), np.zeros((1, 1))) == [Window(5.5, False)]
+    assert windows.add(np.array([5.6]), np.zeros((1, 1))) == [(0, Window(5.5, False))]
 
 
 def test_sensors_that_have_never_moved_say_nothing() -> None:
     stillness = Stillness()
     t_s, values = samples(4.0, (2.3,))
     quiet = np.zeros_like(t_s)
-    stillness.add_legs([GyroBlock(t_s, quiet, quiet, quiet, quiet)])
-    assert not stillness.pop_windows()
-    stillness.add_foot(t_s, np.hstack([values] * 3), np.hstack([values] * 3))
-    assert [window.end_s for window in stillness.pop_windows()] == [2.5, 3.0, 3.5]
-    assert not stillness.pop_windows()
+    assert not stillness.add_legs(GyroBlock(t_s, quiet, quiet, quiet, quiet))
+    windows = stillness.add_foot(t_s, np.hstack([values] * 3), np.hstack([values] * 3))
+    assert [window.end_s for _, window in windows] == [2.5, 3.0, 3.5]
     assert WINDOW_S == 0.5

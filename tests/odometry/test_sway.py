@@ -9,6 +9,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.odometry.alarm import ASK_S, SWAY_S, AlarmKind, WearerAlarm
 from echostep.odometry.stillness import MotionWindows, Window
+from echostep.odometry.wearer_signs import StepTaken
 
 RATE_HZ, NOISE = 100.0, 0.005  # rad/s
 T_S: Floats = np.arange(6000) / RATE_HZ
@@ -18,7 +19,7 @@ def swaying(values: Floats, t_s: Floats = T_S) -> float:
     """Share of the windows in which a wearer counts as swaying; the values are of one axis of three."""
     noise = NOISE * np.random.default_rng(3).standard_normal((len(t_s), 3))
     noise[:, 0] += values
-    windows = MotionWindows(np.full(3, 0.2), 3).add(t_s, noise)
+    windows = [window for _, window in MotionWindows(np.full(3, 0.2), 3).add(t_s, noise)]
     assert not any(window.moved for window in windows)
     return float(np.mean([window.sways for window in windows]))
 
@@ -47,15 +48,16 @@ def test_the_result_does_not_depend_on_portions(cut: int) -> None:
     whole = MotionWindows(np.full(3, 0.2), 3).add(t_s, values)
     windows, cut_up = MotionWindows(np.full(3, 0.2), 3), []
     for begin in range(0, len(t_s), cut):
-        cut_up += windows.add(t_s[begin : begin + cut], values[begin : begin + cut])
+        part = windows.add(t_s[begin : begin + cut], values[begin : begin + cut])
+        cut_up += [(begin + k, window) for k, window in part]
     assert cut_up == whole
-    assert any(window.sways for window in whole)
+    assert any(window.sways for _, window in whole)
 
 
 def test_sway_alone_keeps_the_question_back_for_two_minutes() -> None:
     alarm = WearerAlarm()
     for k in range(5):
-        alarm.step(1.0 + k)
+        alarm.add([StepTaken(1.0 + k)])
     alarm.add([Window(k / 2.0, True) for k in range(1, 21)])
     for k in range(21, 21 + 2 * int(SWAY_S + ASK_S) - 2):
         alarm.add([Window(k / 2.0, False, True)])
@@ -69,7 +71,7 @@ def test_sway_alone_keeps_the_question_back_for_two_minutes() -> None:
 def test_a_mayday_does_not_end_by_sway() -> None:
     alarm = WearerAlarm()
     for k in range(5):
-        alarm.step(1.0 + k)
+        alarm.add([StepTaken(1.0 + k)])
     alarm.add([Window(k / 2.0, True) for k in range(1, 21)])
     alarm.add([Window(k / 2.0, False) for k in range(21, 90)])
     alarm.add([Window(k / 2.0, False, True) for k in range(90, 120)])

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The wearer's alarm: asked after 20 s without motion, mayday after 30 s, or when help is asked for.
+"""The wearer's alarm: asked after 20 s without motion, mayday after 30 s; asked after a fall, mayday 10 s later; or when help is asked for.
 
-In: windows with or without motion, steps, taps. Out: the present `Alarm`, and every change of it. Owns the time of the last motion. All times are
-those of the samples.
+In: signs of the wearer (windows with or without motion, steps, falls), taps. Out: the present `Alarm`, and every change of it. Owns the time of the
+last motion. All times are those of the samples.
 
 They follow NFPA 1982 (PASS), as remembered: alarm after 30 s without motion (+5/-0 s), a warning about 10 s before; compare them with a copy
-before relying on them. Different from it: a mayday for lack of motion also ends when the wearer walks, there only by hand. There is no sound of
-95 dB, no housing and no test of the standard: this is no PASS.
+before relying on them. Different from it: a mayday for lack of motion also ends when the wearer walks, there only by hand; a fall is asked about
+and called sooner, and motion alone, which ends a question for lack of motion, does not end that one. There is no sound of 95 dB, no housing and no
+test of the standard: this is no PASS.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from echostep.odometry.falls import Fall
 from echostep.odometry.stillness import WINDOW_S, Window
+from echostep.odometry.wearer_signs import Sign, StepTaken
 
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
+ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion
 WALKED_STEPS = 3  # of the foot: the wearer walks. By reason: a helper who turns a wearer over makes fewer
 OVER_S = 30.0  # an alarm that has ended is told as over for so long
 SWAY_S = 120.0  # so long after the last movement sway alone keeps the question back, by reason: longer than a foot is not moved by chance
@@ -40,21 +44,26 @@ class AlarmReason(StrEnum):
     """Why."""
 
     STILL = "no motion"
+    FALL = "fall"
     HELP = "help"
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """An alarm: `number` of this run; `since_s`: time of the last motion, of the call for help, or of its end."""
+    """An alarm: `number` of this run; `since_s`: time of the last motion, of the fall, of the call for help, or of its end.
+
+    `mayday_s`: of a question, when it becomes a mayday.
+    """
 
     kind: AlarmKind
     reason: AlarmReason
     number: int
     since_s: float
+    mayday_s: float | None = None
 
 
 class WearerAlarm:
-    """`add` takes windows, `step` the wearer's steps; `alarm` is the present one, None while all is well."""
+    """`add` takes signs in order; `alarm` is the present one, None while all is well."""
 
     def __init__(self) -> None:
         self.alarm: Alarm | None = None
@@ -64,18 +73,25 @@ class WearerAlarm:
         self._motion_s = math.nan  # end of the last one with motion; later after a tap
         self._moved_s = math.nan  # the same, without sway
         self._steps: deque[float] = deque(maxlen=WALKED_STEPS)  # times of the last ones
-        self._mayday_s = math.nan  # when the last mayday began
+        self._begun_s = math.nan  # when the last question or mayday began
 
-    def step(self, t_s: float) -> None:
-        """The wearer made a step."""
-        self._steps.append(t_s)
+    def add(self, signs: Sequence[Sign]) -> None:
+        """Take signs in order; before the first steps nothing is watched: a device that lies ready is not worn yet."""
+        for sign in signs:
+            if isinstance(sign, StepTaken):
+                self._steps.append(sign.t_s)
+                self._end_by_walking()
+            elif len(self._steps) < WALKED_STEPS:
+                continue
+            elif isinstance(sign, Fall):
+                self._ask_about(sign)
+            else:
+                self._pass(sign)
 
-    def add(self, windows: Sequence[Window]) -> None:
-        """Take windows in order of time; before the first steps nothing is watched: a device that lies ready is not worn yet."""
-        if len(self._steps) == WALKED_STEPS:
-            for window in windows:
-                self._pass(window)
-            self._end_by_walking()
+    def _ask_about(self, fall: Fall) -> None:
+        """Ask at once, unless a question or a mayday is under way."""
+        if self.alarm is None or self.alarm.kind is AlarmKind.OVER:
+            self._begin(AlarmKind.ASKING, AlarmReason.FALL, fall.t_s, fall.told_s)
 
     def _pass(self, window: Window) -> None:
         if math.isnan(self._seen_s):
@@ -98,7 +114,7 @@ class WearerAlarm:
     def answer(self, t_s: float, *, ends_help: bool) -> None:
         """The wearer has tapped. `ends_help`: the tap says that all is well; another one says only that the wearer is conscious."""
         self._motion_s = self._moved_s = self._time(t_s)
-        if self.alarm and (ends_help or self.alarm.reason is AlarmReason.STILL):
+        if self.alarm and (ends_help or self.alarm.reason is not AlarmReason.HELP):
             self._end(self._time(t_s))
 
     def _time(self, t_s: float) -> float:
@@ -112,6 +128,10 @@ class WearerAlarm:
             self._change(t_s, None)
         if alarm and alarm.kind is AlarmKind.MAYDAY:
             return
+        if alarm and alarm.kind is AlarmKind.ASKING and alarm.reason is AlarmReason.FALL:
+            if alarm.mayday_s is not None and t_s >= alarm.mayday_s:
+                self._begin(AlarmKind.MAYDAY, AlarmReason.FALL, alarm.since_s, t_s)
+            return
         if still_s >= MAYDAY_S:
             self._begin(AlarmKind.MAYDAY, AlarmReason.STILL, self._motion_s, t_s)
         elif still_s >= ASK_S and (alarm is None or alarm.kind is not AlarmKind.ASKING):
@@ -120,18 +140,20 @@ class WearerAlarm:
             self._change(t_s, None)  # the team was not alarmed
 
     def _end_by_walking(self) -> None:
-        """A mayday for lack of motion ends when the wearer walks."""
+        """A mayday that nobody asked for ends when the wearer walks, and so does the question about a fall."""
         alarm = self.alarm
-        if alarm is None or alarm.kind is not AlarmKind.MAYDAY or alarm.reason is not AlarmReason.STILL:
-            return
-        if self._steps[0] > self._mayday_s:
+        asks = alarm is not None and alarm.kind is AlarmKind.ASKING and alarm.reason is AlarmReason.FALL
+        calls = alarm is not None and alarm.kind is AlarmKind.MAYDAY and alarm.reason is not AlarmReason.HELP
+        if (asks or calls) and len(self._steps) == WALKED_STEPS and self._steps[0] > self._begun_s:
+            self._motion_s = self._moved_s = max(self._seen_s, self._motion_s)
             self._end(self._seen_s)
 
     def _begin(self, kind: AlarmKind, reason: AlarmReason, since_s: float, t_s: float) -> None:
         if kind is AlarmKind.ASKING or self.alarm is None or self.alarm.kind is not AlarmKind.ASKING:
             self._number += 1
-        self._mayday_s = t_s
-        self._change(t_s, Alarm(kind, reason, self._number, since_s))
+        self._begun_s = t_s
+        mayday_s = t_s + ANSWER_S if reason is AlarmReason.FALL else since_s + MAYDAY_S
+        self._change(t_s, Alarm(kind, reason, self._number, since_s, mayday_s if kind is AlarmKind.ASKING else None))
 
     def _end(self, t_s: float) -> None:
         alarm = self.alarm

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.board.calibration import ImuSettings
 from echostep.board.foot_board import FootBoardReader
 from echostep.foot.ins import Noise
 from echostep.ports.chunks import FOOT, MTX, Portion
@@ -34,9 +35,10 @@ class FootSamples(NamedTuple):
 class FootSource:
     """Call `read` with every portion."""
 
-    def __init__(self) -> None:
+    def __init__(self, errors: ImuSettings) -> None:
+        """`errors`: of a foot board's part."""
         self.mtx = MtxReader()
-        self.board = FootBoardReader()
+        self.board = FootBoardReader(errors)
         self.port: str | None = None  # MTX or FOOT, from the first chunk of either on
 
     @property

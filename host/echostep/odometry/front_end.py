@@ -18,16 +18,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.board.calibration import GyroSettings, RangerSettings, heights, ranges
+from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
 from echostep.board.frames import BoardReader, Frames, encode
 from echostep.board.health import BoardReports
 from echostep.board.messages import (
-    BY_ID,
-    ROWS,
     BoardHealth,
     Configuration,
     GyroHealth,
     Identity,
+    Message,
+    Motion,
     Outcome,
     Parts,
     Ping,
@@ -43,19 +43,17 @@ from echostep.legs.trunk_path import GyroBlock, WearerSettings
 from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
-from echostep.odometry.stillness import Stillness
 from echostep.odometry.synchronizer import HEIGHT, PART, Synchronizer
+from echostep.odometry.wearer_signs import WearerSigns
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
+from echostep.ports.meeting import MEETING
 from echostep.ports.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 
-_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-IDENTITY, PING, SYNC, STATUS, PRESSURE, PARTS = (_IDS[kind] for kind in (Identity, Ping, Sync, Status, Pressure, Parts))
-_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)]
-_TIMED = np.array([i in ROWS and (ROWS[i].names or ("",))[0] == "ticks" for i in range(256)])  # the body begins so
+_REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
 
 
 @dataclass(slots=True)
@@ -76,10 +74,12 @@ class FrontEnd:
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
         wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: CompassErrors | None = None,
+        imus: Imus | None = None,
     ) -> None:  # fmt: skip
-        """`iron`: errors of the compass, when it was calibrated."""
+        """`iron`: errors of the compass, when it was calibrated; `imus`: those of the six-axis parts."""
+        errors = imus or Imus()
         self.board = BoardReader()
-        self.foot_source = FootSource()
+        self.foot_source = FootSource(errors.foot)
         self.timeline = Timeline(mtx)
         self.foot = Foot(foot)
         self._foot_settings = foot
@@ -90,11 +90,11 @@ class FrontEnd:
         self.identity: Identity | None = None
         self.reports = BoardReports()
         self.pings = 0
-        self.stillness = Stillness()
+        self.signs = WearerSigns()
         self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
         self._ranger_parts = np.zeros((1, 2), np.int64)  # left, right, by the newest report
-        self._gyro_blocks = GyroBlocks(gyro or GyroSettings())
+        self._gyro_blocks = GyroBlocks(gyro or GyroSettings(), errors.belt)
         self._synchronizer = Synchronizer()
         self._unknown_ports = 0
         self._bad_times = 0
@@ -135,11 +135,14 @@ class FrontEnd:
         self._keep_reports(frames, times)
         self._collect_pings(frames, times)
         leg_blocks = self._gyro_blocks.cut(frames, times)
-        self.stillness.add_legs([block for _, block in leg_blocks])
+        for message_index, block in leg_blocks:
+            self.signs.add_legs(message_index, block)
+        self._watch_belt(frames, times)
         # Foot: its samples -> segments of the trunk's path.
         foot_segments = self._track_foot(samples, times)
         # Handover: segments of foot and legs -> segments of one path.
         observed_s = self._merge_paths(foot_segments, leg_blocks, times)
+        self.signs.settle()
         # Synchronize: segments and pings -> segments with their pings.
         return self._synchronizer.pop_ready(times.board_newest_s, times.mtx_newest_s, observed_s)
 
@@ -161,7 +164,7 @@ class FrontEnd:
 
     def _count_unknown_ports(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM):
+            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:
@@ -176,23 +179,22 @@ class FrontEnd:
 
     def _keep_reports(self, frames: Frames, times: Times) -> None:
         """Keep the board's newest reports about itself."""
-        for identifier in _REPORTS:
-            for row in frames.rows(identifier)[1]:
-                self.reports.add(BY_ID[identifier].unpack(row.tobytes()))
-        if (status := _newest_timed(frames, times, STATUS)) is not None:
+        for report in frames.each(_REPORTS):
+            self.reports.add(report)
+        if (status := _newest_timed(frames, times, Status)) is not None:
             self.status = Status.unpack(status)
-        if (identity := _newest_timed(frames, times, IDENTITY)) is not None:
+        if (identity := _newest_timed(frames, times, Identity)) is not None:
             self.identity = Identity.unpack(identity)
 
     def _collect_pings(self, frames: Frames, times: Times) -> None:
         """Hand pings without a bus error, and heights by pressure, to the synchronizer, in order of their messages."""
-        ping_row, pings = frames.rows(PING)
+        ping_row, pings = frames.rows(Ping)
         self.pings += len(ping_row)
         t_s = times.board_s[ping_row] + self._ranger.delay_s
         usable = ~np.isnan(t_s) & (pings["outcome"] != Outcome.BUS_ERROR)
         which = pings["ranger"] + PART * self._parts_of(frames, ping_row, pings["ranger"])
         ping_values = np.column_stack([t_s, which, ranges(pings, self._ranger)])[usable]
-        height_row, samples = frames.rows(PRESSURE)
+        height_row, samples = frames.rows(Pressure)
         height_m, height_s = heights(samples), times.board_s[height_row]
         valid = ~np.isnan(height_s) & ~np.isnan(height_m)
         height_values = np.column_stack([height_s, np.full(len(height_row), HEIGHT), height_m])[valid]
@@ -201,9 +203,19 @@ class FrontEnd:
         values = np.concatenate([ping_values, height_values])[order]
         self._synchronizer.add_pings(times.board_message_index[frame_row[order]], values)
 
+    def _watch_belt(self, frames: Frames, times: Times) -> None:
+        """Hand samples of the belt's six axes, with the thigh's forces, to the signs of the wearer."""
+        row, samples = frames.rows(Motion)
+        timed = ~np.isnan(times.board_s[row])
+        row, samples = row[timed], samples[timed]
+        if len(row):
+            gyro, accel = six_axes(samples, "belt")
+            thigh = six_axes(samples, "thigh")[1]
+            self.signs.add_belt(times.board_s[row], gyro, accel, thigh, times.board_message_index[row])
+
     def _parts_of(self, frames: Frames, ping_row: Ints, ranger: Ints) -> Ints:
         """The part (n,) that the board's newest report before each ping names in its ranger's place; 0 before the first."""
-        report_row, reports = frames.rows(PARTS)
+        report_row, reports = frames.rows(Parts)
         named = np.column_stack([reports["part_ranger_left"], reports["part_ranger_right"]]).astype(np.int64)
         known = np.concatenate([self._ranger_parts, named])
         self._ranger_parts = known[-1:]
@@ -217,7 +229,7 @@ class FrontEnd:
         if not len(timed):
             return completed
         t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
-        self.stillness.add_foot(t_s, samples.gyro[timed], samples.accel[timed])
+        self.signs.add_foot(t_s, samples.gyro[timed], samples.accel[timed], message_index)
         foot = self.foot.track(t_s, samples.accel[timed], samples.gyro[timed], samples.mag[timed])
         begin = 0
         for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):
@@ -254,7 +266,7 @@ class FrontEnd:
                 foot_segments[next_segment][0] < message_index or block is None
             ):
                 foot_index, segments = foot_segments[next_segment]
-                self._synchronizer.add_segments(foot_index, self.handover.add_foot_segments(segments))
+                self._pass_on(foot_index, self.handover.add_foot_segments(segments))
                 next_segment += 1
             if block is not None:
                 segments = self.handover.add_leg_block(block, float(times.mtx_newest_s[message_index]))
@@ -263,13 +275,18 @@ class FrontEnd:
             legs_s.append(self.handover.legs_observed_s)
         return np.fmax(times.mtx_newest_s, np.repeat(legs_s[:-1], np.diff(block_index)))
 
+    def _pass_on(self, message_index: int, segments: list[PathSegment]) -> None:
+        """Hand segments of the one path to the synchronizer and to the signs of the wearer."""
+        self._synchronizer.add_segments(message_index, segments)
+        self.signs.add_segments(message_index, segments)
+
 
 def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arrivals:
     """The board's messages for the timeline; `chunk_row` (n,): row of the chunk that completed each."""
     ticks = np.ascontiguousarray(frames.body[:, :4]).view("<u4")[:, 0].astype(np.int64)
-    kind = np.where(_TIMED[frames.id], PLAIN, SILENT)
-    kind[frames.id == IDENTITY] = FIRST_MESSAGE
-    sync_row, edges = frames.rows(SYNC)
+    kind = np.where(frames.is_timed, PLAIN, SILENT)
+    kind[frames.rows(Identity)[0]] = FIRST_MESSAGE
+    sync_row, edges = frames.rows(Sync)
     kind[sync_row] = edges["edge"]
     return Arrivals(ticks, chunk_row, t_arrival_ns[chunk_row], kind)
 
@@ -279,8 +296,8 @@ def _foot_arrivals(samples: FootSamples, t_arrival_ns: Ints) -> Arrivals:
     return Arrivals(samples.value, samples.row, t_arrival_ns[samples.row], np.full(len(samples.row), PLAIN))
 
 
-def _newest_timed(frames: Frames, times: Times, identifier: int) -> bytes | None:
-    """Body of the last message with this id that has a time."""
-    frame_row, bodies = frames.rows(identifier)
+def _newest_timed(frames: Frames, times: Times, kind: type[Message]) -> bytes | None:
+    """Body of the last message of a kind that has a time."""
+    frame_row, bodies = frames.rows(kind)
     timed = np.flatnonzero(~np.isnan(times.board_s[frame_row]))
     return bodies[timed[-1]].tobytes() if len(timed) else None

@@ -10,7 +10,6 @@ when others walk by. A window below these limits may still show that a living we
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +25,6 @@ FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
 LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range of 0.05 rad/s, breathing turns a belt by less than 0.03 rad/s
 # Sway counts when most windows of the last seconds have it: a twitch of a wearer who is unconscious is a window or two.
 SWAY_WINDOWS, LEAST_SWAYING = 10, 8
-MOST_WINDOWS = 100_000  # that wait to be read, half a day; beyond it the oldest are dropped
 
 
 class Window(NamedTuple):
@@ -48,26 +46,33 @@ class MotionWindows:
         self._sway = SwayWindows(swaying) if swaying else None
         self._swayed: deque[bool] = deque(maxlen=SWAY_WINDOWS)
 
-    def add(self, t_s: Floats, values: Floats) -> list[Window]:
-        """Windows completed by samples `values` (n, c) at `t_s` (n,); samples of an earlier window are skipped."""
+    def add(self, t_s: Floats, values: Floats) -> list[tuple[int, Window]]:
+        """Windows completed by samples `values` (n, c) at `t_s` (n,), each with the index of the sample that does.
+
+        Samples of an earlier window are skipped.
+        """
         index = np.floor(t_s / WINDOW_S).astype(np.int64)
-        kept = index >= self._index
+        kept = np.flatnonzero(index >= self._index)
         t_s, index, values = t_s[kept], index[kept], values[kept]
         if not len(index):
             return []
         begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
         low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
         sways = self._sways(t_s, index, values)
-        index = index[begins]
+        index, completed_by = index[begins], kept[begins]
         if index[0] == self._index:
+            completed_by = completed_by[1:]
             low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
-        elif self._index >= 0:
+        elif self._index < 0:
+            completed_by = completed_by[1:]
+        else:
             index = np.r_[self._index, index]
             low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
         self._index, self._low, self._high = int(index[-1]), low[-1], high[-1]
         moved: list[bool] = np.any((high - low)[:-1] > self._limits, axis=1).tolist()
         ends_s: list[float] = (WINDOW_S * (index[:-1] + 1.0)).tolist()
-        return [self._window(*row) for row in zip(ends_s, moved, sways[:-1].tolist(), strict=True)]
+        rows = zip(ends_s, moved, sways[:-1].tolist(), strict=True)
+        return list(zip(completed_by.tolist(), [self._window(*row) for row in rows], strict=True))
 
     def _sways(self, t_s: Floats, index: Ints, values: Floats) -> Bools:
         """Whether the windows sway that the samples touch, and before them the last one, when it is complete."""
@@ -92,26 +97,22 @@ class Stillness:
             np.array([LEG_RAD_S] * 3), 2
         )  # sway of thigh and shank: a belt turns with each breath
         self._worn: set[MotionWindows] = set()
-        self._windows: deque[Window] = deque(maxlen=MOST_WINDOWS)
 
-    def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats) -> None:
-        """Samples of the foot: t_s (n,), gyro (n, 3) rad/s, accel (n, 3) m/s2."""
-        self._keep(self._foot, self._foot.add(t_s, np.hstack([gyro, accel])))
+    def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats) -> list[tuple[int, Window]]:
+        """Windows completed by samples of the foot: t_s (n,), gyro (n, 3) rad/s, accel (n, 3) m/s2; each with the sample's index."""
+        with np.errstate(over="ignore", invalid="ignore"):  # of numbers that no sensor measures
+            return self._of_worn(self._foot, self._foot.add(t_s, np.hstack([gyro, accel])))
 
-    def add_legs(self, blocks: Sequence[GyroBlock]) -> None:
-        """Blocks of the leg gyros."""
-        for block in blocks:
-            self._keep(self._legs, self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt])))
+    def add_legs(self, block: GyroBlock) -> list[Window]:
+        """Windows completed by a block of the leg gyros."""
+        found = self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
+        return [window for _, window in self._of_worn(self._legs, found)]
 
-    def pop_windows(self) -> list[Window]:
-        """The windows since the last call, in order of time."""
-        windows = sorted(self._windows)
-        self._windows.clear()
-        return windows
-
-    def _keep(self, source: MotionWindows, windows: Sequence[Window]) -> None:
-        for window in windows:
+    def _of_worn(self, source: MotionWindows, windows: list[tuple[int, Window]]) -> list[tuple[int, Window]]:
+        kept: list[tuple[int, Window]] = []
+        for index, window in windows:
             if window.moved:
                 self._worn.add(source)
             if source in self._worn:
-                self._windows.append(window)
+                kept.append((index, window))
+        return kept
