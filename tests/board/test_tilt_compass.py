@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.board import messages as m
+from echostep.board.calibration import ImuSettings
 from echostep.board.frames import BoardReader, encode
 from echostep.board.tilt_compass import TiltCompass, heading_of
 from echostep.commissioning.fitting import bearings
@@ -74,6 +75,19 @@ def test_the_steps_average_out_and_portions_change_no_bit() -> None:
 def test_a_saturated_or_missing_field_is_no_heading() -> None:
     sent = encode(m.Magnetic(0, 32_767, 0, 0), 0) + encode(m.Magnetic(0, -32768, 0, 0), 1)
     assert np.isnan(TiltCompass().headings(BoardReader().frames(sent))[1]).all()
+
+
+def test_an_offset_of_the_belts_accelerometer_is_taken_out() -> None:
+    """50 mg are three degrees of tilt, and five of heading where the field dips by 66 degrees."""
+    offset, gain, sent = np.array([0.4, -0.45, 0.2]), np.array([1.01, 0.99, 1.005]), b""
+    for k in range(400):
+        sent += encode(motion(k * 10_000, gain * np.array([0.0, 0.0, 9.81]) + offset), 0)
+        if k % 20 == 19:
+            sent += encode(m.Magnetic(k * 10_000, *np.rint(6_842 * NORTH_AND_DOWN).astype(int).tolist()), 0)
+    errors = ImuSettings(*offset.tolist(), *(1.0 / gain).tolist())
+    bare, corrected = (TiltCompass(e).headings(BoardReader().frames(sent))[1][-1] for e in (None, errors))
+    assert abs(bare) > math.radians(4.0)
+    assert abs(corrected) < math.radians(0.2)
 
 
 def test_without_an_accelerometer_the_belt_counts_as_level() -> None:

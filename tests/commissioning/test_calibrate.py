@@ -25,7 +25,7 @@ from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, Chunk
-from echostep.settings import parse_settings
+from echostep.settings import Settings, parse_settings
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.devices.board_sensors import Adis16100Model
 from echostep.simulation.people.walker import Person, walk
@@ -76,14 +76,14 @@ def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
 @pytest.mark.parametrize("reversed_", [False, True])
 @pytest.mark.parametrize("degrees", [360.0, -400.0, 330.0])
 def test_the_way_round_the_belt_gyro_is_worn(reversed_: bool, degrees: float) -> None:
-    found, line = fit_mounting(turn(20.0, degrees, reversed_), GyroSettings())
+    found, line = fit_mounting(turn(20.0, degrees, reversed_), Settings())
     assert found == {"gyro": {"belt_reversed": reversed_}}
     assert ("upside down" in line) == reversed_
 
 
 def test_half_a_turn_is_refused() -> None:
     with pytest.raises(EchostepError, match="turn once round"):
-        fit_mounting(turn(20.0, 170.0), GyroSettings())
+        fit_mounting(turn(20.0, 170.0), Settings())
 
 
 @pytest.mark.parametrize("reversed_", [False, True])
@@ -95,7 +95,9 @@ def test_the_iron_of_the_wearer_is_found(reversed_: bool) -> None:
     rng = np.random.default_rng(3)
     counts = np.gradient(heading, t_s) / COUNT_RAD_S * (-1 if reversed_ else 1) + 15 + rng.normal(0, 2.5, len(t_s))
     bearing = np.degrees(np.pi / 2 - shown[::20]) * 10 + rng.normal(0.0, 10.0, 200)
-    found, line = fit_compass(heard(counts, np.floor(bearing % 3600)), GyroSettings(belt_bias_rad_s=12 * COUNT_RAD_S))
+    found, line = fit_compass(
+        heard(counts, np.floor(bearing % 3600)), Settings(gyro=GyroSettings(belt_bias_rad_s=12 * COUNT_RAD_S))
+    )
     values = found["compass"]
     assert math.degrees(values["sin1"]) == pytest.approx(12.0, abs=0.7)
     assert math.degrees(values["cos1"]) == pytest.approx(0.0, abs=0.7)
@@ -106,7 +108,7 @@ def test_the_iron_of_the_wearer_is_found(reversed_: bool) -> None:
 
 def test_a_compass_that_stands_still_is_told() -> None:
     with pytest.raises(EchostepError, match="do it again"):
-        fit_compass(heard(np.full(4_000, 80.0), np.full(200, 900.0)), GyroSettings())
+        fit_compass(heard(np.full(4_000, 80.0), np.full(200, 900.0)), Settings())
 
 
 def walked(metres: float, *, swapped: bool = False) -> ProbeResult:
@@ -212,7 +214,7 @@ def test_the_rehearsal_of_the_twin_calibrates_everything() -> None:
         heard_in[act] = running.result
     biases: dict[str, Any] = dict(fit_gyros(heard_in[Act.STAND])[0]["gyro"])
     gyros = GyroSettings(**biases)
-    assert fit_mounting(heard_in[Act.TURN], gyros)[0] == {"gyro": {"belt_reversed": False}}
-    assert math.degrees(fit_compass(heard_in[Act.TURN], gyros)[0]["compass"]["rms_rad"]) < 3.0
+    assert fit_mounting(heard_in[Act.TURN], Settings(gyro=gyros))[0] == {"gyro": {"belt_reversed": False}}
+    assert math.degrees(fit_compass(heard_in[Act.TURN], Settings(gyro=gyros))[0]["compass"]["rms_rad"]) < 3.0
     scale = fit_legs(heard_in[Act.WALK], gyros, LegLengths(), 10.0)[0]["wearer"]["leg_scale"]
     assert scale == pytest.approx(1.0, abs=0.08)

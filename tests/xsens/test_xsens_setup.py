@@ -3,42 +3,15 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
-from echostep.xsens import PROJECT, MtSample, MtxReader, OutputFormat, encode_frame
+from echostep.xsens import PROJECT, MtxReader, OutputFormat, encode_frame
 from echostep.xsens.requests import project_requests, reset_heading, set_rate
 from echostep.xsens.setup import TIMEOUT_S, TRIES, MtxSetup, State
-
-SAMPLE = MtSample(7, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
-STEP_S = 0.01
-
-
-class Line:
-    """A host and a device that meet every 10 ms; `lose` drops whole messages in either direction by a seeded generator."""
-
-    def __init__(self, device: MtxDevice, rate_hz: float = 100.0, lose: float = 0.0, seed: int = 0) -> None:
-        self.device, self.setup = device, MtxSetup(project_requests(rate_hz), rate_hz)
-        self.now_s, self.counter = 5.0, 0
-        self.received = b""
-        self._lose, self._rng = lose, np.random.default_rng(seed)
-        self._to_host = b""
-
-    def run(self, seconds: float) -> MtxSetup:
-        for _ in range(round(seconds / STEP_S)):
-            sent = self._through(self.setup.advance(self._to_host, self.now_s))
-            self.received += self._to_host
-            self.now_s += STEP_S
-            self._to_host = self._through(self.device.feed(sent, self.now_s))
-            self.counter += 1
-            self._to_host += self.device.measure(SAMPLE._replace(counter=self.counter))
-        return self.setup
-
-    def _through(self, sent: bytes) -> bytes:
-        return b"" if self._rng.random() < self._lose else sent
+from mt_lines import SAMPLE, STEP_S, Line
 
 
 def device(state: DeviceState, output: OutputFormat) -> MtxDevice:
@@ -58,7 +31,7 @@ def test_from_any_state_to_the_projects_mode(state: DeviceState, output: OutputF
     assert (made.sync_out[0], made.sync_out[1], made.sync_out[2], made.sync_out[3]) == (0x12, 0, 0, 29_491)
     assert made.state is DeviceState.MEASURING
     assert MtxReader().feed(line.received)[-1].accel == SAMPLE.accel
-    assert line.setup.verdict == "MTx: configured"
+    assert line.setup.verdict == "MTx: configured: MTx-28A53G25, firmware 2.8.1"
 
 
 def test_a_device_that_just_woke_is_caught_within_its_half_second() -> None:

@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import threading
-import time
-import tty
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,44 +14,10 @@ from board_runs import ROOT
 from command_line import echostep
 from echostep.recording.reading import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
-from echostep.xsens import PROJECT, MtSample, MtxReader, OutputFormat
+from echostep.xsens import PROJECT, MtxReader, OutputFormat
+from mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
-SAMPLE = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.5, 0.0, -0.875), (1.0, 0.0, 0.0, 0.0))
-
-
-@contextlib.contextmanager
-def on_a_terminal(device: MtxDevice) -> Iterator[str]:
-    """A device that measures at its rate and answers, on a pseudo terminal; gives the port's name."""
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    os.set_blocking(ours, False)
-    stop = threading.Event()
-
-    def live() -> None:
-        counter, due_s = 0, time.monotonic()
-        while not stop.is_set():
-            received = b""
-            with contextlib.suppress(BlockingIOError):
-                received = os.read(ours, 4096)
-            sent = device.feed(received, time.monotonic())
-            if time.monotonic() >= due_s:
-                due_s += 1.0 / device.rate_hz
-                counter += 1
-                sent += device.measure(SAMPLE._replace(counter=counter))
-            with contextlib.suppress(BlockingIOError):
-                os.write(ours, sent)
-            time.sleep(0.001)
-
-    thread = threading.Thread(target=live)
-    thread.start()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        stop.set()
-        thread.join()
-        os.close(ours)
-        os.close(theirs)
 
 
 @contextlib.contextmanager

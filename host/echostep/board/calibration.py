@@ -28,6 +28,10 @@ STANDARD_PA = 101_325.0  # pressure at height 0 [ISO 2533]
 HEIGHT_SCALE_M, HEIGHT_EXPONENT = 44_330.77, 0.190263  # of the height by pressure in the troposphere [ISO 2533]
 GYROS = ("thigh", "calf", "belt")  # fields of a gyro sample, columns of `gyro_rates`
 BELT = GYROS.index("belt")
+OFFSET_MAX_M_S2 = 1.5  # of an accelerometer: 65 mg when new, and soldering [ICM-20649 data sheet DS-000192, table 2], twice; by reason
+SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; by reason
+BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; by reason
+_AXES = ("x", "y", "z")
 
 
 class Echo(NamedTuple):
@@ -54,6 +58,58 @@ class GyroSettings:
     calf_bias_rad_s: float = 0.0
     belt_bias_rad_s: float = 0.0
     belt_reversed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSettings:
+    """Errors of a six-axis part, in its axes: true force = scale (measured - offset), true rate = measured - bias.
+
+    Measured by `echostep calibrate accelerometers`. `celsius`: the part's temperature at that time.
+    """
+
+    offset_x_m_s2: float = 0.0
+    offset_y_m_s2: float = 0.0
+    offset_z_m_s2: float = 0.0
+    scale_x: float = 1.0
+    scale_y: float = 1.0
+    scale_z: float = 1.0
+    bias_x_rad_s: float = 0.0
+    bias_y_rad_s: float = 0.0
+    bias_z_rad_s: float = 0.0
+    celsius: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for what is no part's error."""
+        for name in _AXES:
+            for field, value, limit in (
+                (f"scale_{name}", getattr(self, f"scale_{name}") - 1.0, SCALE_ERROR_MAX),
+                (f"offset_{name}_m_s2", getattr(self, f"offset_{name}_m_s2"), OFFSET_MAX_M_S2),
+                (f"bias_{name}_rad_s", getattr(self, f"bias_{name}_rad_s"), BIAS_MAX_RAD_S),
+            ):
+                if not abs(value) <= limit:
+                    raise ValueError(f"{field}: {getattr(self, field):g} is beyond the errors of any part")
+
+    @property
+    def offset(self) -> Floats:
+        """Offsets (3,) in m/s2."""
+        return np.array([getattr(self, f"offset_{name}_m_s2") for name in _AXES])
+
+    @property
+    def scale(self) -> Floats:
+        """Scales (3,)."""
+        return np.array([getattr(self, f"scale_{name}") for name in _AXES])
+
+    @property
+    def bias(self) -> Floats:
+        """Biases (3,) of the rates in rad/s."""
+        return np.array([getattr(self, f"bias_{name}_rad_s") for name in _AXES])
+
+
+class Imus(NamedTuple):
+    """Errors of the two parts whose forces the tracker uses."""
+
+    foot: ImuSettings = ImuSettings()
+    belt: ImuSettings = ImuSettings()
 
 
 def ranges(pings: NDArray[np.void], settings: RangerSettings) -> Floats:

@@ -11,14 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
+from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S, ImuSettings
 from echostep.board.findings import BoardReports
 from echostep.board.frames import BoardReader
-from echostep.board.messages import BY_ID, BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
+from echostep.board.messages import BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
 
-_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
-FOOT = _IDS[Foot]
-_REPORTS = [_IDS[kind] for kind in (Identity, Configuration, Status, BoardHealth, Parts, FootHealth)]
+_REPORTS = (Identity, Configuration, Status, BoardHealth, Parts, FootHealth)
 _AXES = ("x", "y", "z")
 
 
@@ -34,7 +32,9 @@ class FootFrames(NamedTuple):
 class FootBoardReader:
     """Samples of a byte stream; malformed frames are counted and raise no error."""
 
-    def __init__(self) -> None:
+    def __init__(self, errors: ImuSettings | None = None) -> None:
+        """`errors`: of the part, when it was calibrated."""
+        self._errors = errors or ImuSettings()
         self.reader = BoardReader()
         self.reports = BoardReports()
         self.samples = 0
@@ -48,13 +48,14 @@ class FootBoardReader:
     def feed(self, received: bytes) -> FootFrames:
         """Samples completed by these bytes; raises StaleFirmwareError when the board has another schema."""
         frames = self.reader.frames(received)
-        for identifier in _REPORTS:
-            for row in frames.rows(identifier)[1]:
-                self.reports.add(BY_ID[identifier].unpack(row.tobytes()))
-        frame_row, found = frames.rows(FOOT)
+        for report in frames.each(_REPORTS):
+            self.reports.add(report)
+        frame_row, found = frames.rows(Foot)
         self.samples += len(found)
         rates = np.column_stack([found[f"rate_{axis}"] for axis in _AXES])
         forces = np.column_stack([found[f"acceleration_{axis}"] for axis in _AXES])
+        errors = self._errors
+        accel = (ICM20649_M_S2 * forces - errors.offset) * errors.scale
         return FootFrames(
-            found["ticks"].astype(np.int64), ICM20649_M_S2 * forces, ICM20649_RAD_S * rates, frames.end[frame_row]
+            found["ticks"].astype(np.int64), accel, ICM20649_RAD_S * rates - errors.bias, frames.end[frame_row]
         )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import binascii
 import struct
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -65,6 +66,7 @@ def _schema() -> _Schema:
 
 
 _SCHEMA = _schema()
+_ID_OF = {kind: identifier for identifier, kind in BY_ID.items()}
 
 
 class StaleFirmwareError(EchostepError):
@@ -109,11 +111,23 @@ class Frames:
     end: Ints
     body: Octets
 
-    def rows(self, identifier: int) -> tuple[Ints, NDArray[np.void]]:
-        """Indices (k,) of the frames with this id, and their bodies (k,) by the schema's dtype."""
-        frame_index = (self.id == identifier).nonzero()[0]
-        kind = ROWS[identifier]
-        return frame_index, np.ascontiguousarray(self.body[frame_index, : kind.itemsize]).view(kind)[:, 0]
+    @property
+    def is_timed(self) -> Bools:
+        """Whether each body (n,) begins with ticks."""
+        timed: Bools = _SCHEMA.timed[self.id]
+        return timed
+
+    def rows(self, kind: type[Message]) -> tuple[Ints, NDArray[np.void]]:
+        """Indices (k,) of the messages of a kind, and their bodies (k,) by the schema's dtype."""
+        frame_index = (self.id == _ID_OF[kind]).nonzero()[0]
+        row = ROWS[_ID_OF[kind]]
+        return frame_index, np.ascontiguousarray(self.body[frame_index, : row.itemsize]).view(row)[:, 0]
+
+    def each(self, kinds: Iterable[type[Message]]) -> Iterator[Message]:
+        """The messages of these kinds, one kind after the other."""
+        for kind in kinds:
+            for row in self.rows(kind)[1]:
+                yield kind.unpack(row.tobytes())
 
     def messages(self) -> list[Message]:
         """The frames as named tuples."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from echostep.board.frames import BoardReader, StaleFirmwareError
-from echostep.board.messages import BEACON_BEARING_INVALID, BEACON_RANGE_MM_INVALID, BY_ID, Beacon
+from echostep.board.messages import BEACON_BEARING_INVALID, BEACON_RANGE_MM_INVALID, Beacon
 
 MOST_BEACONS = 64  # by reason
 NEAREST_M, FURTHEST_M = 0.0, 30.0  # limits of a range; by reason: ultrasound does not reach farther
@@ -27,7 +27,6 @@ FEW_READINGS, FEW_S = (
 )  # a beacon of so few readings gives up its slot after so long without one; by reason: invented numbers
 SILENT_S = 1800.0  # any beacon does after so long; by reason: it is out of power or out of the building
 LARGEST_BEARING_DEG = 180.0
-_BEACON = next(identifier for identifier, kind in BY_ID.items() if kind is Beacon)
 
 
 class BeaconReading(NamedTuple):
@@ -88,7 +87,7 @@ class Gateway:
             self._counts.foreign += 1
             self._reader = BoardReader()
             return []
-        frame_index, rows = frames.rows(_BEACON)
+        frame_index, rows = frames.rows(Beacon)
         self._counts.foreign += len(frames.id) - len(frame_index)
         readings = (self._reading(Beacon._make(row.tolist()), now_s) for row in rows)
         return [reading for reading in readings if reading is not None]

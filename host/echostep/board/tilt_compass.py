@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Ints
+from echostep.board.calibration import LSM6DSO_M_S2, ImuSettings
 from echostep.board.frames import Frames
-from echostep.board.messages import BY_ID, MAGNETIC_INVALID, MOTION_INVALID, Magnetic, Motion
+from echostep.board.messages import MAGNETIC_INVALID, MOTION_INVALID, Magnetic, Motion
 
 INTERVALS = 20  # of the magnetometer, two seconds: about two strides
 LEVEL = np.array([0.0, 0.0, 1.0])  # vertical without an accelerometer
 FULL_SCALE = 32_700  # counts: nearer to the end of the range an axis is saturated
-_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 _FORCES = [f"belt_acceleration_{axis}" for axis in "xyz"]
 
 
@@ -40,23 +40,28 @@ def heading_of(field: Floats, vertical: Floats) -> float:
 class TiltCompass:
     """Call `headings` with the frames of each portion, in order."""
 
-    def __init__(self) -> None:
-        self._sums: deque[NDArray[np.int64]] = deque(maxlen=INTERVALS)  # of the forces' counts, one for each interval
+    def __init__(self, belt: ImuSettings | None = None) -> None:
+        """`belt`: errors of the belt's accelerometer, when it was calibrated."""
+        errors = belt or ImuSettings()
+        self._offset, self._scale = errors.offset / LSM6DSO_M_S2, errors.scale  # counts, 1
+        self._sums: deque[NDArray[np.int64]] = deque(
+            maxlen=INTERVALS
+        )  # of each interval: the forces' counts, and how many there are
         self._sum = np.zeros(
-            3, np.int64
-        )  # of the interval under way; integers, so that the sum does not depend on the portions
+            4, np.int64
+        )  # of the interval under way; integers: the sum does not depend on the portions
 
     def headings(self, frames: Frames) -> tuple[Ints, Floats]:
         """Row of the frame (n,) and heading (n,) of each `Magnetic` message; NaN for a field that was not measured or is saturated."""
-        motion_row, motions = frames.rows(_IDS[Motion])
-        magnetic_row, fields = frames.rows(_IDS[Magnetic])
-        forces = np.column_stack([motions[name] for name in _FORCES]).astype(np.int64)
+        motion_row, motions = frames.rows(Motion)
+        magnetic_row, fields = frames.rows(Magnetic)
+        forces = np.column_stack([*(motions[name] for name in _FORCES), np.ones(len(motions))]).astype(np.int64)
         forces[(forces == MOTION_INVALID).any(axis=1)] = 0
         found = np.full(len(magnetic_row), np.nan)
         begin = 0
         for k, end in enumerate(np.searchsorted(motion_row, magnetic_row).tolist()):
             self._sums.append(self._sum + forces[begin:end].sum(axis=0))
-            self._sum = np.zeros(3, np.int64)
+            self._sum = np.zeros_like(self._sum)
             begin = end
             found[k] = self._heading(np.array([fields[axis][k] for axis in "xyz"], np.float64))
         self._sum = self._sum + forces[begin:].sum(axis=0)
@@ -66,5 +71,6 @@ class TiltCompass:
         if (counts == MAGNETIC_INVALID).any() or (np.abs(counts) >= FULL_SCALE).any():
             return math.nan
         rank = np.arange(len(self._sums))
-        force = (np.minimum(rank + 1, len(rank) - rank) @ np.array(self._sums)).astype(np.float64)
+        total = (np.minimum(rank + 1, len(rank) - rank) @ np.array(self._sums)).astype(np.float64)
+        force = (total[:3] - total[3] * self._offset) * self._scale
         return heading_of(counts, force if force.any() else LEVEL)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""`echostep calibrate`: biases of the gyros, mounting, compass and leg scale, measured in a minute and written as settings.
+"""`echostep calibrate`: biases of the gyros, mounting, compass and leg scale, and the accelerometers, written as settings.
 
-In: the board's port, while the wearer stands still, turns and walks as asked. Out: a settings file (TOML) for `--settings`, whose other sections
-are kept. Owns the instructions to the wearer; `probe` reads the port, `fitting` computes the values.
+In: the board's port, while the wearer stands still, turns and walks as asked; for the accelerometers both boards' ports, while the parts lie still.
+Out: a settings file (TOML) for `--settings`, whose other sections are kept. Owns the instructions to the wearer; `probe` reads the ports,
+`fitting` and `poses` compute the values.
 """
 
 from __future__ import annotations
@@ -10,26 +11,40 @@ from __future__ import annotations
 import sys
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
-from echostep.board.calibration import GYROS, GyroSettings
+from echostep.board.calibration import GYROS
 from echostep.board.health import Severity, board_findings
 from echostep.commissioning.fitting import Fit, fit_compass, fit_gyros, fit_legs, fit_mounting
 from echostep.commissioning.listening_bar import listening_bar
+from echostep.commissioning.port_search import find_boards
+from echostep.commissioning.poses import described, measure_poses
 from echostep.commissioning.probe import ProbeResult, probe
-from echostep.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
+from echostep.commissioning.serial_ports import access_findings, list_seen
 from echostep.errors import EchostepError
 from echostep.offline.leg_lengths import checked_lengths
 from echostep.ports.chunks import BOARD
-from echostep.settings import parse_settings, read_settings
+from echostep.settings import Settings, parse_settings, read_settings
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0  # duration of each measurement
+POSE_S = 3.0  # of a board in each pose; by reason: a second passes before it sends all axes, the mean of 200 samples is known to 0.003 m/s2
+ACCELEROMETERS = "accelerometers"  # only when asked for: the boxes have to be taken off
 WALKED_RANGE_M = (3.0, 100.0)  # of --walked; by reason: shorter walks have too few strides
+
+
+Sections = dict[str, dict[str, Any]]  # of a settings file
+
+
+class Ports(NamedTuple):
+    """Ports of the belt board and of a foot board; those that are None are searched for."""
+
+    board: str | None = None
+    foot: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +58,12 @@ class Wearer:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One calibration: instruction to the wearer, duration, and the fit. Parts with equal instructions share one measurement."""
+    """One calibration: instruction to the wearer, duration, and the fit by what is known. Parts with equal instructions share one measurement."""
 
     name: str
     request: str
     seconds: float
-    fit: Callable[[ProbeResult, GyroSettings, Wearer], Fit]
+    fit: Callable[[ProbeResult, Settings, Wearer], Fit]
 
 
 _TURN = "Turn: once round on the spot, slowly, and a little further."
@@ -57,36 +72,41 @@ PARTS = (
         "gyros",
         "Gyros: stand still, or lay everything on a table.",
         STILL_S,
-        lambda probed, _gyro, _wearer: fit_gyros(probed),
+        lambda probed, _known, _wearer: fit_gyros(probed),
     ),
-    Part("mounting", _TURN, TURN_S, lambda probed, gyro, _wearer: fit_mounting(probed, gyro)),
-    Part("compass", _TURN, TURN_S, lambda probed, gyro, _wearer: fit_compass(probed, gyro)),
+    Part("mounting", _TURN, TURN_S, lambda probed, known, _wearer: fit_mounting(probed, known)),
+    Part("compass", _TURN, TURN_S, lambda probed, known, _wearer: fit_compass(probed, known)),
     Part(
         "legs",
         "Legs: stand for two seconds, walk {walked_m:g} m straight on, and stand again.",
         WALK_S,
-        lambda probed, gyro, wearer: fit_legs(
-            probed, gyro, checked_lengths(wearer.thigh_m, wearer.shank_m), wearer.walked_m
+        lambda probed, known, wearer: fit_legs(
+            probed, known.gyro, checked_lengths(wearer.thigh_m, wearer.shank_m), wearer.walked_m
         ),
     ),
 )
 
 
-def calibrate(port: str | None, names: list[str], wearer: Wearer, out: Path, console: Console) -> None:
+def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console: Console) -> None:
     """Instruct, measure, fit and write, part by part; raises EchostepError with what to repeat. Parts finished before it are kept."""
     parts = _chosen_parts(names)
     _check_wearer(wearer)
-    board_port = port or find(list_seen(), Role.BOARD, BOARD_NAME)
-    if board_port is None:
+    ports = Ports(*find_boards(list_seen(), ports.board, ports.foot))
+    if ports.board is None and (parts or ports.foot is None):
         raise EchostepError("no board is plugged in: plug it in, or name its port with --board; see echostep doctor")
-    for finding in access_findings("board", board_port):
+    for finding in [f for port in ports if port is not None for f in access_findings("board", port)]:
         raise EchostepError(str(finding))
     sections = _sections(out)
+    if ACCELEROMETERS in names:
+        _calibrate_accelerometers([port for port in ports if port is not None], out, sections, console)
     for request, group in groupby(parts, key=lambda part: part.request):
         console.print(request.format(walked_m=wearer.walked_m))
-        probed = _probe(board_port, next(group).seconds, console)
+        seconds = next(group).seconds
+        _wait(console)
+        probed = _probe(str(ports.board), seconds, f"Listening for {seconds:g} s", console)
+        _check_gyros(probed)
         for part in (part for part in parts if part.request == request):
-            values_of_section, line = part.fit(probed, _known_gyros(sections), wearer)
+            values_of_section, line = part.fit(probed, _known(sections, out), wearer)
             console.print(line)
             for section, values in values_of_section.items():
                 sections.setdefault(section, {}).update(values)
@@ -94,11 +114,25 @@ def calibrate(port: str | None, names: list[str], wearer: Wearer, out: Path, con
     console.print(f"{out}: use it with --settings {out}")
 
 
+def _calibrate_accelerometers(ports: list[str], out: Path, sections: Sections, console: Console) -> None:
+    """The errors of all six-axis parts, into the sections and the file."""
+
+    def listen(text: str) -> list[ProbeResult]:
+        _wait(console)
+        return [_probe(port, POSE_S, text, console) for port in ports]
+
+    for place, errors in measure_poses(listen, console).items():
+        console.print(described(place, errors))
+        sections[f"{place}_imu"] = asdict(errors)
+    _write(out, sections)
+
+
 def _chosen_parts(names: list[str]) -> list[Part]:
+    """The parts that are worn; all of them without a name."""
     known = [part.name for part in PARTS]
     for name in names:
-        if name not in known:
-            raise EchostepError(f"{name}: cannot be calibrated; choose from {', '.join(known)}")
+        if name not in [*known, ACCELEROMETERS]:
+            raise EchostepError(f"{name}: cannot be calibrated; choose from {', '.join([*known, ACCELEROMETERS])}")
     return [part for part in PARTS if part.name in (names or known)]
 
 
@@ -110,31 +144,34 @@ def _check_wearer(wearer: Wearer) -> None:
         )
 
 
-def _probe(port: str, seconds: float, console: Console) -> ProbeResult:
+def _wait(console: Console) -> None:
     if sys.stdin.isatty():
         console.input("Press Enter to begin. ")
-    with listening_bar(f"Listening for {seconds:g} s", seconds, console):
+
+
+def _probe(port: str, seconds: float, text: str, console: Console) -> ProbeResult:
+    """What the board at this port says, with `text` at a bar that fills meanwhile."""
+    with listening_bar(text, seconds, console):
         probed = probe({BOARD: port}, seconds)
-    _check(probed, port)
-    return probed
-
-
-def _known_gyros(sections: dict[str, dict[str, Any]]) -> GyroSettings:
-    """Gyro settings of the file, with those that this calibration has just written."""
-    return GyroSettings(**sections.get("gyro", {}))
-
-
-def _check(probed: ProbeResult, port: str) -> None:
     if probed.stale_firmware:
         raise EchostepError(probed.stale_firmware)
     if probed.reports.identity is None:
         raise EchostepError(f"{port}: the board does not answer: run echostep doctor")
+    return probed
+
+
+def _known(sections: Sections, out: Path) -> Settings:
+    """Settings of the file, with those that this calibration has just written."""
+    return parse_settings(_text(sections), str(out))
+
+
+def _check_gyros(probed: ProbeResult) -> None:
     faults = [f for f in board_findings(probed.reports) if f.severity is Severity.FAULT and "gyro" in f.subject]
     if len(faults) == len(GYROS):
         raise EchostepError(str(faults[0]))
 
 
-def _sections(out: Path) -> dict[str, dict[str, Any]]:
+def _sections(out: Path) -> Sections:
     """Sections of an existing settings file; empty without a file."""
     if not out.exists():
         return {}
@@ -143,14 +180,19 @@ def _sections(out: Path) -> dict[str, dict[str, Any]]:
     return tomllib.loads(text)
 
 
-def _write(out: Path, sections: dict[str, dict[str, Any]]) -> None:
+def _text(sections: Sections) -> str:
+    """The sections as TOML."""
     lines = ["# Settings of echostep, with the results of echostep calibrate."]
     for name, values in sections.items():
         lines += ["", f"[{name}]"]
         lines += [
             f"{key} = {str(value).lower() if isinstance(value, bool) else repr(value)}" for key, value in values.items()
         ]
-    text = "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n"
+
+
+def _write(out: Path, sections: Sections) -> None:
+    text = _text(sections)
     parse_settings(text, str(out))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

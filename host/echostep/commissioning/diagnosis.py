@@ -27,6 +27,7 @@ from echostep.board.subscription import knows_subscriptions
 from echostep.commissioning.probe import Drift, ProbeResult, drift_of
 from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import MtxTiming
+from echostep.xsens.products import force_range_g
 
 DRIFT_MAX_PPM = 200.0  # by reason: a crystal is within 50, a ceramic resonator within 5000
 ANSWER_MAX_S = 0.02
@@ -34,6 +35,7 @@ MTX_RATE_ERROR = 0.02  # relative
 CONSTANT_SAMPLES = 400  # so many equal samples in a row are a fault: a gyro has two counts of noise
 FULL_SCALE = 2047  # counts of an ADIS16100
 SIX_AXES_FULL_SCALE = 4697  # counts of `gyros` at the 1000 deg/s of an LSM6DSO, less its last 0.1 %
+HURRIED_G = 18.0  # range of the MTx that is beyond a hurried foot's force [echostep evaluate kits]
 LEAST_PINGS = 20  # for a statement on echoes
 
 
@@ -224,6 +226,12 @@ def judge_mtx(report: Diagnosis, probed: ProbeResult, *, with_board: bool) -> No
     if abs(rate_hz / wanted_hz - 1.0) > MTX_RATE_ERROR:
         what = f"{rate_hz:.1f} samples/s, expected are {wanted_hz:g}"
         report.findings.append(Finding(Severity.WARNING, "MTx", what, "samples are lost: check its cable"))
+    force_g = force_range_g(probed.mtx_product)
+    if force_g is not None and force_g < HURRIED_G:
+        what = f"{probed.mtx_product} measures up to {force_g:g} g; hurried feet exceed that"
+        report.findings.append(
+            Finding(Severity.NOTE, "MTx", what, "walk calmly, or wear an MTx of 18 g or a foot board")
+        )
     if with_board and not probed.ticks.get("Sync"):
         what = "no SyncOut pulse reaches the board: its samples are timed by their arrival, to a millisecond"
         report.findings.append(

@@ -13,10 +13,9 @@ from echostep.board.health import Finding, Severity
 from echostep.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep.commissioning.foot_diagnosis import judge_foot_board
 from echostep.commissioning.listening_bar import listening_bar
-from echostep.commissioning.port_search import listen
+from echostep.commissioning.port_search import find_boards
 from echostep.commissioning.probe import probe
 from echostep.commissioning.serial_ports import (
-    BOARD_NAME,
     MTX_NAME,
     PortSeen,
     Role,
@@ -52,7 +51,7 @@ def examine(board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: 
     report = Diagnosis()
     seen = list_seen()
     report.lines += [f"port      {port.name}: {port.role.value} ({port.text})" for port in seen]
-    board, foot = _boards(seen, board, foot)
+    board, foot = find_boards(seen, board, foot)
     ports = {BOARD: board, MTX: mtx or find(seen, Role.MTX, MTX_NAME), FOOT: foot}
     usable = {name: port for name, port in ports.items() if port is not None and _usable(report, name, port)}
     if ports[BOARD] is None:
@@ -68,16 +67,6 @@ def examine(board: str | None, mtx: str | None, seconds: float = PROBE_S, foot: 
     report.findings += rules_findings()
     report.findings.sort(key=lambda finding: -finding.severity)
     return report
-
-
-def _boards(seen: list[PortSeen], board: str | None, foot: str | None) -> tuple[str | None, str | None]:
-    """The ports of belt board and foot board; several boards are told apart by what comes from them."""
-    paths = [port.path for port in seen if port.role is Role.BOARD and port.path not in (board, foot)]
-    if len(paths) + (board is not None) + (foot is not None) < 2 or not paths:
-        return board or find(seen, Role.BOARD, BOARD_NAME), foot
-    devices, _ = listen(paths)
-    belts, ankles = ([path for path in paths if devices.get(path) == device] for device in (BOARD, FOOT))
-    return board or (belts[0] if belts else None), foot or (ankles[0] if ankles else None)
 
 
 def _usable(report: Diagnosis, name: str, port: str) -> bool:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.board.calibration import ADIS16100_RAD_S, GYROS, GyroSettings
+from echostep.board.calibration import ADIS16100_RAD_S, GYROS, GyroSettings, ImuSettings
 from echostep.board.frames import BoardReader, encode
 from echostep.board.messages import GYROS_INVALID
 from echostep.board.tilt_compass import TiltCompass
@@ -22,6 +22,7 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_lengths import calibrated_scale
+from echostep.settings import Settings
 
 Values = dict[str, float | bool]
 Fit = tuple[dict[str, Values], str]
@@ -52,20 +53,23 @@ def gyro_rates(probed: ProbeResult, settings: GyroSettings | None = None) -> tup
     )
 
 
-def bearings(probed: ProbeResult) -> tuple[Floats, Floats]:
-    """Times (n,) s and compass bearings (n,) rad, clockwise, of a compass or of a magnetometer; invalid ones left out."""
+def bearings(probed: ProbeResult, belt: ImuSettings | None = None) -> tuple[Floats, Floats]:
+    """Times (n,) s and compass bearings (n,) rad, clockwise, of a compass or of a magnetometer; invalid ones left out.
+
+    `belt`: errors of the belt's accelerometer.
+    """
     if not probed.compass and "Magnetic" in probed.ticks:
-        return _bearings_by_field(probed)
+        return _bearings_by_field(probed, belt)
     t_s = np.array(probed.ticks.get("Compass", []), float) / TICKS_PER_S
     bearing = np.array([c.bearing for c in probed.compass], float)
     good = bearing < INVALID_BEARING
     return t_s[good], np.radians(0.1 * bearing[good])
 
 
-def _bearings_by_field(probed: ProbeResult) -> tuple[Floats, Floats]:
+def _bearings_by_field(probed: ProbeResult, belt: ImuSettings | None) -> tuple[Floats, Floats]:
     """The same of a magnetometer of three axes, compensated for tilt as while a walk is tracked."""
     sent = b"".join(encode(message, 0) for message in probed.axes)
-    _, headings = TiltCompass().headings(BoardReader().frames(sent))
+    _, headings = TiltCompass(belt).headings(BoardReader().frames(sent))
     t_s = np.array(probed.ticks["Magnetic"], float) / TICKS_PER_S
     good = np.isfinite(headings)
     return t_s[good], np.mod(0.5 * math.pi - headings[good], 2.0 * math.pi)
@@ -111,18 +115,18 @@ def fit_gyros(probed: ProbeResult) -> Fit:
     return {"gyro": values}, "Bias: " + ", ".join(parts)
 
 
-def _turn(probed: ProbeResult, settings: GyroSettings) -> tuple[Floats, Floats, Floats, Floats]:
+def _turn(probed: ProbeResult, settings: Settings) -> tuple[Floats, Floats, Floats, Floats]:
     """Times (n,) s and rates (n,) rad/s of the belt gyro, times (k,) s and bearings (k,) rad of the compass; raises EchostepError."""
-    t_s, rate = gyro_rates(probed, settings)
+    t_s, rate = gyro_rates(probed, settings.gyro)
     belt = rate[:, GYROS.index("belt")]
     valid = np.isfinite(belt)
-    bearing_s, bearing = bearings(probed)
+    bearing_s, bearing = bearings(probed, settings.belt_imu)
     if valid.sum() < LEAST_READINGS or len(bearing) < LEAST_BEARINGS:
         raise EchostepError("belt gyro or compass gives no values: run echostep doctor")
     return t_s[valid], belt[valid], bearing_s, bearing
 
 
-def fit_mounting(probed: ProbeResult, settings: GyroSettings) -> Fit:
+def fit_mounting(probed: ProbeResult, settings: Settings) -> Fit:
     """Whether the belt gyro is worn upside down: the sign of its correlation with the compass in a turn on the spot."""
     t_s, belt, bearing_s, bearing = _turn(probed, settings)
     turned = np.concatenate([[0.0], np.cumsum(np.diff(t_s) * 0.5 * (belt[1:] + belt[:-1]))])
@@ -139,7 +143,7 @@ def fit_mounting(probed: ProbeResult, settings: GyroSettings) -> Fit:
     }, f"The belt gyro is worn {'upside down' if upside_down else 'upright'}."
 
 
-def fit_compass(probed: ProbeResult, settings: GyroSettings) -> Fit:
+def fit_compass(probed: ProbeResult, settings: Settings) -> Fit:
     """Hard- and soft-iron errors of the compass, from a turn on the spot."""
     t_s, belt, bearing_s, bearing = _turn(probed, settings)
     heading = np.full(len(t_s), np.nan)

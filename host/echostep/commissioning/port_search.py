@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 
 from echostep.commissioning.probe import BAUD
-from echostep.commissioning.serial_ports import PortSeen, Role, list_seen
+from echostep.commissioning.serial_ports import BOARD_NAME, PortSeen, Role, find, list_seen
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.ports.serial_ports import SerialPorts
@@ -49,6 +49,16 @@ def find_ports(mtx: str | None = None, foot: str | None = None) -> FoundPorts:
             f"{what}{_listed(seen, found, notes)}: name the port of the one on the foot with --mtx or --foot"
         )
     return FoundPorts(boards[0], mtxs[0] if mtxs else None, feet[0] if feet else None)
+
+
+def find_boards(seen: list[PortSeen], board: str | None, foot: str | None) -> tuple[str | None, str | None]:
+    """The ports of belt board and foot board among those seen; several boards are told apart by what comes from them."""
+    paths = [port.path for port in seen if port.role is Role.BOARD and port.path not in (board, foot)]
+    if len(paths) + (board is not None) + (foot is not None) < 2 or not paths:
+        return board or find([port for port in seen if port.path != foot], Role.BOARD, BOARD_NAME), foot
+    devices, _ = listen(paths)
+    belts, ankles = ([path for path in paths if devices.get(path) == device] for device in (BOARD, FOOT))
+    return board or (belts[0] if belts else None), foot or (ankles[0] if ankles else None)
 
 
 def listen(paths: list[str]) -> tuple[dict[str, str], dict[str, str]]:

@@ -78,6 +78,7 @@ class ProbeResult:
     stale_firmware: str = ""  # why the board's firmware does not fit; empty when it fits
     mtx_messages: list[str] = field(default_factory=list)
     mtx_fault: str = ""
+    mtx_product: str = ""  # its product code
     mtx_times_s: list[float] = field(default_factory=list)  # arrival of each sample, s after the start
     notices: list[str] = field(default_factory=list)
 
@@ -164,6 +165,7 @@ class _Probe:
         self.result.seconds = clock_s() - self._start_s
         self.result.rejected, self.result.lost = self._board.counts.rejected, self._board.counts.lost
         self.result.notices += self._ports.notices
+        self.result.mtx_product = self._start.product
 
     def _send(self, message: Message) -> None:
         self._ports.send(BOARD, encode(message, self._sequence))

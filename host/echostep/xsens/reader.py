@@ -102,10 +102,13 @@ class MtxCounts:
 
 @dataclass(frozen=True, slots=True)
 class MtxLimits:
-    """Largest magnitude of a measurement [MTx data sheet: 18 g and 1200 deg/s versions, and a tenth more]; largest error of |q| = 1."""
+    """Largest magnitude of a measurement, a tenth beyond the range; largest error of |q| = 1.
+
+    Ranges: 18 g [MTx data sheet], 2000 deg/s of the MTx's successors (1200 of the MTx itself) [MTi 1-series data sheet, as remembered].
+    """
 
     accel_m_s2: float = 200.0
-    gyro_rad_s: float = 24.0
+    gyro_rad_s: float = 38.4
     mag: float = 20.0
     quaternion_error: float = 0.01
 

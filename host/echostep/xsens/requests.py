@@ -7,7 +7,7 @@ In: rates and modes. Out: `Request`s. Owns nothing; raises ValueError for settin
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from echostep.xsens.mtdata import PROJECT, OutputFormat
 
@@ -34,7 +34,8 @@ _ERRORS = {  # [LLCP, Error]
 class Request:
     """A message to the MT, and the payload `answer` of its acknowledgement (None: any).
 
-    `optional`: the setup goes on when it is refused. `legacy`: a device that refuses it is taken for a successor of the MTx.
+    `optional`: the setup goes on when it is refused. `instead`: when it is refused, these take the place of it and of all that follow, and
+    `remark` is said. `rates`: the answer lists at least these outputs at these rates (Hz), by identifier.
     """
 
     name: str
@@ -42,12 +43,33 @@ class Request:
     payload: bytes = b""
     answer: bytes | None = None
     optional: bool = False
-    legacy: bool = False
+    instead: tuple[Request, ...] = ()
+    remark: str = ""
+    rates: tuple[tuple[int, int], ...] = ()
+
+    def fault(self, answer: bytes) -> str | None:
+        """What is wrong with this answer, as text; "" when it is right, None when it answers another request of the same name."""
+        if self.rates:
+            return _rate_fault(dict(self.rates), answer)
+        if self.answer is None or self.answer == answer:
+            return ""
+        return f"its answer is {answer.hex()}" if len(answer) == len(self.answer) else None
 
 
 GO_TO_CONFIG = Request("GoToConfig", 0x30)
 GO_TO_MEASUREMENT = Request("GoToMeasurement", 0x10)
 REQUEST_DEVICE_ID = Request("ReqDID", 0x00, optional=True)
+REQUEST_PRODUCT = Request("ReqProductCode", 0x1C, optional=True)
+REQUEST_FIRMWARE = Request("ReqFWRev", 0x12, optional=True)
+OUTPUTS = {
+    0x1020: "sample counter",
+    0x2010: "quaternion",
+    0x4020: "acceleration",
+    0x8020: "rate of turn",
+    0xC020: "magnetic field",
+}
+COUNTER, NEEDED, WITH_ORIENTATION = 0x1020, (0x4020, 0x8020), (0x2010, 0x4020, 0x8020, 0xC020)
+WITH_EACH = 0xFFFF  # in the place of a rate: with every message [LLCP, SetOutputConfiguration]
 
 
 def set_rate(rate_hz: float) -> tuple[Request, ...]:
@@ -56,7 +78,13 @@ def set_rate(rate_hz: float) -> tuple[Request, ...]:
         period = CLOCK_HZ / (rate_hz * (skip + 1))
         if period.is_integer() and SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
             return (
-                Request("SetPeriod", 0x04, struct.pack(">H", int(period)), legacy=True),
+                Request(
+                    "SetPeriod",
+                    0x04,
+                    struct.pack(">H", int(period)),
+                    instead=successor_requests(rate_hz),
+                    remark="it sends MTData2",
+                ),
                 Request("SetOutputSkipFactor", 0xD4, struct.pack(">H", skip)),
             )
     raise ValueError(f"[mtx] rate_hz: an MTx cannot sample at {rate_hz:g} Hz; take 50, 60, 100, 120 or 128")
@@ -89,15 +117,46 @@ def project_requests(rate_hz: float) -> tuple[Request, ...]:
     frame_bits = BITS_PER_BYTE * (PROJECT.length + FRAME_OVERHEAD)
     if frame_bits * rate_hz > BAUD:
         raise ValueError(f"[mtx] rate_hz: {rate_hz:g} Hz do not fit {BAUD} Bd; at most {BAUD // frame_bits}")
-    return (REQUEST_DEVICE_ID, *set_rate(rate_hz), *set_output(PROJECT), *set_sync_out())
+    return (
+        REQUEST_DEVICE_ID, REQUEST_PRODUCT, REQUEST_FIRMWARE, *set_rate(rate_hz), *set_output(PROJECT), *set_sync_out(),
+    )  # fmt: skip
 
 
 def successor_requests(rate_hz: float) -> tuple[Request, ...]:
-    """SetOutputConfiguration for the MTi 10, 100 and 1 series: counter, quaternion, accel, gyro, mag as floats [LLCP, SetOutputConfiguration]."""
-    rate = round(rate_hz)
-    outputs = [(0x1020, 0xFFFF), (0x2010, rate), (0x4020, rate), (0x8020, rate), (0xC020, rate)]
-    payload = b"".join(struct.pack(">HH", *output) for output in outputs)
-    return (Request("SetOutputConfiguration", 0xC0, payload, payload),)
+    """SetOutputConfiguration for the MTi 1, 10, 100 and 600 series: counter, quaternion, accel, gyro, mag as floats [LLCP, SetOutputConfiguration].
+
+    The answer lists the rates that the device really has. A device without orientation (MTi-1, MTi-610) may refuse it, and is asked for less.
+    """
+    least = _output_configuration(NEEDED, round(rate_hz))
+    return (
+        replace(
+            _output_configuration(WITH_ORIENTATION, round(rate_hz)),
+            instead=(least,),
+            remark="it sends neither orientation nor magnetic field",
+        ),
+    )
+
+
+def _output_configuration(outputs: tuple[int, ...], rate: int) -> Request:
+    """Request for a counter with each message and these outputs at this rate."""
+    wanted = [(COUNTER, WITH_EACH), *((identifier, rate) for identifier in outputs)]
+    payload = b"".join(struct.pack(">HH", *output) for output in wanted)
+    return Request(
+        "SetOutputConfiguration", 0xC0, payload, rates=((COUNTER, rate), *((identifier, rate) for identifier in NEEDED))
+    )
+
+
+def _rate_fault(wanted: dict[int, int], answer: bytes) -> str:
+    """Outputs that a SetOutputConfigurationAck lacks or has at another rate, as text. `WITH_EACH` is any rate."""
+    told = dict(struct.iter_unpack(">HH", answer[: len(answer) // 4 * 4]))
+    faults = [
+        f"{OUTPUTS[identifier]} at {told[identifier]} Hz instead of {rate}"
+        if identifier in told
+        else f"no {OUTPUTS[identifier]}"
+        for identifier, rate in wanted.items()
+        if told.get(identifier) not in (rate, WITH_EACH)
+    ]
+    return f"it would send {', '.join(faults)}" if faults else ""
 
 
 def reset_heading() -> Request:

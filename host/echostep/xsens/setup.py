@@ -21,13 +21,15 @@ from typing import NamedTuple
 
 from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, Frame, FrameReader, encode_frame
 from echostep.xsens.mtdata import PROJECT
+from echostep.xsens.products import firmware_text, product_text
 from echostep.xsens.requests import (
     GO_TO_CONFIG,
     GO_TO_MEASUREMENT,
+    REQUEST_FIRMWARE,
+    REQUEST_PRODUCT,
     WAKE_UP_ACK,
     Request,
     error_text,
-    successor_requests,
 )
 
 TRIES = 4  # of each request; by reason: one more than Xsens' own library makes for GoToConfig [CMT]
@@ -86,6 +88,7 @@ class MtxSetup:
         self._received = 0
         self._measurements: list[_Measurement] = []  # since the restart, at most MAX_MEASUREMENTS
         self._acknowledged = False
+        self._answers: dict[str, bytes] = {}  # by the request's name
 
     @property
     def finished(self) -> bool:
@@ -118,10 +121,12 @@ class MtxSetup:
                 self._handle_refusal(request, error_text(frame.payload), now_s)
             elif frame.mid == request.mid + 1 and self._tries:
                 self._acknowledged = True
-                if request.answer is None or request.answer == frame.payload:
+                fault = request.fault(frame.payload)
+                if fault:
+                    self._handle_refusal(request, fault, now_s)
+                elif fault is not None:  # else a late answer to the request before
+                    self._answers[request.name] = frame.payload
                     self._next_request(now_s)
-                elif len(frame.payload) == len(request.answer):  # else a late answer to the request before
-                    self._handle_refusal(request, f"its answer is {frame.payload.hex()}", now_s)
 
     def _handle_wake_up(self, now_s: float) -> None:
         """Acknowledge a WakeUp and begin again; without an acknowledgement within 500 ms the device measures as before [LLCP, WakeUp]."""
@@ -141,9 +146,9 @@ class MtxSetup:
         """Handle a refused request: repeat, replace by those of the MTx's successors, skip, or abandon the setup."""
         if request is GO_TO_CONFIG or request is GO_TO_MEASUREMENT:
             return  # it is sent again until its tries are over
-        if request.legacy:
-            self.remarks.append("it accepts no legacy settings and sends MTData2")
-            self._queue = deque((*successor_requests(self._rate_hz), GO_TO_MEASUREMENT))
+        if request.instead:
+            self.remarks.append(request.remark)
+            self._queue = deque((*request.instead, GO_TO_MEASUREMENT))
             self._tries, self._deadline_s = 0, now_s
         elif request.optional:
             self.remarks.append(f"{request.name} refused: {why}")
@@ -196,11 +201,23 @@ class MtxSetup:
         return ""
 
     @property
+    def product(self) -> str:
+        """Product code of the device; "" as long as it has not told it."""
+        return product_text(self._answers.get(REQUEST_PRODUCT.name, b""))
+
+    @property
+    def _device_text(self) -> str:
+        """Product and firmware, after a colon."""
+        firmware = firmware_text(self._answers.get(REQUEST_FIRMWARE.name, b""))
+        known = [self.product, f"firmware {firmware}" if firmware else ""]
+        return ": " + ", ".join(filter(None, known)) if any(known) else ""
+
+    @property
     def verdict(self) -> str:
         """Result of the setup and, after a failure, the remedy, in one line."""
         by_hand = BY_HAND.format(rate=self._rate_hz)
         if self.state is State.CONFIGURED:
-            return "MTx: configured" + "".join(f"; {remark}" for remark in self.remarks)
+            return f"MTx: configured{self._device_text}" + "".join(f"; {remark}" for remark in self.remarks)
         if self.state is State.UNANSWERED:
             return "MTx: does not answer, but sends the wanted format: it is used as it is"
         if self.state is State.WRONG_MODE:

@@ -28,6 +28,11 @@ class MtxStart:
         self._send, self._say = send, say
         self._usable = False  # whether the MTx was once in the wanted format
 
+    @property
+    def product(self) -> str:
+        """Product code of the device; "" as long as it has not told it."""
+        return self._setup.product
+
     def advance(self, chunk: Chunk | None) -> None:
         """Process the next chunk of any port; None when nothing came, so that timeouts are checked."""
         was_busy = not self._setup.finished

@@ -81,17 +81,18 @@ class FootBoardSensors:
 def measure_foot(
     walk: Walk, rng: np.random.Generator, model: FootBoardModel | None = None
 ) -> tuple[Floats, Floats, Floats]:
-    """Samples of a whole walk without a board: t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s."""
+    """Samples of a whole walk without a board: t_s (n,), accel (n, 3) m/s2, gyro (n, 3) rad/s. Equal generators draw equal biases."""
     m = model or FootBoardModel()
+    biases = [m.accel_bias_m_s2 * rng.standard_normal(3), m.gyro_bias_rad_s * rng.standard_normal(3)]
     t_s: Floats = np.arange(10.0 * m.period_s, walk.t_s[-1] - 0.05, m.period_s)
     mounting = rotations(np.array([m.mounting_rpy_rad]))[0]
     force, rate = (means(v, t_s, m.period_s) for v in specific_force_and_rate(walk, mounting))
     found = []
     for true, bias, noise, unit, limit in (
-        (force, m.accel_bias_m_s2, m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
-        (rate, m.gyro_bias_rad_s, m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
+        (force, biases[0], m.accel_noise_m_s2, ICM20649_M_S2, m.force_limit_counts),
+        (rate, biases[1], m.gyro_noise_rad_s, ICM20649_RAD_S, m.rate_limit_counts),
     ):
-        noisy = true + bias * rng.standard_normal(3) + noise * rng.standard_normal(true.shape)
+        noisy = true + bias + noise * rng.standard_normal(true.shape)
         found.append(unit * np.clip(np.rint(noisy / unit), -limit, limit))
     return t_s, found[0], found[1]
 

@@ -35,8 +35,19 @@ from echostep.xsens.mtdata import (
 FACTORY = OutputFormat(ORIENTATION, SAMPLE_COUNTER | QUATERNION)  # what an MTx is sold with [Xsens MT0100P, 5.2]
 WAKE_UP_S = 0.5
 DEVICE_ID = bytes.fromhex("00312345")
+PRODUCT, FIRMWARE = b"MTx-28A53G25".ljust(20), bytes((2, 8, 1))
 CELSIUS = 25.0
-ACCEPTED = {0x00: (0,), 0x04: (0, 2), 0xA4: (2,), 0xD0: (0, 2), 0xD2: (0, 4), 0xD4: (0, 2), 0xD8: (1, 3, 5)}
+ACCEPTED = {
+    0x00: (0,),
+    0x04: (0, 2),
+    0x12: (0,),
+    0x1C: (0,),
+    0xA4: (2,),
+    0xD0: (0, 2),
+    0xD2: (0, 4),
+    0xD4: (0, 2),
+    0xD8: (1, 3, 5),
+}
 
 
 class DeviceState(Enum):
@@ -103,6 +114,8 @@ class MtxDevice:
         value = int.from_bytes(payload, "big")
         if mid == 0x00:
             return DEVICE_ID
+        if mid in (0x12, 0x1C):
+            return FIRMWARE if mid == 0x12 else PRODUCT
         if mid == 0xA4:
             return b""
         if mid == 0xD8:
