@@ -34,4 +34,6 @@ def test_the_recordings_are_counted_and_cause_no_mayday() -> None:
 
 
 def test_days_and_recordings_belong_to_the_first_seeds() -> None:
-    assert [row["name"] for row in one_run(0, DATA / "missing", 1, 1)] == ["cannot move"]
+    rows = one_run(0, DATA / "missing", 1, 1)
+    assert [row["name"] for row in rows if "fell" not in row] == ["cannot move"]
+    assert [row["fell"] for row in rows if "fell" in row] == [1, 0]

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.evaluate import fall_recordings, falls
 from echostep.evaluate.feet.datasets import SETS as FEET
 from echostep.evaluate.legs.datasets import SETS as LEGS
 from echostep.evaluate.recordings import read_sets
@@ -23,7 +24,8 @@ from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry.alarm import AlarmKind, WearerAlarm
-from echostep.odometry.stillness import WINDOW_S, Stillness
+from echostep.odometry.stillness import WINDOW_S, Stillness, Window
+from echostep.odometry.wearer_signs import StepTaken
 
 RATE_HZ = 100.0
 GYRO_NOISE, ACCEL_NOISE = math.radians(0.1) * 10.0, 0.04  # rad/s, m/s2: an MTx at 100 Hz, by its manual
@@ -93,20 +95,20 @@ class SimulatedWearer:
             self._draw_sway()
         gyro = moved[:, None] * self._axis + sway[:3].T + GYRO_NOISE * self.rng.standard_normal((len(t_s), 3))
         accel = 3.0 * moved[:, None] * self._up + ACCEL_NOISE * self.rng.standard_normal((len(t_s), 3))
-        self.stillness.add_foot(t_s, gyro, accel + 9.81 * self._up)
+        windows = [window for _, window in self.stillness.add_foot(t_s, gyro, accel + 9.81 * self._up)]
         if self.legs:
             thigh, shank, belt = 0.6 * moved + LEG_NOISE * self.rng.standard_normal((3, len(t_s)))
             thigh, shank = thigh + sway[3], shank + sway[4]
             belt += BREATH_RAD_S * np.sin(2.0 * np.pi * BREATH_HZ * t_s) if lies else 0.0
-            self.stillness.add_legs([GyroBlock(t_s, thigh, shank, belt, np.full(len(t_s), np.nan))])
+            windows += self.stillness.add_legs(GyroBlock(t_s, thigh, shank, belt, np.full(len(t_s), np.nan)))
         self.t_s = float(t_s[-1])
-        self.alarm.add(self.stillness.pop_windows())
+        self.alarm.add(sorted(windows))
 
     def walk(self, seconds: float) -> None:
         """Walk: a step of this foot each 1.1 s."""
         self.live(seconds, np.arange(0.0, seconds, PAUSES_S["walk"]).tolist())
         for t_s in np.arange(self.t_s - seconds, self.t_s, 2.0 * PAUSES_S["walk"]).tolist():
-            self.alarm.step(t_s)
+            self.alarm.add([StepTaken(t_s)])
 
     @property
     def kind(self) -> AlarmKind | None:
@@ -114,7 +116,7 @@ class SimulatedWearer:
 
 
 def incapacitated(seed: int) -> Row:
-    """A wearer who walks, crouches or stands, falls within 2 s and then does not move but breathe; each second one twitches."""
+    """Walking, crouching or standing, a fall within 2 s, then no motion but breathing; in half of the seeds twitches."""
     rng = np.random.default_rng([seed, 1])
     wearer = SimulatedWearer(rng, legs=bool(seed % 2))
     wearer.walk(rng.uniform(5.0, 40.0))
@@ -160,22 +162,19 @@ def recorded(folder: Path) -> list[Row]:
     """Every recording of feet and legs: how often the alarm asked and called. They are walks, not work: half an hour in all."""
     rows: list[Row] = []
     for foot in read_sets(folder, FEET)[0]:
-        stillness = Stillness()
-        stillness.add_foot(np.asarray(foot.t_s, np.float64), foot.gyro, foot.accel)
-        rows.append(_of_recording("recorded feet", stillness, foot.t_s))
+        windows = Stillness().add_foot(np.asarray(foot.t_s, np.float64), foot.gyro, foot.accel)
+        rows.append(_of_recording("recorded feet", [window for _, window in windows], foot.t_s))
     for leg in read_sets(folder, LEGS)[0]:
-        stillness = Stillness()
         thigh, shank = (np.linalg.norm(rate, axis=1) for rate in (leg.thigh, leg.shank))
-        stillness.add_legs([GyroBlock(leg.t_s, thigh, shank, leg.belt, np.full(len(leg.t_s), np.nan))])
-        rows.append(_of_recording("recorded legs", stillness, leg.t_s))
+        block = GyroBlock(leg.t_s, thigh, shank, leg.belt, np.full(len(leg.t_s), np.nan))
+        rows.append(_of_recording("recorded legs", Stillness().add_legs(block), leg.t_s))
     return rows
 
 
-def _of_recording(name: str, stillness: Stillness, t_s: Floats) -> Row:
+def _of_recording(name: str, windows: Sequence[Window], t_s: Floats) -> Row:
     alarm = WearerAlarm()
-    for k in range(3):
-        alarm.step(float(k))  # on from the first sample, also before the walk
-    alarm.add(stillness.pop_windows())
+    alarm.add([StepTaken(float(k)) for k in range(3)])  # on from the first sample, also before the walk
+    alarm.add(windows)
     kinds = [change.kind for _, change in alarm.changes if change]
     counts = {"asked": kinds.count(AlarmKind.ASKING), "maydays": kinds.count(AlarmKind.MAYDAY)}
     return {"name": name, "seed": 0, "hours": float(t_s[-1] - t_s[0]) / 3600.0, **counts}
@@ -194,17 +193,17 @@ DAYS: dict[str, Callable[[int], Row]] = {
 
 
 def one_run(days: int, data: Path, first: int, seed: int) -> list[Row]:
-    """A wearer who cannot move; with the first `days` seeds also the working days of one who can, with the first seed the recordings."""
-    rows = [incapacitated(seed)]
+    """A wearer who cannot move, one who falls, one who does not; with the first `days` seeds also working days, with the first one the recordings."""
+    rows = [incapacitated(seed), falls.fallen(seed), falls.not_fallen(seed)]
     if seed - first < days:
         rows += [day(seed) for day in DAYS.values()]
-    return rows + (recorded(data) if seed == first and data.is_dir() else [])
+    return rows + (recorded(data) + fall_recordings.recorded(data) if seed == first and data.is_dir() else [])
 
 
 def summarize(rows: Sequence[Row]) -> list[Row]:
-    """One row for each name."""
+    """One row for each name; those of falls last."""
     made: list[Row] = []
-    for group in rows_by_name(rows):
+    for group in rows_by_name([row for row in rows if "fell" not in row]):
         row: Row = {"name": group[0]["name"], "runs": len(group)}
         if "told_s" in group[0]:
             told = [r["told_s"] for r in group]
@@ -214,12 +213,12 @@ def summarize(rows: Sequence[Row]) -> list[Row]:
             counts = {key: sum(r[key] for r in group) for key in ("asked", "maydays")}
             row |= {"hours": hours, **counts, "per_8h": 8.0 * counts["maydays"] / hours}
         made.append(row)
-    return made
+    return made + falls.summarize([row for row in rows if "fell" in row])
 
 
 def _tables(rows: Sequence[Row], _: StudyRequest) -> list[Table]:
     told = f"told within {TOLD_S:.0f} s"
-    falls = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
+    lying = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
     days = {
         "name": "",
         "runs": "runs",
@@ -229,8 +228,11 @@ def _tables(rows: Sequence[Row], _: StudyRequest) -> list[Table]:
         "per_8h": "in 8 hours",
     }
     return [
-        Table("Wearers who cannot move (simulated)", [row for row in rows if "told" in row], falls),
+        Table(
+            "Wearers who cannot move (simulated)", [row for row in rows if "told" in row and "early" not in row], lying
+        ),
         Table("Wearers who can (days simulated, recordings real)", [row for row in rows if "hours" in row], days),
+        *falls.tables([row for row in rows if "early" in row or "claimed" in row]),
     ]
 
 

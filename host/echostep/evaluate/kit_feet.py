@@ -7,21 +7,26 @@ and limits of the data sheets, steps smoother than real ones; the firmware has n
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.board.imu_errors import fit_errors, pose_of
 from echostep.evaluate.report import Row
-from echostep.foot.ins import Noise
+from echostep.foot.ins import GRAVITY_M_S2, Noise
 from echostep.foot.steps import walk_track
 from echostep.odometry.foot_source import ICM20649_NOISE
-from echostep.simulation.devices.foot_board import FootBoardModel, measure_foot
+from echostep.simulation.devices.foot_board import measure_foot
 from echostep.simulation.devices.mtx import MtxModel, measure
 from echostep.simulation.people.walker import RATE_HZ, Person, Walk, walk
 from echostep.simulation.world.sites import otb
 
 PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; by reason
 SMALL_MTX_M_S2 = 50.0  # full scale of the MTx version of 5 g [Xsens MT0100P, 4.1]
-CALIBRATED = 0.15  # share of the force's bias that six positions leave, by reason
+LEAN_RAD = 0.05  # of each side on which the part lies, by reason
+SIDES_RPY_RAD = np.pi / 2.0 * np.array([(0, 0, 0), (2, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
+POSE_MS = 2500  # as in `echostep calibrate accelerometers`
 Samples = tuple[Floats, Floats, Floats]  # t_s (n,), accel, gyro (n, 3)
 
 
@@ -41,14 +46,29 @@ def devices(walked: Walk, seed: int) -> dict[str, tuple[Samples, Noise]]:
     """What each device measures on this walk, and the error model by which it is navigated."""
     mtx = measure(walked, MtxModel(), np.random.default_rng([seed, 12]))
     small = np.clip(mtx.accel, -SMALL_MTX_M_S2, SMALL_MTX_M_S2)
-    bare, model = FootBoardModel(), FootBoardModel(accel_bias_m_s2=CALIBRATED * FootBoardModel().accel_bias_m_s2)
-    boards = [measure_foot(walked, np.random.default_rng([seed, 13]), m) for m in (bare, model)]
+    board = measure_foot(walked, np.random.default_rng([seed, 13]))
     return {
         "MTx 18 g": ((mtx.t_s, mtx.accel, mtx.gyro), Noise()),
         "MTx 5 g": ((mtx.t_s, small, mtx.gyro), Noise()),
-        "foot board": (boards[0], ICM20649_NOISE),
-        "foot board, calibrated": (boards[1], ICM20649_NOISE),
+        "foot board": (board, ICM20649_NOISE),
+        "foot board, calibrated": (calibrated(board, walked, seed), ICM20649_NOISE),
     }
+
+
+def calibrated(samples: Samples, walked: Walk, seed: int) -> Samples:
+    """The same samples less the errors that six poses of the same part tell; its temperature is that of the walk."""
+    poses = []
+    for side in SIDES_RPY_RAD:
+        lying = replace(
+            walked,
+            t_s=walked.t_s[:POSE_MS],
+            foot_m=np.zeros((POSE_MS, 3)),
+            foot_rpy_rad=np.tile(side + LEAN_RAD, (POSE_MS, 1)),
+        )
+        poses.append(pose_of(*measure_foot(lying, np.random.default_rng([seed, 13]))[1:]))
+    errors = fit_errors(poses, GRAVITY_M_S2, 0.0)
+    t_s, accel, gyro = samples
+    return t_s, (accel - errors.offset) * errors.scale, gyro - errors.bias
 
 
 def errors_m(walked: Walk, samples: Samples, noise: Noise) -> list[float]:

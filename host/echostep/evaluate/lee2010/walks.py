@@ -156,8 +156,7 @@ def _read(received: bytes) -> Measured:
 
 def _timed(frames: Frames, kind: type[m.Message]) -> tuple[Floats, NDArray[np.void]]:
     """The messages of a kind with their times."""
-    identifier = next(i for i, one in m.BY_ID.items() if one is kind)
-    _, rows = frames.rows(identifier)
+    _, rows = frames.rows(kind)
     ticks = rows["ticks"].astype(np.int64)
     n, none = len(ticks), np.empty(0, np.int64)
     arrived = ticks * 500 + 1_000_000_000
