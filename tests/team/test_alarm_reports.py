@@ -55,6 +55,14 @@ def test_a_mayday_is_an_emergency_with_place_floor_radius_and_heading() -> None:
     assert track.get("course") == "61.4"
 
 
+def test_a_report_carries_the_trunks_tilt_and_older_ones_have_none() -> None:
+    made = report(trunk_tilt_deg=85.0, alarm=replace(MAYDAY, reason="fall"))
+    assert decode(encode(made)) == made
+    assert decode(encode(made).replace(b',"trunk_tilt_deg":85.0', b"")).trunk_tilt_deg is None
+    with pytest.raises(BadReportError, match="trunk_tilt_deg"):
+        decode(encode(made).replace(b'"trunk_tilt_deg":85.0', b'"trunk_tilt_deg":181.0'))
+
+
 def test_its_end_cancels_the_emergency_and_a_question_is_none() -> None:
     _, over = (ElementTree.fromstring(made) for made in events(report(alarm=OVER)))
     assert over.get("type") == "b-a-o-can"
@@ -70,6 +78,8 @@ def test_its_end_cancels_the_emergency_and_a_question_is_none() -> None:
     [
         (MAYDAY, "mayday: no motion for 34 s"),
         (ReportedAlarm("mayday", "help", 1, 5.0), "mayday: asked for help 5 s ago"),
+        (ReportedAlarm("mayday", "fall", 1, 14.0), "mayday: fall 14 s ago"),
+        (ReportedAlarm("asking", "fall", 1, 4.0), "asked whether all is well: fall 4 s ago"),
         (ReportedAlarm("asking", "no motion", 1, 22.0), "asked whether all is well: no motion for 22 s"),
         (OVER, "mayday over for 2 s"),
     ],

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from hypothesis import given
@@ -22,7 +22,7 @@ from echostep.plan.model import load_plan
 from echostep.team import mesh
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
-from echostep.team.mesh import POSITION_EVERY, MeshListener, MeshTransport
+from echostep.team.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
 from echostep.team.mesh_airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
 from echostep.team.mesh_report import Unpacker, pack
 from echostep.team.outbox import Outbox
@@ -185,6 +185,12 @@ def test_twenty_wearers_for_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None
     assert max(gap for gap in gaps if gap < 1.5 * INTERVAL_S) <= INTERVAL_S + 1.5  # when none was lost
 
 
+@pytest.mark.parametrize("reason", ["no motion", "fall", "help"])
+def test_every_reason_of_an_alarm_is_sent(reason: Literal["no motion", "fall", "help"]) -> None:
+    sent = report(alarm=replace(ALARM, reason=reason))
+    assert UNPACKER.unpack(pack(sent, 1, 1_790_000_000.25)).alarm == sent.alarm
+
+
 def test_an_alarm_goes_out_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[bytes] = []
 
@@ -286,6 +292,24 @@ def test_a_node_that_is_unplugged_is_an_os_error(air: Air) -> None:
     transport.close(ended=False)
     with pytest.raises(OSError):  # noqa: PT011
         transport.open()
+
+
+def test_a_port_that_the_package_closes_under_a_write_is_an_os_error(air: Air) -> None:
+    node = MeshNode(air.node().port)
+    interface = node._interface
+    wrapped = interface.stream
+
+    class Closing:
+        """A stream whose reader finds at the first write that the node is gone."""
+
+        def write(self, _: bytes) -> None:
+            interface.stream = None
+
+    interface.stream = Closing()
+    with pytest.raises(ConnectionError, match="broke"):
+        node.send(b"report")
+    interface.stream = wrapped
+    node.close()
 
 
 def test_without_the_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import time
@@ -12,12 +13,13 @@ import jsonschema
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.console import Console
 
 from echostep.plan.model import load_plan
-from echostep.team.commander import as_tree, table, update_roster
+from echostep.team.commander import as_tree, notes, table, update_roster
 from echostep.team.inbox import MESSAGES_PER_TOPIC, Inbox
 from echostep.team.report import BadReportError, Presence, check_name, decode, encode, schema
-from echostep.team.roster import MAX_MEMBERS, MAX_REASONS, MemberState, Roster
+from echostep.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
 from team.letters import NOW, UNIX, heard, said
 from team.team_reports import PLAN, POSITION, report
 
@@ -200,6 +202,29 @@ def test_old_reports_and_clocks_that_jump_are_counted() -> None:
     roster.receive("echostep/red/anna/estimate", encode(report(sequence=8, at_s=UNIX + 3600.0)), False, NOW, UNIX)
     (member,) = roster.members(NOW)
     assert (member.missed, member.notes["clock jumped"]) == (3, 1)
+
+
+def test_a_table_is_as_long_as_the_terminal_and_has_the_most_urgent_first() -> None:
+    roster = heard(*(said(f"wearer {k:02d}") for k in range(40)), said("kim", status="lost"))
+    console = Console(file=io.StringIO(), width=140)
+    console.print(table(roster, load_plan(PLAN), NOW, connected=False, columns=140, lines=24))
+    shown = console.file.getvalue().rstrip("\n").split("\n")  # type: ignore[attr-defined]
+    assert len(shown) <= 24
+    assert sum("red/" in line for line in shown) == 16
+    assert "red/kim" in next(line for line in shown if "red/" in line)
+    assert any(line.startswith("and 25 more") for line in shown)
+
+
+def test_two_senders_under_one_name_and_run_are_named() -> None:
+    roster = heard(said())
+    forged = report(sequence=1 << 40, at_s=UNIX)
+    roster.receive("echostep/red/anna/estimate", encode(forged), False, NOW, UNIX)
+    for k in (1, 2):
+        made = report(sequence=10 + k, at_s=UNIX + k)
+        roster.receive("echostep/red/anna/estimate", encode(made), False, NOW + k, UNIX + k)
+    (member,) = roster.members(NOW + 2.0)
+    assert roster.rejected["a second sender under one name and run"] == 2
+    assert f"{CONTRADICTION} 2 x" in notes(member, load_plan(PLAN), NOW + 2.0, set())
 
 
 def test_a_position_that_jumps_is_noted() -> None:

@@ -24,6 +24,7 @@ from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Rost
 
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
 MAX_COLUMN_WIDTH = 24  # characters
+TABLE_LINES = 8  # of a table beside its members: title, head, and what is below it
 LOW_BATTERY_PERCENT = 20
 NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
 COLUMNS = {
@@ -54,24 +55,35 @@ def take_messages(
     return believed
 
 
-def table(roster: Roster, plan: Plan, now_s: float, *, connected: bool, columns: int = ALL_COLUMNS_WIDTH) -> Group:
-    """The roster as a table, a line per member, `columns` characters wide."""
+def table(
+    roster: Roster,
+    plan: Plan,
+    now_s: float,
+    *,
+    connected: bool,
+    columns: int = ALL_COLUMNS_WIDTH,
+    lines: int | None = None,
+) -> Group:
+    """The roster as a table, a line per member, `columns` characters wide; `lines`: of the most urgent members only, as many as there is room for."""
     members = roster.members(now_s)
     grid = Table(
         title=f"{plan.name}: {summary(members, now_s)}", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
     )
     names = [name for name in COLUMNS if columns >= LEAST_WIDTHS.get(name, 0)]
     duplicates = roster.duplicates(now_s)
-    rows = [_cells(m, members, plan, now_s, duplicates) for m in members]
+    shown = members if lines is None else members[: max(lines - TABLE_LINES, 1)]
+    rows = [_cells(m, members, plan, now_s, duplicates) for m in shown]
     left = columns - 2
     for name in names:
         longest = max([len(name)] + [cell_len(row[name]) for row in rows])
         width = max(left, 8) if name == "note" else min(longest, MAX_COLUMN_WIDTH)
         left -= width + 2
         grid.add_column(name, justify=COLUMNS[name], no_wrap=True, width=width)  # type: ignore[arg-type]
-    for m, row in zip(members, rows, strict=True):
+    for m, row in zip(shown, rows, strict=True):
         grid.add_row(*(Text(row[name]) for name in names), style=STYLES[m.state(now_s)])
-    below = [] if connected else [Text("no connection to the broker", style="bold red")]
+    below = [Text(f"and {len(members) - len(shown)} more", style="grey62")] if len(shown) < len(members) else []
+    if not connected:
+        below.append(Text("no connection to the broker", style="bold red"))
     if roster.rejected:
         below.append(Text(f"rejected: {rejected(roster)}", style="grey62"))
     return Group(grid, *below)

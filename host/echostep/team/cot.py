@@ -107,12 +107,13 @@ def remarks(report: Report) -> str:
 
 
 def alarm_words(alarm: ReportedAlarm) -> str:
-    """An alarm in words: "mayday: no motion for 34 s"."""
+    """An alarm in words: "mayday: no motion for 34 s", "mayday: fall 14 s ago"."""
     if alarm.kind == "over":
         return f"mayday over for {alarm.age_s:.0f} s"
     kind = "asked whether all is well" if alarm.kind == "asking" else "mayday"
-    why = "no motion for" if alarm.reason == "no motion" else "asked for help"
-    return f"{kind}: {why} {alarm.age_s:.0f} s{'' if alarm.reason == 'no motion' else ' ago'}"
+    age = f"{alarm.age_s:.0f} s"
+    why = {"no motion": f"no motion for {age}", "fall": f"fall {age} ago", "help": f"asked for help {age} ago"}
+    return f"{kind}: {why[alarm.reason]}"
 
 
 def _begun(report: Report, place: ReportedPlace, of: str, kind: str) -> ElementTree.Element:

@@ -68,7 +68,7 @@ class MeshNode:
             raise ConnectionError("the connection to the node broke")
         try:
             self._interface.sendData(data, portNum=port, hopLimit=0)
-        except PORT_FAULTS as error:
+        except (AttributeError, *PORT_FAULTS) as error:  # AttributeError: the package closed the port under a write
             raise ConnectionError(f"the connection to the node broke: {error}") from error
 
     def send_position(self, place: ReportedPlace, unix_s: float) -> None:

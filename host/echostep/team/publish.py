@@ -54,7 +54,7 @@ class Publishing:
         self._tracker, self._print_line = tracker, print_line
         self._history, self._levels = ReportHistory(), tracker.plan.levels
         self._history_before_estimate, self._offered_s = ReportHistory(), time.monotonic()
-        run = secrets.token_hex(4)
+        self.run = run = secrets.token_hex(4)
         self._empty = empty_report(tracker.plan, outlet.name, outlet.team, run, source)
         self._ground = GroundPlane(tracker.plan) if tracker.plan.georeference else None
         self._whereabouts = Whereabouts(tracker.plan)
@@ -78,7 +78,8 @@ class Publishing:
             report = report_of(self._empty, self._levels, self._ground, estimate, motion, streams)
             assert report.position
             position, recorded = replace(report.position, where=where), self._recorded_at(estimate.t_s)
-            self._offer(replace(report, position=position, recorded=recorded, alarm=alarm))
+            tilt_deg = reported_tilt_deg(self._tracker)
+            self._offer(replace(report, position=position, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
 
     def _offer_alarm(self, alarm: ReportedAlarm | None) -> None:
         """Without an estimate, a change of the alarm is reported with the last position."""
@@ -174,6 +175,12 @@ def reported_alarm(tracker: Tracker) -> ReportedAlarm | None:
     )  # NaN before the first samples
 
 
+def reported_tilt_deg(tracker: Tracker) -> float | None:
+    """The trunk's tilt in whole degrees; None where the belt does not tell."""
+    tilt_rad = tracker.front_end.signs.falls.trunk_tilt_rad(tracker.front_end.newest_s)
+    return None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
+
+
 def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
     """The report of a tracker without an estimate; number and times are set when it is sent."""
     return Report(
@@ -192,16 +199,21 @@ def report_of(
     streams: StreamReport,
 ) -> Report:
     """The report of an estimate: the `empty` report with position, motion, streams and position on Earth."""
-    radius = e.ellipse95.major_m
-    heading = e.heading_rad if e.heading_sd_rad <= MAX_HEADING_SD_RAD else None
-    position = Position(
-        t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2, radius95_m=radius,
-        heading_rad=heading, heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=printable(levels[e.level].name, 64),
+    position = position_of(levels, e)
+    sd_m = position.radius95_m / math.sqrt(CHI2_95)
+    place = ground.place(e.x_m, e.y_m, sd_m, position.heading_rad) if ground else None
+    return replace(empty, status=e.status.value, position=position, motion=motion, place=place, streams=streams)
+
+
+def position_of(levels: Sequence[Level], e: Estimate) -> Position:
+    """The position of an estimate as it is reported."""
+    return Position(
+        t_s=e.t_s, age_s=0.0, x_m=e.x_m, y_m=e.y_m, xx_m2=e.xx_m2, xy_m2=e.xy_m2, yy_m2=e.yy_m2,
+        radius95_m=e.ellipse95.major_m, heading_rad=e.heading_rad if e.heading_sd_rad <= MAX_HEADING_SD_RAD else None,
+        heading_sd_rad=min(e.heading_sd_rad, 100.0), floor=e.level, floor_name=printable(levels[e.level].name, 64),
         floor_probability=min(max(e.levels[e.level], 0.0), 1.0), z_m=e.z_m, z_sd_m=e.z_sd_m,
         protection_m=e.protection_m if e.protection_m <= MAX_PROTECTION_M and e.status is not TrackStatus.LOST else None,
     )  # fmt: skip
-    place = ground.place(e.x_m, e.y_m, radius / math.sqrt(CHI2_95), heading) if ground else None
-    return replace(empty, status=e.status.value, position=position, motion=motion, place=place, streams=streams)
 
 
 def battery_percent() -> int | None:

@@ -12,6 +12,7 @@ import math
 import unicodedata
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -124,12 +125,18 @@ class ReportedAlarm:
 
     kind: Annotated[
         Literal["asking", "mayday", "over"],
-        Meta(description="asking: still for 20 s, the wearer is asked; mayday: help is needed; over: it was, for 30 s"),
+        Meta(
+            description="asking: still for 20 s, or fallen, the wearer is asked; mayday: help is needed; over: it was, for 30 s"
+        ),
     ]
-    reason: Annotated[Literal["no motion", "help"], Meta(description="help: the wearer asked for it")]
+    reason: Annotated[
+        Literal["no motion", "fall", "help"],
+        Meta(description="fall: an impact, then lying; help: the wearer asked for it"),
+    ]
     number: Annotated[int, Meta(ge=1, le=2**53, description="counts the alarms of this run")]
     age_s: Annotated[
-        float, Meta(ge=0.0, le=1e9, description="seconds since the last motion, the call for help, or the end")
+        float,
+        Meta(ge=0.0, le=1e9, description="seconds since the last motion, the fall, the call for help, or the end"),
     ]
 
 
@@ -166,6 +173,12 @@ class Report:
         Moment | None, Meta(description="when the position was recorded, in a replay: UTC, by the recorder's clock")
     ] = None
     alarm: Annotated[ReportedAlarm | None, Meta(description="missing while all is well")] = None
+    trunk_tilt_deg: Annotated[
+        Annotated[float, Meta(ge=0.0, le=180.0)] | None,
+        Meta(
+            description="angle of the trunk to its direction while walking; missing where the belt has no accelerometer"
+        ),
+    ] = None
 
     @property
     def sent_s(self) -> float:
@@ -263,6 +276,8 @@ def printable(text: str, most: int) -> str:
 
 def is_printable(text: str) -> bool:
     """Whether a text has no control or format characters, line separators or lone surrogates."""
+    if text.isascii():
+        return text.isprintable()  # the same, and fast: most texts are ASCII
     return all(unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp") for c in text)
 
 
@@ -271,6 +286,9 @@ def moment(unix_s: float) -> str:
     return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
+@lru_cache(
+    maxsize=4096
+)  # each member's last report is asked several times at each look; two times a report, 256 members
 def _unix(text: str) -> float:
     try:
         seconds = datetime.fromisoformat(text)

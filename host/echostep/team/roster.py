@@ -25,6 +25,7 @@ MAX_STALE_S = 60.0  # a report is stale after so long at most, whatever it says
 MAX_SPEED_M_S = 12.0  # a faster position has jumped; by reason: about the top speed of a sprinter
 STILL_S = 30.0  # a longer time without a step is noted
 ENDED_KEPT_S = 3600.0  # a run that ended is shown for so long
+CONTRADICTION = "reports of two senders under this name contradict each other"
 MAX_RETAINED_S = 86_400.0  # an older retained report is rejected
 REPLACED_KEPT_S = 60.0  # a silent run is removed after so long when a newer run has the same name
 
@@ -176,6 +177,11 @@ class Roster:
         if retained and r == last.report:
             return  # the broker repeats it after a new connection
         if r.sequence <= last.report.sequence:
+            if (
+                not retained and r.sent_s > last.report.sent_s
+            ):  # a sender's own reports are numbered in the order of time
+                last.notes[CONTRADICTION] += 1
+                raise BadReportError("a second sender under one name and run")
             raise BadReportError("older than what was heard before")
         last.missed += r.sequence - last.report.sequence - 1
         if not retained and not last.retained and abs(ahead_s - last.clock_ahead_s) > CLOCK_JUMP_S:
