@@ -238,6 +238,10 @@ def main() -> None:
             return
         if mosquitto is None:
             sys.exit("mosquitto is not installed: apt install mosquitto")
+        print(
+            "Preparing: kernels that are not compiled yet are compiled once, not by four wearers at a time", flush=True
+        )
+        Tracker(load_plan(plan_path)).warm_up()
         folder = Path(opened.enter_context(tempfile.TemporaryDirectory()))
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]

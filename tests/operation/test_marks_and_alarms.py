@@ -8,19 +8,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
+from echostep.operation.command import restore
 from echostep.operation.operation import Operation
 from echostep.operation.page import TablePage
+from echostep.operation.requests import Acknowledge, SetMark, Unmark
 from echostep.page.elements.marks import ShownMark
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.plan.model import load_plan
 from echostep.session import marks_ear
 from echostep.session.marks_ear import MarksEar
-from echostep.team.endpoint import parse_endpoint
+from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.inbox import Inbox, Receiver
 from echostep.team.marks import ALL
 from echostep.team.mqtt import Listener
 from echostep.team.report import ReportedAlarm
+from echostep.team.restorer import Restorer
 from operation.teams import TOWER, ServedTeam, whole_team
 from operation.test_table_page import shot, table
 from page.browser import LOCAL, looking, spot, wait_for
@@ -40,6 +43,7 @@ class Commander:
         self.page = TablePage(self.operation, "Simulated operation", Address(port=0))
         self.receiver = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+", ALL], self._inbox.put), print)
         self.page.feed.send = self.receiver.send
+        self._restorer = Restorer()
 
     def __enter__(self) -> Self:
         self.page.__enter__()
@@ -51,7 +55,8 @@ class Commander:
 
     def look(self) -> Any:
         now_s = time.monotonic()
-        self.operation.update(self._inbox, now_s, time.time())
+        believed = self.operation.update(self._inbox, now_s, time.time())
+        restore(self._restorer, self.operation, self.receiver, believed, now_s)
         made = self.operation.scene(now_s, time.time(), connected=self.receiver.connected)
         self.page.publish(made)
         return made
@@ -61,7 +66,8 @@ class Commander:
 def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(marks_ear, "LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
-        wearer = MarksEar(parse_endpoint(broker.url), load_plan(PLAN).digest, print)
+        outlet = parse_outlet([broker.url], "anna", "red")
+        wearer = MarksEar(outlet.endpoints[0], outlet, "0123abcd", load_plan(PLAN).digest, print)
         box = box_to(broker.url)
         box.offer(report("anna", alarm=ReportedAlarm("mayday", "no motion", 1, 31.0)))
         assert until(lambda: ann.look().rows and ben.look().rows)
@@ -89,6 +95,13 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
         assert until(lambda: not ann.look().rows[0].open_alarm and not ben.look().rows[0].open_alarm)
         assert ben.look().rows[0].notes[0] == "acknowledged by Ann"
         wait_for(page, "document.querySelector('#acknowledge').hidden")
+
+        def is_told() -> bool:
+            wearer.news()
+            return wearer.acknowledged_by(1) == "Ann"
+
+        assert until(is_told)
+        assert wearer.acknowledged_by(2) is None
         with Commander(broker.url) as late:  # a third one has the same state at once
             assert until(
                 lambda: late.look().marks == (mark,) and late.look().rows and not late.look().rows[0].open_alarm
@@ -102,6 +115,33 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
         page.context.close()
         box.close()
         wearer.close()
+
+
+@needs_broker
+def test_a_broker_that_dies_and_has_lost_its_memory_gets_it_back(tmp_path: Path) -> None:
+    with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
+        box = box_to(broker.url)
+        box.offer(report("anna", alarm=ReportedAlarm("mayday", "no motion", 1, 31.0)))
+        for x_m in (3.0, 9.0):
+            assert not ann.page.feed.act(SetMark("hazard", x_m, 7.5, 0, "Ann"))
+        assert until(lambda: len(ben.look().marks) == 2 and ben.look().rows)
+        assert not ben.page.feed.act(Acknowledge(ben.look().rows[0].id, "Ben"))
+        assert until(lambda: ann.look().rows and not ann.look().rows[0].open_alarm)
+        assert until(lambda: len(ann.look().marks) == 2)
+        first, second = (mark.id for mark in ann.look().marks)
+        broker.stop()
+        assert until(lambda: not ann.look().connected and not ben.look().connected)
+        broker.start()
+        assert not ben.page.feed.act(Unmark(first))  # sent when the connection is back
+        assert until(lambda: [mark.id for mark in ann.look().marks] == [second] and ben.look().connected)
+        with Commander(broker.url) as late:  # knows only what the broker has
+
+            def has_all() -> bool:
+                _, _, now = ann.look(), ben.look(), late.look()
+                return bool([m.id for m in now.marks] == [second] and now.rows and not now.rows[0].open_alarm)
+
+            assert until(has_all)
+        box.close()
 
 
 def test_marks_are_on_the_table_and_without_a_broker_it_is_said(browser: Any, tmp_path: Path) -> None:

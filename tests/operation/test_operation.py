@@ -10,8 +10,8 @@ import pytest
 
 from echostep.operation import trails
 from echostep.operation.operation import MOST_EVENTS
-from echostep.operation.words import heard_words, place_words
-from echostep.team.report import decode, encode
+from echostep.operation.words import heard_words, place_words, tilt_words
+from echostep.team.report import ReportedAlarm, decode, encode
 from operation.teams import TOWER, Team, place, whole_team
 from team.team_reports import POSITION, report
 
@@ -117,6 +117,20 @@ def test_a_history_says_when_a_state_changed_and_is_bounded() -> None:
     assert details.history[0].unix_s == team.unix_s
     assert {"state", "floor", "heading", "safe radius"} <= {fact.name for fact in details.facts}
     assert team.operation.details(number + 1, team.now_s) is None
+
+
+def test_a_fall_and_the_trunks_tilt_are_said_in_words() -> None:
+    team = Team(now_s=0.0)
+    fall = ReportedAlarm("mayday", "fall", 1, 14.0)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1), alarm=fall, trunk_tilt_deg=86.0)
+    (row,) = team.scene().rows
+    assert row.state == "mayday"
+    assert "mayday: fall 14 s ago" in row.notes
+    details = team.operation.details(row.id, team.now_s)
+    assert details is not None
+    facts = {fact.name: fact.value for fact in details.facts}
+    assert (facts["alarm"], facts["trunk"]) == ("mayday: fall 14 s ago", "lying (86°)")
+    assert [tilt_words(deg) for deg in (4.0, 40.0)] == ["upright (4°)", "bent (40°)"]
 
 
 def test_two_wearers_with_one_name_are_two_rows_and_it_is_said() -> None:

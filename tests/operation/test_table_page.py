@@ -14,6 +14,7 @@ from page.browser import PHONE, PICTURES, loaded_page, overflow, spot, wait_for
 WIDE = {"viewport": {"width": 1280, "height": 720}}
 LOOKS: dict[str, dict[str, Any]] = {
     "wide": {**WIDE, "color_scheme": "light"},
+    "tablet": {**PHONE, "viewport": {"width": 820, "height": 1180}, "color_scheme": "light"},
     "phone": {**PHONE, "color_scheme": "dark"},
     "contrast": {**PHONE, "contrast": "more"},
 }
@@ -80,6 +81,34 @@ def test_a_tap_on_the_map_or_on_the_list_shows_a_wearer_with_history(browser: An
         wait_for(page, "document.querySelector('#who').textContent.includes('Anna')")
         assert not page.wrong
         page.context.close()
+
+
+def test_trails_move_with_the_map_and_are_painted_anew(browser: Any) -> None:
+    team = whole_team()
+    for k in range(12):
+        team.hear("Anna", place(TOWER, 6.0 + k, 2.0, 1))
+        team.pass_time(1.0)
+    with ServedTeam(team) as served:
+        page = table(browser, served.page.url, "wide")
+        page.click("#floors button:nth-child(2)")
+        wait_for(page, TRAIL_SEEN)
+        page.evaluate("echostep.view.grip([300, 200], [340, 230], 1.3, 0.4)")
+        wait_for(page, f"{TRAIL_SEEN} && {TRAILS_SHOWN}.style.transform === ''")  # painted for this view
+        team.hear("Anna", place(TOWER, 17.0, 5.0, 1))
+        served.show()
+        wait_for(page, TRAIL_SEEN.replace("12, 2", "17, 4"))  # a new point is added
+        page.click("#floors button:nth-child(1)")
+        wait_for(page, f"echostep.scene.level === 0 && !({TRAIL_SEEN})")
+        assert not page.wrong
+        page.context.close()
+
+
+TRAILS_SHOWN = "[...document.querySelectorAll('.trails')].find((e) => e.style.visibility !== 'hidden')"
+TRAIL_SEEN = f"""(() => {{
+    const sheet = {TRAILS_SHOWN}, [x, y] = echostep.view.toScreen(12, 2), placed = new DOMMatrix(sheet.style.transform).inverse();
+    const {{ x: sx, y: sy }} = placed.transformPoint({{ x, y }});
+    return sheet.getContext('2d').getImageData(Math.round(sx) - 3, Math.round(sy) - 3, 7, 7).data.some((value) => value > 0);
+}})()"""  # the sheet of the trails that is shown has something within 3 px of (12, 2) m
 
 
 def test_a_broker_that_dies_is_said_and_the_last_state_stays(browser: Any) -> None:

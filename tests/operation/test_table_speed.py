@@ -3,65 +3,137 @@
 
 from __future__ import annotations
 
-import math
+import fcntl
+import os
+import re
+import signal
+import struct
+import subprocess
+import sys
+import termios
 import time
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Self
 
 import pytest
 
-from echostep.page.guarded_socket import FRAME_S
-from operation.teams import FLOORS, STOREYS, ServedTeam, Team
+from command_line import PROGRAM
+from operation.crowd import Crowd, Publishers, Terminal, child_cpu_s
+from operation.teams import STOREYS
 from operation.test_table_page import table
-from team.team_reports import POSITION
+from page.browser import wait_for
+from team.team_broker import Broker, needs_broker
+from team.team_reports import PLAN
+from waiting import until
 
-WEARERS, RATE_HZ, SPAN_S = 200, 10.0, 5.0
+SPAN_S = 5.0
+SLOWER = 4.0  # a main thread so many times slower: what Lighthouse takes for a phone of the middle class
+PANNED = """() => {
+    const move = (t_ms) => { echostep.view.pan(3 * Math.cos(t_ms / 300), 0); requestAnimationFrame(move); };
+    requestAnimationFrame(move);
+}"""  # moves the map with every animation frame
+WEIGHED = """() => {
+    const { link } = echostep, { parse } = link;
+    echostep.bytes = 0;
+    link.parse = (buffer) => { echostep.bytes += buffer.byteLength; return parse(buffer); };
+}"""  # counts the bytes of frames
 
 
 @pytest.mark.speed
-def test_frame_rate_with_200_wearers(browser: Any) -> None:
-    """200 wearers report ten times a second each, spread evenly over time."""
-    team = Team()
-    team.gathers = True
-    walks(team, 0.0, range(WEARERS))
-    team.receive()
-    with ServedTeam(team) as served:
-        page = table(browser, served.page.url, "wide")
+@pytest.mark.parametrize("wearers", [5, 200])
+def test_frame_rate(browser: Any, wearers: int) -> None:
+    """Wearers report ten times a second each, spread evenly over time; their trails are as long as they get."""
+    print()
+    with Crowd(wearers) as crowd:
+        page = table(browser, crowd.served.page.url, "wide")
+        page.evaluate(WEIGHED)
+        console = page.context.new_cdp_session(page)
+        console.send("Performance.enable", {"timeDomain": "threadTicks"})
         for floor in range(STOREYS):
             page.click(f"#floors button:nth-child({floor + 1})")
-            rate_hz, behind_s, cost = measured(page, served)
-            print(
-                f"200 wearers, floor {floor}: {rate_hz:.1f} frames/s; {100.0 * cost:.0f} % of a core reads and encodes"
-            )
-            assert behind_s < SPAN_S
-        assert page.locator("#list li").count() == WEARERS
+            wait_for(page, f"echostep.scene.level === {floor}")
+            say(crowd, f"floor {floor}", page, console)
+        console.send("Emulation.setCPUThrottlingRate", {"rate": SLOWER})
+        say(crowd, f"CPU {SLOWER:g} times slower", page, console)
+        console.send("Emulation.setCPUThrottlingRate", {"rate": 1.0})
+        page.evaluate(PANNED)
+        say(crowd, "map moved all the time", page, console)
+        assert page.locator("#list li").count() == wearers
         assert not page.wrong
         page.context.close()
 
 
-def measured(page: Any, served: ServedTeam) -> tuple[float, float, float]:
-    """Frames drawn a second, seconds behind the clock at the end, and the share of a core that the reports and scenes take."""
-    team, busy_s = served.team, 0.0
-    began, frames, k, next_one = time.monotonic(), page.evaluate("echostep.frames"), 0, 0
-    while (now := time.monotonic()) - began < SPAN_S:
-        due = int((now - began) * RATE_HZ * WEARERS)
-        team.now_s, team.unix_s = now, team.unix_s + FRAME_S
-        walks(team, now - began, [n % WEARERS for n in range(next_one, due)])
-        cpu_s = time.thread_time()
-        team.receive()
-        served.show()
-        busy_s += time.thread_time() - cpu_s
-        next_one, k = due, k + 1
-        time.sleep(max(began + k * FRAME_S - time.monotonic(), 0.0))
-    span_s = time.monotonic() - began
-    return (page.evaluate("echostep.frames") - frames) / span_s, span_s - SPAN_S, busy_s / span_s
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Sums since the beginning: scenes published, frames drawn and their bytes, seconds of CPU of the page's main thread, and of the server."""
+
+    t_s: float
+    scenes: float
+    frames: float
+    bytes: float
+    main_s: float
+    server_s: float
+
+    @classmethod
+    def of(cls, crowd: Crowd, page: Any, console: Any) -> Self:
+        """The counts of now."""
+        named = {m["name"]: m["value"] for m in console.send("Performance.getMetrics")["metrics"]}
+        frames, received = page.evaluate("[echostep.frames, echostep.bytes]")
+        return cls(time.monotonic(), crowd.scenes, frames, received, named["TaskDuration"], crowd.busy_s)
+
+    def since(self, began: Self) -> Self:
+        """The difference to earlier counts."""
+        return type(self)(*(getattr(self, f.name) - getattr(began, f.name) for f in fields(self)))
 
 
-def walks(team: Team, t_s: float, numbers: Any) -> None:
-    """Reports of these wearers, who walk in circles."""
-    for n in numbers:
-        angle = 0.2 * t_s + n
-        x_m, y_m = 15.0 + 12.0 * math.cos(angle), 4.0 + 3.0 * math.sin(1.7 * angle)
-        floor, heading_rad = n % STOREYS, math.remainder(angle, math.tau)
-        at = replace(POSITION, x_m=x_m, y_m=y_m, floor=floor, floor_name=FLOORS[floor], where="in the corridor")
-        team.hear(f"wearer {n:03d}", replace(at, heading_rad=heading_rad, protection_m=0.4))
+def say(crowd: Crowd, name: str, page: Any, console: Any) -> None:
+    """Measure for SPAN_S, and print."""
+    began = Counts.of(crowd, page, console)
+    time.sleep(SPAN_S)
+    n = Counts.of(crowd, page, console).since(began)
+    print(
+        f"{crowd.wearers} wearers, {name}: {n.frames:.0f} frames drawn of {n.scenes:.0f} scenes, {n.frames / n.t_s:.1f}/s; "
+        f"a frame takes {1e3 * n.main_s / max(n.frames, 1.0):.1f} ms of CPU of the page's thread and {n.bytes / max(n.frames, 1.0) / 1e3:.1f} kB; "
+        f"reading and encoding {100.0 * n.server_s / n.t_s:.0f} % of a core"
+    )
+
+
+@pytest.mark.speed
+@needs_broker
+def test_frame_rate_of_the_command(browser: Any, tmp_path: Path) -> None:
+    """The whole of it: a broker, `echostep command` with its table on a terminal of 50 lines, and 200 wearers, all on one floor."""
+    ours, theirs = os.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 140, 0, 0))
+    with Broker(tmp_path) as broker, Publishers(broker.url, 200):
+        command = [
+            *PROGRAM,
+            "command",
+            broker.url,
+            "--plan",
+            str(PLAN),
+            "--port",
+            "0",
+            "--out",
+            str(tmp_path / "a.mcap"),
+        ]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "xterm", "COLUMNS": "140"}
+        running = subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment)
+        said = Terminal(ours)
+        assert until(lambda: re.search(rb"http://127\.0\.0\.1:\d+/", said.text))
+        found = re.search(rb"http://127\.0\.0\.1:\d+/", said.text)
+        assert found
+        page = table(browser, found[0].decode(), "wide")
+        wait_for(page, "document.querySelectorAll('#list li').length === 200")
+        for _ in range(3):
+            frames, began_s, cpu_s = page.evaluate("echostep.frames"), time.monotonic(), child_cpu_s(running.pid)
+            time.sleep(SPAN_S)
+            drawn, span_s = page.evaluate("echostep.frames") - frames, time.monotonic() - began_s
+            cpu = 100.0 * (child_cpu_s(running.pid) - cpu_s) / span_s
+            print(
+                f"echostep command, 200 wearers: {drawn} frames drawn, {drawn / span_s:.1f}/s; the command takes {cpu:.0f} % of a core"
+            )
+        assert not page.wrong
+        page.context.close()
+        running.send_signal(signal.SIGINT)
+        assert until(lambda: running.poll() is not None)

@@ -15,7 +15,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 
 from echostep.errors import EchostepError
@@ -29,10 +29,11 @@ from echostep.page.guarded_socket import FRAME_S
 from echostep.plan.model import Plan, load_plan
 from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
-from echostep.team.inbox import Inbox, Receiver
-from echostep.team.marks import ALL
+from echostep.team.inbox import Inbox, ReceivedMessage, Receiver
+from echostep.team.marks import ALL, is_shared
 from echostep.team.mqtt import Listener
 from echostep.team.report import checked_name
+from echostep.team.restorer import Restorer
 
 TABLE_S = 0.25  # between two drawings of the table, by reason
 
@@ -61,7 +62,8 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         opened.callback(receiver.close)
         if page and endpoint.scheme != "mesh":  # marks need a broker
             page.feed.send = receiver.send
-        run = _Run(operation, inbox, receiver, recorder, tape)
+        restorer = Restorer() if endpoint.scheme != "mesh" else None
+        run = _Run(operation, inbox, receiver, recorder, tape, restorer)
         with suppress(KeyboardInterrupt):
             _follow(run, page, console, math.inf if seconds is None else seconds, views)
         run.look(time.monotonic())
@@ -70,23 +72,36 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """An operation with its source and its recording."""
+    """An operation with its source and its recording. `restorer` None: the source keeps nothing."""
 
     operation: Operation
     inbox: Inbox
     receiver: Receiver
     recorder: OperationRecorder
     tape: Tape
+    restorer: Restorer | None
 
     def look(self, now_s: float) -> None:
-        """Take what was heard, and record it."""
+        """Take what was heard, record it, and give back to the broker what it has lost."""
         unix_s, connected = time.time(), self.receiver.connected
         believed = self.operation.update(self.inbox, now_s, unix_s)
+        if self.restorer:
+            restore(self.restorer, self.operation, self.receiver, believed, now_s)
         roster = self.operation.roster
         self.recorder.add(believed)
         self.recorder.add_condition(now_s, unix_s, roster.received, roster.rejected, connected=connected)
         if self.tape.note(now_s, len(believed)):
             self.tape.keep(Keyframe(now_s, unix_s, self.recorder.offset, connected, self.operation.copy()))
+
+
+def restore(
+    restorer: Restorer, operation: Operation, receiver: Receiver, believed: list[ReceivedMessage], now_s: float
+) -> None:
+    """Send marks and acknowledgements again that the broker has lost or replaced; `believed`: messages since the last call."""
+    heard = [m.topic for m in believed if m.topic and is_shared(m.topic)]
+    lost = restorer.look(receiver.connected, heard, lambda: operation.shared, now_s)
+    for topic, payload in lost + operation.take_answers():
+        receiver.send(topic, payload)
 
 
 def _end_recording(recorder: OperationRecorder, console: Console) -> None:
@@ -109,20 +124,33 @@ def _receiver(
 
 
 def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float, views: Views) -> None:
-    """Show the team for so many seconds."""
-    end_s, table_s, operation = time.monotonic() + seconds, -math.inf, run.operation
+    """Show the team for so many seconds; then the whole table, also when it is interrupted."""
+    due_s, table_s, operation = time.monotonic(), -math.inf, run.operation
+    end_s = due_s + seconds
     pause_s = FRAME_S if page else TABLE_S
+    draws = console.is_terminal and not views.as_json
+
+    def drawn(lines: int | None) -> Group:
+        connected = run.receiver.connected
+        return table(
+            operation.roster, operation.plan, time.monotonic(), connected=connected, columns=console.width, lines=lines
+        )
+
     with Live(console=console, auto_refresh=False, transient=False, redirect_stdout=False) as shown:
-        while (now_s := time.monotonic()) < end_s:
-            time.sleep(min(pause_s, max(end_s - now_s, 0.0)))
-            now_s, connected = time.monotonic(), run.receiver.connected
-            run.look(now_s)
-            for notices in (run.recorder.notices, page.notices if page else deque[str]()):
-                while notices:
-                    console.print(notices.popleft(), markup=False)
-            if page:
-                page.publish(operation.scene(now_s, time.time(), connected=connected))
-            if not views.as_json and now_s - table_s >= TABLE_S:
-                table_s = now_s
-                lines = table(operation.roster, operation.plan, now_s, connected=connected, columns=console.width)
-                shown.update(lines, refresh=True)
+        try:
+            while (now_s := time.monotonic()) < end_s:
+                due_s = max(due_s + pause_s, now_s)  # the work is part of the pause
+                time.sleep(max(min(due_s, end_s) - now_s, 0.0))
+                now_s = time.monotonic()
+                run.look(now_s)
+                for notices in (run.recorder.notices, page.notices if page else deque[str]()):
+                    while notices:
+                        console.print(notices.popleft(), markup=False)
+                if page:
+                    page.publish(operation.scene(now_s, time.time(), connected=run.receiver.connected))
+                if draws and now_s - table_s >= TABLE_S:
+                    table_s = now_s
+                    shown.update(drawn(console.height), refresh=True)
+        finally:
+            if not views.as_json:
+                shown.update(drawn(None))

@@ -15,6 +15,8 @@ from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from msgspec import structs
+
 from echostep.operation import requests
 from echostep.operation.trails import Trails
 from echostep.operation.words import (
@@ -32,7 +34,7 @@ from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import rejected, take_messages
 from echostep.team.inbox import Inbox, ReceivedMessage
-from echostep.team.marks import ROOT, Mark, MarkBoard, ack_message, is_shared
+from echostep.team.marks import Mark, MarkBoard, ack_message, is_shared
 from echostep.team.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
 
@@ -134,12 +136,25 @@ class Operation:
                     identity, at = secrets.token_hex(4), (request.x_m, request.y_m, request.level)
                     return Mark(1, identity, request.mark, *at, request.by, unix_s, self.plan.digest).message
                 case requests.Unmark(identity) if identity in self._board.marks:
-                    return f"{ROOT}/mark/{identity}", b""
+                    return structs.replace(self._board.marks[identity], removed=True).message
                 case requests.Acknowledge(number, by):
                     for m in self.roster.members(now_s):
                         if self._number(m) == number and (key := alarm_key(m)) is not None:
                             return ack_message(key, by, unix_s)
         return "There is no such alarm, mark or floor any more."
+
+    @property
+    def shared(self) -> tuple[tuple[str, bytes], ...]:
+        """Messages that tell all that the commanders share: marks and acknowledgements."""
+        with self._lock:
+            return tuple(self._board.messages)
+
+    def take_answers(self) -> list[tuple[str, bytes]]:
+        """Messages for the broker, which keeps older ones of what the commanders share; each is given once."""
+        with self._lock:
+            answers = list(self._board.answers)
+            self._board.answers.clear()
+        return answers
 
     def _number(self, m: Member) -> int | None:
         followed = self._followed.get(m.key)

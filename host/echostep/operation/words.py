@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from echostep.odometry.falls import LYING_RAD, UPRIGHT_RAD
 from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import notes
@@ -146,11 +147,20 @@ def shown_details(
         rows += [("heading", heading_words(p))]
     if r.motion:
         rows += [("walked", f"{r.motion.walked_m:.0f} m"), ("last step", f"{r.motion.still_s:.0f} s before the report")]
+    if r.trunk_tilt_deg is not None:
+        rows += [("trunk", tilt_words(r.trunk_tilt_deg))]
     if r.battery_percent is not None:
         rows += [("battery", f"{r.battery_percent} %")]
     rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
     rows += [("note", note) for note in notes(m, plan, now_s, duplicates)]
     return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)
+
+
+def tilt_words(tilt_deg: float) -> str:
+    """The trunk's tilt: upright (4°), bent (40°), lying (85°); the limits are those of `odometry/falls.py`."""
+    tilt_rad = math.radians(tilt_deg)
+    posture = "upright" if tilt_rad < UPRIGHT_RAD else "lying" if tilt_rad > LYING_RAD else "bent"
+    return f"{posture} ({tilt_deg:.0f}°)"
 
 
 def heading_words(p: Position) -> str:

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Floors of the plan: for each a button with the number of wearers on it, and a sign when one of them needs help; on a phone more than three are a list.
 
+import { put } from './text.js';
+
 const MOST_BUTTONS = 3;
 const URGENT = ['mayday', 'lost', 'stale'];
 const $ = (id) => document.getElementById(id);
@@ -19,6 +21,7 @@ export class Floors {
     $('floors').replaceChildren(...levels.map((_, level) => {
       const button = document.createElement('button');
       button.type = 'button';
+      button.append(document.createElement('span'), document.createElement('b'));  // a name may be cut off, a number may not
       button.onclick = () => this.onFloor(level);
       return button;
     }));
@@ -29,9 +32,10 @@ export class Floors {
     $('floor').value = shown;
     this.levels.forEach(({ name }, level) => {
       const here = rows.filter((row) => row.level === level), urgent = here.some(({ state }) => URGENT.includes(state));
-      const text = `${name}${here.length ? `: ${here.length}` : ''}${urgent ? ' !' : ''}`, button = $('floors').children[level];
+      const count = `${here.length ? `: ${here.length}` : ''}${urgent ? ' !' : ''}`, button = $('floors').children[level];
       const option = [...$('floor').options].find(({ value }) => Number(value) === level);
-      if (button.textContent !== text) [button.textContent, option.text] = [text, text];
+      [name, count].forEach((text, k) => put(button.children[k], text));
+      if (option.text !== name + count) option.text = name + count;
       button.classList.toggle('urgent', urgent);
       button.setAttribute('aria-pressed', String(level === shown));
     });

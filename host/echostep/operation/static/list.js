@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The list of wearers and the details of one, in words; and the text for screen readers when a wearer needs help.
 
+import { put } from './text.js';
+
 export const SIGNS = { mayday: '▲', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
 const URGENT = ['mayday', 'lost', 'stale'];
 const $ = (id) => document.getElementById(id);
-const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };  // unchanged text causes no new layout
 
 export class List {
   constructor(onChoose) {
@@ -15,7 +16,7 @@ export class List {
   // Rows in order of urgency; elements stay, so that focus and scrolling stay. What happened in the past is not announced.
   show(rows, isPast) {
     this.rows = rows;
-    const known = new Set(rows.map(({ id }) => id)), focused = document.activeElement;
+    const known = new Set(rows.map(({ id }) => id)), focused = document.activeElement, teams = new Set(rows.map(({ team }) => team)).size;
     for (const [id, item] of this.items) if (!known.has(id)) { item.li.remove(); this.items.delete(id); }
     rows.forEach((row, k) => {
       const item = this.items.get(row.id) ?? this.make(row.id), at = $('list').children[k];
@@ -23,7 +24,7 @@ export class List {
       item.button.dataset.state = row.state;
       item.button.dataset.open = row.open_alarm;
       put(item.sign, SIGNS[row.state] ?? '!');
-      put(item.name, this.teams() > 1 ? `${row.name} (${row.team})` : row.name);
+      put(item.name, teams > 1 ? `${row.name} (${row.team})` : row.name);
       put(item.said, row.words);
       put(item.note, row.notes.join('; '));
     });
@@ -31,8 +32,6 @@ export class List {
     this.announce(rows, isPast);
     if (this.chosen !== null && !known.has(this.chosen)) this.choose(null);
   }
-
-  teams() { return new Set(this.rows.map(({ team }) => team)).size; }
 
   make(id) {
     const li = document.createElement('li'), button = document.createElement('button'), parts = ['sign', 'name', 'said', 'note'].map((name) => {

@@ -10,17 +10,18 @@ import { Floors } from './floors.js';
 import { List } from './list.js';
 import { Painter } from './paint.js';
 import { Sheet } from './sheet.js';
+import { put } from './text.js';
 import { TimeBar } from './timebar.js';
 import { Trails } from './trails.js';
 import { parseFrame, placesOf } from './wire.js';
 
 const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
 const $ = (id) => document.getElementById(id);
-const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'));
+const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas')), trails = new Trails($('trails'), $('trails-next'));
 const scene = { places: new Map(), rows: [], marks: [], level: 0, chosen: null };
 const floors = new Floors((level) => showLevel(level));
 const list = new List(choose);
-let plan = null, wantedLevel = 0, fitted = false, dirty = true, drawnStamp = -1, undrawn = [], found = false;
+let plan = null, wantedLevel = 0, fitted = false, isAsked = false, drawnStamp = -1, undrawn = [], found = false;
 
 const link = new Link({ onHello: hello, onFrame: frame, onRefused: hint, onFailed: (reason) => fault(reason), onConsidered: () => {}, onState: connection, parse: parseFrame });
 const sheet = new Sheet((kind, fields) => link.send(kind, fields), hint);
@@ -81,17 +82,17 @@ function frame(received) {
   status(received);
   undrawn.push(received.seq);
   scene.frame = received;
-  dirty = true;
+  ask();
 }
 
 function status({ summary, refused, connected }) {
-  $('words').dataset.status = connected ? 'tracking' : 'broken';
-  $('mark').textContent = connected ? '●' : '✕';
+  put($('mark'), connected ? '●' : '✕');
+  if ($('words').dataset.status !== (connected ? 'tracking' : 'broken')) $('words').dataset.status = connected ? 'tracking' : 'broken';
   const past = timeBar.isPast ? 'the past: ' : '', text = past + (connected ? summary : `no connection to the broker: the last known state. ${summary}`);
-  if ($('status-text').textContent !== text) $('status-text').textContent = text;
+  put($('status-text'), text);
   const why = refused ? `rejected: ${refused}` : '';
-  if ($('refused').textContent !== why) $('refused').textContent = why;
-  $('refused').hidden = !why;
+  put($('refused'), why);
+  if ($('refused').hidden !== !why) $('refused').hidden = !why;
 }
 
 // The page begins on the floor of the most urgent wearer.
@@ -104,7 +105,7 @@ function findFirst() {
 
 function choose(id) {
   scene.chosen = id;
-  dirty = true;
+  ask();
   link.send('choose', { id });
   const place = scene.places.get(id);
   if (!place) return;
@@ -117,17 +118,23 @@ function fault(text) {
   $('fault').hidden = !text;
 }
 
+// Draw with the next animation frame.
+function ask() {
+  if (!isAsked) requestAnimationFrame(draw);
+  isAsked = true;
+}
+
 function draw() {
-  requestAnimationFrame(draw);
-  if (!dirty && drawnStamp === view.stamp) return;
+  isAsked = false;
   if (drawnStamp !== view.stamp) {
     planView.draw(view);
     scale();
   }
   const here = scene.rows.filter(({ id }) => scene.places.get(id)?.level === scene.level).map((row) => ({ ...row, place: scene.places.get(row.id) }));
-  trails.paint(view, scene.level, painter.colour, scene.chosen);
-  painter.paint(view, here, scene.chosen, scene.marks, scene.level);
-  [dirty, drawnStamp, drawn.last] = [false, view.stamp, scene.frame ?? null];
+  trails.paint(view, scene.level, painter.colour.trail);
+  painter.paint(view, here, scene.chosen, trails.points(scene.chosen), scene.marks, scene.level);
+  [drawnStamp, drawn.last] = [view.stamp, scene.frame ?? null];
+  if (trails.isBehind) ask();
   drawn.frames++;
   if (undrawn.length) painted.port2.postMessage(undrawn);
   undrawn = [];
@@ -181,7 +188,7 @@ $('whole').onclick = () => view.fit(planView.box);
 $('north').onclick = () => view.rotate(-view.turn);
 window.addEventListener('error', ({ message }) => fault(`This page has a fault: ${message}. Reload it.`));
 window.addEventListener('unhandledrejection', ({ reason }) => fault(`This page has a fault: ${reason?.message ?? reason}. Reload it.`));
-startTheme($('theme'), () => { painter.recolour(); dirty = true; view.changed(); });
+view.onChanged = ask;
+startTheme($('theme'), () => { painter.recolour(); view.changed(); });
 view.resize($('map').clientWidth, $('map').clientHeight);
 new ResizeObserver(([{ contentRect }]) => view.resize(contentRect.width, contentRect.height)).observe($('map'));
-requestAnimationFrame(draw);

@@ -2,31 +2,40 @@
 // Paints the wearers on a canvas: a sign by state, an arrow along the heading, the circle of the protection radius (dashed) or of the 95 % radius (dotted), the name.
 
 import { paintMarks } from '../static/marks.js';
+import { Sprites } from './sprites.js';
+import { trace } from './trails.js';
 
 const COLOURS = ['trail', 'here', 'halo', 'bad', 'fair', 'good', 'ink', 'faint', 'goal', 'expected'];
 const OF_STATE = { mayday: 'bad', lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
+const URGENT = ['mayday', 'lost', 'stale'];
 const WIDEST_M = 60;  // radius that is still drawn
-const SIGN_PX = 8;
+const WIDEST_SPRITE_PX = 80;  // radius of a circle that is kept as a picture
+const SIGN_PX = 8, ARROW_PX = SIGN_PX + 9, MAYDAY_PX = SIGN_PX + 19;
+const HEADINGS = 72;  // directions in which an arrow is drawn
 const FONT = '600 13px system-ui, sans-serif';
+const MOST_WIDTHS = 1024;  // names whose width is kept
 
 export class Painter {
   constructor(canvas) {
-    Object.assign(this, { canvas, pen: canvas.getContext('2d'), widths: new Map() });
+    Object.assign(this, { canvas, pen: canvas.getContext('2d'), widths: new Map(), isLeft: new Set(), sprites: new Sprites() });
     this.recolour();
   }
 
   recolour() {
     const style = getComputedStyle(document.documentElement);
     this.colour = Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    this.sprites.clear();
   }
 
-  // `wearers`: rows of the list with their `place`, the most urgent first.
-  paint(view, wearers, chosen, marks, level) {
+  // `wearers`: rows of the list with their `place`, the most urgent first; `trail`: points of the chosen one.
+  paint(view, wearers, chosen, trail, marks, level) {
     const sharp = window.devicePixelRatio || 1, { canvas, pen } = this, width = Math.round(view.width * sharp), height = Math.round(view.height * sharp);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
+    pen.imageSmoothingEnabled = false;
+    this.trail(view, trail, level);
     paintMarks(pen, view, marks, level, this.colour);
     const shown = wearers.map((wearer) => ({ ...wearer, at: view.toScreen(wearer.place.x, wearer.place.y) }))
       .filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200);
@@ -34,45 +43,48 @@ export class Painter {
     this.names(shown, chosen);
   }
 
-  wearer(view, { state, place, at: [sx, sy] }, isChosen) {
-    const { pen } = this, colour = this.colour[OF_STATE[state] ?? 'faint'], safe = Number.isFinite(place.protection), radius = safe ? place.protection : place.radius;
-    if (radius < WIDEST_M && radius * view.scale > SIGN_PX) this.circle(sx, sy, radius * view.scale, colour, 1.5, safe ? [6, 5] : [2, 5]);
-    if (state === 'mayday') for (const more of [12, 17]) this.circle(sx, sy, SIGN_PX + more, colour, 2.5, []);
-    if (isChosen) this.circle(sx, sy, SIGN_PX + 9, this.colour.ink, 2.5, []);
-    if (Number.isFinite(place.heading)) this.arrow(sx, sy, -place.heading - view.turn, colour);
-    this.sign(state, sx, sy, colour);
-  }
-
-  circle(sx, sy, radius, colour, width, dash) {
+  trail(view, points, level) {
     const { pen } = this;
     pen.beginPath();
-    pen.arc(sx, sy, radius, 0, 2 * Math.PI);
-    pen.setLineDash(dash);
-    pen.strokeStyle = colour;
-    pen.lineWidth = width;
+    trace(pen, points, level, (x, y) => view.toScreen(x, y));
+    [pen.strokeStyle, pen.lineWidth] = [this.colour.trail, 3];
     pen.stroke();
-    pen.setLineDash([]);
   }
 
-  arrow(sx, sy, angle, colour) {
-    const { pen } = this, tip = SIGN_PX + 9;
+  wearer(view, { state, place, at: [sx, sy] }, isChosen) {
+    const { pen } = this, name = OF_STATE[state] ?? 'faint', safe = Number.isFinite(place.protection), radius = safe ? place.protection : place.radius;
+    if (state !== 'ended' && radius < WIDEST_M && radius * view.scale > SIGN_PX) this.around(sx, sy, Math.round(radius * view.scale), name, safe);
+    if (state === 'mayday') for (const more of [12, 17]) circle(pen, sx, sy, SIGN_PX + more, this.colour.bad, 2.5);
+    if (isChosen) circle(pen, sx, sy, SIGN_PX + 9, this.colour.ink, 2.5);
+    const heading = Number.isFinite(place.heading) ? Math.round((-place.heading - view.turn) / (2 * Math.PI) * HEADINGS) : null;
+    this.sprites.draw(pen, `sign ${state} ${heading === null ? '' : (heading % HEADINGS + HEADINGS) % HEADINGS}`, sx, sy, [ARROW_PX + 3, ARROW_PX + 3], (onto) => {
+      if (heading !== null) this.arrow(onto, 2 * Math.PI * heading / HEADINGS, this.colour[name]);
+      this.sign(onto, state, this.colour[name]);
+    });
+  }
+
+  // The circle of a radius: dashed when it is a protection radius, else dotted.
+  around(sx, sy, radius, name, safe) {
+    const paint = (onto, x, y) => circle(onto, x, y, radius, this.colour[name], 1.5, safe ? [6, 5] : [2, 5]);
+    if (radius > WIDEST_SPRITE_PX) paint(this.pen, sx, sy);
+    else this.sprites.draw(this.pen, `circle ${name} ${safe} ${radius}`, sx, sy, [radius + 2, radius + 2], (onto) => paint(onto, 0, 0));
+  }
+
+  arrow(pen, angle, colour) {
     pen.beginPath();
-    for (const [turn, far] of [[0, tip], [0.62, SIGN_PX], [-0.62, SIGN_PX]]) pen.lineTo(sx + far * Math.cos(angle + turn), sy + far * Math.sin(angle + turn));
+    for (const [turn, far] of [[0, ARROW_PX], [0.62, SIGN_PX], [-0.62, SIGN_PX]]) pen.lineTo(far * Math.cos(angle + turn), far * Math.sin(angle + turn));
     pen.closePath();
-    pen.fillStyle = colour;
-    pen.strokeStyle = this.colour.halo;
-    pen.lineWidth = 2;
+    [pen.fillStyle, pen.strokeStyle, pen.lineWidth] = [colour, this.colour.halo, 2];
     pen.stroke();
     pen.fill();
   }
 
   // Triangle: mayday. Filled: tracking. Half: uncertain. Cross: lost. Hollow: silent. Square: ended.
-  sign(state, sx, sy, colour) {
-    const { pen } = this;
+  sign(pen, state, colour) {
     pen.beginPath();
-    if (state === 'ended') pen.rect(sx - 6, sy - 6, 12, 12);
-    else if (state === 'mayday') for (const [x, y] of [[0, -14], [13, 9], [-13, 9], [0, -14]]) pen.lineTo(sx + x, sy + y);
-    else pen.arc(sx, sy, SIGN_PX, 0, 2 * Math.PI);
+    if (state === 'ended') pen.rect(-6, -6, 12, 12);
+    else if (state === 'mayday') for (const [x, y] of [[0, -14], [13, 9], [-13, 9], [0, -14]]) pen.lineTo(x, y);
+    else pen.arc(0, 0, SIGN_PX, 0, 2 * Math.PI);
     pen.fillStyle = ['tracking', 'mayday'].includes(state) ? colour : this.colour.halo;
     pen.strokeStyle = this.colour.halo;
     pen.lineWidth = 5;
@@ -83,26 +95,48 @@ export class Painter {
     pen.stroke();
     pen.fillStyle = colour;
     pen.beginPath();
-    if (state === 'uncertain') { pen.arc(sx, sy, SIGN_PX, -Math.PI / 2, Math.PI / 2); pen.fill(); }
-    if (state === 'lost') for (const s of [-1, 1]) { pen.moveTo(sx - 4, sy - 4 * s); pen.lineTo(sx + 4, sy + 4 * s); pen.stroke(); }
+    if (state === 'uncertain') { pen.arc(0, 0, SIGN_PX, -Math.PI / 2, Math.PI / 2); pen.fill(); }
+    if (state === 'lost') for (const s of [-1, 1]) { pen.moveTo(-4, -4 * s); pen.lineTo(4, 4 * s); pen.stroke(); }
   }
 
-  // Names that do not cover each other, the most urgent first; the chosen one always.
+  // Names beside their signs, right or left, the most urgent first; none covers another name or a mayday's sign, but for the chosen one, and other signs
+  // are covered only where both sides are taken.
   names(shown, chosen) {
-    const { pen } = this, taken = [];
-    pen.font = FONT;
-    pen.textBaseline = 'middle';
-    const first = shown.filter(({ id }) => id === chosen);
+    const around = ({ id, at: [sx, sy] }, half) => [sx - half, sy - half, sx + half, sy + half, id], signs = shown.map((wearer) => around(wearer, SIGN_PX));
+    const taken = shown.filter(({ state }) => state === 'mayday').map((wearer) => around(wearer, MAYDAY_PX)), first = shown.filter(({ id }) => id === chosen);
     for (const { id, name, state, at: [sx, sy] } of [...first, ...shown.filter((wearer) => wearer.id !== chosen)]) {
-      if (!this.widths.has(name)) this.widths.set(name, pen.measureText(name).width);
-      const width = this.widths.get(name), left = sx + SIGN_PX + 11, box = [left, sy - 9, left + width, sy + 9];
-      if (id !== chosen && taken.some(([x0, y0, x1, y1]) => box[0] < x1 && box[2] > x0 && box[1] < y1 && box[3] > y0)) continue;
+      const width = this.width(name), far = (state === 'mayday' ? MAYDAY_PX : SIGN_PX + 8) + 3;
+      const sides = [sx + far, sx - far - width], boxes = (this.isLeft.has(id) ? sides.reverse() : sides).map((left) => [left, sy - 9, left + width, sy + 9, id]), free = boxes.filter((box) => !taken.some((other) => cover(box, other)));
+      const box = free.find((one) => !signs.some((other) => cover(one, other))) ?? free[0] ?? (id === chosen ? boxes[0] : null);
+      if (!box) continue;
+      this.isLeft[box[0] < sx ? 'add' : 'delete'](id);  // it stays on its side while that is free
       taken.push(box);
-      pen.lineWidth = 4;
-      pen.strokeStyle = this.colour.halo;
-      pen.strokeText(name, left, sy);
-      pen.fillStyle = ['mayday', 'lost', 'stale'].includes(state) ? this.colour.bad : this.colour.ink;
-      pen.fillText(name, left, sy);
+      const colour = this.colour[URGENT.includes(state) ? 'bad' : 'ink'];
+      this.sprites.draw(this.pen, `name ${colour} ${name}`, (box[0] + box[2]) / 2, sy, [width / 2 + 3, 12], (pen) => {
+        Object.assign(pen, { font: FONT, textBaseline: 'middle', textAlign: 'center', lineWidth: 4, strokeStyle: this.colour.halo, fillStyle: colour });
+        pen.strokeText(name, 0, 0);
+        pen.fillText(name, 0, 0);
+      });
     }
   }
+
+  width(name) {
+    if (this.widths.size > MOST_WIDTHS) this.widths.clear();
+    if (this.isLeft.size > MOST_WIDTHS) this.isLeft.clear();
+    this.pen.font = FONT;
+    if (!this.widths.has(name)) this.widths.set(name, this.pen.measureText(name).width);
+    return this.widths.get(name);
+  }
+}
+
+// Whether two boxes [left, top, right, bottom, wearer] of different wearers cover each other.
+const cover = (a, b) => a[0] < b[2] && a[2] > b[0] && a[1] < b[3] && a[3] > b[1] && a[4] !== b[4];
+
+function circle(pen, sx, sy, radius, colour, width, dash = []) {
+  pen.beginPath();
+  pen.arc(sx, sy, radius, 0, 2 * Math.PI);
+  pen.setLineDash(dash);
+  [pen.strokeStyle, pen.lineWidth] = [colour, width];
+  pen.stroke();
+  pen.setLineDash([]);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The time bar over the whole operation: go back, hold, play, return to now. While the past is shown, what calls for help now is said beside it.
 
+import { put } from './text.js';
+
 const $ = (id) => document.getElementById(id);
 const SKIP_S = 10;
 const ANSWER_MS = 2000, NEAR_S = 1;  // a place that was asked for is shown until the server is there, or for so long
@@ -43,7 +45,7 @@ export class TimeBar {
   }
 
   show(time, unix_s) {
-    $('bar-of-time').hidden = !time;
+    if ($('bar-of-time').hidden !== !time) $('bar-of-time').hidden = !time;
     this.last = time;
     if (!time) return;
     const { t_s, end_s, playing, times, now, live, open_alarms } = time, bar = $('time');
@@ -67,5 +69,4 @@ export class TimeBar {
   }
 }
 
-const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 const minutes = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;
