@@ -35,7 +35,7 @@ fields = st.sampled_from(["x_m", "y_m", "sd_m", "heading_rad", "level", "seq", "
 
 
 kinds = st.sampled_from(
-    ["check_in", "undo", "consider", "go_to", "go_nowhere", "drawn", "play", "speed", "seek", "skip", "?"]
+    ["check_in", "undo", "consider", "go_to", "go_nowhere", "drawn", "play", "speed", "seek", "skip", "met", "?"]
 )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from operator import attrgetter
 from types import TracebackType
@@ -19,12 +19,14 @@ from typing import Self
 from echostep.guidance.cue_list import CueList
 from echostep.localization.echo_likelihood import echo_model
 from echostep.localization.estimate import Estimate, unobserved
+from echostep.page.drawing_process import DrawingProcess
 from echostep.page.elements.alarm import shown_alarm
 from echostep.page.elements.beacon_marks import beacon_marks
 from echostep.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep.page.elements.lookahead import extrapolate
 from echostep.page.elements.marks import ShownMark
+from echostep.page.elements.meetings import shown_meeting
 from echostep.page.elements.scene import MOST_SHOWN, PageScene, sample_of, status_text
 from echostep.page.elements.stream_rates import StreamRateMeter
 from echostep.page.elements.true_position import TruePath
@@ -45,6 +47,10 @@ STALE_S = 1.5  # an echo line is shown for this long
 OPENING_S = 5.0  # longest wait for a browser that was started
 OPENING_POLL_S = 0.05
 MOST_KEPT = 2000  # particles in each scene of a replay
+
+
+def _unknown(_: int) -> None:
+    """No commander is known to have acknowledged an alarm."""
 
 
 class LivePage:
@@ -70,6 +76,7 @@ class LivePage:
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.has_team = False  # the run's reports go somewhere
+        self.acknowledged_by: Callable[[int], str | None] = _unknown  # the commander who has, by the alarm's number
         self.server = PageServer(self._mailbox, address)
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
@@ -87,6 +94,7 @@ class LivePage:
         self._trail_end: Estimate | None = None
         self._check_ins = (0, 0)  # check-ins and undoings
         self._undo_clock = UndoClock()
+        self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self._mailbox.publish(self._scene)
         expected_range(0.0, 0.0, 0.0, tracker.laid_out.walls.index, self._model)  # compiled now, not at the first step
@@ -109,15 +117,24 @@ class LivePage:
     def __enter__(self) -> Self:
         self._tracker.watchers.append(self._watch)
         self.server.__enter__()
+        if not self._tracker.plan.is_drawn:
+            fail = self.server.shared.faults.note_text
+            self._drawing = DrawingProcess(self._mailbox.add_drawing, fail, live=not self._replay)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._tracker.watchers.remove(self._watch)
+        if self._drawing:
+            self._drawing.close()
         self.server.__exit__(kind, error, at)
 
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Show the commanders' marks on all pages."""
         self._mailbox.set_marks(marks)
+
+    def set_team(self, names: tuple[str, ...]) -> None:
+        """Offer meetings with these teammates on all pages."""
+        self._mailbox.set_team(names)
 
     def announce(self, text: str) -> None:
         """Show what the run is doing, until its first bytes."""
@@ -139,6 +156,10 @@ class LivePage:
         for check_in in self._mailbox.pop_check_ins():
             yield check_in.encode()
 
+    def pop_meetings(self) -> Iterator[str]:
+        """Names of the teammates whom the wearer has met since the last call, by the pages."""
+        return self._mailbox.pop_meetings()
+
     def note_arrival(self) -> None:
         """Bytes have arrived: their time is the start of the latency of the scenes that follow."""
         self._bytes_arrived_ns = time.monotonic_ns()
@@ -156,13 +177,25 @@ class LivePage:
         if due or self._new:
             streams, state = self._rate_meter.measure(self._tracker, self._arrived_ns), self._tracker.state
             undo = None if self._replay else self._undo_clock.offer(state, time.monotonic_ns())
-            alarm = shown_alarm(self._tracker, has_team=self.has_team)
-            self._scene = replace(self._scene, streams=streams, undo=undo, echoes_fit=echoes_fit(state), alarm=alarm)
+            alarm = shown_alarm(self._tracker, has_team=self.has_team, acknowledged_by=self.acknowledged_by)
+            self._scene = replace(
+                self._scene,
+                streams=streams,
+                undo=undo,
+                echoes_fit=echoes_fit(state),
+                alarm=alarm,
+                met=shown_meeting(state),
+            )
         if self._new or (due and not self._replay):
             for scene in self._new or [self._scene_without_news()]:
                 shown = self._scene
                 scene = replace(
-                    scene, streams=shown.streams, undo=shown.undo, echoes_fit=shown.echoes_fit, alarm=shown.alarm
+                    scene,
+                    streams=shown.streams,
+                    undo=shown.undo,
+                    echoes_fit=shown.echoes_fit,
+                    alarm=shown.alarm,
+                    met=shown.met,
                 )
                 self._mailbox.publish(scene)
                 if self._new:
@@ -224,6 +257,8 @@ class LivePage:
         """Make a scene of the tracker's new estimate. `measured` None: the foot is silent, and there are no new echoes."""
         self._lookahead = None
         self._extend_trail(estimate)
+        if self._drawing and measured is not None:
+            self._drawing.add(measured, estimate, len(self._mailbox.trail))
         published = None if measured is None else self._tracker.particles(MOST_KEPT if self._replay else MOST_SHOWN)
         self._scene = replace(
             self._scene,

@@ -11,7 +11,9 @@ import queue
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 
+from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene
 from echostep.plan.model import Plan
@@ -83,8 +85,13 @@ class Mailbox:
         self.latest: PageScene | None = None
         self.goal: RoutePlace | None = None
         self.marks: tuple[ShownMark, ...] = ()  # of the commanders; replaced, never changed
+        self._drawings: tuple[
+            ShownDrawing, ...
+        ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
+        self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
         self.on_publish: Callable[[], None] | None = None
         self._check_ins: queue.Queue[CheckIn | Undo | Call] = queue.Queue(MOST_CHECK_INS)
+        self._met: queue.Queue[str] = queue.Queue(MOST_CHECK_INS)
 
     def publish(self, scene: PageScene) -> None:
         """Store a new scene and call `on_publish`; called in the tracker's thread."""
@@ -103,6 +110,25 @@ class Mailbox:
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Replace the commanders' marks and call `on_publish`."""
         self.marks = marks
+        if self.on_publish:
+            self.on_publish()
+
+    def add_drawing(self, drawing: ShownDrawing) -> None:
+        """Show a new drawing from its time on and call `on_publish`; called in the drawing's thread."""
+        before = self._drawings if self.replay or self._keeps else ()
+        self._drawings = (*before, drawing)
+        if self.on_publish:
+            self.on_publish()
+
+    def drawing_at(self, t_s: float) -> ShownDrawing | None:
+        """The newest drawing at a time; None before the first."""
+        drawings = self._drawings
+        count = bisect_right(drawings, t_s, key=attrgetter("t_s"))
+        return drawings[count - 1] if count else None
+
+    def set_team(self, names: tuple[str, ...]) -> None:
+        """Replace the teammates who can be met and call `on_publish`."""
+        self.team = names
         if self.on_publish:
             self.on_publish()
 
@@ -133,5 +159,23 @@ class Mailbox:
         while True:
             try:
                 yield self._check_ins.get_nowait()
+            except queue.Empty:
+                return
+
+    def add_meeting(self, name: str) -> bool:
+        """Queue a meeting with a teammate; False when it is refused: in a replay, or with a full queue."""
+        if self.replay:
+            return False
+        try:
+            self._met.put_nowait(name)
+        except queue.Full:
+            return False
+        return True
+
+    def pop_meetings(self) -> Iterator[str]:
+        """Remove and yield the names of those who were met; never waits."""
+        while True:
+            try:
+                yield self._met.get_nowait()
             except queue.Empty:
                 return

@@ -5,8 +5,10 @@ In: plans, scenes, answers. Out: JSON for texts, bytes for frames and walls. Own
 as null; a field that cannot be encoded is a TypeError here. A frame, little-endian:
 
     u32         length of the JSON header, padded with spaces to a multiple of four
-    bytes       the header (`FrameHeader`); its keys "trail" and "cloud" say how many rows follow
+    bytes       the header (`FrameHeader`); its keys "trail", "drawing" and "cloud" say how many rows follow
     float32[3]  x, y, level of each new point of the trail
+    float32[5]  x0, y0, x1, y1, standard deviation of each wall of a new drawing
+    float32[2]  x, y of each point of the path that it corrects
     u16[], u16[], u8[], u8[]   x, y, weight, level of all particles, column by column; x and y on the grid of the header's "cloud"
 """
 
@@ -20,9 +22,11 @@ import numpy as np
 
 from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.beacon_marks import BeaconMark
+from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
 from echostep.page.elements.marks import ShownMark
+from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, ParticleSample
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.taps import Considered
@@ -137,6 +141,15 @@ class TrailPart:
 
 
 @dataclass(frozen=True, slots=True)
+class DrawingPart:
+    """A new drawing in this frame: numbers of walls and points; none: there is no drawing. It ends where the trail has `trail_count` points."""
+
+    walls: int
+    points: int
+    trail_count: int
+
+
+@dataclass(frozen=True, slots=True)
 class CloudGrid:
     """Number of particles, and the grid of their positions."""
 
@@ -148,7 +161,10 @@ class CloudGrid:
 
 @dataclass(frozen=True, slots=True)
 class FrameHeader:
-    """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run."""
+    """One moment. `seq`: the page returns it when the frame is drawn. `goal`: the destination that was chosen on a page of this run.
+
+    `team`: names of the teammates who can be met, when they have changed; `met`: what the newest meeting did.
+    """
 
     seq: int
     t_s: float
@@ -157,6 +173,7 @@ class FrameHeader:
     beams: tuple[EchoLine, ...]
     streams: StreamRates | None
     trail: TrailPart
+    drawing: DrawingPart | None
     cloud: CloudGrid | None
     beacons: tuple[BeaconMark, ...]
     guidance: ShownGuidance | None
@@ -166,6 +183,8 @@ class FrameHeader:
     truth: TruePosition | None
     alarm: ShownAlarm | None
     marks: tuple[ShownMark, ...] | None
+    team: tuple[str, ...] | None
+    met: ShownMeeting | None
     ended: str | None
     kind: Literal["frame"] = "frame"
 
@@ -209,7 +228,7 @@ class FrameParts:
     """What a frame has beside its scene, for one page.
 
     `where`: of the estimate. `places`: of its hypotheses, in words. `trail`: float32 rows x, y, level, the first numbered `trail_from`.
-    `particles`: None when the page has them already. `play`: state of a replay. `ended`: how well the run went, when this is its end.
+    `particles`, `drawing`: None when the page has them already. `play`: state of a replay. `ended`: how well the run went, when this is its end.
     """
 
     seq: int
@@ -222,12 +241,15 @@ class FrameParts:
     goal: RoutePlace | None = None
     play: PlayState | None = None
     marks: tuple[ShownMark, ...] | None = None
+    drawing: ShownDrawing | None = None
+    team: tuple[str, ...] | None = None
     ended: str | None = None
 
 
 def frame(scene: PageScene, parts: FrameParts) -> bytes:
     """A frame as bytes, in the layout of this module's docstring."""
     grid, cloud = (None, b"") if parts.particles is None else _cloud(parts.particles)
+    part, drawing = (None, b"") if parts.drawing is None else _drawing(parts.drawing)
     header = FrameHeader(
         seq=parts.seq,
         t_s=scene.t_s,
@@ -236,6 +258,7 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         beams=scene.echo_lines,
         streams=scene.streams,
         trail=TrailPart(parts.trail_from, len(parts.trail) // TRAIL_ROW_BYTES),
+        drawing=part,
         cloud=grid,
         beacons=scene.beacons,
         guidance=parts.guidance,
@@ -245,9 +268,11 @@ def frame(scene: PageScene, parts: FrameParts) -> bytes:
         truth=scene.truth,
         alarm=scene.alarm,
         marks=parts.marks,
+        team=parts.team,
+        met=scene.met,
         ended=parts.ended,
     )
-    return packed(header, parts.trail + cloud)
+    return packed(header, parts.trail + drawing + cloud)
 
 
 def packed(header: object, rows: bytes) -> bytes:
@@ -281,6 +306,12 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
             for h, place in zip(e.hypotheses, parts.places, strict=False)
         ),
     )
+
+
+def _drawing(drawing: ShownDrawing) -> tuple[DrawingPart, bytes]:
+    """Header and rows of a drawing."""
+    part = DrawingPart(len(drawing.walls), len(drawing.path), drawing.trail_count)
+    return part, drawing.walls.astype("<f4").tobytes() + drawing.path.astype("<f4").tobytes()
 
 
 def _cloud(particles: ParticleSample) -> tuple[CloudGrid, bytes]:

@@ -16,6 +16,7 @@ from echostep.plan.routing import RoutePlace
 from echostep.ports.check_in import MOST_LEVELS, Call, CheckIn, Undo, call_of, check_in_of, undo_of
 
 MOST_REQUEST = 2048  # bytes
+MOST_NAME = 32  # characters of a wearer's name, as in reports
 FASTEST = 32.0  # times as fast as it was recorded
 
 
@@ -24,6 +25,13 @@ class Consider:
     """Say what a check-in would do, without making it."""
 
     check_in: CheckIn
+
+
+@dataclass(frozen=True, slots=True)
+class Met:
+    """The wearer stands beside a teammate of this name."""
+
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +81,9 @@ class StepBy:
     by: int
 
 
-Request = CheckIn | Undo | Call | Consider | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+Request = (
+    CheckIn | Undo | Call | Consider | Met | GoTo | EndGuidance | FrameDrawn | SetPlaying | SetSpeed | Seek | StepBy
+)
 
 
 def parse_request(text: str) -> Request | None:
@@ -95,6 +105,11 @@ def _request(tree: dict[str, Any]) -> Request | None:
 def _consider(tree: dict[str, Any]) -> Consider | None:
     check_in = check_in_of(tree)
     return None if check_in is None else Consider(check_in)
+
+
+def _met(tree: dict[str, Any]) -> Met | None:
+    name = tree.get("name")
+    return Met(name) if isinstance(name, str) and 0 < len(name) <= MOST_NAME else None
 
 
 def _go_to(tree: dict[str, Any]) -> GoTo | None:
@@ -133,6 +148,7 @@ _REQUESTS: dict[str, Callable[[dict[str, Any]], Request | None]] = {
     "undo": undo_of,
     "call": call_of,
     "consider": _consider,
+    "met": _met,
     "go_to": _go_to,
     "go_nowhere": lambda _: EndGuidance(),
     "drawn": _drawn,

@@ -17,6 +17,7 @@ from starlette.websockets import WebSocket
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.page import protocol, requests
+from echostep.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene, ParticleSample
@@ -47,6 +48,8 @@ class PageSession(GuardedSocket):
         self._last: PageScene | None = None
         self._particles: ParticleSample | None = None
         self._marks: tuple[ShownMark, ...] | None = None  # that the page has
+        self._drawing: ShownDrawing | None = None  # that the page has
+        self._team: tuple[str, ...] | None = None  # that the page has
         self._trail_count = 0  # points of the trail that the page has
         self._told_end = False
         self._frame_due = True  # the page needs a frame, even of the same scene
@@ -58,7 +61,7 @@ class PageSession(GuardedSocket):
     async def _begin_replay(self) -> None:
         """The live run is over: from now on the page plays its scenes, beginning with the last one, at rest."""
         self._cursor = ReplayCursor(self._mailbox.history, at_end=True)
-        self._trail_count, self._particles, self._frame_due = 0, None, True
+        self._trail_count, self._particles, self._drawing, self._frame_due = 0, None, None, True
         await self._greet()
 
     async def _handle(self, text: str | None) -> None:
@@ -82,6 +85,8 @@ class PageSession(GuardedSocket):
                 await self._take(request, "It is too late to undo this." if is_late else "")
             case Call():
                 await self._take(request, "")
+            case requests.Met(name):
+                await self._meet(name)
             case requests.GoTo(goal) if goal.level < levels:
                 self._mailbox.set_goal(goal)
             case requests.EndGuidance():
@@ -101,6 +106,15 @@ class PageSession(GuardedSocket):
             self._counts.refused += 1
             await self.tell(protocol.encode(protocol.Refused(refusal)))
 
+    async def _meet(self, name: str) -> None:
+        """Pass a meeting with a teammate on to the tracker, or tell the page why not."""
+        is_heard = name in self._mailbox.team
+        if is_heard and self._mailbox.add_meeting(name):
+            return
+        self._counts.refused += 1
+        refusal = "Not accepted: this is a replay, or the tracker is too busy." if is_heard else f"{name} is not heard."
+        await self.tell(protocol.encode(protocol.Refused(refusal)))
+
     async def _send(self) -> None:
         """Send a frame when there is something new, not before `FRAME_S` after the last one."""
         due_s = 0.0
@@ -119,8 +133,12 @@ class PageSession(GuardedSocket):
                 continue
             self._follow_goal()
             self._frame_due = self._frame_due or self._marks is not self._mailbox.marks
+            self._frame_due = self._frame_due or self._team is not self._mailbox.team
             scene = self._cursor.scene(time.monotonic()) if self._cursor else self._mailbox.latest
-            if scene is None or (scene is self._last and not self._frame_due and not playing):
+            if scene is None:
+                continue
+            self._frame_due = self._frame_due or self._mailbox.drawing_at(scene.t_s) is not self._drawing
+            if scene is self._last and not self._frame_due and not playing:
                 continue
             due_s = max(due_s, time.monotonic() - FRAME_S) + FRAME_S
             await self.tell(self._frame(scene))
@@ -138,6 +156,7 @@ class PageSession(GuardedSocket):
         new_estimate = self._cursor is None and (self._last is None or scene.estimate is not self._last.estimate)
         self._undrawn[self._seq] = scene.arrived_ns if new_estimate else None
         begin = min(self._trail_count, scene.trail_count)  # a replay may go back
+        drawing = self._mailbox.drawing_at(scene.t_s)
         parts = protocol.FrameParts(
             seq=self._seq,
             where=self._shared.taps.where(scene.estimate) if scene.estimate else "",
@@ -149,9 +168,11 @@ class PageSession(GuardedSocket):
             goal=self._mailbox.goal,
             play=self._cursor.state() if self._cursor else None,
             marks=self._mailbox.marks if self._marks is not self._mailbox.marks else None,
+            drawing=(drawing or NO_DRAWING) if drawing is not self._drawing else None,
+            team=self._mailbox.team if self._team is not self._mailbox.team else None,
             ended=self._mailbox.summary if self._cursor is None or self._cursor.at_end else None,
         )
-        self._marks = self._mailbox.marks
+        self._marks, self._team, self._drawing = self._mailbox.marks, self._mailbox.team, drawing
         self._last, self._trail_count, self._particles = scene, scene.trail_count, scene.particles
         return protocol.frame(scene, parts)
 

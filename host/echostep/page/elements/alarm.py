@@ -7,9 +7,10 @@ In: the tracker. Out: `ShownAlarm`: plain data. Owns nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from echostep.odometry.alarm import MAYDAY_S, AlarmKind, AlarmReason
+from echostep.odometry.alarm import AlarmKind, AlarmReason
 from echostep.tracker import Tracker
 
 AGAIN_S = 5.0  # between two times that a sentence is spoken, by reason
@@ -25,8 +26,13 @@ class ShownAlarm:
     times: int
 
 
-def shown_alarm(tracker: Tracker, *, has_team: bool) -> ShownAlarm | None:
-    """The present alarm; None while all is well. `has_team`: the run's reports go somewhere."""
+def shown_alarm(
+    tracker: Tracker, *, has_team: bool, acknowledged_by: Callable[[int], str | None] = lambda _: None
+) -> ShownAlarm | None:
+    """The present alarm; None while all is well. `has_team`: the run's reports go somewhere.
+
+    `acknowledged_by`: the commander who has acknowledged the alarm of a number.
+    """
     alarm = tracker.alarm.alarm
     if alarm is None:
         return None
@@ -34,14 +40,21 @@ def shown_alarm(tracker: Tracker, *, has_team: bool) -> ShownAlarm | None:
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
     times = 1000 * alarm.number + int(age_s / AGAIN_S)
     told = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
+    if commander := acknowledged_by(alarm.number):
+        told = f"{commander} has acknowledged it."
+    left_s = max(math.ceil((alarm.mayday_s or alarm.since_s) - alarm.since_s - age_s), 0)
     match alarm.kind, alarm.reason:
-        case AlarmKind.ASKING, _:
-            left_s = max(math.ceil(MAYDAY_S - age_s), 0)
-            text = f"Are you all right? Move, or tap. In {left_s} s it is a mayday."
-            return ShownAlarm(alarm.kind.value, text, "Are you all right? Move, or tap.", times)
+        case AlarmKind.ASKING, reason:
+            asks = (
+                "A fall: are you all right? Walk, or tap."
+                if reason is AlarmReason.FALL
+                else "Are you all right? Move, or tap."
+            )
+            return ShownAlarm(alarm.kind.value, f"{asks} In {left_s} s it is a mayday.", asks, times)
         case AlarmKind.MAYDAY, AlarmReason.HELP:
             return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {told}", f"Mayday. {told}", times)
-        case AlarmKind.MAYDAY, _:
-            text = f"Mayday: no motion for {age_s:.0f} s. {told}"
+        case AlarmKind.MAYDAY, reason:
+            why = f"a fall {age_s:.0f} s ago" if reason is AlarmReason.FALL else f"no motion for {age_s:.0f} s"
+            text = f"Mayday: {why}. {told}"
             return ShownAlarm(alarm.kind.value, text, f"Mayday. {told} Walk, or tap, if you are all right.", times)
     return ShownAlarm(alarm.kind.value, "The mayday is over.", "The mayday is over.", 1000 * alarm.number)

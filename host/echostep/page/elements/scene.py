@@ -17,10 +17,11 @@ from echostep.page.elements.alarm import ShownAlarm
 from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
+from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
-from echostep.tracker import Particles
+from echostep.tracker_state import Particles
 
 KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
 MOST_SHOWN = 10_000  # particles in a frame
@@ -66,6 +67,7 @@ class PageScene:
     guidance: ShownGuidance | None = None
     truth: TruePosition | None = None
     alarm: ShownAlarm | None = None
+    met: ShownMeeting | None = None
 
 
 def sample_of(particles: Particles) -> ParticleSample:

@@ -48,6 +48,11 @@ export function parseFrame(buffer) {
   let offset = 4 + length;
   header.trail.points = new Float32Array(buffer, offset, 3 * header.trail.count);
   offset += 12 * header.trail.count;
+  if (header.drawing) {
+    const { walls, points, trail_count } = header.drawing;
+    header.drawing = { trail_count, walls: new Float32Array(buffer, offset, 5 * walls), path: new Float32Array(buffer, offset + 20 * walls, 2 * points) };
+    offset += 20 * walls + 8 * points;
+  }
   if (header.cloud) {
     const n = header.cloud.count;
     header.cloud.x = new Uint16Array(buffer, offset, n);

@@ -16,8 +16,8 @@ const $ = (id) => document.getElementById(id);
 
 const view = new View(), planView = new PlanView($('walls'), $('rooms')), painter = new Painter($('canvas'));
 const panel = new Panel((level) => { setFollows(false); showLevel(level); });
-const scene = { frame: null, cloud: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
-let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, invited = false, connected = false;
+const scene = { frame: null, cloud: null, drawing: null, marks: [], trail: { points: new Float32Array(3072), count: 0 }, tapped: null, level: 0 };
+let plan = null, mode = null, follows = true, dirty = true, drawnStamp = -1, undrawn = [], turned = 0, fitted = false, wantedLevel = 0, metNumber = 0, invited = false, connected = false;
 
 const taps = new Taps(view, {
   send: (kind, fields) => link.send(kind, fields), changed: () => { scene.tapped = taps.ghost; dirty = true; }, mayCheckIn: () => !$('here').hidden,
@@ -36,6 +36,7 @@ async function hello(message) {
   if (plan && plan.digest !== message.plan.digest) startAnew();
   plan = message.plan;
   scene.trail.count = 0;
+  scene.drawing = null;
   invited = false;
   panel.hello(message);
   const begins = message.replay && $('replay').hidden;
@@ -45,6 +46,7 @@ async function hello(message) {
     fitted = false;
   }
   $('here').hidden = $('sheet-here').hidden = $('help').hidden = message.replay;
+  if (message.replay) panel.team([]);
   taps.reconnected();
   await showLevel(Math.min(scene.level, plan.levels.length - 1));
 }
@@ -81,6 +83,12 @@ function connection(open) {
 function frame(received) {
   scene.frame = received;
   if (received.cloud) scene.cloud = received.cloud;
+  if (received.drawing) panel.drawing(scene.drawing = received.drawing.path.length ? received.drawing : null);
+  if (received.team) panel.team(received.team);
+  if (received.met && received.met.number !== metNumber) {
+    metNumber = received.met.number;
+    hint(received.met.text, 8000);
+  }
   if (received.marks) panel.marks(scene.marks = received.marks);
   extend(scene.trail, received.trail);
   undrawn.push(received.seq);
@@ -186,14 +194,13 @@ function setFollows(on) {
   $('follow').setAttribute('aria-pressed', String(on));
 }
 
-// The whole plan, and the whole track where that leads out of it.
+// The whole plan, and the whole track and drawing where these lead out of it.
 function fitWhole() {
   setFollows(false);
-  const box = [...planView.box], { points, count } = scene.trail;
-  for (let k = 0; k < count; k++) {
-    const [x, y] = [points[3 * k], points[3 * k + 1]];
-    box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
-  }
+  const box = planView.isEmpty && scene.drawing ? [Infinity, Infinity, -Infinity, -Infinity] : [...planView.box], { points, count } = scene.trail, walls = scene.drawing?.walls ?? [];
+  const add = (x, y) => { if (Number.isNaN(x)) return; box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y); };
+  for (let k = 0; k < count; k++) add(points[3 * k], points[3 * k + 1]);
+  for (let k = 0; k < walls.length; k += 5) { add(walls[k], walls[k + 1]); add(walls[k + 2], walls[k + 3]); }
   view.fit(box);
 }
 
@@ -213,6 +220,10 @@ $('north').onclick = () => view.rotate(-view.turn);
 $('help').onclick = () => link.send('call', { help: true });
 $('fine').onclick = () => link.send('call', { help: false });
 $('end-guidance').onclick = () => link.send('go_nowhere');
+$('met').onchange = () => {
+  if ($('met').value) link.send('met', { name: $('met').value });
+  $('met').value = '';
+};
 $('goal').onchange = () => {
   const { value } = $('goal');
   if (value === 'map') return enter('go', true);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Paints the moving things on a canvas: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
 
+import { paintDrawing } from './drawing.js';
 import { paintMarks } from './marks.js';
 
 const GRADES = 4;  // shades of the particles' weight
@@ -18,7 +19,7 @@ export class Painter {
   recolour() {
     const style = getComputedStyle(document.documentElement);
     this.colour = Object.fromEntries(
-      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink', 'good'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+      ['cloud', 'trail', 'here', 'halo', 'left', 'right', 'expected', 'goal', 'beacon', 'bad', 'ink', 'good', 'wall'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
   paint(view, scene) {
@@ -28,8 +29,9 @@ export class Painter {
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     pen.clearRect(0, 0, view.width, view.height);
     pen.lineJoin = pen.lineCap = 'round';
+    if (scene.drawing) paintDrawing(pen, view, scene.drawing, this.colour);
     if (scene.cloud) this.particles(view, scene.cloud, scene.level);
-    this.trail(view, scene.trail, scene.level);
+    this.trail(view, scene.trail, scene.level, scene.drawing?.trail_count ?? 0);
     paintMarks(pen, view, scene.marks, scene.level, this.colour);
     const { told: estimate } = scene.frame ?? {};
     const { guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.level === scene.level ? guidance.path : [];
@@ -90,12 +92,12 @@ export class Painter {
     pen.setLineDash([]);
   }
 
-  // A point with NaN coordinates breaks the line: there was a check-in.
-  trail(view, { points, count }, shownLevel) {
+  // From the point `first` on: the path before it is in the drawing. A point with NaN coordinates breaks the line: there was a check-in.
+  trail(view, { points, count }, shownLevel, first) {
     const [a, b, c, d, e, f] = view.matrix(), { pen } = this;
     pen.beginPath();
     let drawing = false;
-    for (let k = 0; k < 3 * count; k += 3) {
+    for (let k = 3 * Math.max(first - 1, 0); k < 3 * count; k += 3) {
       const x = points[k], y = points[k + 1], visible = points[k + 2] === shownLevel && !Number.isNaN(x);
       if (visible) pen[drawing ? 'lineTo' : 'moveTo'](a * x + c * y + e, b * x + d * y + f);
       drawing = visible;

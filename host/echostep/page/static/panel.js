@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
 
+import { drawnText } from './drawing.js';
 import { marksText } from './marks.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
@@ -64,6 +65,17 @@ export class Panel {
   marks(marks) {
     put('marks', marksText(marks, this.plan.levels));
     $('marks').hidden = !marks.length;
+  }
+
+  drawing(drawing) {
+    put('drawn', drawnText(drawing));
+    $('drawn').hidden = !drawing;
+  }
+
+  // The teammates who can be met: a list that is there only when there are any.
+  team(names) {
+    $('met').hidden = !names.length;
+    $('met').replaceChildren(new Option('I met…', ''), ...names.map((name) => new Option(name, name)));
   }
 
   alarm(alarm) {

@@ -8,12 +8,13 @@ const KEPT_PX = 22;  // distance of names from the wearer
 
 export class PlanView {
   constructor(wallsGroup, roomsGroup) {
-    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], kept: null, box: [0, 0, 10, 10] });
+    Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], kept: null, box: [0, 0, 10, 10], isEmpty: true });
   }
 
   show(walls, rooms) {
     this.tiles = tilesOf(walls);
     this.box = boxOf(walls, rooms);
+    this.isEmpty = this.box === NOTHING_DRAWN;
     this.wallsGroup.replaceChildren();
     this.rooms = rooms.map(({ name, at_m: [x, y] }) => {
       const text = document.createElementNS(SVG, 'text');

@@ -3,10 +3,13 @@
 
 export class View {
   constructor() {
-    Object.assign(this, { x: 0, y: 0, scale: 20, turn: 0, width: 1, height: 1, stamp: 0 });
+    Object.assign(this, { x: 0, y: 0, scale: 20, turn: 0, width: 1, height: 1, stamp: 0, onChanged: () => {} });
   }
 
-  changed() { this.stamp++; }
+  changed() {
+    this.stamp++;
+    this.onChanged();
+  }
 
   resize(width, height) {
     this.width = Math.max(width, 1);
