@@ -158,7 +158,7 @@ def run(seconds: float, folder: Path, board: TracedBoard | None = None, began_s:
         metadata = run_metadata(plan, tracker.start, SEED, "soak", source=SIMULATED) | clock_metadata()
         with start_recording(folder / "walk.mcap", metadata) as recorder:
             tour.board.send(encode(m.Identify(), 0))
-            chunks = _recorded_chunks(cast("SerialPorts", ports), recorder, 100.0, None, session.page)
+            chunks = _recorded_chunks(cast("SerialPorts", ports), recorder, 100.0, None, session)
             session.track(portions_of(chunks, PORTION), None, recorder)
         session.finish("soak")
         stack.close()  # the page's client ends with the page

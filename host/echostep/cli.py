@@ -504,10 +504,19 @@ def flash(
 @app.command()
 def calibrate(
     parts: Annotated[
-        list[str] | None, typer.Argument(help="gyros, mounting, compass, legs; without any, all of them.")
+        list[str] | None,
+        typer.Argument(
+            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides."
+        ),
     ] = None,
     board: Annotated[
         str | None, typer.Option("--board", metavar="PORT", help="Port of the board; without it, it is searched for.")
+    ] = None,
+    foot: Annotated[
+        str | None,
+        typer.Option(
+            "--foot", metavar="PORT", help="Port of a foot board, for accelerometers; without it, it is searched for."
+        ),
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
@@ -518,13 +527,15 @@ def calibrate(
         float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
     ] = 10.0,
 ) -> None:
-    """Calibrate gyros, mounting, compass and legs. Writes the results as settings."""
+    """Calibrate gyros, mounting, compass and legs, or the accelerometers. Writes the results as settings."""
     from rich.console import Console
 
     from echostep.commissioning import calibrate as calibration
 
     wearer = calibration.Wearer(thigh, shank, walked)
-    calibration.calibrate(board, parts or [], wearer, out, Console(soft_wrap=True, highlight=False))
+    calibration.calibrate(
+        calibration.Ports(board, foot), parts or [], wearer, out, Console(soft_wrap=True, highlight=False)
+    )
 
 
 def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:

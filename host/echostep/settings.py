@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from echostep.board.calibration import GyroSettings, RangerSettings
+from echostep.board.calibration import GyroSettings, Imus, ImuSettings, RangerSettings
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
@@ -33,6 +33,10 @@ class Settings:
     mtx: MtxTiming = field(default_factory=MtxTiming)
     ranger: RangerSettings = field(default_factory=RangerSettings)
     gyro: GyroSettings = field(default_factory=GyroSettings)
+    foot_imu: ImuSettings = field(default_factory=ImuSettings)
+    thigh_imu: ImuSettings = field(default_factory=ImuSettings)
+    calf_imu: ImuSettings = field(default_factory=ImuSettings)
+    belt_imu: ImuSettings = field(default_factory=ImuSettings)
     compass: CompassErrors = field(default_factory=CompassErrors)
     foot: FootSettings = field(default_factory=FootSettings)
     gait: GaitSettings = field(default_factory=GaitSettings)
@@ -41,6 +45,16 @@ class Settings:
     beacons: BeaconSettings = field(default_factory=BeaconSettings)
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     wearer: WearerSettings = field(default_factory=WearerSettings)
+
+    @property
+    def iron(self) -> CompassErrors | None:
+        """Errors of the compass; None when it was not calibrated."""
+        return None if self.compass == CompassErrors() else self.compass
+
+    @property
+    def imus(self) -> Imus:
+        """Errors of the six-axis parts whose forces are used."""
+        return Imus(self.foot_imu, self.belt_imu)
 
 
 RENAMED = {("echo", "short"): "hidden"}  # fields of older recordings, by their present names

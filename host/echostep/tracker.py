@@ -10,38 +10,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from echostep.angles import wrap
-from echostep.arrays import Floats, Ints
-from echostep.board.findings import BoardReports, Finding
-from echostep.board.frames import FrameCounts
-from echostep.board.gateway import BeaconReading, Gateway, GatewayCounts
-from echostep.board.health import board_findings
-from echostep.board.messages import Identity, Status
+from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
-from echostep.legs.heading import CompassErrors
 from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.before_check_in import BeforeCheckIn
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, Right, estimate, unobserved
 from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.meeting_model import carries_position, start_at
+from echostep.localization.meetings import MeetingEffect, MeetingQueue
 from echostep.localization.particle_kernels import systematic
 from echostep.localization.plausibility import STATED
 from echostep.localization.ranger_models import echo_of
 from echostep.localization.start import Start
-from echostep.odometry.alarm import Alarm, WearerAlarm
-from echostep.odometry.front_end import FrontEnd, FrontEndCounts
+from echostep.odometry.alarm import WearerAlarm
+from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
+from echostep.ports.meeting import MEETING
 from echostep.ports.teammate import TEAM
 from echostep.settings import Settings
+from echostep.tracker_state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
-from echostep.xsens.reader import MtxCounts
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
 LATE_S = 0.5  # behind a published time: an older estimate no longer says where the wearer is; by reason: half a stride, a third of the claimed 1 m
@@ -49,74 +46,6 @@ KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over; by re
 KNOWN = 0.9  # probability of the estimate whose heading it is; by reason: a tap where the wearer is not says that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerState:
-    """The tracker after the newest chunk.
-
-    `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `right`: probability that the wearer is where the
-    cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
-    newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
-    `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well.
-    """
-
-    estimate: Estimate | None
-    last_segment: PathSegment | None
-    pending_segments: tuple[PathSegment, ...]
-    waits_for_start: bool
-    undoable: int | None
-    check_ins: int
-    undone: int
-    bad_check_ins: int
-    particle_count: int
-    right: float
-    searches: bool
-    beacon_numbers: tuple[int, ...]
-    beacon_heard_s: float | None
-    alarm: Alarm | None
-
-
-@dataclass(frozen=True, slots=True)
-class StreamState:
-    """Counts of each input stream since the start, and the newest reports of the board.
-
-    `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples. `mtx`: also of a foot board's samples;
-    `foot_reports`: of a foot board about itself, None where an MTx is worn.
-    """
-
-    board: FrameCounts
-    mtx: MtxCounts
-    gateway: GatewayCounts
-    front_end: FrontEndCounts
-    pings: int
-    synchronised: bool
-    board_restarts: int
-    status: Status | None
-    identity: Identity | None
-    reports: BoardReports
-    foot_reports: BoardReports | None
-
-    @property
-    def findings(self) -> list[Finding]:
-        """Findings on the boards, the most severe first."""
-        of_foot = board_findings(self.foot_reports) if self.foot_reports else []
-        return sorted([*board_findings(self.reports), *of_foot], key=lambda finding: -finding.severity)
-
-    @property
-    def foot_name(self) -> str:
-        """What is worn on the foot."""
-        return "MTx" if self.foot_reports is None else "foot board"
-
-
-@dataclass(frozen=True, slots=True)
-class Particles:
-    """n particles: `x_m`, `y_m` (n,) in the map, `level` (n,) index in the plan, `log_weight` (n,), 0 for the heaviest of all particles."""
-
-    x_m: Floats
-    y_m: Floats
-    level: Ints
-    log_weight: Floats
 
 
 class Tracker:
@@ -139,9 +68,7 @@ class Tracker:
         s = self.settings
         self.plan = plan
         self.start = self._start_of(start or plan.start, waits)
-        self.front_end = FrontEnd(
-            s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, None if s.compass == CompassErrors() else s.compass
-        )
+        self.front_end = FrontEnd(s.mtx, s.ranger, s.foot, s.gait, s.wearer, s.gyro, s.iron, s.imus)
         self.laid_out = lay_out_levels(plan)
         self._building = Building(self.laid_out.walls, self.laid_out.sheet)
         self.filter: MapFilter | None = None  # from the first segment on
@@ -150,6 +77,7 @@ class Tracker:
         self.watchers: list[Watch] = []  # called in this order
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # that wait for their segment
+        self._meetings = MeetingQueue()
         self._check_ins = self._bad_check_ins = self._undone = 0
         self._before: BeforeCheckIn | None = None  # the newest check-in, while it can be undone
         self._check_in: CheckIn | None = None  # the newest
@@ -178,6 +106,8 @@ class Tracker:
             beacon_numbers=tuple(self.gateway.numbers),
             beacon_heard_s=None if self.filter is None else self.filter.beacon_map.heard_s,
             alarm=self.alarm.alarm,
+            met=self._meetings.news,
+            meetings=dict(self._meetings.counts),
         )
 
     @property
@@ -227,13 +157,16 @@ class Tracker:
         """Process many chunks; the estimates are those of the chunks one by one."""
         estimates: list[Estimate] = []
         for piece in portion.cut_after(PERSON):
-            for told in piece.cut_after(TEAM):
-                for part in told.cut_after(GATEWAY):
-                    estimates += self._track(part)
-                if from_team := told.of(TEAM).received:
-                    for hear in self.team_watchers:
-                        hear(from_team)
-            self.alarm.add(self.front_end.stillness.pop_windows())
+            for met in piece.cut_after(MEETING):
+                for told in met.cut_after(TEAM):
+                    for part in told.cut_after(GATEWAY):
+                        estimates += self._track(part)
+                    if from_team := told.of(TEAM).received:
+                        for hear in self.team_watchers:
+                            hear(from_team)
+                self.alarm.add(self.front_end.signs.pop())
+                if len(met.of(MEETING).row):
+                    estimates += self._hear_meeting(met.of(MEETING).received)
             check_in = piece.of(PERSON)
             if len(check_in.row):
                 estimates += self._apply_person(check_in.received)
@@ -270,12 +203,10 @@ class Tracker:
         self._ranger_part = measured.ranger_part or self._ranger_part
         self.filter = self.filter or self._first_filter(segment.heading0_rad)
         last, self._segment = self._segment, segment
-        if last is not None and segment.step != last.step:
-            self.alarm.step(segment.t1_s)
         if self.filter is None:
             return []
-        readings = self._pop_readings(segment.t1_s)
-        if self._before and not self._before.add(measured, readings):
+        readings, meetings = self._pop_readings(segment.t1_s), self._meetings.pop(segment.t1_s)
+        if self._before and not self._before.add(measured, readings, meetings):
             self._before = None
         if segment.t0_s < self._check_in_s:
             last_rad = segment.heading0_rad if last is None else last.heading1_rad
@@ -285,6 +216,8 @@ class Tracker:
                 return []
             measured = measured.after(self._check_in_s)
         self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
+        for meeting in meetings:
+            self._meetings.note(meeting, self.filter.meet(meeting))
         self._estimate = self.filter.update(measured, readings)
         return [self._publish(measured, self._estimate)]
 
@@ -306,6 +239,20 @@ class Tracker:
         for watch in self.watchers:
             watch(measured, new)
         return new
+
+    def _hear_meeting(self, received: bytes) -> list[Estimate]:
+        """Keep a meeting for the segment in which it happened; where no start is known yet it is one. A tap is a sign of life."""
+        now_s = self.front_end.newest_s
+        meeting = self._meetings.hear(received, len(self.plan.levels))
+        if meeting is None:
+            return []
+        if meeting.range_m is None:
+            self.alarm.answer(now_s, ends_help=False)
+        if self.start is not None or self._check_in is not None or not carries_position(meeting):
+            self._meetings.add(meeting, now_s)
+            return []
+        self._meetings.note(meeting, MeetingEffect.MOVED)
+        return self._apply_check_in(start_at(meeting))
 
     def _apply_person(self, received: bytes) -> list[Estimate]:
         """Apply a check-in, its undoing or a call; other bytes are counted. A tap is a sign of life."""
@@ -350,13 +297,15 @@ class Tracker:
         self._check_in_s = -math.inf
         self._rng.bit_generator.state = before.random_state
         waiting: list[BeaconReading] = []
-        for measured, readings in before.since:
+        for measured, readings, meetings in before.since:
             self._ranger_part = measured.ranger_part or self._ranger_part
             self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
             if self.filter is None:
                 waiting += readings
             else:
                 self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
+                for meeting in meetings:
+                    self.filter.meet(meeting)
                 self._estimate = self.filter.update(measured, readings)
         self._readings = (waiting + self._readings)[-MAX_READINGS:]
         if self._segment is None or self._estimate is None:

@@ -16,8 +16,8 @@ from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
+from mt_lines import on_a_terminal
 from players import babbling_port, pseudo_terminal, python_board
-from xsens.test_xsens_startup import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 PAGE = ROOT / "host/docs/mistakes.md"

@@ -24,9 +24,9 @@ from echostep.recording.device import sender
 from echostep.recording.reading import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT
+from mt_lines import on_a_terminal
 from players import babbling_port, pseudo_terminal, python_board
 from waiting import PATIENCE_S
-from xsens.test_xsens_startup import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 

@@ -4,7 +4,7 @@
 In: the ELF and the twin; the MTx begins with its factory settings and accepts its configuration. Out: two ports for `echostep live`, and the
 true path in out/twin/truth.csv. The walk begins when the board's port is opened, and is repeated until Ctrl-C. With
 `--beacons udp://127.0.0.1:9000` a simulated gateway sends the readings of beacons along the walk to that port. With `--still`
-the wearer acts what `echostep calibrate` asks for. Owns both pseudo terminals.
+the wearer acts what `echostep calibrate` asks for, with the kit of 2026 the boxes lie as `calibrate accelerometers` asks. Owns both pseudo terminals.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from echostep.simulation.devices.board import Sent
 from echostep.simulation.devices.foot_board import FootBoardPort
 from echostep.simulation.devices.mtx_setup import MtxDevice
 from echostep.simulation.kits import Kit
+from echostep.simulation.poses import LyingParts
 from echostep.simulation.rehearsal import Act, Rehearsal
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
@@ -252,6 +253,43 @@ def rehearse(rehearsal: Rehearsal, board: PtyBoard, mtx: PtyMtx) -> None:
         time.sleep(max(0.0, due_s - time.monotonic()))
 
 
+class LyingBoard:
+    """A board of 2026 whose parts lie still in a pose."""
+
+    def __init__(self, seed: int, *, foot: bool) -> None:
+        self.board = PtyBoard(FOOT_BOARD if foot else 1)
+        self.board.fault("kit=foot" if foot else "kit=2026")
+        self.parts = LyingParts(np.random.default_rng([seed, foot]), "foot board" if foot else "belt board")
+        self.pose = 0
+
+    def advance(self) -> None:
+        """Run the firmware for BLOCK_MS."""
+        self.board.advance(self.parts.rows(self.pose, BLOCK_MS))
+
+
+def run_poses(seed: int) -> int:
+    """Lay the parts of both boards of 2026 on another side whenever a program has closed their port, until Ctrl-C."""
+    boards = LyingBoard(seed, foot=False), LyingBoard(seed, foot=True)
+    ports = [lying.board.port for lying in boards]
+    print(f"board {ports[0]}\nfoot  {ports[1]}\n\nIn another terminal:\n  .venv/bin/echostep calibrate accelerometers "
+          f"--board {ports[0]} --foot {ports[1]} --out out/twin/calibration.toml\n\nCtrl-C ends.", flush=True)  # fmt: skip
+    due_s = time.monotonic()
+    try:
+        while True:
+            for lying in boards:
+                was_open = lying.board.is_open
+                lying.advance()
+                lying.pose += was_open and not lying.board.is_open
+            due_s = max(due_s + BLOCK_MS * 1e-3, time.monotonic() - LATE_S)
+            time.sleep(max(0.0, due_s - time.monotonic()))
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for lying in boards:
+            lying.board.close()
+    return 0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
@@ -265,6 +303,8 @@ def main() -> int:
     options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
+    if options.kit == Kit.OF_2026.value and options.still:
+        return run_poses(options.seed)
     if options.kit == Kit.OF_2026.value:
         return run_2026(options.seed, options.out, once=options.once)
     with as_file(files("echostep") / "plans" / "demo.json") as path:

@@ -252,6 +252,22 @@ def operation_command(
     run_study(operation_study(), StudyRequest(runs, seed, json, out, scheduler))
 
 
+@app.command("team")
+def team_command(
+    runs: Annotated[int, typer.Option("--runs", help="Teams of five wearers.", min=1)] = 10,
+    seed: Seed = 1,
+    rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: '*/tap'.")] = "*",
+    json: Json = None,
+    out: Out = Path("out/team"),
+    scheduler: Scheduler = None,
+) -> None:
+    """Five wearers, one at a wrong start, each alone and told of its meetings by tap or radio range (simulated)."""
+    from echostep.evaluate.study import StudyRequest, run_study
+    from echostep.evaluate.team.study import team_study
+
+    run_study(team_study(rows), StudyRequest(runs, seed, json, out, scheduler))
+
+
 @app.command("clutter")
 def clutter_command(
     folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of CARMEN logs: *.log, *.log.gz.")],

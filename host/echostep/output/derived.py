@@ -16,7 +16,6 @@ import numpy as np
 from echostep.board.calibration import ranges
 from echostep.board.frames import BoardReader, Frames
 from echostep.board.messages import (
-    BY_ID,
     PRESSURE_PRESSURE_INVALID,
     PRESSURE_TEMPERATURE_INVALID,
     Ping,
@@ -57,7 +56,6 @@ ELLIPSE_POINTS = 17
 TRACK_PIECE = 40  # points of the track in one line of the scene
 BEAM_S = 1.0  # an older echo is not drawn
 
-_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 _SHAPES: dict[str, Shape] = {
     "float": NUMBER,
     "int": WHOLE,
@@ -127,7 +125,7 @@ class Derived:
         return notes
 
     def _echoes(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
-        frame_index, pings = frames.rows(_IDS[Ping])
+        frame_index, pings = frames.rows(Ping)
         notes = []
         for k, ping, range_m in zip(
             frame_index.tolist(), pings, ranges(pings, self._tracker.settings.ranger).tolist(), strict=True
@@ -140,7 +138,7 @@ class Derived:
         return notes
 
     def _status(self, frames: Frames, t_ns: Any) -> list[DerivedMessage]:
-        frame_index, rows = frames.rows(_IDS[Status])
+        frame_index, rows = frames.rows(Status)
         streams = self._tracker.streams
         own = {
             "frames": streams.board.good,
@@ -238,7 +236,7 @@ def east_north(rotation_rad: float, xx_m2: float, xy_m2: float, yy_m2: float) ->
 
 
 def _pressures(frames: Frames, t_ns: Any) -> list[DerivedMessage]:
-    frame_index, rows = frames.rows(_IDS[Pressure])
+    frame_index, rows = frames.rows(Pressure)
     notes = []
     for k, row in zip(frame_index.tolist(), rows, strict=True):
         if row["pressure"] == PRESSURE_PRESSURE_INVALID:

@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from echostep.board.messages import BY_ID, SCHEMA_HASH, Identity
+from echostep.board.messages import SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
 from echostep.recording.arrival_order import ArrivalOrder
@@ -27,7 +27,6 @@ LONGEST_LINE = 4000  # characters
 LONGEST_VALUE = 100  # characters of a metadata value on the line of its key
 DECODED_AT_ONCE = 1 << 16  # bytes of one port
 GAP_S = 1.0  # a longer time between two chunks of a port is counted as a gap
-IDENTITY = next(identifier for identifier, kind in BY_ID.items() if kind is Identity)
 
 
 @dataclass
@@ -109,7 +108,7 @@ class Contents:
         undecoded.clear()
 
     def _decode_board(self, received: bytes) -> None:
-        for row in self.decoder.board.frames(received).rows(IDENTITY)[1]:
+        for row in self.decoder.board.frames(received).rows(Identity)[1]:
             identity = Identity.unpack(row.tobytes())
             version = f"{identity.version_major}.{identity.version_minor}.{identity.version_patch}"
             self.firmware = f"{version}, protocol 0x{identity.schema_hash:08X}"

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from echostep.board.frames import BoardReader, Frames, StaleFirmwareError
-from echostep.board.messages import BY_ID, Configuration, Foot, FootHealth
+from echostep.board.messages import Configuration, Foot, FootHealth
 from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.xsens import FrameReader
 
 DEVICES = {BOARD: "the sensor board", MTX: "the MTx", FOOT: "the foot board"}
-_IDS = {kind: identifier for identifier, kind in BY_ID.items()}
 LEAST_FRAMES = 3  # by reason: one of 256 wrong frames of an MTx passes its checksum
 LISTENED_BYTES = 1 << 14  # by which a device has sent so many frames: half a second of a board, two of an MTx
 
@@ -33,9 +32,9 @@ def sender(received: bytes) -> str | None:
 
 def _is_of_foot(frames: Frames) -> bool:
     """Whether a board has a foot's sensor; such a board reads no other one [protocol/README.md, foot_health]."""
-    if any(len(frames.rows(_IDS[kind])[0]) for kind in (Foot, FootHealth)):
+    if any(len(frames.rows(kind)[0]) for kind in (Foot, FootHealth)):
         return True
-    configurations = frames.rows(_IDS[Configuration])[1]
+    configurations = frames.rows(Configuration)[1]
     return len(configurations) > 0 and configurations[-1]["sensors"] == 0
 
 

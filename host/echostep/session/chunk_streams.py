@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
+from echostep.ports.meeting import MEETING
 from echostep.ports.teammate import TEAM
 from echostep.recording.recorder import Recorder
 from echostep.session.console import print_notices
@@ -21,6 +22,7 @@ from echostep.session.console import print_notices
 if TYPE_CHECKING:
     from echostep.page.live import LivePage
     from echostep.session.team_ear import TeamEar
+    from echostep.session.teammates_ear import TeammatesEar
 
 LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
 
@@ -54,6 +56,20 @@ def with_team(
         yield chunk
         for payload in ear.pop() if ear else ():
             yield Chunk(TEAM, arrival_ns(chunk), payload)
+
+
+def with_meetings(
+    chunks: Iterable[Chunk | None],
+    page: LivePage | None,
+    ear: TeammatesEar | None,
+    arrival_ns: Callable[[Chunk | None], int],
+) -> Iterator[Chunk | None]:
+    """Insert each meeting that a page tells, with the teammate's newest report, behind the chunk after which it was told."""
+    for chunk in chunks:
+        yield chunk
+        for name in page.pop_meetings() if page and ear else ():
+            if ear and (payload := ear.meeting(name)):
+                yield Chunk(MEETING, arrival_ns(chunk), payload)
 
 
 def recorded(

@@ -18,12 +18,11 @@ from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.errors import EchostepError
 from echostep.interruption import raise_lost
-from echostep.page.live import LivePage
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
-from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_team
+from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_meetings, with_team
 from echostep.session.console import console, print_notices
 from echostep.session.metadata import clock_metadata, plan_of, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
@@ -33,7 +32,6 @@ from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
 from echostep.session.starts import check_start
-from echostep.session.team_ear import TeamEar
 from echostep.settings import parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
@@ -59,9 +57,7 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
         with session:
             with start_recording(folder / "walk.mcap", metadata, ports.keep) as recorder:
-                chunks = _recorded_chunks(
-                    opened, recorder, settings.mtx.rate_hz, ports.seconds, session.page, session.ear
-                )
+                chunks = _recorded_chunks(opened, recorder, settings.mtx.rate_hz, ports.seconds, session)
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
@@ -111,12 +107,14 @@ def _recorded_chunks(
     recorder: Recorder,
     rate_hz: float,
     seconds: float | None,
-    page: LivePage | None = None,
-    ear: TeamEar | None = None,
+    session: Session | None = None,
 ) -> Iterator[Chunk | None]:
-    """Chunks of the ports and check-ins of the page, each recorded before anything else sees it. The MTx is set up on the way."""
-    chunks = with_check_ins(_chunks_for(ports, seconds), page, lambda _: now_ns())
-    chunks = with_team(chunks, ear, lambda _: now_ns())
+    """Chunks of the ports, check-ins and meetings of the page, places of a teammate, each recorded before anything sees it; the MTx is set up."""
+    chunks = _chunks_for(ports, seconds)
+    if session is not None:
+        chunks = with_check_ins(chunks, session.page, lambda _: now_ns())
+        chunks = with_meetings(chunks, session.page, session.teammates, lambda _: now_ns())
+        chunks = with_team(chunks, session.ear, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from echostep.page.live import LivePage
     from echostep.session.marks_ear import MarksEar
     from echostep.session.team_ear import TeamEar
+    from echostep.session.teammates_ear import TeammatesEar
     from echostep.team.publish import Publishing, Source
 
 PAGE_POLL_S = 0.2
@@ -73,6 +74,7 @@ class Session:
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
         self.ear: TeamEar | None = None  # hears the wearer whom a rescuer is guided to
+        self.teammates: TeammatesEar | None = None  # hears whom the wearer can have met
         self._publishing: Publishing | None = None
         self._marks: MarksEar | None = None  # hears what commanders mark
         self._foxglove: FoxgloveServer | None = None
@@ -155,15 +157,22 @@ class Session:
         opened.callback(self.ear.close)
 
     def _open_marks(self, opened: ExitStack) -> None:
-        """The page of a live run shows the marks of the first broker that it publishes to."""
-        endpoints = self.output.outlet.endpoints if self.output.outlet else ()
-        broker = next((e for e in endpoints if e.scheme in ("mqtt", "mqtts")), None)
-        if broker is None or self.page is None or self.recorded is not None:
+        """The page of a live run shows what commanders say by the first broker that it publishes to, and offers meetings with the teammates there."""
+        outlet, publishing = self.output.outlet, self._publishing
+        if outlet is None or publishing is None or self.page is None or self.recorded is not None:
+            return
+        broker = next((e for e in outlet.endpoints if e.scheme in ("mqtt", "mqtts")), None)
+        if broker is None:
             return
         from echostep.session.marks_ear import MarksEar
+        from echostep.session.teammates_ear import TeammatesEar
 
-        self._marks = MarksEar(broker, self.tracker.plan.digest, partial(console.print, markup=False, highlight=False))
+        print_line = partial(console.print, markup=False, highlight=False)
+        self._marks = MarksEar(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
+        self.page.acknowledged_by = self._marks.acknowledged_by
         opened.callback(self._marks.close)
+        self.teammates = TeammatesEar(broker, outlet, self.tracker.plan, print_line)
+        opened.callback(self.teammates.close)
 
     def track(
         self,
@@ -202,6 +211,8 @@ class Session:
         if self.page:
             if self._marks and (marks := self._marks.news()) is not None:
                 self.page.set_marks(marks)
+            if self.teammates and (names := self.teammates.news()) is not None:
+                self.page.set_team(names)
             self.page.publish(portion)
             print_notices(self.page.notices)
         self.estimates += estimates

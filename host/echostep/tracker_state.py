@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""What views read of a tracker: copies of its state.
+
+In: nothing. Out: `TrackerState`, `StreamState`, `Particles`. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from echostep.arrays import Floats, Ints
+from echostep.board.findings import BoardReports, Finding
+from echostep.board.frames import FrameCounts
+from echostep.board.gateway import GatewayCounts
+from echostep.board.health import board_findings
+from echostep.board.messages import Identity, Status
+from echostep.localization.estimate import Estimate
+from echostep.localization.meetings import MeetingNews
+from echostep.odometry.alarm import Alarm
+from echostep.odometry.front_end import FrontEndCounts
+from echostep.path import PathSegment
+from echostep.xsens.reader import MtxCounts
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerState:
+    """The tracker after the newest chunk.
+
+    `last_segment` belongs to `estimate`; `pending_segments` follow it and wait for their pings. `right`: probability that the wearer is where the
+    cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
+    newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
+    `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well. `met`: the newest meeting with a teammate;
+    `meetings`: how many did what, by name of the effect.
+    """
+
+    estimate: Estimate | None
+    last_segment: PathSegment | None
+    pending_segments: tuple[PathSegment, ...]
+    waits_for_start: bool
+    undoable: int | None
+    check_ins: int
+    undone: int
+    bad_check_ins: int
+    particle_count: int
+    right: float
+    searches: bool
+    beacon_numbers: tuple[int, ...]
+    beacon_heard_s: float | None
+    alarm: Alarm | None
+    met: MeetingNews | None
+    meetings: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class StreamState:
+    """Counts of each input stream since the start, and the newest reports of the board.
+
+    `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples. `mtx`: also of a foot board's samples;
+    `foot_reports`: of a foot board about itself, None where an MTx is worn.
+    """
+
+    board: FrameCounts
+    mtx: MtxCounts
+    gateway: GatewayCounts
+    front_end: FrontEndCounts
+    pings: int
+    synchronised: bool
+    board_restarts: int
+    status: Status | None
+    identity: Identity | None
+    reports: BoardReports
+    foot_reports: BoardReports | None
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Findings on the boards, the most severe first."""
+        of_foot = board_findings(self.foot_reports) if self.foot_reports else []
+        return sorted([*board_findings(self.reports), *of_foot], key=lambda finding: -finding.severity)
+
+    @property
+    def foot_name(self) -> str:
+        """What is worn on the foot."""
+        return "MTx" if self.foot_reports is None else "foot board"
+
+
+@dataclass(frozen=True, slots=True)
+class Particles:
+    """n particles: `x_m`, `y_m` (n,) in the map, `level` (n,) index in the plan, `log_weight` (n,), 0 for the heaviest of all particles."""
+
+    x_m: Floats
+    y_m: Floats
+    level: Ints
+    log_weight: Floats
