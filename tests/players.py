@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import math
 import os
 import sys
 import threading
@@ -82,9 +83,10 @@ def python_board(shape: Callable[[NDArray[Any], int], None] = some_noise) -> Ite
 
         def step() -> None:
             nonlocal played_ms
+            heard = b""
             with contextlib.suppress(BlockingIOError):
-                board.send(os.read(ours, 4096))
-            due_ms = int((time.monotonic() - began) * 1e3)
+                heard = os.read(ours, 4096)
+            due_ms = math.ceil((time.monotonic() - began) * 1e3)  # its answers bear a time after their questions
             if due_ms > played_ms:
                 rows = quiet_rows(due_ms - played_ms)
                 shape(rows, played_ms)
@@ -92,6 +94,7 @@ def python_board(shape: Callable[[NDArray[Any], int], None] = some_noise) -> Ite
                     with contextlib.suppress(BlockingIOError):
                         os.write(ours, sent)
                 played_ms = due_ms
+            board.send(heard)
             time.sleep(0.001)
 
         with _playing(step):

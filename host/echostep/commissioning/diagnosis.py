@@ -191,17 +191,16 @@ def _echo_findings(probed: ProbeResult) -> list[Finding]:
 
 def describe(drift: Drift) -> str:
     """The clock's drift and answer time as text."""
-    sign = "fast" if drift.ppm >= 0.0 else "slow"
     return (
-        f"the board's runs {abs(drift.ppm):.0f} ± {drift.sd_ppm:.0f} ppm {sign} against this computer's; "
+        f"the board's is {drift.low_ppm:+.0f} to {drift.high_ppm:+.0f} ppm off this computer's; "
         f"it answers in {1e3 * drift.answer_s:.1f} ms"
     )
 
 
 def _clock_findings(drift: Drift, subject: str) -> list[Finding]:
     findings = []
-    if abs(drift.ppm) - 3.0 * drift.sd_ppm > DRIFT_MAX_PPM:
-        what = f"its clock is off by {drift.ppm:.0f} ± {drift.sd_ppm:.0f} ppm"
+    if drift.least_ppm > DRIFT_MAX_PPM:
+        what = f"its clock is off by at least {drift.least_ppm:.0f} ppm"
         remedy = "times stay consistent, speeds are wrong by the same factor; use a board with a 16 MHz crystal"
         findings.append(Finding(Severity.WARNING, subject, what, remedy))
     if drift.answer_s > ANSWER_MAX_S:

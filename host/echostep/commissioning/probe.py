@@ -101,33 +101,37 @@ class ProbeResult:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Rate error of the board's clock against this computer's (ppm, + is fast), its standard deviation, and the median answer time."""
+    """Limits of the rate error of the board's clock against this computer's (ppm, + is fast), and the median answer time."""
 
-    ppm: float
-    sd_ppm: float
+    low_ppm: float
+    high_ppm: float
     answer_s: float
+
+    @property
+    def least_ppm(self) -> float:
+        """The least error within the limits."""
+        return max(self.low_ppm, -self.high_ppm, 0.0)
 
 
 def drift_of(result: ProbeResult) -> Drift | None:
-    """Fit a line to the faster half of the replies, weighted by 1 / (answer time)^2; None when there are too few."""
+    """Limits from causality: a reply's ticks were read after its query was sent, and before it arrived.
+
+    A line of ticks against time that runs through all these intervals has a slope between the steepest one that any
+    pair of replies demands and the flattest one. None for too few replies, or when no line fits: a clock was set.
+    """
     if len(result.replies) < LEAST_REPLIES:
         return None
     sent_s, arrived_s, ticks = np.array(result.replies, float).T
-    took_s = arrived_s - sent_s
-    fast = took_s <= np.median(took_s)
-    host_s = 0.5 * (sent_s + arrived_s)[fast]
-    board_s = ticks[fast] / TICKS_PER_S
-    weight = np.maximum(took_s[fast], 1e-4) ** -2.0
-    weight /= weight.sum()
-    host_s -= weight @ host_s
-    board_s -= weight @ board_s
-    spread = float(weight @ host_s**2)
-    if fast.sum() < 4 or spread == 0.0:
+    i, j = np.nonzero(np.subtract.outer(ticks, ticks).T > 0.0)  # j is after i
+    board_s = (ticks[j] - ticks[i]) / TICKS_PER_S
+    longest_s, shortest_s = arrived_s[j] - sent_s[i], sent_s[j] - arrived_s[i]
+    if not len(i) or np.any(longest_s <= 0.0):
         return None
-    slope = float(weight @ (host_s * board_s)) / spread
-    residual = board_s - slope * host_s
-    sd = math.sqrt(float(weight**2 @ (residual * host_s) ** 2)) / spread  # robust to unequal errors [White 1980]
-    return Drift((slope - 1.0) * 1e6, sd * 1e6, float(np.median(took_s)))
+    low = float(np.max(board_s / longest_s))
+    high = float(np.min(board_s / np.where(shortest_s > 0.0, shortest_s, 1e-9)))
+    if high < low:
+        return None
+    return Drift((low - 1.0) * 1e6, (high - 1.0) * 1e6, float(np.median(arrived_s - sent_s)))
 
 
 class _Probe:
