@@ -331,10 +331,12 @@ def foot(
 @app.command()
 def legs(
     samples: Annotated[
-        Path,
+        list[Path],
         typer.Argument(
+            metavar="SAMPLES...",
             help="CSV: t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]; 50 to 500 Hz, either sign. "
-            "Gyros of three axes: thigh_x,thigh_y,thigh_z, shank_x,shank_y,shank_z in rad/s, mounted anyhow."
+            "Gyros of three axes: thigh_x,thigh_y,thigh_z, shank_x,shank_y,shank_z in rad/s, mounted anyhow. "
+            "Both legs: the other one in columns other_thigh_rad_s... of the same file, or in a second file.",
         ),
     ],
     thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")],

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,17 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.evaluate.legs.datasets import SETS, LegRecording
-from echostep.evaluate.legs.recordings import SCALE, means, recordings_study, rows_of, strides_of
+from echostep.evaluate.legs.recordings import (
+    BOTH,
+    LENGTHS,
+    NOTHING,
+    SCALE,
+    means,
+    pairs,
+    recordings_study,
+    rows_of,
+    strides_of,
+)
 from echostep.evaluate.recordings import read_sets
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, StrideSettings
@@ -48,6 +59,17 @@ def test_rows_of_a_leg() -> None:
     assert means(rows)[0]["error_m"] == abs(rows[0]["error_m"])
 
 
+def test_both_legs_have_rows_of_their_own() -> None:
+    right = simulated()
+    left = replace(right, name="left")
+    assert pairs([left, right]) == [(left, right)]
+    rows = rows_of(left, right)
+    assert [row["known"] for row in rows] == [known + BOTH for known in (NOTHING, LENGTHS, SCALE)]
+    assert {row["recording"] for row in rows} == {"both"}
+    assert rows[0]["walked_m"] == pytest.approx(30.0, abs=0.1)
+    assert means(rows)[0]["known"] == NOTHING + BOTH
+
+
 def test_folders_without_recordings_are_named(tmp_path: Path) -> None:
     with pytest.raises(EchostepError, match="no such folder"):
         recordings_study(tmp_path / "none")
@@ -61,7 +83,7 @@ def test_folders_without_recordings_are_named(tmp_path: Path) -> None:
 @needs_data("legs_gaittoolbox")
 def test_a_turn_and_a_stop_in_motion_capture(recordings: list[LegRecording]) -> None:
     for recording in (r for r in recordings if r.group == "gaittoolbox"):
-        strides = strides_of(recording, StrideSettings())
+        strides = strides_of([recording], StrideSettings())
         assert not any(s.flags & (Flag.STAIRS_UP | Flag.STAIRS_DOWN | Flag.BACKWARD | Flag.UNSEEN) for s in strides)
         last = [s for s in strides if Flag.STANDING not in s.flags][-1]
         assert last.length_m == pytest.approx(recording.walked_m(last.t_start_s, last.t_end_s), abs=0.2)
@@ -73,7 +95,7 @@ def test_the_left_leg_that_was_lifted_before_the_walk(recordings: list[LegRecord
     left = next(r for r in recordings if (r.group, r.name) == ("qmt", "left"))
     begin_s, end_s = left.walk_s()
     assert left.walked_m(begin_s, end_s) == pytest.approx(73.0, abs=2.0)
-    strides = [s for s in strides_of(left, StrideSettings()) if s.t_start_s > begin_s]
+    strides = [s for s in strides_of([left], StrideSettings()) if s.t_start_s > begin_s]
     assert not any(Flag.BACKWARD in s.flags for s in strides)
     assert sum(s.length_m for s in strides) == pytest.approx(left.walked_m(begin_s, end_s), rel=0.05)
 

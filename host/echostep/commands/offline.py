@@ -18,8 +18,9 @@ from echostep.foot.alignment import aligned
 from echostep.foot.steps import Track, walk_track
 from echostep.legs.stride import StrideSettings
 from echostep.offline.imu_csv import Imu, checked, describe_track, load_imu, write_foot_track
-from echostep.offline.leg_csv import load_legs
+from echostep.offline.leg_csv import load_pair
 from echostep.offline.leg_lengths import calibrated_scale, checked_lengths
+from echostep.offline.leg_pair import track_pair
 from echostep.offline.leg_summary import describe_legs, describe_strides, write_leg_track
 from echostep.offline.leg_track import PROFILES as LEG_PROFILES
 from echostep.output.leg_plot import draw_legs
@@ -79,21 +80,24 @@ class LegOptions:
     walked_m: float | None = None
 
 
-def legs(path: Path, out: Path, options: LegOptions, *, plot: bool = False) -> None:
-    """Track a recorded leg with this project's method or that of a paper."""
+def legs(paths: list[Path], out: Path, options: LegOptions, *, plot: bool = False) -> None:
+    """Track a recorded leg, or both of one person, with this project's method or that of a paper."""
     profile, scale = options.profile, options.scale
     if profile not in LEG_PROFILES:
         raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(LEG_PROFILES)}")
     if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
         raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
     lengths = checked_lengths(options.thigh_m, options.shank_m, scale or 1.0)
-    samples = load_legs(path)
-    for note in samples.notes:
+    path, pair = paths[0], load_pair(paths)
+    for note in (note for leg in pair for note in leg.notes):
         console.print(f"{path.name}: {note}")
     if lengths.measured_to_floor and profile == "default":
         ankle = f"{lengths.to_ankle_m:.3f} m to the ankle"
         console.print(f"--shank {options.shank_m:g} is taken as knee to floor: {ankle}")
-    track = LEG_PROFILES[profile](samples, StrideSettings(lengths, calibrated=scale is not None))
+    settings = StrideSettings(lengths, calibrated=scale is not None)
+    if len(pair) == 2 and profile != "default":
+        raise EchostepError(f"--profile {profile} is a method for one leg: give one file, without columns other_...")
+    track = track_pair(*pair, settings) if len(pair) == 2 else LEG_PROFILES[profile](pair[0], settings)
     write_leg_track(out, track)
     for line in describe_strides(track):
         console.print(line)

@@ -2,19 +2,23 @@
 """A recorded leg as a CSV file: samples read and checked.
 
 In: columns `t_s,thigh_rad_s,shank_rad_s[,belt_rad_s,compass_rad]`, 50 to 500 Hz, either sign; in place of a pitch rate the rates about three axes
-in rad/s, as `thigh_x,thigh_y,thigh_z`. Out: `LegSamples` with notes on what was mended, or an EchostepError that says what is wrong. Owns nothing.
+in rad/s, as `thigh_x,thigh_y,thigh_z`. The other leg: the same columns with `other_` before them, or a file of its own whose times are of the same
+clock. Out: `LegSamples` with notes on what was mended, or an EchostepError that says what is wrong. Owns nothing.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.errors import EchostepError
 from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.mounting import walking_axis
 from echostep.offline.csv_lines import LONGEST_LINE, CsvLimits, header_of, lines_of
@@ -24,6 +28,7 @@ from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")
 OPTIONAL = ("belt_rad_s", "compass_rad")
 AXES = {name: tuple(f"{name.split('_')[0]}_{axis}" for axis in "xyz") for name in COLUMNS[1:]}  # of gyros with three
+OTHER = "other_"  # before the names of the columns of the other leg
 TIME, THIGH, SHANK, BELT, COMPASS = range(5)  # columns of a table of samples
 
 FASTEST_LEG_RAD_S = 20.0  # for the 99 % quantile of the rates; by reason: the shank of a sprinter reaches it
@@ -44,17 +49,32 @@ class LegSamples:
     notes: tuple[str, ...] = ()
 
 
-def load_legs(path: Path | str) -> LegSamples:
-    """Samples of a CSV file; raises EchostepError that names the file and what is wrong with which column."""
-    table, mended = open_samples(path, _mended_table)
+def load_pair(paths: Sequence[Path]) -> tuple[LegSamples, ...]:
+    """Samples of one leg or of both, from one file or two; the notes on the other leg say so. Raises EchostepError."""
+    if len(paths) > 2:
+        raise EchostepError(f"{len(paths)} files: a person has two legs, give one file or two")
+    if len(paths) == 1 and not open_samples(paths[0], _has_other):
+        return (load_legs(paths[0]),)
+    other = load_legs(paths[-1], OTHER if len(paths) == 1 else "")
+    return load_legs(paths[0]), replace(other, notes=tuple(f"other leg: {note}" for note in other.notes))
+
+
+def _has_other(file: TextIO) -> bool:
+    """Whether the header names columns of the other leg."""
+    return any(name.startswith(OTHER) for name in header_of(file.readline(LONGEST_LINE))[0])
+
+
+def load_legs(path: Path | str, prefix: str = "") -> LegSamples:
+    """Samples of the leg whose columns have this prefix; raises EchostepError that names the file and what is wrong with which column."""
+    table, mended = open_samples(path, partial(_mended_table, prefix=prefix))
     later = np.concatenate([[True], table[1:, TIME] > np.maximum.accumulate(table[:-1, TIME])])
     t_s, thigh, shank, belt, compass = table[later].T
     return LegSamples(t_s, thigh, shank, belt, compass, (*mended, *_notes(table)))
 
 
-def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
+def _mended_table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     """Usable rows (n, 5) in order of time, and notes on what was mended; raises ValueError for samples that cannot be used."""
-    table, mounted = _table(file)
+    table, mounted = _table(file, prefix)
     whole = np.isfinite(table[:, : len(COLUMNS)]).all(axis=1)
     holes = () if whole.all() else (f"{int((~whole).sum())} rows without a number in some column: skipped",)
     table, mended = sorted_by_time(table[whole])
@@ -63,9 +83,12 @@ def _mended_table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
     return table, (*holes, *mended, *mounted)
 
 
-def _table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
+def _table(file: TextIO, prefix: str) -> tuple[Floats, tuple[str, ...]]:
     """The columns (n, 5), NaN for a column that the file lacks and for a cell without a number; notes on the axes of sensors with three."""
     header, separator = header_of(file.readline(LONGEST_LINE))
+    if prefix:
+        hidden = tuple(name.split("_")[0] for name in COLUMNS[1:])  # of the first leg
+        header = ["" if name.startswith(hidden) else name.removeprefix(prefix) for name in header]
     names = [AXES.get(name, ()) if name not in header else () for name in COLUMNS]
     sources = [
         axes if axes and all(axis in header for axis in axes) else (name,)
@@ -73,7 +96,7 @@ def _table(file: TextIO) -> tuple[Floats, tuple[str, ...]]:
     ]
     if missing := [name for source in sources for name in source if name not in header]:
         raise ValueError(
-            f"no column {', '.join(missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}], "
+            f"no column {', '.join(prefix + name for name in missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}], "
             f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{_unit_hint(header)}"
         )
     wanted = [name for source in sources for name in source]

@@ -53,23 +53,18 @@ class LegTrack:
 
 def track_default(samples: LegSamples, settings: StrideSettings, heading_rad: float | None = None) -> LegTrack:
     """The method of this project: strides by both gyros of the leg, heading by belt gyro and compass; `heading_rad` at the start, if known."""
-    legs, strides = _strides(samples, settings)
-    sign, sign_notes = belt_sign(samples)
-    heading, angles = _headings(samples, sign, standing(strides, samples.t_s), heading_rad)
-    if np.isnan(samples.belt).all() and np.isnan(samples.compass).all():
-        angles = np.zeros_like(angles)
+    strides, counts = leg_strides(samples, settings)
+    angles, notes = fused_heading(samples, strides, heading_rad)
     if not np.isnan(samples.belt).all():
         strides = about_trunk(strides, samples.t_s, angles[:, 0])
-    rows = _rows(samples.t_s, strides, angles[:, 0])
-    accepted = heading.read - heading.refused
-    compass_notes = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
-    notes = (*sign_notes, *compass_notes, *_doubts(strides))
+    rows = path_rows(samples.t_s, distance_at(samples.t_s, strides), angles[:, 0])
+    notes = (*notes, *doubts(strides))
     strides = with_turns(strides, samples.t_s, angles[:, 0])
-    return LegTrack(rows, strides, legs.counts, _source(samples), float(angles[-1, 1]), notes)
+    return LegTrack(rows, strides, counts, source_of(samples), float(angles[-1, 1]), notes)
 
 
-def _strides(samples: LegSamples, settings: StrideSettings) -> tuple[StrideEstimator, tuple[Stride, ...]]:
-    """The estimator after all samples, and its strides; a second time with the signs that it found in the end, if it revised them."""
+def leg_strides(samples: LegSamples, settings: StrideSettings) -> tuple[tuple[Stride, ...], LegCounts]:
+    """Strides of one leg, and counts; read a second time with the signs that were found in the end, if they were revised."""
     rates = repair_clipping(samples.t_s, np.column_stack([samples.thigh, samples.shank]))
     legs = StrideEstimator(settings)
     for _ in range(2):
@@ -77,16 +72,28 @@ def _strides(samples: LegSamples, settings: StrideSettings) -> tuple[StrideEstim
         if not legs.revised:
             break
         legs = StrideEstimator(settings, legs.swings.sign)
-    return legs, strides
+    return strides, legs.counts
 
 
-def _headings(samples: LegSamples, sign: float, still: Bools, heading_rad: float | None) -> tuple[Heading, Floats]:
-    """The filter after all samples, and (n, 2) heading and sd; a second pass knows from the first the gyro's bias and the iron beside the compass."""
+def fused_heading(
+    samples: LegSamples, strides: tuple[Stride, ...], heading_rad: float | None
+) -> tuple[Floats, tuple[str, ...]]:
+    """Heading of the trunk and its sd (n, 2), and notes; 0 without belt and compass.
+
+    A second pass knows from the first one the gyro's bias and the iron beside the compass.
+    """
+    if np.isnan(samples.belt).all() and np.isnan(samples.compass).all():
+        return np.zeros((len(samples.t_s), 2)), ()
+    sign, notes = belt_sign(samples)
+    still = standing(strides, samples.t_s)
     belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
     first, heading = (Heading(heading_rad=heading_rad, sd_rad=START_SD_RAD) for _ in range(2))
     first.feed(samples.t_s, belt, samples.compass, still)
     heading.adopt_errors(first)
-    return heading, heading.feed(samples.t_s, belt, samples.compass, still)
+    angles = heading.feed(samples.t_s, belt, samples.compass, still)
+    accepted = heading.read - heading.refused
+    read = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
+    return angles, (*notes, *read)
 
 
 def track_lee2010(samples: LegSamples, settings: StrideSettings) -> LegTrack:
@@ -104,13 +111,13 @@ def track_lee2010(samples: LegSamples, settings: StrideSettings) -> LegTrack:
         walker.heading = lee2010.Fused(0.0, 0.0)
     belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
     rows = walker.feed(samples.t_s, thigh * samples.thigh, shank * samples.shank, belt, samples.compass)
-    return LegTrack(rows, (), None, _source(samples), math.sqrt(walker.heading.variance), sign_notes)
+    return LegTrack(rows, (), None, source_of(samples), math.sqrt(walker.heading.variance), sign_notes)
 
 
 PROFILES = {"default": track_default, "lee2010": track_lee2010}
 
 
-def _doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
+def doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:
     """Notes on strides that contradict a walk forward."""
     steps = [s for s in strides if not s.flags & (Flag.STANDING | Flag.GAP)]
     if len(steps) > 2 and sum(Flag.BACKWARD in s.flags for s in steps) > 0.5 * len(steps):
@@ -156,7 +163,7 @@ def belt_sign(samples: LegSamples) -> tuple[float, tuple[str, ...]]:
     return -1.0, ("belt gyro worn the other way round, by the compass",)
 
 
-def _source(samples: LegSamples) -> str:
+def source_of(samples: LegSamples) -> str:
     """Sensors of the heading, in words."""
     belt, compass = (not bool(np.isnan(column).all()) for column in (samples.belt, samples.compass))
     if belt and compass:
@@ -166,8 +173,8 @@ def _source(samples: LegSamples) -> str:
     return "compass alone" if compass else "none: a straight line is drawn"
 
 
-def _rows(t_s: Floats, strides: tuple[Stride, ...], heading: Floats) -> Floats:
-    """Rows of `LegTrack` (n, 6): the distance grows evenly within each stride, the position moves along the heading (n,)."""
+def distance_at(t_s: Floats, strides: tuple[Stride, ...]) -> Floats:
+    """Distance (n,) gone at times (n,): it grows evenly within each stride."""
     knots = [(float(t_s[0]), 0.0)]
     distance_m = 0.0
     for stride in strides:
@@ -175,7 +182,11 @@ def _rows(t_s: Floats, strides: tuple[Stride, ...], heading: Floats) -> Floats:
             knots.append((stride.t_start_s, distance_m))
         distance_m += stride.length_m
         knots.append((max(stride.t_end_s, knots[-1][0]), distance_m))
-    distance = np.interp(t_s, *np.array(knots).T)
+    return np.interp(t_s, *np.array(knots).T)
+
+
+def path_rows(t_s: Floats, distance: Floats, heading: Floats) -> Floats:
+    """Rows of `LegTrack` (n, 6): the position moves along the heading (n,) as the distance (n,) grows."""
     move = np.diff(distance, prepend=0.0)
     speed = np.array([0.0, *(move[1:] / np.diff(t_s))])
     x, y = np.cumsum(move * np.cos(heading)), np.cumsum(move * np.sin(heading))

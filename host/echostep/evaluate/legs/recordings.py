@@ -2,12 +2,13 @@
 """`echostep evaluate legs --data`: real legs against the way of both feet, by what is known of the wearer.
 
 In: the folder of recordings. Out: rows `{set, recording, known, walked_m, found_m, error_m, error_percent, sd_m, error_over_sd, stairs}`, a row a leg
-and a method, then the means of each method. Owns nothing. Nothing is chosen by these recordings: one setting for all.
+and a method and a row two legs and a method, then the means of each method. Owns nothing. Nothing is chosen by these recordings: one setting for all.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean
 
@@ -21,9 +22,12 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.mounting import walking_axis
 from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
 from echostep.offline.leg_csv import LegSamples
+from echostep.offline.leg_pair import track_pair
 from echostep.offline.leg_track import track_default
 
 NOTHING, LENGTHS, SCALE = "nothing", "leg lengths", "first 20 m"
+LEFT, RIGHT = "left", "right"  # ends of the names of recordings
+BOTH = ", both legs"
 SCALE_M = 20.0  # of the walk, from which the scale is taken
 LEAST_REST_M = 5.0  # to be judged after that
 COLUMNS = {
@@ -37,7 +41,7 @@ def recordings_study(folder: Path) -> Study:
     recordings = recordings_in(folder, SETS)
     return Study(
         "legs-recordings",
-        lambda _seed: [row for recording in recordings for row in rows_of(recording)],
+        lambda _seed: [row for legs in (*((r,) for r in recordings), *pairs(recordings)) for row in rows_of(*legs)],
         lambda rows: rows + means(rows),
         _tables,
         seeds=range(1),
@@ -46,28 +50,45 @@ def recordings_study(folder: Path) -> Study:
     )
 
 
-def rows_of(recording: LegRecording) -> list[Row]:
-    """One row for each method that this recording allows."""
-    begin_s, end_s = recording.walk_s()
-    strides = strides_of(recording, StrideSettings())
-    rows = [_row(recording, NOTHING, strides, begin_s, end_s)]
-    if recording.lengths is not None:
-        rows.append(_row(recording, LENGTHS, strides_of(recording, StrideSettings(recording.lengths)), begin_s, end_s))
-    known_s = float(np.interp(recording.walked_m(-math.inf, begin_s) + SCALE_M, recording.way_m, recording.way_s))
+def pairs(recordings: Sequence[LegRecording]) -> list[tuple[LegRecording, LegRecording]]:
+    """Both legs of each person, left and right."""
+    by_name = {(r.group, r.name): r for r in recordings}
+    wanted = [(r, (r.group, r.name.removesuffix(LEFT) + RIGHT)) for r in recordings if r.name.endswith(LEFT)]
+    return [(left, by_name[right]) for left, right in wanted if right in by_name]
+
+
+def rows_of(*legs: LegRecording) -> list[Row]:
+    """One row for each method that this leg allows, or both legs of a person."""
+    first, words = legs[0], "" if len(legs) == 1 else BOTH
+    begin_s, end_s = first.walk_s()
+    strides = strides_of(legs, StrideSettings())
+    rows = [_row(first, NOTHING + words, strides, begin_s, end_s)]
+    lengths = [(r.lengths.thigh_m, r.lengths.shank_m) for r in legs if r.lengths is not None]
+    if lengths:
+        known = strides_of(legs, StrideSettings(LegLengths(*np.mean(lengths, axis=0).tolist())))
+        rows.append(_row(first, LENGTHS + words, known, begin_s, end_s))
+    known_s = float(np.interp(first.walked_m(-math.inf, begin_s) + SCALE_M, first.way_m, first.way_s))
     found = found_m(strides, begin_s, known_s)
-    if found > 0.0 and recording.walked_m(known_s, end_s) > LEAST_REST_M:
-        scale = recording.walked_m(begin_s, known_s) / found
-        scaled = strides_of(recording, StrideSettings(LegLengths(scale=scale), calibrated=True))
-        rows.append(_row(recording, SCALE, scaled, known_s, end_s))
+    if found > 0.0 and first.walked_m(known_s, end_s) > LEAST_REST_M:
+        scale = first.walked_m(begin_s, known_s) / found
+        scaled = strides_of(legs, StrideSettings(LegLengths(scale=scale), calibrated=True))
+        rows.append(_row(first, SCALE + words, scaled, known_s, end_s))
+    if len(legs) > 1:
+        rows = [row | {"recording": first.name.removesuffix(LEFT) + "both"} for row in rows]
     return rows
 
 
-def strides_of(recording: LegRecording, settings: StrideSettings) -> tuple[Stride, ...]:
-    """What the method finds with the axes of walking of both sensors and the belt."""
-    r = recording
+def strides_of(legs: Sequence[LegRecording], settings: StrideSettings) -> tuple[Stride, ...]:
+    """What the method finds by one leg or both with the axes of walking of their sensors and the belt."""
+    samples = [_samples(leg) for leg in legs]
+    if len(samples) == 2:
+        return track_pair(samples[0], samples[1], settings).strides
+    return track_default(samples[0], settings).strides
+
+
+def _samples(r: LegRecording) -> LegSamples:
     thigh, shank = (rates @ walking_axis(r.t_s, rates).axis for rates in (r.thigh, r.shank))
-    samples = LegSamples(r.t_s, thigh, shank, r.belt, np.full(len(r.t_s), np.nan))
-    return track_default(samples, settings).strides
+    return LegSamples(r.t_s, thigh, shank, r.belt, np.full(len(r.t_s), np.nan))
 
 
 def found_m(strides: tuple[Stride, ...], begin_s: float, end_s: float) -> float:
@@ -102,7 +123,7 @@ def _row(recording: LegRecording, known: str, strides: tuple[Stride, ...], begin
 def means(rows: list[Row]) -> list[Row]:
     """Of each method: mean absolute errors, the rms of error / sd, all strides that were read as stairs."""
     found: list[Row] = []
-    for known in (NOTHING, LENGTHS, SCALE):
+    for known in (known + words for words in ("", BOTH) for known in (NOTHING, LENGTHS, SCALE)):
         same = [row for row in rows if row["known"] == known]
         if not same:
             continue
