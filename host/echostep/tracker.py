@@ -20,7 +20,7 @@ from echostep.errors import EchostepError
 from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.before_check_in import BeforeCheckIn
 from echostep.localization.building import Building
-from echostep.localization.estimate import Estimate, Right, estimate, unobserved
+from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
 from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.meeting_model import carries_position, start_at
 from echostep.localization.meetings import MeetingEffect, MeetingQueue
@@ -28,6 +28,7 @@ from echostep.localization.particle_kernels import systematic
 from echostep.localization.plausibility import STATED
 from echostep.localization.ranger_models import echo_of
 from echostep.localization.start import Start
+from echostep.localization.team_beacons import TeamBeaconMap, shared_beacons
 from echostep.odometry.alarm import WearerAlarm
 from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
@@ -35,6 +36,7 @@ from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
 from echostep.ports.meeting import MEETING
+from echostep.ports.team_beacons import TEAM_BEACONS, SharedBeacon
 from echostep.ports.teammate import TEAM
 from echostep.settings import Settings
 from echostep.tracker_state import Particles, StreamState, TrackerState
@@ -78,6 +80,7 @@ class Tracker:
         self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # that wait for their segment
         self._meetings = MeetingQueue()
+        self._team_beacons = TeamBeaconMap()
         self._check_ins = self._bad_check_ins = self._undone = 0
         self._before: BeforeCheckIn | None = None  # the newest check-in, while it can be undone
         self._check_in: CheckIn | None = None  # the newest
@@ -108,6 +111,8 @@ class Tracker:
             alarm=self.alarm.alarm,
             met=self._meetings.news,
             meetings=dict(self._meetings.counts),
+            team_beacons={name: tuple(beacons.values()) for name, beacons in self._team_beacons.told.items()},
+            team_beacon_messages=dict(self._team_beacons.counts),
         )
 
     @property
@@ -145,6 +150,13 @@ class Tracker:
         """Every beacon with a known place, as the particles believe it at `t_s`."""
         return [] if self.filter is None else self.filter.beacon_map.places(self.filter.cloud, t_s)
 
+    def own_beacons(self) -> tuple[SharedBeacon, ...] | None:
+        """The beacons that this walk has placed, for teammates; None unless the tracker says `tracking`."""
+        last = self._estimate
+        if self.filter is None or last is None or last.status is not TrackStatus.TRACKING:
+            return None
+        return shared_beacons(self.filter.beacon_map, self.filter.cloud, last.t_s, self.gateway.numbers)
+
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""
         return self.front_end.timeline.arrival_ns(t_s)
@@ -159,8 +171,11 @@ class Tracker:
         for piece in portion.cut_after(PERSON):
             for met in piece.cut_after(MEETING):
                 for told in met.cut_after(TEAM):
-                    for part in told.cut_after(GATEWAY):
-                        estimates += self._track(part)
+                    for placed in told.cut_after(TEAM_BEACONS):
+                        for part in placed.cut_after(GATEWAY):
+                            estimates += self._track(part)
+                        if len(placed.of(TEAM_BEACONS).row):
+                            self._team_beacons.hear(placed.of(TEAM_BEACONS).received, len(self.plan.levels))
                     if from_team := told.of(TEAM).received:
                         for hear in self.team_watchers:
                             hear(from_team)
@@ -206,6 +221,7 @@ class Tracker:
         if self.filter is None:
             return []
         readings, meetings = self._pop_readings(segment.t1_s), self._meetings.pop(segment.t1_s)
+        meetings += self._team_beacons.ranges(readings, self.gateway.numbers)
         if self._before and not self._before.add(measured, readings, meetings):
             self._before = None
         if segment.t0_s < self._check_in_s:

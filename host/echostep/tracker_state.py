@@ -19,6 +19,7 @@ from echostep.localization.meetings import MeetingNews
 from echostep.odometry.alarm import Alarm
 from echostep.odometry.front_end import FrontEndCounts
 from echostep.path import PathSegment
+from echostep.ports.team_beacons import SharedBeacon
 from echostep.xsens.reader import MtxCounts
 
 
@@ -30,7 +31,8 @@ class TrackerState:
     cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
     newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
     `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well. `met`: the newest meeting with a teammate;
-    `meetings`: how many did what, by name of the effect.
+    `meetings`: how many did what, by name of the effect. `team_beacons`: those that each teammate has placed; `team_beacon_messages`: how many were
+    believed, and bad.
     """
 
     estimate: Estimate | None
@@ -49,6 +51,8 @@ class TrackerState:
     alarm: Alarm | None
     met: MeetingNews | None
     meetings: dict[str, int]
+    team_beacons: dict[str, tuple[SharedBeacon, ...]]
+    team_beacon_messages: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True)

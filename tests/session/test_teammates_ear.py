@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The teammates' ear: who can be met, from a real broker, and the meeting that a page tells."""
+"""The teammates' ear: who can be met, from a real broker, the meeting that a page tells, and beacons that are shared."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ from typing import cast
 import pytest
 
 from echostep.page.live import LivePage
-from echostep.plan.model import load_plan
+from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.ports.meeting import MEETING, parse_meeting
+from echostep.ports.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.session import teammates_ear
-from echostep.session.chunk_streams import with_meetings
+from echostep.session.chunk_streams import with_teammates
 from echostep.session.teammates_ear import TeammatesEar
 from echostep.team import outbox
-from echostep.team.endpoint import parse_outlet
+from echostep.team.endpoint import parse_endpoint, parse_outlet
+from echostep.team.mqtt import Listener
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report
 from waiting import PATIENCE_S, until
+
+RUN = "0000beac"
 
 
 def arrival_ns(chunk: Chunk | None) -> int:
@@ -46,7 +50,7 @@ def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(teammates_ear, "LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
         outlet = parse_outlet([broker.url], "bo", "red")
-        ear = TeammatesEar(outlet.endpoints[0], outlet, load_plan(PLAN), print)
+        ear = TeammatesEar(outlet.endpoints[0], outlet, RUN, load_plan(PLAN), print)
         said: list[tuple[str, ...]] = []
 
         def hears(*names: str) -> bool:
@@ -61,7 +65,7 @@ def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.M
         boxes["anna"].offer(report("anna", position=replace(POSITION, x_m=5.0)))
         assert until(lambda: hears("anna", "zoe"))
         page = Told("anna", "eve", "nobody", "bo")
-        chunks = [*with_meetings([Chunk(BOARD, 7, b"")], cast("LivePage", page), ear, arrival_ns)]
+        chunks = [*with_teammates([Chunk(BOARD, 7, b"")], cast("LivePage", page), ear, arrival_ns)]
         for box in boxes.values():
             box.close()
         ear.close()
@@ -70,3 +74,59 @@ def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.M
     assert met is not None
     assert (met.name, met.x_m, met.level, met.range_m) == ("anna", 5.0, 0, None)
     assert met.age_s >= POSITION.age_s
+
+
+def a_beacon(number: int) -> SharedBeacon:
+    return SharedBeacon(number, 4.0, 7.5, 0, 0.01, 0.0, 0.01)
+
+
+@needs_broker
+def test_beacons_reach_teammates_once_and_hostile_ones_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of this run, of another plan and of another team are not heard; those of an earlier run under the same name are."""
+    monkeypatch.setattr(teammates_ear, "LOOK_S", 0.0)
+    monkeypatch.setattr(teammates_ear, "SHARE_S", 0.0)
+    plan = load_plan(PLAN)
+    early = TeamBeacons(1, "bo", "0000aaaa", plan.digest, (a_beacon(3),))
+    heard: list[TeamBeacons] = []
+    with Broker(tmp_path) as broker:
+        publish(broker.url, "echostep/red/bo/beacons", early.encode())
+        bo, zoe = (an_ear(broker, plan, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN)))
+
+        def hears(count: int) -> bool:
+            bo.news()
+            chunks = with_teammates([Chunk(BOARD, 7, b"")], None, bo, arrival_ns)
+            heard.extend(told for c in chunks if c and c.port == TEAM_BEACONS and (told := parse_team_beacons(c.data)))
+            return len(heard) == count
+
+        assert until(lambda: hears(1))
+        zoe.share(lambda: None)  # its tracker does not know its place
+        zoe.share(lambda: (a_beacon(7),))
+        assert until(lambda: hears(2))
+        bo.share(lambda: (a_beacon(8),))
+        for topic, payload in (
+            ("red/eve", TeamBeacons(1, "eve", RUN, "0" * 64, (a_beacon(1),)).encode()), ("blue/eve", zoe._shared),
+            ("red/eve", zoe._shared), ("red/eve", b"[]"),
+        ):  # fmt: skip
+            publish(broker.url, f"echostep/{topic}/beacons", payload)
+        zoe.share(lambda: (a_beacon(7), a_beacon(9)))
+        assert until(lambda: hears(3) and sum(bo.rejected.values()) == 2)
+        bo.close()
+        zoe.close()
+    assert [(told.name, told.run, [b.number for b in told.beacons]) for told in heard] == [
+        ("bo", "0000aaaa", [3]), ("zoe", RUN, [7]), ("zoe", RUN, [7, 9]),
+    ]  # fmt: skip
+    assert bo.rejected == {"beacons and topic contradict each other": 1, "not valid beacons": 1}
+
+
+def publish(url: str, topic: str, payload: bytes) -> None:
+    sender = Listener(parse_endpoint(url), ["nothing"], lambda *_: None)
+    sender.open()
+    sender.publish(topic, payload)
+    sender.close()
+
+
+def an_ear(broker: Broker, plan: Plan, name: str, run: str) -> TeammatesEar:
+    outlet = parse_outlet([broker.url], name, "red")
+    return TeammatesEar(outlet.endpoints[0], outlet, run, plan, print)

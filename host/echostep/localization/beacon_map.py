@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_beliefs import BeaconBeliefs, BeaconMeasurement, moments
+from echostep.localization.beacon_beliefs import BeaconBeliefs, BeaconMeasurement, moments, place_covariance
 from echostep.localization.beacon_model import BeaconSettings, beacon_model
 from echostep.localization.beacon_slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
 from echostep.localization.beacon_step import Beacons, Waiting, no_waiting, update_by_reading
@@ -91,6 +91,10 @@ class BeaconMap:
         beacons = moments(cloud.beliefs, cloud.weight)
         placed = np.flatnonzero(self._health.known & (self._health.each[:, SUSPECT] == 0.0)).tolist()
         return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in placed]
+
+    def covariance(self, cloud: Cloud, slot: int) -> Floats:
+        """Covariance (2, 2) of a placed beacon's place (m2), the cloud's own error included."""
+        return place_covariance(cloud.beliefs, slot, cloud.weight)
 
     def _place(self, cloud: Cloud, slot: int, moments_of_it: list[float], t_s: float) -> BeaconPlace:
         x, y, sd, axis = moments_of_it

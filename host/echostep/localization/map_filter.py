@@ -155,13 +155,16 @@ class MapFilter:
         """Weigh the clouds by where a teammate is who stands beside the wearer, and decide which of them is tracked.
 
         Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
-        one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing.
+        one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing; a range to a teammate's beacon, one in
+        five of which is an outlier, neither confirms nor contradicts.
         """
         area_m2 = self._building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
         if refusal is not None:
             return refusal
         fits = [weigh(each.cloud, meeting, area_m2) for each in self._clouds()]
+        if meeting.beacon is not None:
+            return MeetingEffect.USED if fits[0] >= FITS else MeetingEffect.CONTRADICTS
         plausibility, wrong = self.tracked.plausibility, WRONG[meeting.status]
         if fits[0] >= FITS:
             plausibility.raise_to(min(fits[0], 1.0 - wrong))

@@ -18,7 +18,7 @@ from echostep.ports.meeting import Meeting, parse_meeting
 # By reason: in so much of the path a wearer's own echoes, or drift, have renewed what the filter knows.
 RENEWED_M = 10.0
 CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
-MOST_NAMES = 256  # teammates that are remembered: the most of a roster
+MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a team's beacons that a tracker keeps
 MOST_WAITING = 64  # meetings that wait for their segment
 
 
@@ -50,16 +50,19 @@ class MeetingMemory:
     """Says which meetings may count: a teammate's position counts again when the own cloud has been renewed."""
 
     def __init__(self) -> None:
-        self._path_m: dict[str, float] = {}  # length of the path at the last meeting with each teammate
+        self._path_m: dict[
+            tuple[str, int | None], float
+        ] = {}  # length of the path at the last meeting with each teammate, or range to a beacon of theirs
         self._contradicted_m: list[float] = []  # lengths of the path at the contradictions since the last agreement
 
     def refusal(self, meeting: Meeting, path_m: float) -> MeetingEffect | None:
         """Why a meeting does not count; None where it does, which is remembered."""
         if not carries_position(meeting):
             return MeetingEffect.EMPTY
-        last_m = self._path_m.pop(meeting.name, None)
+        key = meeting.name, meeting.beacon
+        last_m = self._path_m.pop(key, None)
         repeated = last_m is not None and path_m - last_m < RENEWED_M
-        self._path_m[meeting.name] = last_m if repeated and last_m is not None else path_m
+        self._path_m[key] = last_m if repeated and last_m is not None else path_m
         if len(self._path_m) > MOST_NAMES:
             self._path_m.pop(next(iter(self._path_m)))
         return MeetingEffect.REPEATED if repeated else None
@@ -110,6 +113,9 @@ class MeetingQueue:
         return ready
 
     def note(self, meeting: Meeting, effect: MeetingEffect) -> None:
-        """Count what a meeting did."""
+        """Count what a meeting did; a range to a teammate's beacon is no news."""
+        if meeting.beacon is not None:
+            self.counts[f"beacon {effect.value}"] += 1
+            return
         self.counts[effect.value] += 1
         self.news = MeetingNews(1 if self.news is None else self.news.number + 1, meeting.name, effect)

@@ -49,6 +49,7 @@ from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
 from echostep.ports.meeting import MEETING
+from echostep.ports.team_beacons import TEAM_BEACONS
 from echostep.ports.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
@@ -164,7 +165,7 @@ class FrontEnd:
 
     def _count_unknown_ports(self, portion: Portion) -> None:
         for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING):
+            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS):
                 self._unknown_ports += int((portion.port == k).sum())
 
     def _count_bad_times(self, board: Arrivals, times: Times) -> None:

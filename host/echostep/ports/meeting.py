@@ -26,6 +26,7 @@ class Meeting(msgspec.Struct, frozen=True):
     """A wearer is near: the newest position (x_m, y_m) on `level` that the wearer's tracker reported, with its covariance (m2), `age_s` ago.
 
     `level_probability`: of that level. `range_m`: the distance by radio, with standard deviation `range_sd_m`; None: a tap says "side by side".
+    `beacon`: number of the beacon that the teammate has placed there, where the range is that to a beacon, not to the teammate.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=32)]
@@ -40,6 +41,7 @@ class Meeting(msgspec.Struct, frozen=True):
     level_probability: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
     range_m: Annotated[float, Meta(ge=0.0, le=MOST_RANGE_M)] | None = None
     range_sd_m: Annotated[float, Meta(ge=0.0, le=MOST_RANGE_M)] = 0.0
+    beacon: Annotated[int, Meta(ge=0, le=0xFFFF)] | None = None
 
     def encode(self) -> bytes:
         """The meeting as JSON: the bytes of a chunk."""

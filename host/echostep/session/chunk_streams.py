@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.ports.meeting import MEETING
+from echostep.ports.team_beacons import TEAM_BEACONS
 from echostep.ports.teammate import TEAM
 from echostep.recording.recorder import Recorder
 from echostep.session.console import print_notices
@@ -58,18 +59,22 @@ def with_team(
             yield Chunk(TEAM, arrival_ns(chunk), payload)
 
 
-def with_meetings(
+def with_teammates(
     chunks: Iterable[Chunk | None],
     page: LivePage | None,
     ear: TeammatesEar | None,
     arrival_ns: Callable[[Chunk | None], int],
 ) -> Iterator[Chunk | None]:
-    """Insert each meeting that a page tells, with the teammate's newest report, behind the chunk after which it was told."""
+    """Insert each meeting that a page tells, with the teammate's newest report, and the beacons that teammates share, behind the chunk after which
+    they came.
+    """
     for chunk in chunks:
         yield chunk
         for name in page.pop_meetings() if page and ear else ():
             if ear and (payload := ear.meeting(name)):
                 yield Chunk(MEETING, arrival_ns(chunk), payload)
+        for payload in ear.beacons() if ear else ():
+            yield Chunk(TEAM_BEACONS, arrival_ns(chunk), payload)
 
 
 def recorded(

@@ -22,7 +22,7 @@ from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
-from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_meetings, with_team
+from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_team, with_teammates
 from echostep.session.console import console, print_notices
 from echostep.session.metadata import clock_metadata, plan_of, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
@@ -109,11 +109,11 @@ def _recorded_chunks(
     seconds: float | None,
     session: Session | None = None,
 ) -> Iterator[Chunk | None]:
-    """Chunks of the ports, check-ins and meetings of the page, places of a teammate, each recorded before anything sees it; the MTx is set up."""
+    """Chunks of the ports, check-ins and meetings of the page, what teammates tell, each recorded before anything sees it; the MTx is set up."""
     chunks = _chunks_for(ports, seconds)
     if session is not None:
         chunks = with_check_ins(chunks, session.page, lambda _: now_ns())
-        chunks = with_meetings(chunks, session.page, session.teammates, lambda _: now_ns())
+        chunks = with_teammates(chunks, session.page, session.teammates, lambda _: now_ns())
         chunks = with_team(chunks, session.ear, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks

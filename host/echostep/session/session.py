@@ -74,7 +74,7 @@ class Session:
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
         self.ear: TeamEar | None = None  # hears the wearer whom a rescuer is guided to
-        self.teammates: TeammatesEar | None = None  # hears whom the wearer can have met
+        self.teammates: TeammatesEar | None = None  # hears whom the wearer can have met, and beacons of theirs
         self._publishing: Publishing | None = None
         self._marks: MarksEar | None = None  # hears what commanders mark
         self._foxglove: FoxgloveServer | None = None
@@ -157,9 +157,9 @@ class Session:
         opened.callback(self.ear.close)
 
     def _open_marks(self, opened: ExitStack) -> None:
-        """The page of a live run shows what commanders say by the first broker that it publishes to, and offers meetings with the teammates there."""
+        """By the first broker that a live run publishes to, beacons are shared; its page shows what commanders say, and offers meetings."""
         outlet, publishing = self.output.outlet, self._publishing
-        if outlet is None or publishing is None or self.page is None or self.recorded is not None:
+        if outlet is None or publishing is None or self.recorded is not None:
             return
         broker = next((e for e in outlet.endpoints if e.scheme in ("mqtt", "mqtts")), None)
         if broker is None:
@@ -168,11 +168,13 @@ class Session:
         from echostep.session.teammates_ear import TeammatesEar
 
         print_line = partial(console.print, markup=False, highlight=False)
+        self.teammates = TeammatesEar(broker, outlet, publishing.run, self.tracker.plan, print_line)
+        opened.callback(self.teammates.close)
+        if self.page is None:
+            return
         self._marks = MarksEar(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
         self.page.acknowledged_by = self._marks.acknowledged_by
         opened.callback(self._marks.close)
-        self.teammates = TeammatesEar(broker, outlet, self.tracker.plan, print_line)
-        opened.callback(self.teammates.close)
 
     def track(
         self,
@@ -208,10 +210,13 @@ class Session:
         if self.page:
             self.page.note_arrival()
         estimates = self.tracker.take(portion)
+        names = self.teammates.news() if self.teammates else None
+        if self.teammates and estimates:
+            self.teammates.share(self.tracker.own_beacons)
         if self.page:
             if self._marks and (marks := self._marks.news()) is not None:
                 self.page.set_marks(marks)
-            if self.teammates and (names := self.teammates.news()) is not None:
+            if names is not None:
                 self.page.set_team(names)
             self.page.publish(portion)
             print_notices(self.page.notices)

@@ -16,6 +16,7 @@ from enum import StrEnum
 
 from echostep.team.outbox import aged
 from echostep.team.report import BadReportError, Position, Presence, Report, check_name, decode, decode_presence
+from echostep.team.shared_beacons import BEACONS, decode_beacons
 
 MAX_MEMBERS = 256
 MAX_REASONS = 64
@@ -121,6 +122,8 @@ class Roster:
                 self._receive_report(team, name, decode(payload), retained, now_s, unix_s)
             elif leaf == "presence":
                 self._receive_presence(team, name, decode_presence(payload))
+            elif leaf == BEACONS:
+                decode_beacons(name, payload)
             else:
                 raise BadReportError("unknown topic")
         except BadReportError as error:

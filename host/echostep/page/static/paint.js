@@ -138,19 +138,21 @@ export class Painter {
     pen.textAlign = 'center';
     pen.lineWidth = 3;
     pen.strokeStyle = this.colour.halo;
-    for (const { number, x_m, y_m, state } of order.reverse()) {
+    for (const { number, x_m, y_m, state, by } of order.reverse()) {
       const [sx, sy] = view.toScreen(x_m, y_m);
       if (taken.some(([tx, ty]) => Math.abs(tx - sx) < 18 && Math.abs(ty - sy) < 14)) continue;
       taken.push([sx, sy]);
       pen.fillStyle = state === 'well' ? this.colour.beacon : this.colour.bad;
-      pen.strokeText(number, sx, sy + 18);
-      pen.fillText(number, sx, sy + 18);
+      const name = by ? `${number} ${by}` : number;
+      pen.strokeText(name, sx, sy + 18);
+      pen.fillText(name, sx, sy + 18);
     }
   }
 
-  // A triangle in the circle of its spread. Filled: well; with waves while it is heard. Hollow: moved (with a dotted tail) or silent (crossed out).
-  beacon(view, { x_m, y_m, radius95_m, state, heard }) {
-    const { pen } = this, [sx, sy] = view.toScreen(x_m, y_m), colour = state === 'well' ? this.colour.beacon : this.colour.bad;
+  // A triangle in the circle of its spread; on its tip: placed by a teammate. Filled: well; with waves while it is heard. Hollow: moved (with a dotted
+  // tail) or silent (crossed out).
+  beacon(view, { x_m, y_m, radius95_m, state, heard, by }) {
+    const { pen } = this, tip = by ? -1 : 1, [sx, sy] = view.toScreen(x_m, y_m), colour = state === 'well' ? this.colour.beacon : this.colour.bad;
     pen.strokeStyle = pen.fillStyle = colour;
     pen.lineWidth = 1.5;
     if (radius95_m * view.scale > 9) {  // a smaller circle is covered by the triangle
@@ -164,9 +166,9 @@ export class Painter {
       pen.setLineDash([]);
     }
     pen.beginPath();
-    pen.moveTo(sx, sy - 7);
-    pen.lineTo(sx + 6.5, sy + 4);
-    pen.lineTo(sx - 6.5, sy + 4);
+    pen.moveTo(sx, sy - 7 * tip);
+    pen.lineTo(sx + 6.5, sy + 4 * tip);
+    pen.lineTo(sx - 6.5, sy + 4 * tip);
     pen.closePath();
     pen.lineWidth = 4;
     pen.strokeStyle = this.colour.halo;

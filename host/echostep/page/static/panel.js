@@ -187,8 +187,9 @@ function echoText(lines) {
 // How many beacons are heard, and the numbers of those that are silent or moved.
 function beaconText(beacons) {
   const of = (state) => beacons.filter((beacon) => beacon.state === state).map(({ number }) => number).join(', ');
-  const heard = `beacons: ${beacons.filter((beacon) => beacon.heard).length} of ${beacons.length} heard`;
-  return [heard, of('silent') && `silent: ${of('silent')}`, of('moved') && `moved: ${of('moved')}`].filter(Boolean).join(' · ');
+  const own = beacons.filter(({ by }) => !by), names = [...new Set(beacons.map(({ by }) => by).filter(Boolean))].join(', ');
+  const heard = own.length && `beacons: ${own.filter((beacon) => beacon.heard).length} of ${own.length} heard`;
+  return [heard, names && `beacons of ${names}: ${beacons.length - own.length}`, of('silent') && `silent: ${of('silent')}`, of('moved') && `moved: ${of('moved')}`].filter(Boolean).join(' · ');
 }
 
 const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
