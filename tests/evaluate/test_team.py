@@ -13,10 +13,13 @@ import pytest
 
 from board_runs import ROOT
 from echostep.arrays import Floats
+from echostep.board.gateway import Gateway
 from echostep.evaluate.study import StudyRequest, run_study
 from echostep.evaluate.team import study, walks
-from echostep.evaluate.team.walks import AGAIN_S, encounters
+from echostep.evaluate.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons
+from echostep.evaluate.team.walks import AGAIN_S, TeamWalks, encounters
 from echostep.plan.model import load_plan
+from echostep.simulation.scenario import START_NS
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 T_S = np.arange(0.0, 100.0, 0.02)
@@ -45,6 +48,25 @@ def test_two_who_stay_together_meet_once_and_again_after_a_while() -> None:
     assert len(met) == 100.0 // AGAIN_S or len(met) == 100.0 // AGAIN_S + 1
     assert min(np.diff([e.t_s for e in met])) >= AGAIN_S
     assert len(encounters(PLAN, [walked(10.0, 7.2), walked(10.0, 7.8)])) == 1
+
+
+def test_beacons_are_heard_from_when_they_are_dropped_on_their_floor_and_through_no_wall() -> None:
+    """One wearer walks along the corridor at 0.2 m/s and drops beacons, a second one waits there, a third one in an office, a fourth upstairs."""
+    going = walked(4.0 + 0.2 * T_S, 7.5)
+    truth = (going, walked(20.0, 7.5), walked(20.0, 10.5), walked(20.0, 7.5, 3.0))
+    heard = with_dropped_beacons(TeamWalks(PLAN, ((),) * 4, truth, (), ()), 3).chunks
+    dropped = {b.number: b for b in dropped_on(going, 0, np.random.default_rng(1))}
+    assert [b.x_m for b in dropped.values()] == pytest.approx([4.0, 9.0, 14.0, 19.0], abs=0.31)
+    assert [b.t_s for b in dropped.values()] == pytest.approx([0.0, 25.0, 50.0, 75.0], abs=0.03)
+    for who, chunks in enumerate(heard):
+        gateway, first_s = Gateway(), dict[int, float]()
+        for chunk in chunks:
+            for reading in gateway.read(chunk.data, 1e-9 * (chunk.t_arrival_ns - START_NS)):
+                first_s.setdefault(gateway.numbers[reading.slot], reading.t_s)
+        of_first = {number: t_s for number, t_s in first_s.items() if number in dropped}
+        assert all(t_s >= dropped[number].t_s - 0.01 for number, t_s in of_first.items())
+        assert set(of_first) == ({1, 2, 3, 4} if who == 0 else {3, 4} if who == 1 else set())
+        assert who * MOST_EACH + 1 in first_s  # its own
 
 
 def test_the_columns_are_those_of_all_wearers() -> None:

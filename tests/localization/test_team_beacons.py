@@ -78,15 +78,46 @@ def test_a_sure_cloud_is_not_changed_by_a_bit_and_not_made_surer() -> None:
     assert sure.tracked.plausibility.probability == pytest.approx(0.6)
 
 
-def test_beacons_that_contradict_move_nothing_and_are_no_witness_for_a_tap() -> None:
-    """A stated start is given up when two teammates contradict it by a tap: ranges to beacons are none of them."""
+def test_beacons_of_one_teammate_do_not_make_a_stated_start_improbable_but_those_of_two_do() -> None:
+    """They move nothing, and they are no witness for a tap: by taps a stated start is given up when two teammates contradict it."""
     stated = filter_at(20.0, 2.0, 0.15)
     before = stated.cloud.x_m.copy()
-    for number in range(3):
+    for number in range(20):
         assert stated.meet(a_range(1.0, number)) is MeetingEffect.CONTRADICTS
-    assert np.array_equal(stated.cloud.x_m, before)
+    assert 0.6 < stated.tracked.plausibility.probability < 0.7
     elsewhere = Meeting("anna", "tracking", 4.0, 7.5, 0, 0.0025, 0.0, 0.0025)
     assert stated.meet(elsewhere) is MeetingEffect.CONTRADICTS
+    stated.meet(a_range(1.0, name="bo"))
+    assert stated.tracked.plausibility.probability < 0.5
+    assert np.array_equal(stated.cloud.x_m, before)
+
+
+def test_ranges_that_fit_take_back_doubt_and_give_nothing_more() -> None:
+    stated = filter_at(7.0, 7.5, 0.15)
+    assert stated.meet(a_range(9.0)) is MeetingEffect.CONTRADICTS  # an outlier
+    assert stated.tracked.plausibility.probability < 0.96
+    for number in range(8, 12):
+        assert stated.meet(a_range(3.0, number)) is MeetingEffect.USED
+    assert stated.tracked.plausibility.probability == pytest.approx(0.99)
+
+
+def test_a_search_is_narrowed_by_ranges_of_two_beacons_that_it_fits_badly_at_first() -> None:
+    """Of a whole building, a short range leaves a small ring: less than chance explains, and yet the ring."""
+    lost = MapFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
+    assert lost.cloud.is_coarse
+    for range_m, number in ((0.5, 7), (0.5, 8)):
+        lost.meet(a_range(range_m, number))
+    near = np.hypot(lost.cloud.map_x_m - 4.0, lost.cloud.y_m - 7.5) < 2.0
+    assert float(lost.cloud.weight @ near) > 0.8
+
+
+def test_a_search_that_begins_later_is_weighed_by_the_same_beacons_again() -> None:
+    memory = MeetingMemory()
+    tap = Meeting("kim", "tracking", 4.0, 7.5, 0, 0.01, 0.0, 0.01)
+    assert (memory.refusal(a_range(2.0), 0.0), memory.refusal(tap, 0.0)) == (None, None)
+    memory.forget_beacons()
+    assert memory.refusal(a_range(2.0), 1.0) is None
+    assert memory.refusal(tap, 1.0) is MeetingEffect.REPEATED
 
 
 def test_a_beacon_counts_once_on_a_way_but_each_of_them_does() -> None:

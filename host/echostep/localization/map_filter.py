@@ -23,6 +23,7 @@ from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model
 from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.gaps import Gap, Gaps
+from echostep.localization.hypothetical import Hypothetical
 from echostep.localization.level_changes import ClimbSettings, HeightChange
 from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
 from echostep.localization.meetings import CONTRADICTIONS, MeetingEffect, MeetingMemory, moved_probability
@@ -74,19 +75,6 @@ class FilterSettings:
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     beacons: BeaconSettings = field(default_factory=BeaconSettings)
     plan_sd_m: float = 0.0  # of the walls' positions, per axis
-
-
-@dataclass(slots=True)
-class Hypothetical:
-    """A cloud, the probability that it is right, and whether it has contracted once: before that, echoes tell little of it.
-
-    `is_stated`: it began where it was said to begin, so it should explain the echoes from the first on.
-    """
-
-    cloud: Cloud
-    plausibility: Plausibility
-    is_stated: bool = False
-    has_contracted: bool = False
 
 
 class MapFilter:
@@ -155,15 +143,19 @@ class MapFilter:
         """Weigh the clouds by where a teammate is who stands beside the wearer, and decide which of them is tracked.
 
         Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
-        one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing; a range to a teammate's beacon, one in
-        five of which is an outlier, neither confirms nor contradicts.
+        one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing; ranges to beacons of two teammates
+        can begin a search.
         """
         area_m2 = self._building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
         if refusal is not None:
             return refusal
-        fits = [weigh(each.cloud, meeting, area_m2) for each in self._clouds()]
-        if meeting.beacon is not None:
+        is_beacon = meeting.beacon is not None
+        fits = [
+            each.weigh_range(meeting, area_m2) if is_beacon else weigh(each.cloud, meeting, area_m2)
+            for each in self._clouds()
+        ]
+        if is_beacon:
             return MeetingEffect.USED if fits[0] >= FITS else MeetingEffect.CONTRADICTS
         plausibility, wrong = self.tracked.plausibility, WRONG[meeting.status]
         if fits[0] >= FITS:
@@ -328,6 +320,7 @@ class MapFilter:
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m = self._pings.path_m
+        self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(self._gathered))
 
     def _believed(self, walk_heading_rad: float) -> Pose:

@@ -11,7 +11,8 @@ The teammate's errors may be this wearer's own: both use one plan, and positions
 not known, so the two are fused by covariance intersection [Julier and Uhlmann 1997, A Non-divergent Estimation Algorithm in the Presence of Unknown
 Correlations], which is consistent for any: the inverse covariance becomes omega A + (1 - omega) B, A of the cloud, B of the meeting. Particles carry
 the prior already, so their weights are multiplied by (meeting / prior)^(1 - omega), the prior taken as a normal distribution. omega minimises the
-determinant; a cloud that knows every direction better than the meeting has omega = 1 and does not change, by a bit.
+determinant; a cloud that knows every direction better than the meeting has omega = 1 and does not change, by a bit. A coarse cloud, which is spread
+over the building, knows nothing that could be the teammate's: there the meeting is a likelihood, and the cloud is weighed even if it fits badly.
 """
 
 from __future__ import annotations
@@ -112,19 +113,27 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
     right = density / (density + wrong * anywhere)
-    mean = weight @ place
-    spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
-    own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
-    omega = best_omega(own, information(meeting, mean))
-    if omega < 1.0 and right >= FITS:  # a cloud elsewhere is left alone
-        away = place - mean
-        log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
-        factor = (1.0 - omega) * (log_met - log_prior)
-        factor -= factor.max()
+    factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
+    if factor is not None:  # a gathered cloud elsewhere is left alone
+        factor = factor - factor.max()
         factor -= math.log(float(weight @ np.exp(factor)))
         # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
         cloud.reweight(np.log(np.maximum(right * np.exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))
     return right
+
+
+def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floats) -> Floats | None:
+    """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud knows every direction better."""
+    mean = weight @ place
+    spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
+    own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
+    omega = best_omega(own, information(meeting, mean))
+    if omega >= 1.0:
+        return None
+    away = place - mean
+    log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
+    found: Floats = (1.0 - omega) * (log_met - log_prior)
+    return found
 
 
 def _along(away: Floats) -> Floats:

@@ -67,6 +67,10 @@ class MeetingMemory:
             self._path_m.pop(next(iter(self._path_m)))
         return MeetingEffect.REPEATED if repeated else None
 
+    def forget_beacons(self) -> None:
+        """A search has begun, which no range to a beacon has weighed yet."""
+        self._path_m = {key: m for key, m in self._path_m.items() if key[1] is None}
+
     def agree(self) -> None:
         """A teammate agrees with the cloud: what others said against it is answered."""
         self._contradicted_m.clear()

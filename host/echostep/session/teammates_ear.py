@@ -22,10 +22,9 @@ from echostep.team.inbox import Inbox, Receiver
 from echostep.team.meeting import meeting_with
 from echostep.team.mqtt import Listener
 from echostep.team.roster import Member, MemberState, Roster
-from echostep.team.shared_beacons import BEACONS, beacons_message
+from echostep.team.shared_beacons import BEACONS, SHARE_S, beacons_message
 
 LOOK_S = 0.5  # between two looks at what was heard, by reason
-SHARE_S = 5.0  # between two messages of the own beacons, at least, by reason
 HEARD_S = 60.0  # a teammate who has been silent for longer is not listed, by reason
 
 

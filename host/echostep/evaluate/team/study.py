@@ -4,9 +4,10 @@
 In: seeds. Out: rows `office/tap`, `tower/radio`, ... Owns the conditions. Simulated.
 
 All but the first wearer know their starts; the first is told a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
-apart) or none (`unknown`, apart), or knows its own too and reports false places (`liar`, who is left out of all columns). `ratio`: mean error of all
-wearers and runs together over that alone. `worst`: the greatest such ratio of one wearer in one run, the first one left out; `by_chance`: the same
-of the trackers alone with other random numbers, over those alone: how much of `worst` means nothing. An error on a wrong floor is at least a storey.
+apart; `beacons`: the same, each drops beacons, hears those of all and shares its own) or none (`unknown`, apart), or knows its own too and reports
+false places (`liar`, who is left out of all columns). `ratio`: mean error of all wearers and runs together over that alone. `worst`: the greatest
+such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other random numbers, over those alone:
+how much of `worst` means nothing. An error on a wrong floor is at least a storey.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from echostep.evaluate.anywhere import sites
 from echostep.evaluate.anywhere.tours import random_tour
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
+from echostep.evaluate.team.beacons import with_dropped_beacons
 from echostep.evaluate.team.tracking import LIAR, How, track_team
 from echostep.evaluate.team.walks import WEARERS, T, TeamWalks, X, Y, Z, team_walks
 from echostep.localization.estimate import Estimate, TrackStatus
@@ -40,7 +42,14 @@ FALSE_M = 1.0  # error above which "tracking" is false
 FIRST = 0  # the wearer whose start is wrong or unknown
 OTHER_DRAWS = 1_000_000  # added to the seed of the filters
 TRIES = 200  # for a wrong start
-HOWS = {"door": How.TAP, "tap": How.TAP, "radio": How.RADIO, "unknown": How.TAP, "liar": How.LIAR}
+HOWS = {
+    "door": How.TAP,
+    "tap": How.TAP,
+    "radio": How.RADIO,
+    "unknown": How.TAP,
+    "liar": How.LIAR,
+    "beacons": How.BEACONS,
+}
 COLUMNS = {
     "name": "", "runs": "runs", "meetings": "meetings", "alone_m": "alone m", "together_m": "together m", "ratio": "ratio",
     "first_alone_m": "first alone", "first_together_m": "together", "others_alone_m": "others alone",
@@ -73,6 +82,8 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[Row]:
         alone: dict[str, tuple[list[list[Estimate]], list[list[Estimate]]]] = {}
         for how in hows:
             walks = apart if apart and how != "door" else team_walks(plan, begin, length_m, seed, at_door=True)
+            if how == "beacons":
+                walks = with_dropped_beacons(walks, seed)
             kind = "wrong" if how in ("tap", "radio") else how
             told = [_told(walks, begin, kind, seed), *walks.starts[1:]]
             if kind not in alone:
@@ -86,7 +97,7 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[Row]:
 def _told(walks: TeamWalks, begin: RoutePlace, kind: str, seed: int) -> Pose | Start:
     """The start that the first wearer's tracker is told."""
     true = walks.starts[FIRST]
-    if kind not in ("wrong", "door"):
+    if kind not in ("wrong", "door", "beacons"):
         return Start() if kind == "unknown" else true
     rng = np.random.default_rng([seed, 78])
     for _ in range(TRIES):

@@ -4,7 +4,7 @@
 In: `TeamWalks`, the starts that the trackers are told. Out: their estimates. Owns how two tap, how a radio measures, and what a liar reports.
 
 After an encounter both are told of each other at one moment, by the newest estimate of either tracker: as reports come, up to a second old. A tap
-comes up to TAP_S after they were nearest, and they do not stop for it.
+comes up to TAP_S after they were nearest, and they do not stop for it. Beacons are shared every SHARE_S, without taps.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ from enum import StrEnum
 
 import numpy as np
 
-from echostep.evaluate.team.walks import Encounter, TeamWalks
+from echostep.evaluate.team.walks import Encounter, T, TeamWalks
 from echostep.localization.estimate import Estimate
 from echostep.localization.start import Start
 from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.meeting import MEETING, Meeting
+from echostep.ports.team_beacons import TEAM_BEACONS, TeamBeacons
 from echostep.simulation.scenario import START_NS
 from echostep.team.meeting import meeting_with
 from echostep.team.outbox import aged
 from echostep.team.publish import position_of
+from echostep.team.shared_beacons import SHARE_S
 from echostep.tracker import Tracker
 
 TAP_S = 1.0  # from the encounter to the tap, at most, by reason
@@ -44,12 +46,15 @@ class How(StrEnum):
     TAP = "tap"
     RADIO = "radio"
     LIAR = "liar"
+    BEACONS = "beacons"
 
 
 def track_team(walks: TeamWalks, told: Sequence[Pose | Start], how: How | None, seed: int) -> list[list[Estimate]]:
     """Estimates of all wearers; `told`: their starts; `how`: None for trackers that are told of no meeting."""
     team = [_Wearer(walks, k, start, seed) for k, start in enumerate(told)]
-    if how is not None:
+    if how is How.BEACONS:
+        _share_all(walks, team)
+    elif how is not None:
         _meet_all(walks, team, how, seed)
     for wearer in team:
         wearer.advance(np.inf)
@@ -64,6 +69,20 @@ def _meet_all(walks: TeamWalks, team: Sequence[_Wearer], how: How, seed: int) ->
         for who, meeting in zip(encounter.who, reversed(reports), strict=True):
             if meeting is not None:
                 team[who].meet(meeting, encounter.t_s)
+
+
+def _share_all(walks: TeamWalks, team: Sequence[_Wearer]) -> None:
+    """Every SHARE_S tell each wearer the beacons that the others have placed."""
+    end_s = max(truth[-1, T] for truth in walks.truth)
+    for t_s in np.arange(SHARE_S, end_s, SHARE_S).tolist():
+        for wearer in team:
+            wearer.advance(t_s)
+        placed = [wearer.tracker.own_beacons() for wearer in team]
+        for who, beacons in enumerate(placed):
+            if beacons:
+                told = TeamBeacons(1, f"wearer {who}", f"{who:08x}", walks.plan.digest, beacons)
+                for other in (*team[:who], *team[who + 1 :]):
+                    other.hear(Chunk(TEAM_BEACONS, START_NS + int(1e9 * t_s), told.encode()))
 
 
 def _told_at(encounters: Sequence[Encounter], how: How, rng: np.random.Generator) -> list[Encounter]:
@@ -94,7 +113,11 @@ class _Wearer:
 
     def meet(self, meeting: Meeting, t_s: float) -> None:
         """Tell the tracker of a meeting now."""
-        self.estimates += self.tracker.feed(Chunk(MEETING, START_NS + int(1e9 * t_s), meeting.encode()))
+        self.hear(Chunk(MEETING, START_NS + int(1e9 * t_s), meeting.encode()))
+
+    def hear(self, chunk: Chunk) -> None:
+        """Give the tracker a chunk now."""
+        self.estimates += self.tracker.feed(chunk)
 
 
 def _report(
