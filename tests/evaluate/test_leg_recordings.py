@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.evaluate.legs.datasets import SETS, LegRecording
+from echostep.evaluate.legs.datasets import SETS, LegRecording, moves_of
 from echostep.evaluate.legs.recordings import (
     BOTH,
     LENGTHS,
@@ -106,3 +106,13 @@ def test_a_scale_of_a_fast_walk_holds_in_a_slower_one(recordings: list[LegRecord
     assert len(after) == 2
     assert np.mean([abs(row["error_percent"]) for row in after]) < 3.0
     assert sum(row["stairs"] for row in after) == 0
+
+
+def test_the_way_of_an_ankle_is_from_stance_to_stance() -> None:
+    t_s = np.arange(0.0, 6.0, 0.01)
+    swing = np.clip(np.mod(t_s, 1.2) - 0.7, 0.0, 0.5) / 0.5
+    gone = 1.4 * (np.floor(t_s / 1.2) + 0.5 * (1.0 - np.cos(np.pi * swing)))
+    sway = 0.1 * np.sin(np.pi * swing)
+    moves = moves_of(t_s, np.column_stack([gone, sway]) + 1e-4 * np.random.default_rng(1).standard_normal((600, 2)))
+    assert [round(float(np.hypot(*move)), 2) for _, _, move in moves] == [1.4] * 4
+    assert all(0.3 < end_s - start_s < 0.6 for start_s, end_s, _ in moves)

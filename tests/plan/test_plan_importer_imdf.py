@@ -249,7 +249,7 @@ def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> No
 def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
     source, out = folder(tmp_path / "a", without_openings()), tmp_path / "plan.json"
     done = command_line.echostep("plan", "import", source, "-o", out)
-    assert "has no door openings, so nobody can enter the rooms: --doors 0.9" in done.stdout
+    assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in done.stdout
     done = command_line.echostep("plan", "import", source, "-o", out, "--doors", "0.9")
     assert "9 doors are assumed" in done.stdout
     assert "no door openings" not in done.stdout

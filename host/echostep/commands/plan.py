@@ -84,7 +84,7 @@ def _levels_without_doors(plan: Plan) -> list[str]:
         return []
     where = "The source" if len(closed) == len(plan.levels) else f"The source of {', '.join(closed)}"
     return [
-        f"{where} has no door openings, so nobody can enter the rooms: "
+        f"{where} has no door openings, so its rooms cannot be entered: "
         "--doors 0.9 assumes doors 0.9 m wide (IMDF), echostep plan edit draws them"
     ]
 

@@ -2,7 +2,8 @@
 """Public recordings of legs with gyros of three axes, read from a folder laid out like ../shared/data.
 
 In: the folder. Out: `LegRecording`s, the names of sets that are not there, and of files that could not be read. Owns nothing. Each leg is a recording
-of its own. The truth is what both feet have gone: by their inertial tracks (`foot.steps`), or by motion capture of the middle between both ankles.
+of its own. The truth is what both feet have gone from stance to stance, by their inertial tracks (`foot.steps`) or by motion capture of the ankles:
+so that sway to and fro is no way.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.evaluate.recordings import Sets
-from echostep.foot.steps import Track, walk_track
+from echostep.foot.steps import walk_track
 from echostep.legs.kinematics import LegLengths
 
 WAY_HZ = 10.0  # of the feet's path: slow enough that the noise of standing markers adds nothing
 PAUSE_S = 3.0  # feet that rest for longer end a walk
 MOVING_M_S = 0.1  # mean speed of both feet over `PAUSE_S` in a walk; by reason
+SMOOTHED = 5  # samples of motion capture, against its noise
+STANDS_M_S, STANDS_S = 0.3, 0.08  # of an ankle in a stance, which turns on about the heel and the ball; by reason
+Move = tuple[float, float, Floats]  # begin and end s, x and y m
 MARGIN_S = 1.0  # of standing, kept before and after the walk
 
 
@@ -70,7 +74,9 @@ def _qmt(path: Path) -> Iterator[LegRecording]:
 
     feet = [walk_track(t_s, sensor(f"foot_{k}", "acc"), sensor(f"foot_{k}", "gyr")) for k in ("left", "right")]
     way_s = np.arange(t_s[0], t_s[-1], 1.0 / WAY_HZ)
-    ways = [_way_by_steps(way_s, foot) for foot in feet]
+    ways = [
+        _way_by_moves(way_s, [(s.t_start_s, s.t_end_s, np.array(s.move_m[:2])) for s in foot.steps]) for foot in feet
+    ]
     belt = sensor("lower_back", "gyr")[:, 0]  # x is up
     for side in ("left", "right"):
         thigh, shank = (sensor(f"{part}_{side}", "gyr") for part in ("upper_leg", "lower_leg"))
@@ -90,9 +96,7 @@ def _gait_toolbox(path: Path) -> Iterator[LegRecording]:
         rates = _columns(path.with_name(path.name.replace("vicon", part)), "ori_1")
         return np.column_stack([rates[f"gyr_{k}"] for k in (1, 2, 3)])
 
-    between = 0.5 * (marker("LTIO") + marker("RTIO"))[:, :2]
-    places = np.column_stack([np.interp(way_s, t_s, column) for column in between.T])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    way = np.mean([_way_by_moves(way_s, moves_of(t_s, marker(name)[:, :2])) for name in ("LTIO", "RTIO")], axis=0)
     belt = gyro("Pelvis")[:, 0]  # x is up
     for side, name in (("L", "left"), ("R", "right")):
         hip, knee, ankle = (marker(side + point) for point in ("FEP", "FEO", "TIO"))
@@ -112,12 +116,26 @@ def _columns(path: Path, first: str) -> dict[str, Floats]:
     return dict(zip(names, table.T, strict=True))
 
 
-def _way_by_steps(way_s: Floats, foot: Track) -> Floats:
-    """Distance (m,) gone by a foot at the times way_s (m,): its steps from stance to stance, each at an even pace."""
+def moves_of(t_s: Floats, places_m: Floats) -> list[Move]:
+    """The moves of an ankle between its stances, from its places (n, 2) by motion capture at t_s (n,), evenly sampled."""
+    even = np.ones(SMOOTHED) / SMOOTHED
+    slow = [np.convolve(np.pad(column, SMOOTHED // 2, "edge"), even, "valid") for column in places_m.T]
+    stands = np.hypot(*np.gradient(slow, t_s, axis=1)) < STANDS_M_S
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(np.int8))).reshape(-1, 2)
+    stances = [(a, b) for a, b in edges.tolist() if t_s[b - 1] - t_s[a] > STANDS_S]
+    places = [places_m[a:b].mean(axis=0) for a, b in stances]
+    return [
+        (float(t_s[end - 1]), float(t_s[begin]), later - place)
+        for (_, end), (begin, _), place, later in zip(stances, stances[1:], places, places[1:], strict=False)
+    ]
+
+
+def _way_by_moves(way_s: Floats, moves: list[Move]) -> Floats:
+    """Distance (m,) gone by a foot at the times way_s (m,): its moves from stance to stance, each at an even pace."""
     knots = [(-np.inf, 0.0)]
-    for step in foot.steps:
+    for start_s, end_s, move_m in moves:
         gone = knots[-1][1]
-        knots += [(step.t_start_s, gone), (step.t_end_s, gone + float(np.hypot(*step.move_m[:2])))]
+        knots += [(start_s, gone), (end_s, gone + float(np.hypot(*move_m)))]
     return np.interp(way_s, *np.array(knots[1:]).T)
 
 
