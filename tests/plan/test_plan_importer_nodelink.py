@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import command_line
 from echostep.errors import EchostepError
 from echostep.plan.importers.formats import import_plan
 from needs_data import needs_data
@@ -36,6 +37,11 @@ def test_a_small_building(tmp_path: Path) -> None:
     assert walls == {((0.0, 4.0), (10.0, 4.0)), ((5.0, 0.0), (5.0, 4.0))}
     assert [(c.kind, c.levels) for c in plan.connectors] == [("stairs", (0, 1))]
     assert plan.start is None
+
+
+def test_a_source_without_doors_and_rooms_is_named(tmp_path: Path) -> None:
+    done = command_line.echostep("plan", "import", write(tmp_path) / "core.txt", "-o", tmp_path / "plan.json")
+    assert "neither door openings nor rooms: ways are the gaps" in done.stdout
 
 
 @needs_data("maps/biba")

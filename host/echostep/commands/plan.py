@@ -78,7 +78,11 @@ def import_(
 
 
 def _levels_without_doors(plan: Plan) -> list[str]:
-    """One line when levels with rooms have no door; what to do about it."""
+    """One line when levels with rooms have no door, or when no level has any; what to do about it."""
+    if not any(level.rooms or level.doors for level in plan.levels):
+        return [
+            "The source has neither door openings nor rooms: ways are the gaps in its walls; echostep plan edit draws doors"
+        ]
     closed = [level.name for level in plan.levels if level.rooms and not level.doors]
     if not closed:
         return []
