@@ -34,7 +34,7 @@ enum twi_state { TWI_BUSY, TWI_DONE, TWI_NACK, TWI_FAILED };
 struct twi_transfer {
 	uint8_t address;        /* 7 bits */
 	uint8_t write_length;   /* 0-4 bytes to write */
-	uint8_t read_length;    /* 0-7 bytes to read after a repeated start */
+	uint8_t read_length;    /* 0-7 bytes to read, after a repeated start if bytes were written */
 	uint8_t bytes[7];       /* in: the bytes to write; out: the bytes read */
 	volatile uint8_t state; /* enum twi_state */
 	uint32_t ticks;         /* of the stop condition */

@@ -176,6 +176,7 @@ enum {
 	PART_ICM20649 = 7,
 	PART_SCP1000 = 8,
 	PART_BMP390 = 9,
+	PART_MAXSONAR = 10,
 };
 
 enum {

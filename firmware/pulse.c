@@ -11,38 +11,37 @@
 #define TICKS_PER_US 2u
 #define POLL_TICKS TICKS_PER_MS
 
-static uint32_t begun[2]; /* when the trigger pulse was sent, ticks */
-
-bool pulse_begin(uint8_t side, uint32_t now)
+bool pulse_begin(uint8_t side, struct ranging *r)
 {
-	begun[side] = now;
+	r->due = r->trigger; /* when the trigger pulse was sent */
 	return echo_begin(side);
 }
 
-static enum ranging_state finish(uint8_t side, const struct echo_pulse *pulse, struct ranging *out)
+static enum ranging_state finish(uint8_t side, const struct echo_pulse *pulse, struct ranging *r)
 {
 	uint32_t length = pulse->fall - pulse->rise;
-	out->time_of_flight_us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
+	r->time_of_flight_us = length > ECHO_MAX_TICKS ? 0 : (uint16_t)(length / TICKS_PER_US);
 	parts_found(side, PART_PULSE, 0);
 	return RANGING_DONE;
 }
 
-enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *out)
+enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *r)
 {
 	struct echo_pulse pulse;
 	enum echo_state state = echo_take(side, &pulse);
-	uint32_t elapsed = now - begun[side];
-	out->trigger = state == ECHO_WAITING ? begun[side] : pulse.rise;
-	out->next = now + POLL_TICKS;
+	uint32_t elapsed = now - r->due;
+	if (state != ECHO_WAITING)
+		r->trigger = pulse.rise;
+	r->next = now + POLL_TICKS;
 	if (state == ECHO_OVER)
-		return finish(side, &pulse, out);
+		return finish(side, &pulse, r);
 	if (state == ECHO_WAITING && elapsed > ANSWER_MAX_TICKS) {
 		echo_end(side);
 		return RANGING_REFUSED;
 	}
 	if (elapsed > PULSE_MAX_TICKS) {
 		echo_end(side);
-		out->fault = FAULT_ALWAYS_READY;
+		r->fault = FAULT_ALWAYS_READY;
 		return RANGING_FAILED;
 	}
 	return RANGING_BUSY;

@@ -6,9 +6,9 @@
 #include "ranger.h" /* struct ranging */
 
 /* Sends a trigger pulse (12 us); false: another device drives the echo line. */
-bool pulse_begin(uint8_t side, uint32_t now);
+bool pulse_begin(uint8_t side, struct ranging *r);
 
-/* Looks for the two edges of the answer; `out` is complete when it is RANGING_DONE or RANGING_FAILED. RANGING_REFUSED: no answer. */
-enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *out);
+/* Looks for the two edges of the answer. RANGING_REFUSED: no answer. */
+enum ranging_state pulse_run(uint8_t side, uint32_t now, struct ranging *r);
 
 #endif

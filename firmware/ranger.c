@@ -3,6 +3,7 @@
 #include "board.h"         /* ticks */
 #include "configuration.h" /* schedule, enabled rangers */
 #include "link.h"          /* sending the messages */
+#include "maxsonar.h"      /* driver */
 #include "parts.h"         /* refused wiring */
 #include "pulse.h"         /* driver */
 #include "srf02.h"         /* driver */
@@ -15,16 +16,18 @@
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
 #define MISSES_MAX 8u                     /* slots without an answer, half a second, after which any kind is sought again */
 
-/* Half periods of the two schedules: see ranger.h. */
+/* Half periods of the two schedules: see ranger.h. Of a MaxSonar a new ranging is advised every 100 ms [MaxBotix PD11848]. */
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
 #define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
+#define SLOW_CONCURRENT_HALF_TICKS (50u * TICKS_PER_MS)
+#define SLOW_SEQUENTIAL_HALF_TICKS (100u * TICKS_PER_MS)
 
 #define CONCURRENT_JITTER_MASK 0x1FFFu /* ticks: up to 4.1 ms */
 #define JITTER_STEPS 13u               /* bits of the mask: every bit of a delay is new */
 #define LFSR_TAPS 0xB400u              /* 16-bit Galois register of maximal length */
 #define LFSR_START 0xACE1u             /* any value but 0 */
 
-enum kind { UNKNOWN, SRF02, PULSE };
+enum kind { UNKNOWN, MAXSONAR, SRF02, PULSE }; /* in the order in which they are sought, and preferred */
 
 static struct ranger {
 	bool pinging;
@@ -41,10 +44,13 @@ static struct ranger {
 static const uint8_t sensors[2] = { SENSORS_RANGER_LEFT, SENSORS_RANGER_RIGHT };
 
 static uint16_t lfsr;
+static bool slow; /* the grid is that of a MaxSonar */
 
 static uint32_t half_period(void)
 {
-	return configuration.schedule == SCHEDULE_SEQUENTIAL ? SEQUENTIAL_HALF_TICKS : CONCURRENT_HALF_TICKS;
+	if (configuration.schedule == SCHEDULE_SEQUENTIAL)
+		return slow ? SLOW_SEQUENTIAL_HALF_TICKS : SEQUENTIAL_HALF_TICKS;
+	return slow ? SLOW_CONCURRENT_HALF_TICKS : CONCURRENT_HALF_TICKS;
 }
 
 /* Pseudo-random delay in ticks, 0 when sequential; the same sequence after every start. With one shift per delay, each delay would be
@@ -68,6 +74,11 @@ static bool may_trigger(const struct ranger *r)
 	return !r->pinging && configuration_reads(sensors[r->index]) && !blocked_by_other(r);
 }
 
+static enum kind first_kind(const struct ranger *r)
+{
+	return r->kind == UNKNOWN ? MAXSONAR : r->kind;
+}
+
 /* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips slots. The grid does
  * not move. */
 static void schedule_next(struct ranger *r, uint32_t now)
@@ -78,7 +89,7 @@ static void schedule_next(struct ranger *r, uint32_t now)
 	r->due = r->slot + jitter();
 	r->tries = 0;
 	r->pinging = false;
-	r->pinged = r->kind == PULSE ? PULSE : SRF02;
+	r->pinged = first_kind(r);
 }
 
 static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_flight_us)
@@ -94,16 +105,10 @@ static void fail(struct ranger *r, uint32_t now, uint8_t fault)
 	schedule_next(r, now);
 }
 
-static void refuse_mixed_kinds(void)
-{
-	for (uint8_t k = 0; k < 2; k++)
-		if (rangers[k].kind == PULSE && rangers[!k].kind == SRF02)
-			rangers[k].kind = UNKNOWN; /* its next answer is refused */
-}
-
 static void succeed(struct ranger *r, uint32_t now)
 {
-	if (r->pinged == PULSE && rangers[!r->index].kind == SRF02) {
+	struct ranger *other = &rangers[!r->index];
+	if (other->kind != UNKNOWN && other->kind < r->pinged) {
 		parts_set_wiring(WIRING_MIXED_RANGERS);
 		fail(r, now, FAULT_NO_ANSWER);
 		return;
@@ -111,23 +116,26 @@ static void succeed(struct ranger *r, uint32_t now)
 	uint16_t time_of_flight_us = r->ranging.time_of_flight_us;
 	r->kind = r->pinged;
 	r->misses = 0;
-	refuse_mixed_kinds();
-	if (rangers[0].kind == rangers[1].kind)
+	if (other->kind > r->kind)
+		other->kind = UNKNOWN; /* its next answer is refused */
+	if (other->kind == r->kind)
 		parts_set_wiring(WIRING_OK);
 	status_ok((enum device)r->index);
 	report(r, time_of_flight_us ? OUTCOME_ECHO : OUTCOME_NO_ECHO, time_of_flight_us);
 	schedule_next(r, now);
 }
 
-/* The ranger has not accepted its trigger: another try, then another kind if it is not known, then the next slot. */
+/* The ranger has not accepted its trigger: another try, or another kind if it is not known, then the next slot. */
 static void try_again(struct ranger *r, uint32_t now)
 {
+	bool sought = r->kind == UNKNOWN;
+	bool once = r->pinged == PULSE || (r->pinged == MAXSONAR && sought);
 	r->pinging = false;
 	r->due = now + RETRY_TICKS;
-	if (r->pinged == SRF02 && ++r->tries < TRIGGER_TRIES)
+	if (!once && ++r->tries < TRIGGER_TRIES)
 		return;
-	if (r->pinged == SRF02 && r->kind == UNKNOWN) {
-		r->pinged = PULSE;
+	if (sought && r->pinged != PULSE) {
+		r->pinged++;
 		return;
 	}
 	if (r->kind != UNKNOWN && ++r->misses >= MISSES_MAX) {
@@ -141,14 +149,23 @@ static void trigger(struct ranger *r, uint32_t now)
 {
 	r->ranging.trigger = now;
 	r->ranging.next = now;
-	if (r->pinged == SRF02)
-		r->pinging = srf02_begin(r->index, now);
-	else if (pulse_begin(r->index, now))
+	if (r->pinged == MAXSONAR)
+		r->pinging = maxsonar_begin(r->index, &r->ranging);
+	else if (r->pinged == SRF02)
+		r->pinging = srf02_begin(r->index, &r->ranging);
+	else if (pulse_begin(r->index, &r->ranging))
 		r->pinging = true;
 	else if (r->kind == PULSE)
 		fail(r, now, FAULT_ALWAYS_READY);
 	else
 		try_again(r, now);
+}
+
+static enum ranging_state run_driver(struct ranger *r, uint32_t now)
+{
+	if (r->pinged == MAXSONAR)
+		return maxsonar_run(r->index, now, &r->ranging);
+	return r->pinged == SRF02 ? srf02_run(r->index, now, &r->ranging) : pulse_run(r->index, now, &r->ranging);
 }
 
 static void advance(struct ranger *r, uint32_t now)
@@ -158,7 +175,7 @@ static void advance(struct ranger *r, uint32_t now)
 			trigger(r, now);
 		return;
 	}
-	switch (r->pinged == PULSE ? pulse_run(r->index, now, &r->ranging) : srf02_run(r->index, now, &r->ranging)) {
+	switch (run_driver(r, now)) {
 	case RANGING_DONE:
 		succeed(r, now);
 		break;
@@ -190,7 +207,7 @@ static void start_one(uint8_t index, uint32_t slot)
 	r->slot = slot;
 	if (!r->pinging) {
 		r->due = slot + jitter();
-		r->pinged = r->kind == PULSE ? PULSE : SRF02;
+		r->pinged = first_kind(r);
 	}
 }
 
@@ -201,10 +218,21 @@ void ranger_start(uint32_t now)
 	start_one(RANGER_RIGHT, now + START_TICKS + half_period());
 }
 
+/* Lays the grid anew when the first MaxSonar is found, and when none is left. */
+static void fit_grid(uint32_t now)
+{
+	bool found = rangers[RANGER_LEFT].kind == MAXSONAR || rangers[RANGER_RIGHT].kind == MAXSONAR;
+	if (found == slow)
+		return;
+	slow = found;
+	ranger_start(now);
+}
+
 uint32_t ranger_run(uint32_t now)
 {
 	advance(&rangers[RANGER_LEFT], now);
 	advance(&rangers[RANGER_RIGHT], now);
+	fit_grid(now);
 	uint32_t left = wake_time(&rangers[RANGER_LEFT], now), right = wake_time(&rangers[RANGER_RIGHT], now);
 	return ticks_reached(left, right) ? right : left;
 }

@@ -5,12 +5,14 @@
  *   concurrent: period 66 ms, plus a pseudo-random delay of up to 4.1 ms on every trigger. From ping to ping, an echo of the other
  *               ranger's ping moves by a known amount; an own echo does not.
  *   sequential: period 140 ms, no delay, and a ranger waits until the other one has been read [Girard 2011, section 2].
+ * With a MaxSonar the periods are 100 ms and 200 ms.
  * Both rangers must be of one kind: with two kinds, one beam and one range would be right for one side only. */
 #ifndef ECHOSTEP_RANGER_H
 #define ECHOSTEP_RANGER_H
 
 #include <stdbool.h>
 #include <stdint.h>
+#include "board.h" /* struct twi_transfer */
 
 /* Starts a new grid, first slot in 100 ms; a ping under way is still read. */
 void ranger_start(uint32_t now);
@@ -29,7 +31,11 @@ enum ranging_state {
 	RANGING_FAILED,
 };
 
+/* One ranging cycle, begun and advanced by the driver of the ranger's kind. */
 struct ranging {
+	struct twi_transfer transfer; /* the driver's, as are the next two: */
+	uint8_t stage;
+	uint32_t due;               /* of its next step */
 	uint32_t trigger;           /* time of the ping, ticks */
 	uint32_t next;              /* of the driver's next call, unless an interrupt comes earlier */
 	uint16_t time_of_flight_us; /* 0: no echo */

@@ -8,39 +8,32 @@
 #define COMMAND_RANGE_US 0x52u
 #define REGISTER_COMMAND 0u
 #define REGISTER_REVISION 0u
+#define UNUSED 0x80u /* content of register 1 [SRF02 technical specification] */
 #define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
 #define RANGING_MIN_TICKS (60u * TICKS_PER_MS) /* first request for the result */
 #define RANGING_MAX_TICKS (72u * TICKS_PER_MS) /* last request: 65 ms with a margin */
 #define POLL_TICKS (TICKS_PER_MS / 2u)         /* between requests */
 
-static struct srf02 {
-	struct twi_transfer transfer;
-	enum { TRIGGERING, RANGING, READING } stage;
-	uint32_t trigger; /* time of the trigger */
-	uint32_t due;     /* next request for the result */
-} rangers[2];
+enum stage { TRIGGERING, RANGING, READING };
 
-bool srf02_begin(uint8_t side, uint32_t now)
+bool srf02_begin(uint8_t side, struct ranging *r)
 {
-	struct srf02 *r = &rangers[side];
 	r->transfer.address = (uint8_t)(ADDRESS_LEFT + side);
 	r->transfer.write_length = 2;
 	r->transfer.read_length = 0;
 	r->transfer.bytes[0] = REGISTER_COMMAND;
 	r->transfer.bytes[1] = COMMAND_RANGE_US;
-	r->trigger = now;
-	r->due = now;
 	r->stage = TRIGGERING;
 	return twi_begin(&r->transfer);
 }
 
-static enum ranging_state check_trigger(struct srf02 *r, struct ranging *out)
+static enum ranging_state check_trigger(struct ranging *r)
 {
 	enum twi_state state = twi_state(&r->transfer);
 	if (state == TWI_NACK)
 		return RANGING_REFUSED;
 	if (state == TWI_FAILED) {
-		out->fault = FAULT_BUS_STUCK;
+		r->fault = FAULT_BUS_STUCK;
 		return RANGING_FAILED;
 	}
 	if (state == TWI_DONE) {
@@ -52,7 +45,7 @@ static enum ranging_state check_trigger(struct srf02 *r, struct ranging *out)
 }
 
 /* Reads revision and result in one transfer: a revision of REVISION_BUSY means that the ranging is not over. */
-static void request_result(struct srf02 *r)
+static void request_result(struct ranging *r)
 {
 	r->transfer.write_length = 1;
 	r->transfer.read_length = 4;
@@ -61,22 +54,24 @@ static void request_result(struct srf02 *r)
 		r->stage = READING;
 }
 
-static enum ranging_state succeed(struct srf02 *r, uint8_t side, struct ranging *out)
+static enum ranging_state finish(uint8_t side, struct ranging *r)
 {
-	out->time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
+	if (r->transfer.bytes[1] != UNUSED)
+		return RANGING_REFUSED;
+	r->time_of_flight_us = (uint16_t)((uint16_t)(r->transfer.bytes[2] << 8) | r->transfer.bytes[3]);
 	parts_found(side, PART_SRF02, r->transfer.bytes[0]);
 	return RANGING_DONE;
 }
 
-static enum ranging_state check_result(struct srf02 *r, uint8_t side, uint32_t now, struct ranging *out)
+static enum ranging_state check_result(uint8_t side, uint32_t now, struct ranging *r)
 {
 	enum twi_state state = twi_state(&r->transfer);
 	if (state == TWI_BUSY)
 		return RANGING_BUSY;
 	if (state == TWI_DONE && r->transfer.bytes[0] != REVISION_BUSY)
-		return succeed(r, side, out);
+		return finish(side, r);
 	if (ticks_reached(now, r->trigger + RANGING_MAX_TICKS)) {
-		out->fault = state == TWI_FAILED ? FAULT_BUS_STUCK : FAULT_TOO_LATE;
+		r->fault = state == TWI_FAILED ? FAULT_BUS_STUCK : FAULT_TOO_LATE;
 		return RANGING_FAILED;
 	}
 	r->due = now + POLL_TICKS;
@@ -84,17 +79,15 @@ static enum ranging_state check_result(struct srf02 *r, uint8_t side, uint32_t n
 	return RANGING_BUSY;
 }
 
-enum ranging_state srf02_run(uint8_t side, uint32_t now, struct ranging *out)
+enum ranging_state srf02_run(uint8_t side, uint32_t now, struct ranging *r)
 {
-	struct srf02 *r = &rangers[side];
 	enum ranging_state state = RANGING_BUSY;
 	if (r->stage == TRIGGERING)
-		state = check_trigger(r, out);
+		state = check_trigger(r);
 	else if (r->stage == READING)
-		state = check_result(r, side, now, out);
+		state = check_result(side, now, r);
 	if (r->stage == RANGING && ticks_reached(now, r->due) && ranger_quiet(now))
 		request_result(r);
-	out->trigger = r->trigger;
-	out->next = r->stage != RANGING ? now + RANGER_IDLE_TICKS : ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
+	r->next = r->stage != RANGING ? now + RANGER_IDLE_TICKS : ticks_reached(now, r->due) ? now + POLL_TICKS : r->due;
 	return state;
 }

@@ -6,9 +6,9 @@
 #include "ranger.h" /* struct ranging */
 
 /* Sends the ranging command; false: the bus is in use. */
-bool srf02_begin(uint8_t side, uint32_t now);
+bool srf02_begin(uint8_t side, struct ranging *r);
 
-/* Does the next step; `out` is complete when the answer is RANGING_DONE or RANGING_FAILED. */
-enum ranging_state srf02_run(uint8_t side, uint32_t now, struct ranging *out);
+/* Does the next step. RANGING_REFUSED: no answer, or that of another part. */
+enum ranging_state srf02_run(uint8_t side, uint32_t now, struct ranging *r);
 
 #endif

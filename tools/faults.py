@@ -69,11 +69,15 @@ def _device_faults() -> Iterator[Fault]:
 
 
 def _kit_faults() -> Iterator[Fault]:
-    """Parts of the kit of 2026 that are plugged in instead of the papers' ones, and that then fail."""
+    """Parts of the kit of 2026, and MaxSonars, that are plugged in instead of the papers' ones, and that then fail."""
     for part, papers in (("thigh=lsm6dso", "adis16100"), ("compass=lis3mdl", "cmps10"), ("pressure=bmp390", "scp1000")):
         yield Fault((f"part_{part}",), (f"part_{part.split('=')[0]}={papers}",))
     rangers = ("part_ranger_left", "part_ranger_right")
-    yield Fault(tuple(f"{each}=pulse" for each in rangers), tuple(f"{each}=srf02" for each in rangers))
+    back = tuple(f"{each}=srf02" for each in rangers)
+    maxsonars = tuple(f"{each}=maxsonar" for each in rangers)
+    yield Fault(tuple(f"{each}=pulse" for each in rangers), back)
+    yield Fault(maxsonars, back)
+    yield Fault((*maxsonars, "maxsonar_left=deaf"), ("maxsonar_left=ok", *back))
     for fault in ("pulse_left=deaf", "imu_thigh=absent", "bmp390=absent", "lis3mdl=nack"):
         yield Fault(("kit=2026", fault), (f"{fault.split('=')[0]}=ok", "kit=papers"))
 

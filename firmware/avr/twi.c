@@ -96,7 +96,7 @@ ISR(TWI_vect)
 	}
 	switch (TW_STATUS) {
 	case TW_START:
-		TWDR = (uint8_t)(current->address << 1 | TW_WRITE);
+		TWDR = (uint8_t)(current->address << 1 | (current->write_length ? TW_WRITE : TW_READ));
 		TWCR = GO;
 		break;
 	case TW_REP_START:

@@ -115,6 +115,13 @@ def test_rates_below_what_is_configured_are_said() -> None:
     assert rate_findings(heard, rates | {"Compass": 0.0}) == []  # the status says why
 
 
+def test_maxsonars_are_expected_to_ping_less_often() -> None:
+    heard = words(status(), m.Parts(**dict.fromkeys(m.Parts._fields, 0) | {"part_ranger_right": m.Part.MAXSONAR}))
+    assert expected_rates(heard)["Ping"] == 19.0
+    assert rate_findings(heard, expected_rates(heard) | {"Ping": 20.0}) == []
+    assert [f.severity for f in rate_findings(heard, expected_rates(heard) | {"Ping": 9.0})] == [Severity.FAULT]
+
+
 def test_temperature_of_a_gyro() -> None:
     assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
 

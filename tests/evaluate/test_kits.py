@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from echostep.evaluate import kit_feet, kits
 from echostep.evaluate.report import rows_by_name
@@ -14,21 +15,29 @@ def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> Non
     rows = kits.one_run(3)
     names = [row["name"] for row in rows]
     of_rangers = [row for row in rows if not row["name"].startswith("foot alone")]
-    assert len(set(names)) == 9 + 8
-    assert len(of_rangers) == 9
+    assert len(set(names)) == 12 + 8
+    assert len(of_rangers) == 12
     assert all(len(row["errors_m"]) == 52 for row in of_rangers)
     means = {row["name"]: float(np.mean(row["errors_m"])) for row in rows}
     assert means["default, SRF02"] < 0.13  # what the paper's system reached with ranging [Girard 2011, Table 1]
     assert means["default, pulse"] < 0.13
+    assert means["default, MaxSonar"] < 0.13
     assert [group[0]["name"] for group in rows_by_name(rows)]
     walks = [kits._walk(otb(), 3, kind) for kind in kits.kinds().values()]
     assert all(np.array_equal(walk.trunk_m, walks[0].trunk_m) for walk in walks)
     assert all(np.array_equal(walk.heading_rad, walks[0].heading_rad) for walk in walks)
 
 
-def test_the_tracker_and_the_simulation_agree_on_the_reach_of_pulse_rangers() -> None:
-    kind = kits.kinds()["pulse"]
-    assert (kind.echo.maximum_m, kind.acoustics.maximum_m) == (4.5, 4.5)
+@pytest.mark.parametrize(("name", "reach_m"), [("SRF02", 6.0), ("pulse", 4.5), ("MaxSonar", 7.65)])
+def test_the_tracker_and_the_simulation_agree_on_the_reach_of_rangers(name: str, reach_m: float) -> None:
+    kind = kits.kinds()[name]
+    assert (kind.echo.maximum_m, kind.acoustics.maximum_m) == (reach_m, reach_m)
+    assert kind.echo.minimum_m == kind.acoustics.minimum_m
+    pings = kits._walk(otb(), 3, kind).pings
+    heard_m = pings.range_m[np.isfinite(pings.range_m)]
+    assert kind.acoustics.minimum_m <= heard_m.min()
+    assert 0.5 * reach_m < heard_m.max() <= reach_m + 0.1
+    assert np.diff(pings.t_s[pings.ranger == 0]).mean() == pytest.approx(2.0 * kind.half_s, abs=1e-3)
 
 
 def test_a_foot_board_is_as_good_as_an_mtx_on_the_same_steps() -> None:

@@ -259,7 +259,7 @@ def test_rangers_of_two_kinds_are_refused_in_words(bench: Bench) -> None:
     assert {p.outcome for p in pings(found, m.Ranger.RIGHT)} == {m.Outcome.BUS_ERROR}
     assert parts(bench).wiring == m.Wiring.MIXED_RANGERS
     (text,) = [str(f) for f in board_findings(reports(bench)) if "ranger" in f.subject]
-    assert text.startswith("rangers: one is an SRF02 and the other one a pulse ranger, which is not used")
+    assert text.startswith("rangers: the left one is an SRF02, the right one a pulse ranger; the right one is not used")
     bench.fault("part_ranger_left=pulse")
     bench.run(2_500)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}

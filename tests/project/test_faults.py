@@ -33,7 +33,7 @@ def test_the_matrix_has_a_fault_of_each_switch() -> None:
     known = {name for group in names for name in re.findall(r"`(\w+)`", group)}
     used = {switch.split("=")[0] for fault in faults.FAULTS for switch in fault.switches}
     assert used <= known
-    like_others = {"belt", "part_calf", "part_belt", "imu_calf", "imu_belt", "pulse_right"}
+    like_others = {"belt", "part_calf", "part_belt", "imu_calf", "imu_belt", "pulse_right", "maxsonar_right"}
     without_an_effect_alone = {"reset", "brown_out_fuse", "usb"}
     of_another_board = {"icm20649"}  # tests/firmware/test_twin_foot.py
     assert known - used <= like_others | without_an_effect_alone | of_another_board

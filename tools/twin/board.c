@@ -31,6 +31,7 @@ static void power_devices(void)
 	lis3mdl_power();
 	lsm6dso_power();
 	pulse_power();
+	maxsonar_power();
 	icm20649_power();
 }
 

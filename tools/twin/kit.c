@@ -1,11 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Which part is plugged in in each place: that of the papers, that of the kit of 2026, or none, on a foot board. A part that is plugged in gets its
- * power anew. */
+ * Which part is plugged in in each place: that of the papers, that of the kit of 2026, none, on a foot board, or a MaxSonar. A part that is plugged
+ * in gets its power anew. */
 #include <string.h>
 
 #include "twin.h"
 
-enum { OF_PAPERS, OF_2026, KINDS, EMPTY = KINDS };
+enum { OF_PAPERS, OF_2026, EMPTY, MAXSONAR, KINDS };
+
+static void ranger_power(void)
+{
+	pulse_power();
+	maxsonar_power();
+}
 
 static struct socket {
 	const char *place;
@@ -13,8 +19,8 @@ static struct socket {
 	void (*power)(void);
 	int part;
 } sockets[PLACES] = {
-	[PLACE_RANGER_LEFT] = { "part_ranger_left", { "srf02", "pulse" }, pulse_power, OF_PAPERS },
-	[PLACE_RANGER_RIGHT] = { "part_ranger_right", { "srf02", "pulse" }, pulse_power, OF_PAPERS },
+	[PLACE_RANGER_LEFT] = { "part_ranger_left", { "srf02", "pulse", NULL, "maxsonar" }, ranger_power, OF_PAPERS },
+	[PLACE_RANGER_RIGHT] = { "part_ranger_right", { "srf02", "pulse", NULL, "maxsonar" }, ranger_power, OF_PAPERS },
 	[PLACE_COMPASS] = { "part_compass", { "cmps10", "lis3mdl" }, lis3mdl_power, OF_PAPERS },
 	[PLACE_THIGH] = { "part_thigh", { "adis16100", "lsm6dso" }, lsm6dso_power, OF_PAPERS },
 	[PLACE_CALF] = { "part_calf", { "adis16100", "lsm6dso" }, lsm6dso_power, OF_PAPERS },
@@ -31,6 +37,11 @@ bool kit_of_papers(enum place place)
 bool kit_of_2026(enum place place)
 {
 	return sockets[place].part == OF_2026;
+}
+
+bool kit_has_maxsonar(enum place place)
+{
+	return sockets[place].part == MAXSONAR;
 }
 
 bool kit_has_foot(void)
@@ -64,7 +75,7 @@ bool kit_fault(const char *name, const char *value)
 		}
 	for (int k = 0; k < PLACES; k++)
 		for (int part = 0; !strcmp(name, sockets[k].place) && part < KINDS; part++)
-			if (!strcmp(value, sockets[k].parts[part])) {
+			if (sockets[k].parts[part] && !strcmp(value, sockets[k].parts[part])) {
 				plug(&sockets[k], part);
 				return true;
 			}

@@ -148,6 +148,8 @@ bool scp1000_fault(const char *name, const char *value);
 void compass_power(void);
 bool compass_fault(const char *name, const char *value);
 
+void maxsonar_power(void);
+bool maxsonar_fault(const char *name, const char *value);
 void pulse_power(void);
 void pulse_resume(void);
 bool pulse_fault(const char *name, const char *value);
@@ -166,6 +168,7 @@ bool bmp390_fault(const char *name, const char *value);
 enum place { PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_COMPASS, PLACE_THIGH, PLACE_CALF, PLACE_BELT, PLACE_PRESSURE, PLACES };
 bool kit_of_papers(enum place place);
 bool kit_of_2026(enum place place);
+bool kit_has_maxsonar(enum place place); /* a ranger */
 bool kit_has_foot(void); /* a foot board, with nothing else */
 bool kit_fault(const char *name, const char *value);
 

@@ -36,7 +36,7 @@ from echostep.board.messages import (
     Status,
     Wiring,
 )
-from echostep.board.part_faults import MIXED_RANGERS, SIX_AXES_RESPONSES, SIX_AXES_TESTS, foot_text, part_text
+from echostep.board.part_faults import SIX_AXES_RESPONSES, SIX_AXES_TESTS, foot_text, mixed_rangers, part_text
 
 TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; by reason
 UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; by reason
@@ -96,7 +96,7 @@ def _mixed_rangers(reports: BoardReports, failed: list[Healthy]) -> tuple[list[F
     """A finding on rangers of two kinds, and the one that is refused."""
     if reports.parts is None or reports.parts.wiring != Wiring.MIXED_RANGERS:
         return [], Healthy(0)
-    what, remedy = MIXED_RANGERS
+    what, remedy = mixed_rangers(part_in(reports, Healthy.RANGER_LEFT), part_in(reports, Healthy.RANGER_RIGHT))
     refused = _union(d for d in failed if d & (Healthy.RANGER_LEFT | Healthy.RANGER_RIGHT))
     return [Finding(Severity.FAULT, "rangers", what, remedy)], refused
 

@@ -60,6 +60,7 @@ PART_NAMES = {
     Part.NONE: "no part",
     Part.SRF02: "SRF02",
     Part.PULSE: "pulse ranger",
+    Part.MAXSONAR: "MaxSonar",
     Part.CMPS10: "CMPS10",
     Part.LIS3MDL: "LIS3MDL",
     Part.ADIS16100: "ADIS16100",

@@ -37,6 +37,7 @@ MEMORY_MAX_BYTES = 2200  # [firmware/README.md, budgets]
 RATE_LEAST = 0.9  # of the expected rate; by reason
 RATE_FAULT = 0.5  # of the expected rate, below it the finding is a fault; by reason
 PINGS_HZ = {Schedule.CONCURRENT: 28.0, Schedule.SEQUENTIAL: 13.5}  # both rangers [firmware/README.md]
+MAXSONAR_PINGS_HZ = {Schedule.CONCURRENT: 19.0, Schedule.SEQUENTIAL: 9.5}  # both rangers [firmware/ranger.h]
 PRESSURE_HZ = {PressureMode.HIGH_SPEED: 9.0, PressureMode.HIGH_RESOLUTION: 1.8}
 DEFAULT_GYROS_HZ, DEFAULT_COMPASS_HZ = 200.0, 10.0  # [protocol/README.md]
 _STREAMS = {  # by message: subject and unit of a finding, devices
@@ -114,10 +115,12 @@ def expected_rates(reports: BoardReports) -> dict[str, float]:
     mode = PressureMode.HIGH_SPEED if c is None else PressureMode(c.pressure_mode)
     compass = "Magnetic" if part_in(reports, Healthy.COMPASS) is Part.LIS3MDL else "Compass"
     rangers = (on & (Sensors.RANGER_LEFT | Sensors.RANGER_RIGHT)).bit_count()
+    kinds = [part_in(reports, d) for d in (Healthy.RANGER_LEFT, Healthy.RANGER_RIGHT)]
+    pings_hz = MAXSONAR_PINGS_HZ if Part.MAXSONAR in kinds else PINGS_HZ
     return {
         name: rate
         for name, rate, there in (
-            ("Ping", PINGS_HZ[schedule] * rangers / 2, rangers),
+            ("Ping", pings_hz[schedule] * rangers / 2, rangers),
             (
                 "Gyros",
                 DEFAULT_GYROS_HZ if c is None else float(c.gyro_rate_hz),

@@ -123,6 +123,7 @@ class Part(IntEnum):
     ICM20649 = 7
     SCP1000 = 8
     BMP390 = 9
+    MAXSONAR = 10
 
 
 class Wiring(IntEnum):
@@ -544,21 +545,21 @@ class Parts(NamedTuple):
         if len(body) != 21:
             raise ValueError(f"parts: {len(body)} bytes, expected 21")
         message = cls._make(_PARTS.unpack(body))
-        if message.part_ranger_left >= 10:
+        if message.part_ranger_left >= 11:
             raise ValueError(f"parts: part_ranger_left {message.part_ranger_left} is unknown")
-        if message.part_ranger_right >= 10:
+        if message.part_ranger_right >= 11:
             raise ValueError(f"parts: part_ranger_right {message.part_ranger_right} is unknown")
-        if message.part_compass >= 10:
+        if message.part_compass >= 11:
             raise ValueError(f"parts: part_compass {message.part_compass} is unknown")
-        if message.part_thigh >= 10:
+        if message.part_thigh >= 11:
             raise ValueError(f"parts: part_thigh {message.part_thigh} is unknown")
-        if message.part_calf >= 10:
+        if message.part_calf >= 11:
             raise ValueError(f"parts: part_calf {message.part_calf} is unknown")
-        if message.part_belt >= 10:
+        if message.part_belt >= 11:
             raise ValueError(f"parts: part_belt {message.part_belt} is unknown")
-        if message.part_pressure >= 10:
+        if message.part_pressure >= 11:
             raise ValueError(f"parts: part_pressure {message.part_pressure} is unknown")
-        if message.part_foot >= 10:
+        if message.part_foot >= 11:
             raise ValueError(f"parts: part_foot {message.part_foot} is unknown")
         if message.wiring >= 2:
             raise ValueError(f"parts: wiring {message.wiring} is unknown")
@@ -1135,14 +1136,14 @@ GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x0A, 4, 2),  # gyro_health.gyro
     (0x0A, 7, 5),  # gyro_health.self_test
     (0x0B, 10, 11),  # board_health.crash_place
-    (0x0C, 4, 9),  # parts.part_ranger_left
-    (0x0C, 5, 9),  # parts.part_ranger_right
-    (0x0C, 6, 9),  # parts.part_compass
-    (0x0C, 7, 9),  # parts.part_thigh
-    (0x0C, 8, 9),  # parts.part_calf
-    (0x0C, 9, 9),  # parts.part_belt
-    (0x0C, 10, 9),  # parts.part_pressure
-    (0x0C, 11, 9),  # parts.part_foot
+    (0x0C, 4, 10),  # parts.part_ranger_left
+    (0x0C, 5, 10),  # parts.part_ranger_right
+    (0x0C, 6, 10),  # parts.part_compass
+    (0x0C, 7, 10),  # parts.part_thigh
+    (0x0C, 8, 10),  # parts.part_calf
+    (0x0C, 9, 10),  # parts.part_belt
+    (0x0C, 10, 10),  # parts.part_pressure
+    (0x0C, 11, 10),  # parts.part_foot
     (0x0C, 20, 1),  # parts.wiring
     (0x10, 4, 2),  # foot_health.foot_state
     (0x10, 5, 9),  # foot_health.fault

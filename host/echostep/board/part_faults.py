@@ -28,6 +28,12 @@ _PULSE = {
         "check it for a short to 5 V (left D4, right D13); a module that holds it for 0.2 s without an echo is of another kind: replace it",
     ),
 }
+_MAXSONAR = {
+    Fault.BAD_VALUE: (
+        "gives ranges above 765 cm, which it cannot measure",
+        "its wires may be too long: shorten them, check the pull-ups, SDA (D2) and SCL (D3)",
+    ),
+}
 _LSM6DSO = {
     Fault.NO_ANSWER: ("does not answer", f"{_SPI} and its chip select (thigh D8, calf D9, belt D10)"),
     Fault.NEVER_READY: ("has no new rates", f"it may have lost its supply for a moment: {_SPI}"),
@@ -46,6 +52,7 @@ _ICM20649 = {
 _TEXTS: dict[Part, dict[Fault, tuple[str, str]]] = {
     Part.BMP390: _BMP390,
     Part.PULSE: _PULSE,
+    Part.MAXSONAR: _MAXSONAR,
     Part.LSM6DSO: _LSM6DSO,
     Part.LIS3MDL: _LIS3MDL,
     Part.ICM20649: _ICM20649,
@@ -62,10 +69,21 @@ SIX_AXES_TESTS = {  # what is wrong and the remedy, by the outcome of the self-t
     SelfTest.MOVED: ("turned during its self-test", "stand still and run echostep doctor"),
 }
 SIX_AXES_RESPONSES = "-615 to -2870 and 615 to 2870"  # counts, to the negative and the positive sign [LSM6DSO data sheet: 150 to 700 deg/s]
-MIXED_RANGERS = (
-    "one is an SRF02 and the other one a pulse ranger, which is not used: beam, range and resolution differ",
-    "plug in two of one kind",
-)
+_KINDS = {  # of rangers, in the order in which the firmware prefers them
+    Part.MAXSONAR: "a MaxSonar",
+    Part.SRF02: "an SRF02",
+    Part.PULSE: "a pulse ranger",
+}
+
+
+def mixed_rangers(left: Part, right: Part) -> tuple[str, str]:
+    """What is wrong with rangers of two kinds and the remedy."""
+    what, remedy = "they are of two kinds, and one of them is not used", "plug in two of one kind"
+    order = list(_KINDS)
+    if left in order and right in order and left != right:
+        unused = "left" if order.index(left) > order.index(right) else "right"
+        what = f"the left one is {_KINDS[left]}, the right one {_KINDS[right]}; the {unused} one is not used"
+    return f"{what}: beam, range and resolution differ", remedy
 
 
 def foot_text(fault: Fault) -> tuple[str, str]:

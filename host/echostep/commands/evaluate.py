@@ -49,7 +49,7 @@ def kits(
     out: Out = Path("out/kits"),
     scheduler: Scheduler = None,
 ) -> None:
-    """The 52 steps of Girard et al. 2011 with the rangers of either kit (simulated; pulse rangers were not built yet)."""
+    """The 52 steps of Girard et al. 2011 with each kind of ranger and of foot (simulated; only SRF02 and MTx were ever worn)."""
     from echostep.evaluate.kits import STUDY
     from echostep.evaluate.study import StudyRequest, run_study
 

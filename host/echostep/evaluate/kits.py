@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`echostep evaluate kits`: the 52 steps of Girard with the rangers and the feet of either kit; the kit of 2026 was not built yet.
 
-In: seeds. Out: rows: errors and coverage of the paper's filter and of the default one with SRF02 and with pulse rangers, on the same steps.
+In: seeds. Out: rows: errors and coverage of the paper's filter and of the default one with each kind of ranger, on the same steps.
 Everything here is simulated: building, walker, sensors. In the rows of the rangers the foot is the same; `kit_feet` has those of the feet.
 """
 
@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cache
 
-from echostep.board.messages import Part
+from echostep.board.messages import Part, Schedule
 from echostep.evaluate import kit_feet
 from echostep.evaluate.girard2011 import COLUMNS, MethodOutput, default, girard
 from echostep.evaluate.report import Row, Table, rows_by_name, summary
@@ -19,31 +19,37 @@ from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.echo_likelihood import EchoSettings
 from echostep.localization.ranger_models import ECHO_OF
 from echostep.papers.girard2011 import GirardSettings
+from echostep.simulation.devices.srf02 import HALF_US
 from echostep.simulation.people.marker_walk import MarkerWalk, lay_markers, walk_markers
-from echostep.simulation.world.acoustics import PULSE_RANGER, SRF02, Acoustics
+from echostep.simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics
 from echostep.simulation.world.sites import SimulatedSite, furnished, otb
 
 PULSE_CONE_RAD = math.radians(30.0)  # [HC-SR04 user guide: best within 30 degrees]
+MAXSONAR_CONE_RAD = math.radians(45.0)  # -6 dB each way of the piston in `acoustics`
+MAXSONAR_HALF_S = 0.05  # [firmware/ranger.h]
 
 
 @dataclass(frozen=True, slots=True)
 class RangerKind:
-    """One kind of ranger: how it hears, and the settings of the two filters that fit it."""
+    """One kind of ranger: how it hears, the settings of the two filters that fit it, and half its period between pings."""
 
     acoustics: Acoustics
     echo: EchoSettings
     girard: GirardSettings
+    half_s: float = HALF_US[Schedule.CONCURRENT] * 1e-6
 
 
 @cache
 def kinds() -> dict[str, RangerKind]:
     """The kinds of rangers by the names of their rows; `pulse, as SRF02` is a pulse ranger whose settings were forgotten."""
-    echo = ECHO_OF[Part.PULSE]
+    echo, maxsonar = ECHO_OF[Part.PULSE], ECHO_OF[Part.MAXSONAR]
     paper = GirardSettings()
     narrow = replace(paper, aperture_rad=PULSE_CONE_RAD, maximum_m=echo.maximum_m)
+    far = replace(paper, aperture_rad=MAXSONAR_CONE_RAD, maximum_m=maxsonar.maximum_m)
     return {
         "SRF02": RangerKind(SRF02, EchoSettings(), paper),
         "pulse": RangerKind(PULSE_RANGER, echo, narrow),
+        "MaxSonar": RangerKind(MAXSONAR, maxsonar, far, MAXSONAR_HALF_S),
         "pulse, as SRF02": RangerKind(PULSE_RANGER, EchoSettings(), paper),
     }
 
@@ -63,7 +69,7 @@ def one_run(seed: int) -> list[Row]:
 
 
 def _walk(site: SimulatedSite, seed: int, kind: RangerKind) -> MarkerWalk:
-    return walk_markers(lay_markers(site.route), site.built, seed, site.passers, acoustics=kind.acoustics)
+    return walk_markers(lay_markers(site.route), site.built, seed, site.passers, None, kind.acoustics, kind.half_s)
 
 
 def _row(name: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> Row:
@@ -79,7 +85,7 @@ def _summary(runs: list[Row]) -> Row:
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    title = f"Position error in metres by kind of ranger, and of the foot alone, {request.runs} simulated runs; pulse rangers: not built yet"
+    title = f"Position error in metres by kind of ranger, and of the foot alone, {request.runs} simulated runs; only SRF02 and MTx were ever worn"
     return [Table(title, sorted(rows, key=lambda row: row["name"].split(", ")[:-1]), COLUMNS)]
 
 

@@ -169,7 +169,7 @@ def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.r
         at = np.clip(at, 0, count - 1)
         cross_us = heard.cross_us[at, ranger].astype(float)
         came[:, k] = np.where(there & (cross_us > 0), cross_us + (t_s[at] - t_s) * 1e6, 0.0)
-    came[(came < FIRST_US) | (came > LAST_US)] = np.inf
+    came[(came < FIRST_US) | (came > max(LAST_US, 2e6 * a.maximum_m / a.speed_m_s))] = np.inf
     first_us = came.min(1)
     range_m = np.where(np.isfinite(first_us), first_us * (0.5e-6 * a.speed_m_s), np.nan)
     axis = heading + np.where(ranger == 0, 0.5 * math.pi, -0.5 * math.pi)

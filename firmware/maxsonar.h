@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/* MaxBotix I2CXL-MaxSonar-EZ (MB1202 to MB1242), an ultrasonic ranger on I2C: left at address 0x70, right at 0x71. */
+#ifndef ECHOSTEP_MAXSONAR_H
+#define ECHOSTEP_MAXSONAR_H
+
+#include "ranger.h" /* struct ranging */
+
+/* Sends the ranging command; false: the bus is in use. */
+bool maxsonar_begin(uint8_t side, struct ranging *r);
+
+/* Does the next step. RANGING_REFUSED: no answer, or that of another part. */
+enum ranging_state maxsonar_run(uint8_t side, uint32_t now, struct ranging *r);
+
+#endif

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""MaxBotix I2CXL-MaxSonar-EZ rangers in the twin: told from SRF02, measured at their own pace, and failing in their own ways."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
+from echostep.board import messages as m
+from echostep.board.findings import BoardReports
+from echostep.board.health import board_findings
+from echostep.board.subscription import SUBSCRIBE
+
+pytestmark = needs_twin
+
+SIDES = (("left", m.Ranger.LEFT), ("right", m.Ranger.RIGHT))
+US_PER_CM = 58
+CLOCK_BEGINS_US = 1_163  # of the true time, after power-up
+JITTER_US = 2.0  # limit on the stamps
+
+
+def plug(bench: Bench, part: str, *sides: str) -> None:
+    for side in sides or ("left", "right"):
+        bench.fault(f"part_ranger_{side}={part}")
+
+
+@pytest.fixture
+def rangers(bench: Bench) -> Bench:
+    """A board of the papers with MaxSonar rangers on both sides, subscribed."""
+    plug(bench, "maxsonar")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(1_700)
+    return bench
+
+
+def parts(bench: Bench) -> m.Parts:
+    return next(x for x in reversed(bench.messages) if isinstance(x, m.Parts))
+
+
+def findings(bench: Bench) -> list[str]:
+    """Every finding that any status gave rise to."""
+    kept, found = BoardReports(), []
+    for message in bench.messages:
+        kept.add(message)
+        if isinstance(message, m.Status):
+            found += [str(f) for f in board_findings(kept)]
+    return found
+
+
+def outcomes(found: list[m.Message], ranger: m.Ranger) -> set[int]:
+    return {p.outcome for p in pings(found, ranger)}
+
+
+def test_maxsonars_are_found_and_ping_ten_times_a_second_each(rangers: Bench) -> None:
+    found = rangers.run(10_000)
+    assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == m.Part.MAXSONAR
+    for side, ranger in SIDES:
+        answers = pings(found, ranger)
+        assert 99 <= len(answers) <= 101
+        assert {p.outcome for p in answers} == {m.Outcome.ECHO}
+        truth_us = np.array([t for t, text in rangers.board.trace if text == f"trigger {side}"]) * 1e-3
+        stamps_us = np.array([p.ticks for p in answers]) * 0.5
+        errors = stamps_us - truth_us[np.abs(truth_us[:, None] - CLOCK_BEGINS_US - stamps_us).argmin(0)]
+        assert np.ptp(errors) <= JITTER_US
+    assert not rangers.status.errors_ranger_left
+    assert kinds(found)["Gyros"] >= 1_999
+
+
+@pytest.mark.parametrize(
+    ("own_us", "range_cm"),
+    [(0, 0), (700, 25), (1_450, 25), (5_831, 101), (7_424, 128), (22_272, 384), (44_000, 759), (45_000, 0)],
+)
+def test_a_range_is_given_in_centimetres_from_the_least_to_the_greatest(
+    rangers: Bench, own_us: int, range_cm: int
+) -> None:
+    """128 and 384 cm have the low byte 0x80 of an SRF02's register 1."""
+    rows = quiet_rows(1_000)
+    rows["own_us"] = own_us
+    rangers.run(200, rows[:200])
+    for _, ranger in SIDES:
+        assert {p.time_of_flight_us for p in pings(rangers.run(1_000, rows), ranger)} == {range_cm * US_PER_CM}
+    assert parts(rangers).part_ranger_left == m.Part.MAXSONAR
+
+
+def test_in_turn_they_ping_five_times_a_second_each(rangers: Bench) -> None:
+    rangers.ask(m.Configure(0xFF, m.Schedule.SEQUENTIAL, 200, 10, m.PressureMode.HIGH_SPEED))
+    rangers.run(500)
+    found = rangers.run(4_000)
+    for _, ranger in SIDES:
+        assert 19 <= len(pings(found, ranger)) <= 21
+        assert outcomes(found, ranger) == {m.Outcome.ECHO}
+    times = sorted(p.ticks for p in found if isinstance(p, m.Ping))
+    assert min(np.diff(times)) > 99 * 2_000
+
+
+def test_the_other_rangers_ping_moves_with_the_schedule(rangers: Bench) -> None:
+    rows = quiet_rows(5_000)
+    rows["own_us"][:, 0], rows["own_us"][:, 1] = 0, 7_000
+    rows["cross_us"][:, 0] = 65_000
+    heard = [p.time_of_flight_us for p in pings(rangers.run(5_000, rows), m.Ranger.LEFT) if p.outcome == m.Outcome.ECHO]
+    assert len(heard) > 30
+    assert np.ptp(heard) > 2_000
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause", "words"),
+    [
+        ("absent", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
+        ("nack", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
+        ("mute", m.Fault.NO_ANSWER, "left ranger (MaxSonar): does not answer at I2C address 0x70"),
+        ("misread", m.Fault.BAD_VALUE, "left ranger (MaxSonar): gives ranges above 765 cm"),
+    ],
+)
+def test_a_maxsonar_that_fails_is_named_and_comes_back(rangers: Bench, kind: str, cause: m.Fault, words: str) -> None:
+    rangers.fault(f"maxsonar_left={kind}")
+    rangers.run(1_500)
+    found = rangers.run(1_000)
+    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
+    assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
+    assert len(pings(found, m.Ranger.RIGHT)) >= 9
+    assert cause in {x.fault_ranger_left for x in rangers.messages if isinstance(x, m.Status)}
+    assert any(text.startswith(words) for text in findings(rangers))
+    rangers.fault("maxsonar_left=ok")
+    rangers.run(2_500)
+    found = rangers.run(1_000)
+    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.ECHO}
+    assert rangers.status.healthy & m.Healthy.RANGER_LEFT
+
+
+def test_a_deaf_maxsonar_reports_no_echo_and_a_long_stretch_of_the_clock_is_borne(rangers: Bench) -> None:
+    rangers.fault("maxsonar_right=deaf")
+    rangers.run(200)
+    assert outcomes(rangers.run(1_000), m.Ranger.RIGHT) == {m.Outcome.NO_ECHO}
+    rangers.fault("maxsonar_right=stretch")
+    rangers.run(200)
+    found = rangers.run(2_000)
+    assert outcomes(found, m.Ranger.RIGHT) == outcomes(found, m.Ranger.LEFT) == {m.Outcome.ECHO}
+    assert not rangers.status.bus_recoveries
+
+
+def test_rangers_of_all_kinds_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
+    expected = {"srf02": (m.Part.SRF02, 28), "maxsonar": (m.Part.MAXSONAR, 19), "pulse": (m.Part.PULSE, 28)}
+    for part in ("srf02", "maxsonar", "pulse", "maxsonar", "srf02"):
+        plug(rangers, part)
+        rangers.run(4_000)
+        found = rangers.run(1_000)
+        name, least = expected[part]
+        assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == name
+        assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+        assert least <= kinds(found)["Ping"] <= least + 3
+
+
+@pytest.mark.parametrize(("other", "name"), [("srf02", "an SRF02"), ("pulse", "a pulse ranger")])
+def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, other: str, name: str) -> None:
+    plug(bench, other, "left")
+    plug(bench, "maxsonar", "right")
+    bench.run(300)
+    bench.ask(SUBSCRIBE)
+    bench.run(2_000)
+    found = bench.run(2_000)
+    assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
+    assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
+    assert parts(bench).wiring == m.Wiring.MIXED_RANGERS
+    words = f"rangers: the left one is {name}, the right one a MaxSonar; the left one is not used"
+    assert any(text.startswith(words) for text in findings(bench))
+    plug(bench, "maxsonar", "left")
+    bench.run(3_000)
+    assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+    assert parts(bench).wiring == m.Wiring.OK
+
+
+def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
+    rangers.fault("reset=watchdog")
+    rangers.run(2_000)
+    assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+    rangers.run(1_000)
+    assert not [text for text in findings(rangers) if "ranger" in text]
