@@ -71,6 +71,18 @@ def test_a_gap_of_one_leg_is_seen_by_the_other(legs: tuple[LegSamples, LegSample
     assert track_default(LegSamples(*columns), StrideSettings()).distance_m < 0.9 * found.distance_m
 
 
+def test_sensors_that_are_not_worn_do_not_halve_the_way(legs: tuple[LegSamples, LegSamples]) -> None:
+    first, nothing = legs[0], np.full(len(legs[0].t_s), np.nan)
+    noise = 0.002 * np.random.default_rng(1).standard_normal((2, len(first.t_s)))
+    lying = LegSamples(first.t_s, noise[0], noise[1], nothing, nothing)
+    alone = track_default(first, StrideSettings()).distance_m
+    for pair, name in (((first, lying), "the other"), ((lying, first), "the first")):
+        found = track_pair(*pair, StrideSettings())
+        assert found.distance_m == pytest.approx(alone, rel=0.03)
+        assert any(f"the sensors of {name} leg rest" in note for note in found.notes)
+        assert distance_sd_m(found.strides) > 0.07 * alone
+
+
 def test_legs_of_two_persons_and_of_two_clocks(legs: tuple[LegSamples, LegSamples]) -> None:
     first, other = legs
     wide = replace(other, thigh=1.25 * other.thigh, shank=1.25 * other.shank)

@@ -11,6 +11,7 @@ other leg goes on with the scale that makes both equally long where both are see
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,7 @@ from echostep.offline.leg_track import (
 LEGS_DIFFER = 0.04  # standard deviation of the ratio of a person's two legs [14 legs of 7 people]
 DOUBTFUL = 3.0  # times that: no two legs of one person; by reason
 STRAIGHT_S, STRAIGHT_RAD = 1.0, math.radians(15.0)  # of trunks that go straight on: about a stride; by reason
+NAMES = "the first", "the other"
 LEAST_M = 3.0  # seen by both legs, to compare them; by reason: two strides
 Legs = tuple[tuple[Stride, ...], tuple[Stride, ...]]
 UNKNOWN = Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # strides of which a leg does not know the length
@@ -55,13 +57,18 @@ def track_pair(
     t_s = np.union1d(first.t_s, other.t_s)
     moves = np.array([np.diff(distance_at(t_s, strides)) for strides in legs])
     seen = np.array([_seen(t_s, leg, strides) for leg, strides in zip((first, other), legs, strict=True)])
+    idle = np.array([_idle(t_s, legs[0], legs[1]), _idle(t_s, legs[1], legs[0])])
+    seen &= ~idle
     angles, heading_notes = fused_heading(trunk, legs[0] if trunk is first else legs[1], heading_rad)
     heading = np.interp(t_s, trunk.t_s, angles[:, 0])
     ratio, notes = _ratio(moves[:, seen.all(axis=0) & _straight(t_s, heading)].sum(axis=1))
     alone = seen.any(axis=0) & ~seen.all(axis=0)
     distance = _summed((np.where(alone, seen * ratio[:, None], 0.5) * moves).sum(axis=0))
     strides = with_turns(_joint_strides(t_s, distance, seen, legs), t_s, heading)
-    notes = (*notes, *heading_notes, *doubts(strides))
+    loose = (
+        f"the sensors of {name} leg rest during a walk: are they worn?" for name in np.array(NAMES)[idle.any(axis=1)]
+    )
+    notes = (*notes, *loose, *heading_notes, *doubts(strides))
     counts = LegCounts(*(getattr(found[0][1], k) + getattr(found[1][1], k) for k in LegCounts.__slots__))
     return LegTrack(path_rows(t_s, distance, heading), strides, counts, source_of(trunk), float(angles[-1, 1]), notes)
 
@@ -82,10 +89,27 @@ def _seen(t_s: Floats, leg: LegSamples, strides: tuple[Stride, ...]) -> Bools:
     """Whether the leg measures the way between each two times (n - 1,)."""
     middle = 0.5 * (t_s[:-1] + t_s[1:])
     seen = (middle > leg.t_s[0]) & (middle < leg.t_s[-1])
+    return seen & ~_within(middle, [s for s in strides if s.flags & UNKNOWN])
+
+
+def _idle(t_s: Floats, strides: tuple[Stride, ...], others: tuple[Stride, ...]) -> Bools:
+    """Whether this leg has no stride between each two times (n - 1,) while the other leg goes a whole one, which no leg does."""
+    middle = 0.5 * (t_s[:-1] + t_s[1:])
+    stands = ~_within(middle, [s for s in strides if Flag.STANDING not in s.flags])
+    begun = _summed(stands.astype(np.float64))
+    whole = [s for s in others if s.length_m > 0.0 and Flag.EDGE not in s.flags]
+    spans = [np.searchsorted(middle, [s.t_start_s, s.t_end_s]) for s in whole]
+    return _within(
+        middle, [s for s, (a, b) in zip(whole, spans, strict=True) if b > a and begun[b] - begun[a] == b - a]
+    )
+
+
+def _within(times: Floats, strides: Sequence[Stride]) -> Bools:
+    """Whether each time (n,) is in one of these strides."""
+    within = np.zeros(len(times), np.bool_)
     for stride in strides:
-        if stride.flags & UNKNOWN:
-            seen &= (middle < stride.t_start_s) | (middle > stride.t_end_s)
-    return seen
+        within[slice(*np.searchsorted(times, [stride.t_start_s, stride.t_end_s]))] = True
+    return within
 
 
 def _straight(t_s: Floats, heading: Floats) -> Bools:
