@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Types of numpy arrays that annotations use everywhere, and the numpy dtype of a record that a Protocol describes.
+"""Types of numpy arrays that annotations use everywhere, runs of a condition, and the numpy dtype of a record that a Protocol describes.
 
 In: a Protocol class with annotated fields. Out: names of array types; dtypes of records. Owns nothing.
 """
@@ -20,6 +20,11 @@ Octets = NDArray[np.uint8]
 
 _SCALARS = {"float": "f8", "int": "i8"}
 _ARRAYS = {"Floats": "f8", "Ints": "i8"}
+
+
+def spans(holds: Bools) -> Ints:
+    """Runs of True in a condition (n,): (k, 2) the first index of each, and the index after its last."""
+    return np.flatnonzero(np.diff(holds, prepend=False, append=False)).reshape(-1, 2)
 
 
 def record_dtype(protocol: type, array_size: int | None = None, **sizes: int) -> np.dtype[np.void]:

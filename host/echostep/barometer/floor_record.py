@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Floats, Ints, spans
 from echostep.barometer.altitude import AirColumn, Altitude, BarometerSettings, Heights, Pressures, noise_of
 from echostep.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
 from echostep.barometer.vertical_model import CLAIMED
@@ -178,10 +178,9 @@ def _apart(heights_m: Floats) -> Floats:
 def _rises(heights: Heights) -> list[float]:
     """Rise (m) between each two neighbouring stays, which are long stretches without vertical motion; rises within one floor are left out."""
     level = heights.moving < MOVING_P
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], level.astype(np.int8), [0]])))
     stays = [
         (a, b)
-        for a, b in edges.reshape(-1, 2).tolist()
+        for a, b in spans(level).tolist()
         if heights.t_s[b - 1] - heights.t_s[a] >= (SHORTEST_END_S if a == 0 or b == len(level) else SHORTEST_STAY_S)
     ]
     if len(stays) < 2:  # one change of floors from the first sample to the last

@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, Ints
+from echostep.arrays import Bools, Floats, Ints, spans
 from echostep.barometer import vertical_model as vertical
 from echostep.barometer.altitude import BarometerSettings, Pressures
 from echostep.barometer.floor_filter import FloorFilter, Floors
@@ -117,8 +117,7 @@ def judge(found: Floors, away_m: Floats) -> Row:
 
 def longest_s(t_s: Floats, wrong: Bools) -> float:
     """The longest time without a right sample, to the first right one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], wrong.astype(np.int8), [0]]))).reshape(-1, 2)
-    return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in edges.tolist()), default=0.0)
+    return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in spans(wrong).tolist()), default=0.0)
 
 
 def _summary(rows: Sequence[Row]) -> Row:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, spans
 
 # The source of these values is not recorded.
 NEAR = 0.985  # share of the limit from which a rate counts as clipped: a bias may have been subtracted from it
@@ -74,8 +74,7 @@ def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) 
 
     A stretch stays as it is if it has one sample only, is too long, or has no unclipped samples on both sides.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], clipped, [False]]).astype(np.int8)))
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for begin, end in spans(clipped).tolist():
         a, b = begin - 1, end
         if a < 1 or b + 1 >= len(rate) or end - begin < 2 or end - begin > LONGEST or clipped[a - 1] or clipped[b + 1]:
             continue

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, spans
 from echostep.mapping.drawing import Drawing
 from echostep.mapping.evidence import CELL_M, MARGIN_M, Cells, add_crossings, cell_counts, is_straight, ping_poses
 from echostep.mapping.graph import Graph
@@ -86,7 +86,7 @@ def _passed(cells: Cells, k: int, length_m: float) -> Bools:
 
 def _split(wall: Floats, gone: Bools) -> tuple[Floats, Floats]:
     """The pieces of a wall (4,) that stand, and those that are doubtful; short doubts are none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]]).astype(np.int8))).reshape(-1, 2)
+    edges = spans(gone)
     edges = edges[(edges[:, 1] - edges[:, 0]) * CELL_M >= LEAST_DOUBTFUL_M]
     shares = np.minimum(edges / max(len(gone), 1), 1.0)
     cuts = np.concatenate([[0.0], shares.ravel(), [1.0]]).reshape(-1, 2)
@@ -111,7 +111,7 @@ def _unknown(drawn: Floats, known: Floats) -> Floats:
         new = np.ones(count, np.bool_)
         if tree is not None:
             new[tree.query(points, predicate="dwithin", distance=KNOWN_M)[0]] = False
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], new, [False]]).astype(np.int8))).reshape(-1, 2)
+        edges = spans(new)
         edges = edges[(edges[:, 1] - edges[:, 0]) * SAMPLE_M >= LEAST_NEW_M]
         pieces.append(_between(wall, edges / count))
     return np.concatenate(pieces)

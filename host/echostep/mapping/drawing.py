@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, Ints
+from echostep.arrays import Bools, Floats, Ints, spans
 from echostep.mapping.evidence import add_crossings, cell_counts, explained_by_ends, is_straight, ping_poses
 from echostep.mapping.graph import Graph
 from echostep.mapping.lines import Lines, find_lines, joined
@@ -53,8 +53,7 @@ def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
 
 def pieces_on(path: Floats, on: Bools) -> list[Floats]:
     """The pieces (k, 2) of a path (n, 2) whose nodes are `on` (n,) a storey."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
-    return [path[a:b] for a, b in edges.reshape(-1, 2)]
+    return [path[a:b] for a, b in spans(on)]
 
 
 def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, spans
 from echostep.mapping.evidence import CELL_M, CROSSED, Cells
 from echostep.mapping.lines import Lines
 
@@ -49,7 +49,7 @@ def find_runs(cells: Cells, aligned: Bools) -> list[Run]:
         least = (LEAST_PINGS, LEAST_M) if aligned[line] else (LEAST_PINGS_ASKEW, LEAST_ASKEW_M)
         near, near_passed = np.convolve(h, kernel, "same"), np.convolve(p, kernel, "same")
         there = (near > 0.0) & (HEARD_ODDS * near > PASSED_ODDS * near_passed)
-        for low, high in _bridged(_spans(there), near_passed):
+        for low, high in _bridged(spans(there).tolist(), near_passed):
             at = np.flatnonzero(h[low:high]) + low
             if not len(at):
                 continue
@@ -60,16 +60,10 @@ def find_runs(cells: Cells, aligned: Bools) -> list[Run]:
     return runs
 
 
-def _spans(there: Bools) -> list[tuple[int, int]]:
-    """Begin and end of each run of true cells."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
-def _bridged(spans: list[tuple[int, int]], passed: Floats) -> list[tuple[int, int]]:
+def _bridged(pieces: list[tuple[int, int]], passed: Floats) -> list[tuple[int, int]]:
     """Spans joined over short gaps, and over longer ones that no ping passed."""
     joined: list[tuple[int, int]] = []
-    for low, high in spans:
+    for low, high in pieces:
         if joined:
             gap = (low - joined[-1][1]) * CELL_M
             silent = not passed[joined[-1][1] : low].any()

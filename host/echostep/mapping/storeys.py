@@ -14,7 +14,7 @@ from statistics import median
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, Ints
+from echostep.arrays import Floats, Ints, spans
 from echostep.mapping.nodes import Nodes
 from echostep.path import MeasuredSegment
 
@@ -48,7 +48,9 @@ def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys |
     climb, way = np.interp(nodes.t_s, *_climb(segments)), nodes.way_m
     after, before = (np.interp(way + side * WINDOW_M, way, climb) for side in (1.0, -1.0))
     stretches = [
-        (first, end) for first, end in _spans(np.abs(after - before) < FLAT_M) if way[end - 1] - way[first] > STRETCH_M
+        (first, end)
+        for first, end in spans(np.abs(after - before) < FLAT_M).tolist()
+        if way[end - 1] - way[first] > STRETCH_M
     ]
     heights: list[float] = []
     which: list[int] = []
@@ -75,12 +77,6 @@ def _height_m(climb: Floats, way: Floats, first: int, end: int, *, from_end: boo
     """Height of the STRETCH_M at the beginning or the end of a stretch of nodes [first, end)."""
     near = way[end - 1] - way[first:end] < STRETCH_M if from_end else way[first:end] - way[first] < STRETCH_M
     return float(np.median(climb[first:end][near]))
-
-
-def _spans(level: Bools) -> list[tuple[int, int]]:
-    """Begin and end of each run of level nodes."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], level, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _widened(climb: Floats, first: int, end: int) -> tuple[int, int]:

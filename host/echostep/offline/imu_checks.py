@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Floats, spans
 from echostep.foot.steps import Track
 from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
 from echostep.offline.csv_table import rate_complaint
@@ -103,18 +103,12 @@ def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
             return f"{name} is constant: is that sensor alive?"
         others = [column for column in range(RATE.start, RATE.stop) if column != k]
         moving = np.linalg.norm(table[:, others], axis=1) > MOVING_RAD_S
-        for begin, end in _runs(np.diff(table[:, k]) == 0.0):
+        for begin, end in spans(np.diff(table[:, k]) == 0.0).tolist():
             span = float(table[end, TIME] - table[begin, TIME])
             if span > longest and moving[begin:end].mean() > MOVING_SHARE:
                 longest, since = span, float(table[begin, TIME])
                 dead = f"{name} does not change for {span:.1f} s from {since:.2f} s on, while the foot moves: is that sensor alive?"
     return dead
-
-
-def _runs(same: Bools) -> list[tuple[int, int]]:
-    """Index of the first true value of each run, and of the first false one after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _unit_complaint(table: Floats) -> str:

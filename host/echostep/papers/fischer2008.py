@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, spans
 from echostep.foot.ins import GRAVITY_M_S2
 from echostep.foot.steps import FootCounts, Stance, Step, Track
 from echostep.foot.zupt_ins import GAP_S, MAX_ACCEL_M_S2, MAX_RATE_RAD_S, STRAY_SAMPLES
@@ -111,10 +111,9 @@ def headings(orientation: Floats, level: Floats) -> Floats:
 def events(t_s: Floats, position: Floats, heading: Floats, stance: Bools) -> list[Step | Stance]:
     """The stances that ended, and the steps between the detection of one stance and of the next, in order of time."""
     found: list[Step | Stance] = []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], stance, [False]]).astype(np.int8)))
     unknown = np.full((3, 3), np.nan)
     before: int | None = None
-    for begin, end in edges.reshape(-1, 2).tolist():
+    for begin, end in spans(stance).tolist():
         if before is not None:
             x, y, z = (position[begin] - position[before]).tolist()
             found.append(Step(float(t_s[before]), float(t_s[begin]), (x, y, z), unknown, float(heading[begin]), np.nan))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, spans
 from echostep.foot.steps import Track
 
 FROZEN_SAMPLES = 5  # motion capture that repeats itself for longer has lost its markers
@@ -104,9 +104,8 @@ def climb(track: Track) -> list[Figure]:
 def _frozen(truth: Floats) -> Bools:
     """Where motion capture (n, 2) has lost its markers and repeats itself for longer than 25 ms, before it jumps."""
     same = np.concatenate([[False], (np.diff(truth, axis=0) == 0.0).all(1)])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
     found = np.zeros(len(truth), bool)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in spans(same):
         found[begin:end] = end - begin > FROZEN_SAMPLES
     return found
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.arrays import Floats, spans
 from echostep.evaluate.anywhere.sites import LOBBY
 from echostep.evaluate.anywhere.tours import random_tour
 from echostep.localization.estimate import Estimate
@@ -97,9 +97,7 @@ def _full(waypoint: Waypoint) -> tuple[float, float, float, float]:
 def _standing_s(truth: Floats, stop: Waypoint) -> float:
     """Two seconds after the wearer has come to rest at a stop."""
     still = np.hypot(truth[:, 1] - stop[0], truth[:, 2] - stop[1]) < 0.2
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
-    stays = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
-    begin, _ = max(stays, key=lambda stay: stay[1] - stay[0])
+    begin, _ = max(spans(still), key=lambda stay: stay[1] - stay[0])
     return float(truth[begin, 0]) + 2.0
 
 

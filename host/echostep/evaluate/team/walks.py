@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, spans
 from echostep.evaluate.anywhere.tours import random_tour
 from echostep.plan.model import Plan, Pose
 from echostep.plan.routing import RoutePlace
@@ -95,7 +95,7 @@ def encounters(plan: Plan, truth: Sequence[Floats]) -> tuple[Encounter, ...]:
         beside = (a[:, T] >= BEGIN_S) & (away < SIDE_M) & (np.abs(a[:, Z] - b[:, Z]) < LEVEL_M)
         beside[beside] = ~_walled(plan, a[beside], b[beside])
         last_s = -np.inf
-        for first, end in _spans(beside):
+        for first, end in spans(beside).tolist():
             k = first + int(away[first:end].argmin())
             if a[k, T] - last_s >= AGAIN_S:
                 last_s = float(a[k, T])
@@ -114,9 +114,3 @@ def _walled(plan: Plan, a: Floats, b: Floats) -> Bools:
         walls = shapely.union_all(shapely.linestrings(level.solid.reshape(-1, 2, 2)))
         walled[rows] = shapely.intersects(lines, walls)
     return walled
-
-
-def _spans(inside: Bools) -> list[tuple[int, int]]:
-    """First row and the row after the last of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
