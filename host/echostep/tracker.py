@@ -168,23 +168,18 @@ class Tracker:
     def take(self, portion: Portion) -> list[Estimate]:
         """Process many chunks; the estimates are those of the chunks one by one."""
         estimates: list[Estimate] = []
-        for piece in portion.cut_after(PERSON):
-            for met in piece.cut_after(MEETING):
-                for told in met.cut_after(TEAM):
-                    for placed in told.cut_after(TEAM_BEACONS):
-                        for part in placed.cut_after(GATEWAY):
-                            estimates += self._track(part)
-                        if len(placed.of(TEAM_BEACONS).row):
-                            self._team_beacons.hear(placed.of(TEAM_BEACONS).received, len(self.plan.levels))
-                    if from_team := told.of(TEAM).received:
-                        for hear in self.team_watchers:
-                            hear(from_team)
-                self.alarm.add(self.front_end.signs.pop())
-                if len(met.of(MEETING).row):
-                    estimates += self._hear_meeting(met.of(MEETING).received)
-            check_in = piece.of(PERSON)
-            if len(check_in.row):
-                estimates += self._apply_person(check_in.received)
+        for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, TEAM, MEETING, PERSON):
+            estimates += self._track(piece)
+            if len(piece.of(TEAM_BEACONS).row):
+                self._team_beacons.hear(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
+            self.alarm.add(self.front_end.signs.pop())
+            if from_team := piece.of(TEAM).received:
+                for hear in self.team_watchers:
+                    hear(from_team)
+            for port, apply in ((MEETING, self._hear_meeting), (PERSON, self._apply_person)):
+                told = piece.of(port)
+                if len(told.row):
+                    estimates += apply(told.received)
         return estimates
 
     def warm_up(self) -> None:

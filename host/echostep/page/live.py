@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from operator import attrgetter
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from echostep.guidance.cue_list import CueList
 from echostep.localization.echo_likelihood import echo_model
@@ -49,10 +49,6 @@ OPENING_POLL_S = 0.05
 MOST_KEPT = 2000  # particles in each scene of a replay
 
 
-def _unknown(_: int) -> None:
-    """No commander is known to have acknowledged an alarm."""
-
-
 class LivePage:
     """Call `note_arrival` and `publish` for each portion; `pop_check_ins` gives the pages' check-ins as bytes of chunks."""
 
@@ -76,7 +72,7 @@ class LivePage:
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.has_team = False  # the run's reports go somewhere
-        self.acknowledged_by: Callable[[int], str | None] = _unknown  # the commander who has, by the alarm's number
+        self.acknowledged_by: Callable[[int], str | None] | None = None  # the commander who has, by the alarm's number
         self.server = PageServer(self._mailbox, address)
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
@@ -174,33 +170,28 @@ class LivePage:
         due = self._arrived_ns - self._rates_ns >= RATES_NS
         if due:
             self._rates_ns = self._arrived_ns
-        if due or self._new:
-            streams, state = self._rate_meter.measure(self._tracker, self._arrived_ns), self._tracker.state
-            undo = None if self._replay else self._undo_clock.offer(state, time.monotonic_ns())
-            alarm = shown_alarm(self._tracker, has_team=self.has_team, acknowledged_by=self.acknowledged_by)
-            self._scene = replace(
-                self._scene,
-                streams=streams,
-                undo=undo,
-                echoes_fit=echoes_fit(state),
-                alarm=alarm,
-                met=shown_meeting(state),
-            )
-        if self._new or (due and not self._replay):
-            for scene in self._new or [self._scene_without_news()]:
-                shown = self._scene
-                scene = replace(
-                    scene,
-                    streams=shown.streams,
-                    undo=shown.undo,
-                    echoes_fit=shown.echoes_fit,
-                    alarm=shown.alarm,
-                    met=shown.met,
-                )
+        if not (due or self._new):
+            return
+        state_fields = self._state_fields()
+        self._scene = replace(self._scene, **state_fields)
+        if self._new or not self._replay:
+            for old in self._new or [self._scene_without_news()]:
+                scene = replace(old, **state_fields)
                 self._mailbox.publish(scene)
                 if self._new:
                     self._mailbox.keep(scene)
             self._new = []
+
+    def _state_fields(self) -> dict[str, Any]:
+        """The fields of a scene that follow the tracker's state rather than an estimate."""
+        state = self._tracker.state
+        return {
+            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns),
+            "undo": None if self._replay else self._undo_clock.offer(state, time.monotonic_ns()),
+            "echoes_fit": echoes_fit(state),
+            "alarm": shown_alarm(self._tracker, has_team=self.has_team, acknowledged_by=self.acknowledged_by),
+            "met": shown_meeting(state),
+        }
 
     def _advance_clock(self, portion: Portion) -> None:
         """The arrival clock: time of the newest chunk, or the host's clock when a portion is empty."""

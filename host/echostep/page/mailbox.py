@@ -12,6 +12,7 @@ from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from operator import attrgetter
+from typing import TypeVar
 
 from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.marks import ShownMark
@@ -23,6 +24,8 @@ from echostep.ports.check_in import Call, CheckIn, Undo
 MOST_CHECK_INS = (
     16  # in the queue to the tracker; further ones are refused. By reason: a person makes a few in a minute
 )
+
+T = TypeVar("T")
 
 
 class PageTrail:
@@ -98,27 +101,23 @@ class Mailbox:
         if self.replay:
             self.history.add(scene)
         self.latest = scene
-        if self.on_publish:
-            self.on_publish()
+        self._announce()
 
     def set_goal(self, goal: RoutePlace | None) -> None:
         """Set the destination of all pages and call `on_publish`; None ends the guidance to it."""
         self.goal = goal
-        if self.on_publish:
-            self.on_publish()
+        self._announce()
 
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Replace the commanders' marks and call `on_publish`."""
         self.marks = marks
-        if self.on_publish:
-            self.on_publish()
+        self._announce()
 
     def add_drawing(self, drawing: ShownDrawing) -> None:
         """Show a new drawing from its time on and call `on_publish`; called in the drawing's thread."""
         before = self._drawings if self.replay or self._keeps else ()
         self._drawings = (*before, drawing)
-        if self.on_publish:
-            self.on_publish()
+        self._announce()
 
     def drawing_at(self, t_s: float) -> ShownDrawing | None:
         """The newest drawing at a time; None before the first."""
@@ -129,8 +128,7 @@ class Mailbox:
     def set_team(self, names: tuple[str, ...]) -> None:
         """Replace the teammates who can be met and call `on_publish`."""
         self.team = names
-        if self.on_publish:
-            self.on_publish()
+        self._announce()
 
     def keep(self, scene: PageScene) -> None:
         """Add the scene of an estimate to the history that is played after `end`, if the run keeps one."""
@@ -141,41 +139,41 @@ class Mailbox:
         """The run is over; a history that was kept is played from now on."""
         self.summary = summary
         self.replay = self.replay or (self._keeps and len(self.history) > 0)
-        if self.on_publish:
-            self.on_publish()
+        self._announce()
 
     def add_check_in(self, check_in: CheckIn | Undo | Call) -> bool:
         """Queue a check-in, its undoing or a call for the tracker; False when it is refused: in a replay, or with a full queue."""
-        if self.replay:
-            return False
-        try:
-            self._check_ins.put_nowait(check_in)
-        except queue.Full:
-            return False
-        return True
+        return self._put(self._check_ins, check_in)
 
     def pop_check_ins(self) -> Iterator[CheckIn | Undo | Call]:
         """Remove and yield the queued check-ins; never waits."""
-        while True:
-            try:
-                yield self._check_ins.get_nowait()
-            except queue.Empty:
-                return
+        return _popped(self._check_ins)
 
     def add_meeting(self, name: str) -> bool:
         """Queue a meeting with a teammate; False when it is refused: in a replay, or with a full queue."""
+        return self._put(self._met, name)
+
+    def pop_meetings(self) -> Iterator[str]:
+        """Remove and yield the names of those who were met; never waits."""
+        return _popped(self._met)
+
+    def _put(self, waiting: queue.Queue[T], told: T) -> bool:
         if self.replay:
             return False
         try:
-            self._met.put_nowait(name)
+            waiting.put_nowait(told)
         except queue.Full:
             return False
         return True
 
-    def pop_meetings(self) -> Iterator[str]:
-        """Remove and yield the names of those who were met; never waits."""
-        while True:
-            try:
-                yield self._met.get_nowait()
-            except queue.Empty:
-                return
+    def _announce(self) -> None:
+        if self.on_publish:
+            self.on_publish()
+
+
+def _popped(waiting: queue.Queue[T]) -> Iterator[T]:
+    while True:
+        try:
+            yield waiting.get_nowait()
+        except queue.Empty:
+            return

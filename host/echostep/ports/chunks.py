@@ -79,9 +79,9 @@ class Portion:
             self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
         )
 
-    def cut_after(self, name: str) -> Iterator[Portion]:
-        """The portion in pieces; each chunk of the named port is the last one of its piece."""
-        cuts = self._rows_from(name) + 1
+    def cut_after(self, *names: str) -> Iterator[Portion]:
+        """The portion in pieces; each chunk of the named ports is the last one of its piece."""
+        cuts = np.sort(np.concatenate([self._rows_from(name) for name in names])) + 1
         for begin, end in pairwise(dict.fromkeys([0, *cuts.tolist(), len(self.port)])):
             yield self.rows(begin, end)
 

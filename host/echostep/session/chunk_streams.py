@@ -39,42 +39,43 @@ def paced(chunks: Iterable[Chunk], speed: float) -> Iterator[Chunk]:
         yield chunk
 
 
+ArrivalNs = Callable[[Chunk | None], int]  # arrival time of what comes after a chunk
+
+
 def with_check_ins(
-    chunks: Iterable[Chunk | None], page: LivePage | None, arrival_ns: Callable[[Chunk | None], int]
+    chunks: Iterable[Chunk | None], page: LivePage | None, arrival_ns: ArrivalNs
 ) -> Iterator[Chunk | None]:
-    """Insert each check-in of the page behind the chunk after which it was made; `arrival_ns` gives its arrival time from that chunk."""
-    for chunk in chunks:
-        yield chunk
-        for payload in page.pop_check_ins() if page else ():
-            yield Chunk(PERSON, arrival_ns(chunk), payload)
+    """Insert each check-in of the page."""
+    return _with(chunks, PERSON, page.pop_check_ins if page else tuple, arrival_ns)
 
 
-def with_team(
-    chunks: Iterable[Chunk | None], ear: TeamEar | None, arrival_ns: Callable[[Chunk | None], int]
-) -> Iterator[Chunk | None]:
-    """Insert what is heard of another wearer, each place behind the chunk after which it came."""
-    for chunk in chunks:
-        yield chunk
-        for payload in ear.pop() if ear else ():
-            yield Chunk(TEAM, arrival_ns(chunk), payload)
+def with_team(chunks: Iterable[Chunk | None], ear: TeamEar | None, arrival_ns: ArrivalNs) -> Iterator[Chunk | None]:
+    """Insert what is heard of another wearer."""
+    return _with(chunks, TEAM, ear.pop if ear else tuple, arrival_ns)
 
 
 def with_teammates(
-    chunks: Iterable[Chunk | None],
-    page: LivePage | None,
-    ear: TeammatesEar | None,
-    arrival_ns: Callable[[Chunk | None], int],
+    chunks: Iterable[Chunk | None], page: LivePage | None, ear: TeammatesEar | None, arrival_ns: ArrivalNs
 ) -> Iterator[Chunk | None]:
-    """Insert each meeting that a page tells, with the teammate's newest report, and the beacons that teammates share, behind the chunk after which
-    they came.
-    """
-    for chunk in chunks:
-        yield chunk
+    """Insert each meeting that a page tells, with the teammate's newest report, and the beacons that teammates share."""
+
+    def told() -> Iterator[bytes]:
         for name in page.pop_meetings() if page and ear else ():
             if ear and (payload := ear.meeting(name)):
-                yield Chunk(MEETING, arrival_ns(chunk), payload)
-        for payload in ear.beacons() if ear else ():
-            yield Chunk(TEAM_BEACONS, arrival_ns(chunk), payload)
+                yield payload
+
+    met = _with(chunks, MEETING, told, arrival_ns)
+    return _with(met, TEAM_BEACONS, ear.beacons if ear else tuple, arrival_ns)
+
+
+def _with(
+    chunks: Iterable[Chunk | None], port: str, pop: Callable[[], Iterable[bytes]], arrival_ns: ArrivalNs
+) -> Iterator[Chunk | None]:
+    """Insert what was told since the chunk before, as chunks of a port behind the chunk after which it was told."""
+    for chunk in chunks:
+        yield chunk
+        for payload in pop():
+            yield Chunk(port, arrival_ns(chunk), payload)
 
 
 def recorded(

@@ -27,7 +27,7 @@ class ShownAlarm:
 
 
 def shown_alarm(
-    tracker: Tracker, *, has_team: bool, acknowledged_by: Callable[[int], str | None] = lambda _: None
+    tracker: Tracker, *, has_team: bool, acknowledged_by: Callable[[int], str | None] | None = None
 ) -> ShownAlarm | None:
     """The present alarm; None while all is well. `has_team`: the run's reports go somewhere.
 
@@ -40,7 +40,7 @@ def shown_alarm(
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
     times = 1000 * alarm.number + int(age_s / AGAIN_S)
     told = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
-    if commander := acknowledged_by(alarm.number):
+    if acknowledged_by and (commander := acknowledged_by(alarm.number)):
         told = f"{commander} has acknowledged it."
     left_s = max(math.ceil((alarm.mayday_s or alarm.since_s) - alarm.since_s - age_s), 0)
     match alarm.kind, alarm.reason:
