@@ -58,6 +58,7 @@ class MeasuredSegment:
 
     `t_s`, `ranger` (0 looks left, 1 right) and `range_m` (NaN: no echo) are (n,). `height_m` (k,): heights by pressure in the same time.
     `ranger_part`: kind of ranger of the last ping, as the board has named it [protocol/messages.toml, part]; 0: not named, or no ping.
+    `board_restarts`: of the board before the last height, which may then be another barometer's.
     """
 
     segment: PathSegment
@@ -66,6 +67,7 @@ class MeasuredSegment:
     range_m: Floats
     height_m: Floats = field(default_factory=lambda: np.zeros(0))
     ranger_part: int = 0
+    board_restarts: int = 0
 
     @property
     def without_pings(self) -> MeasuredSegment:
@@ -79,7 +81,7 @@ class MeasuredSegment:
         rest = replace(s, t0_s=t_s, dx_m=share * s.dx_m, dy_m=share * s.dy_m, heading0_rad=s.heading_rad(t_s))
         kept = self.t_s >= t_s
         pings = (self.t_s[kept], self.ranger[kept], self.range_m[kept])
-        return MeasuredSegment(rest, *pings, self.height_m, self.ranger_part)
+        return MeasuredSegment(rest, *pings, self.height_m, self.ranger_part, self.board_restarts)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from enum import Enum, auto
 from echostep.path import MeasuredSegment
 
 # All by reason.
-PAUSE_S = 1.0  # between two segments: nothing was received, so the pressure may have begun anew, as after a restart
+PAUSE_S = 1.0  # between two segments: nothing was received
 LONG_S = 5.0  # of an unobserved segment: a walk out of the room
 MUTE_S = 10.0  # of standing without a ping, where there were pings before: rangers measure whatever the wearer does
 STANDING_M = 0.5  # path that still counts as standing
@@ -30,6 +30,7 @@ class Gaps:
     """Watches the segments of one walk."""
 
     def __init__(self) -> None:
+        self.pause_s = 0.0  # between the last two segments
         self._end_s = math.inf  # of the last segment
         self._ping_s = math.inf  # of the last ping
         self._path_m = 0.0  # since that ping
@@ -37,12 +38,12 @@ class Gaps:
     def ended(self, measured: MeasuredSegment) -> Gap | None:
         """The gap that this segment ends, or that is known by its end."""
         segment = measured.segment
-        paused = segment.t0_s - self._end_s > PAUSE_S
+        self.pause_s = max(segment.t0_s - self._end_s, 0.0)
         self._end_s = segment.t1_s
         is_mute = self._is_mute(measured)
         if segment.unobserved:
             return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
-        if paused:
+        if self.pause_s > PAUSE_S:
             return Gap.PAUSE
         return Gap.MUTE if is_mute else None
 

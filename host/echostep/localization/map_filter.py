@@ -100,6 +100,7 @@ class MapFilter:
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
+        self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
@@ -127,6 +128,7 @@ class MapFilter:
         if self._height is not None:
             self._height.update(_height_change(measured))
         gap = self._gaps.ended(measured)
+        self._follow_barometer(measured)
         if segment.unobserved:
             self._scatter(measured)
         if gap is not None:
@@ -208,21 +210,29 @@ class MapFilter:
         return self._building.has_walls and self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
 
     def _search_after(self, gap: Gap, segment: PathSegment) -> None:
-        """Doubt the tracked cloud after a gap, and search the whole building from where the path goes on: the tracked cloud stands for what is near.
+        """Doubt the tracked cloud after a gap, and search the whole building from where the path goes on.
 
-        Nothing of the pressure's level is kept after a pause.
+        The tracked cloud stands for what is near.
         """
         cloud = self.tracked.cloud
-        if gap is Gap.PAUSE:
-            cloud.forget_lag()
         if gap is not Gap.UNOBSERVED:
             self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
         if cloud.is_coarse or not len(self._building.floor.x_m):
             return
         self._is_elsewhere = True
         self.search = self._new_search(Start(), segment.heading1_rad)
-        if gap is not Gap.PAUSE:
-            self.search.cloud.adopt_lag(cloud)
+        self.search.cloud.adopt_lag(cloud)
+
+    def _follow_barometer(self, measured: MeasuredSegment) -> None:
+        """The lag of the height by pressure drifts in a pause, and is not known after a restart of the board: it may be another one."""
+        anew = len(measured.height_m) > 0 and measured.board_restarts != self._board_restarts
+        if anew:
+            self._board_restarts = measured.board_restarts
+        for each in self._clouds():
+            if anew:
+                each.cloud.forget_lag()
+            else:
+                each.cloud.let_lag_drift(self._gaps.pause_s)
 
     def _scatter(self, measured: MeasuredSegment) -> None:
         """Spread the cloud over an unobserved segment."""
@@ -332,10 +342,12 @@ class MapFilter:
         return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)
 
     def _has_failed(self, search: Hypothetical) -> bool:
-        """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing for long."""
+        """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing probable for long."""
         if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
             return True
-        return self._pings.path_m - self._search_m > self._found_within_m
+        # Storeys that are alike stay several places, and no new search would tell them apart.
+        is_probable = search.has_contracted and search.plausibility.probability > FOUND
+        return not is_probable and self._pings.path_m - self._search_m > self._found_within_m
 
     def _estimate(self, segment: PathSegment, right: Right) -> Estimate:
         """The estimate at the end of a segment."""

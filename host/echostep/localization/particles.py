@@ -65,6 +65,7 @@ GATHERED_M, GATHERED_REST = (
     2.5,
     1e-4,
 )  # a cloud has gathered when no more than this weight is further from its mean, by reason
+WEATHER_M_S = 1e-3  # standard deviation of the height by pressure's speed, by reason: a front changes the pressure by 0.4 hPa in an hour
 KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 
 
@@ -262,6 +263,11 @@ class Cloud:
     def forget_lag(self) -> None:
         """The height by pressure may have begun anew: nothing is known of its lag."""
         self._lag_variance = UNKNOWN_LAG_M2
+
+    def let_lag_drift(self, pause_s: float) -> None:
+        """Nothing was measured for so long."""
+        drift_m = math.hypot(self._climbing.drift_m * math.sqrt(pause_s), WEATHER_M_S * pause_s)
+        self._lag_variance = min(self._lag_variance + drift_m**2, UNKNOWN_LAG_M2)
 
     def adopt_lag(self, other: Cloud) -> None:
         """Take over what another cloud knows of the lag of the height by pressure."""

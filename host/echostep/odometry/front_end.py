@@ -198,7 +198,8 @@ class FrontEnd:
         height_row, samples = frames.rows(Pressure)
         height_m, height_s = heights(samples), times.board_s[height_row]
         valid = ~np.isnan(height_s) & ~np.isnan(height_m)
-        height_values = np.column_stack([height_s, np.full(len(height_row), HEIGHT), height_m])[valid]
+        kind = HEIGHT + PART * times.board_restarts[height_row]
+        height_values = np.column_stack([height_s, kind, height_m])[valid]
         frame_row = np.concatenate([ping_row[usable], height_row[valid]])
         order = np.argsort(frame_row, kind="stable")
         values = np.concatenate([ping_values, height_values])[order]

@@ -21,7 +21,7 @@ SILENCE_S = 0.5  # a port that lags the other one by more is not waited for; by 
 BLIND_S = 1.0  # time without any observation that makes a dropout; by reason: twice a standing segment [path.STANDING_PIECE_S]
 MAX_WAITING = 4096  # pings and heights that wait; beyond it the oldest are dropped and counted; by reason: nearly two minutes of both
 HEIGHT = 2  # in the ranger column of a ping: the value is a height by pressure, not a range
-PART = 4  # factor of the ranger's part in that column
+PART = 4  # factor of the ranger's part in that column; of a height: of the number of the board's restarts before it
 DROPOUT = -1  # in the segment column of the output: a dropout, no segment
 
 
@@ -95,7 +95,10 @@ class Synchronizer:
         return tuple(self._segments)
 
     def add_pings(self, message_index: Ints, pings: Floats) -> None:
-        """Pings (n, 3) of t_s, ranger + PART * its part, range_m, or of t_s, HEIGHT, height_m; and the index (n,) of the message of each."""
+        """Pings (n, 3) of t_s, ranger + PART * its part, range_m, or of t_s, HEIGHT + PART * restarts of the board, height_m.
+
+        With the index (n,) of the message of each.
+        """
         self._new = _NewPings(message_index, pings)
 
     def add_segments(self, message_index: int, segments: list[PathSegment]) -> None:
@@ -146,10 +149,10 @@ def _pieces(segments: list[PathSegment], popped: _Popped, count: int) -> list[Me
 
 def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats) -> MeasuredSegment:
     """A segment with its pings, and apart from them the heights."""
-    heard = ranger != HEIGHT
-    which = ranger[heard]
-    part = int(which[-1]) // PART if len(which) else 0
-    return MeasuredSegment(segment, t_s[heard], which % PART, value_m[heard], value_m[~heard], part)
+    heard = ranger % PART != HEIGHT
+    which, high = ranger[heard], ranger[~heard]
+    part, restarts = (int(kind[-1]) // PART if len(kind) else 0 for kind in (which, high))
+    return MeasuredSegment(segment, t_s[heard], which % PART, value_m[heard], value_m[~heard], part, restarts)
 
 
 @kernel

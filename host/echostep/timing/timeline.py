@@ -61,6 +61,7 @@ class Times(NamedTuple):
 
     `board_message_index` (b,), `mtx_message_index` (m,): index of each message among those of both ports in order of arrival. By that index,
     `board_newest_s` and `mtx_newest_s` (b + m,): newest time of each port once this message is in, NaN before its first one.
+    `board_restarts` (b,): how often the board's clock has restarted up to this message.
     """
 
     board_s: Floats
@@ -69,6 +70,7 @@ class Times(NamedTuple):
     mtx_message_index: Ints
     board_newest_s: Floats
     mtx_newest_s: Floats
+    board_restarts: Ints
 
 
 class Timeline:
@@ -121,6 +123,7 @@ class Timeline:
             np.empty(nm, np.int64),
             np.empty(nb + nm),
             np.empty(nb + nm),
+            np.empty(nb, np.int64),
         )
         _assign_times(self._board, self._mtx, self._edges, self._foot_latency_s, board, mtx, times)
         return times
@@ -140,6 +143,7 @@ def _assign_times(
             if board_clock.steps != steps:
                 mtx_clock.started = 0  # begun anew on the clock after the step
             times.board_message_index[b] = message_index
+            times.board_restarts[b] = board_clock.restarts
             b += 1
         else:
             times.mtx_s[m] = _mtx_time(board_clock, mtx_clock, edges, mtx.value[m], mtx.t_arrival_ns[m], latency_s)

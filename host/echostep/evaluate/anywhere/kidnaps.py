@@ -32,13 +32,24 @@ def carried(walk: SimulatedWalk, from_m: float, over_m: float) -> Kidnapped:
 
 
 def off_in_lift(walk: SimulatedWalk) -> Kidnapped:
-    """The tracker is off during a ride: it goes on where it was, and the heights by pressure begin anew at what they were before."""
+    """Board and tracker are off during a ride: it goes on where it was, and the heights by pressure begin anew at what they were before."""
+    before, after, rise_m = _ride(walk)
+    zeroed = tuple(replace(s, height_m=s.height_m - rise_m, board_restarts=1) for s in after)
+    return replace(walk, segments=(*before, *zeroed)), after[0].segment.t0_s
+
+
+def asleep_in_lift(walk: SimulatedWalk) -> Kidnapped:
+    """The laptop sleeps during a ride: the heights by pressure go on."""
+    before, after, _ = _ride(walk)
+    return replace(walk, segments=(*before, *after)), after[0].segment.t0_s
+
+
+def _ride(walk: SimulatedWalk) -> tuple[tuple[MeasuredSegment, ...], tuple[MeasuredSegment, ...], float]:
+    """The segments before and after the ride in the lift, and how far up it leads."""
     rides = np.flatnonzero(np.abs(np.diff(walk.truth[:, Z])) > RIDES_M)
     begin_s, end_s = float(walk.truth[rides[0], T]) - DOORS_S, float(walk.truth[rides[-1] + 1, T]) + DOORS_S
     rise_m = float(walk.truth[rides[-1] + 1, Z] - walk.truth[rides[0], Z])
-    before, after = _cut(walk, begin_s, end_s)
-    zeroed = tuple(replace(s, height_m=s.height_m - rise_m) for s in after)
-    return replace(walk, segments=(*before, *zeroed)), after[0].segment.t0_s
+    return *_cut(walk, begin_s, end_s), rise_m
 
 
 def restarted(walk: SimulatedWalk, from_m: float) -> Kidnapped:

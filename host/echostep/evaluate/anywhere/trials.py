@@ -16,7 +16,7 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.evaluate.anywhere import echo_changes, plan_changes, sites
-from echostep.evaluate.anywhere.kidnaps import Kidnapped, carried, off_in_lift, restarted
+from echostep.evaluate.anywhere.kidnaps import Kidnapped, asleep_in_lift, carried, off_in_lift, restarted
 from echostep.evaluate.anywhere.walks import SimulatedWalk, X, Y, simulate, simulate_with_gap
 from echostep.localization.start import Start
 from echostep.plan.model import Plan, Pose
@@ -88,8 +88,17 @@ class Walks:
 
     @cached_property
     def lift(self) -> Kidnapped:
-        """A walk there with a ride in the lift, the tracker off."""
-        return off_in_lift(simulate(sites.by_lift(self.seed), self.seed))
+        """A walk there with a ride in the lift, board and tracker off."""
+        return off_in_lift(self._by_lift)
+
+    @cached_property
+    def asleep_in_lift(self) -> Kidnapped:
+        """The same, only the laptop asleep."""
+        return asleep_in_lift(self._by_lift)
+
+    @cached_property
+    def _by_lift(self) -> SimulatedWalk:
+        return simulate(sites.by_lift(self.seed), self.seed)
 
 
 def _exact(walk: SimulatedWalk) -> Pose:
@@ -167,6 +176,7 @@ TRIALS: dict[str, Callable[[Walks], Trial]] = {
     "start/unknown-westport-house": lambda w: _from_anywhere(w.westport_house),
     "kidnap/carried": lambda w: _kidnapped(carried(w.office, KIDNAP_AT_M, CARRIED_M)),
     "kidnap/lift": lambda w: _kidnapped(w.lift),
+    "kidnap/lift-asleep": lambda w: _kidnapped(w.asleep_in_lift),
     "kidnap/restart": _restarted,
     "kidnap/asleep": lambda w: _kidnapped(w.asleep),
     "plan/10cm": lambda w: _from_start(w.office, plan_changes.displaced(w.office.built, 0.1, w.rng(2))),
