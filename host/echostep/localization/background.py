@@ -21,7 +21,7 @@ from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
 
 ALIKE = 0.5  # share of echoes that are like the one before, by reason
-ALIKE_M = 0.07  # mean difference of such, by reason: the error of two ranges, and the sway between them
+ALIKE_M = 0.07  # mean difference of such, by reason: the error of two ranges, and the sway between them; the plan's error is added
 STAYS = 0.9  # probability that such a view still has an echo, or still none, by reason
 POSES = 400  # drawn on the floor, by reason: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
@@ -63,10 +63,15 @@ class UnplannedDensities(NamedTuple):
 
 
 class RangeMemory:
-    """The density of echoes without any plan: like the last echo of the same ranger, or as anywhere in the building."""
+    """The density of echoes without any plan: like the last echo of the same ranger, or as anywhere in the building.
 
-    def __init__(self, background: Background) -> None:
+    `plan_sd_m`: standard deviation of the plan's walls. A right cloud foretells no echo better than that, though a wall's error stays the same along
+    it; a rival that used this would beat it on every wall, so it knows the last echo no better either.
+    """
+
+    def __init__(self, background: Background, plan_sd_m: float = 0.0) -> None:
         self._background = background
+        self._alike_m = math.hypot(ALIKE_M, plan_sd_m)
         self._missed = MissedEchoes()
         self._last_m = [math.nan, math.nan]  # range of each ranger's last ping; 0: no echo, NaN: no ping yet
 
@@ -76,7 +81,7 @@ class RangeMemory:
         anywhere = np.exp(log_anywhere)
         missed, alike = np.zeros(len(range_m)), np.empty(len(range_m))
         for k, (which, value_m) in enumerate(zip(ranger.tolist(), range_m.tolist(), strict=True)):
-            alike[k] = _alike(value_m, self._last_m[which], float(anywhere[k]))
+            alike[k] = _alike(value_m, self._last_m[which], float(anywhere[k]), self._alike_m)
             if value_m <= 0.0:
                 missed[k] = self._missed.odds(which)
             if (
@@ -88,7 +93,7 @@ class RangeMemory:
         return UnplannedDensities(missed, alike, power * np.log(anywhere + missed), either)
 
 
-def _alike(range_m: float, last_m: float, anywhere: float) -> float:
+def _alike(range_m: float, last_m: float, anywhere: float, alike_m: float) -> float:
     """Density of a range after one that it is like: Laplace about it. After no echo, no echo is likely."""
     if math.isnan(last_m):
         return anywhere
@@ -96,7 +101,7 @@ def _alike(range_m: float, last_m: float, anywhere: float) -> float:
         if last_m > 0.0:
             return 1.0 - STAYS
         return STAYS if range_m <= 0.0 else (1.0 - STAYS) * anywhere
-    return STAYS * math.exp(-abs(range_m - last_m) / ALIKE_M) / (2.0 * ALIKE_M)
+    return STAYS * math.exp(-abs(range_m - last_m) / alike_m) / (2.0 * alike_m)
 
 
 @kernel

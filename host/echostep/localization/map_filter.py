@@ -89,7 +89,8 @@ class MapFilter:
         self._building = building
         self._rng = rng
         self._model, self._blurred = _echo_models(self._settings)
-        self._pings = UsablePings(building.background(self._model), self._settings.echo.correlation_m)
+        background, s = building.background(self._model), self._settings
+        self._pings = UsablePings(background, s.echo.correlation_m, s.plan_sd_m)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
         self._plan = Plausibility(PLAN_FITS)

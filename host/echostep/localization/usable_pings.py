@@ -26,16 +26,18 @@ TURNING_RAD = math.radians(15.0)
 class UsablePings:
     """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `correlation_m`."""
 
-    def __init__(self, background: Background, correlation_m: float) -> None:
+    def __init__(self, background: Background, correlation_m: float, plan_sd_m: float = 0.0) -> None:
+        """`plan_sd_m`: standard deviation of the plan's walls."""
         self.path_m = 0.0  # length of the path so far
         self._correlation_m = correlation_m
-        self._ranges = RangeMemory(background)
+        self._plan_sd_m = plan_sd_m
+        self._ranges = RangeMemory(background, plan_sd_m)
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
     def hear_by(self, background: Background, correlation_m: float) -> None:
         """Go on with rangers of another kind."""
         self._correlation_m = correlation_m
-        self._ranges = RangeMemory(background)
+        self._ranges = RangeMemory(background, self._plan_sd_m)
 
     @property
     def silent_m(self) -> float:

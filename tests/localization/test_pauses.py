@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""The height by pressure in a pause: it goes on with the same board, and begins anew with another one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.localization.background import ALIKE_M, Background, RangeMemory
+from echostep.localization.building import Building
+from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.particles import CloudSettings
+from echostep.localization.start import Start
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.model import Pose
+from echostep.simulation.world.tower import LIFT_AT, STOREY_M, tower
+from echostep.walls.level_sheet import lay_out_levels
+
+PAUSE_S = 20.0  # a ride over two storeys
+FIRST_M = 100.0  # height by pressure on the lowest floor
+SETTINGS = FilterSettings(CloudSettings(searching=5_000))  # the search is not what is judged here
+
+
+def standing(t0_s: float, height_m: float, board_restarts: int = 0) -> MeasuredSegment:
+    """Half a second in the lift, with five heights by pressure."""
+    path = PathSegment(t0_s, t0_s + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
+    heights_m = np.full(5, height_m)
+    return MeasuredSegment(
+        path, np.zeros(0), np.zeros(0, np.int64), np.zeros(0), heights_m, board_restarts=board_restarts
+    )
+
+
+def levels_after_ride(height_m: float, board_restarts: int) -> tuple[float, ...]:
+    """Probability of each level after 3 s in the lift on the lowest floor, a pause, and 3 s at a height by pressure."""
+    laid_out = lay_out_levels(tower(3))
+    building = Building(laid_out.walls, laid_out.sheet)
+    tracked = MapFilter(building, Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), SETTINGS)
+    for k in range(6):
+        tracked.update(standing(0.5 * k, FIRST_M))
+    begin_s = 3.0 + PAUSE_S
+    for k in range(6):
+        levels = tracked.update(standing(begin_s + 0.5 * k, height_m, board_restarts)).levels
+    return levels
+
+
+@pytest.mark.parametrize("storeys", [0, 1, 2])
+def test_a_ride_during_a_pause_is_seen_by_pressure(storeys: int) -> None:
+    assert levels_after_ride(FIRST_M + storeys * STOREY_M, 0)[storeys] > 0.99
+
+
+def test_heights_of_another_board_tell_no_ride() -> None:
+    """A barometer that reads 7 m more: the cloud in the lift stays where it was, and the search beside it has the other levels."""
+    assert levels_after_ride(FIRST_M + 2.0 * STOREY_M, 1)[2] < 0.01
+
+
+def test_weather_makes_a_long_pause_worthless() -> None:
+    laid_out = lay_out_levels(tower(3))
+    cloud = MapFilter(
+        Building(laid_out.walls, laid_out.sheet), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0,
+        np.random.default_rng(1), SETTINGS,
+    ).cloud  # fmt: skip
+    cloud.adopt_lag(cloud)
+    cloud._lag_variance = 0.01
+    for hours, least_m, most_m in ((0.01, 0.1, 0.2), (1.0, 3.0, 5.0), (8.0, 20.0, 40.0)):
+        before = cloud._lag_variance
+        cloud.let_lag_drift(3600.0 * hours)
+        assert least_m < math.sqrt(cloud._lag_variance - before + 0.01) < most_m
+
+
+def test_a_rival_knows_the_last_echo_no_better_than_the_plan_its_walls() -> None:
+    anywhere = Background(np.full(200, -2.0))
+    ranger, range_m, power = np.zeros(2, np.int64), np.array([1.5, 1.5]), np.ones(2)
+    exact, off = (RangeMemory(anywhere, sd_m).densities(ranger, range_m, power).alike[1] for sd_m in (0.0, 0.1))
+    assert off / exact == pytest.approx(ALIKE_M / math.hypot(ALIKE_M, 0.1))
