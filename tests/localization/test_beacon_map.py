@@ -15,11 +15,15 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.angles import mean_angle
 from echostep.errors import EchostepError
 from echostep.guidance.guided_run import GuidedRun, destination
 from echostep.localization.beacon_beliefs import BeaconBeliefs, moments
 from echostep.localization.estimate import digest
-from echostep.plan.model import Plan, load_plan
+from echostep.localization.hypothetical import Hypothetical
+from echostep.localization.plausibility import Plausibility
+from echostep.localization.start import Start
+from echostep.plan.model import Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import GATEWAY, Chunk, portion_of
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
@@ -75,6 +79,30 @@ def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> 
         assert np.hypot(p.x_m - x, p.y_m - y) < 0.8
     end = walk.truth[-1, 1:3]
     assert np.hypot(one[-1].x_m - end[0], one[-1].y_m - end[1]) < 0.3
+
+
+def test_another_cloud_that_is_tracked_from_now_on_locates_the_beacons_anew(walk: Walk) -> None:
+    """A search that is followed has placed no beacon, and those of the wrong cloud are not where it put them."""
+    tracker = walk.tracker()
+    half = len(walk.chunks) // 2
+    tracker.take(portion_of(walk.chunks[:half]))
+    at, before = tracker.state.estimate, tracker.filter
+    assert at is not None
+    assert before is not None
+    assert tracker.beacon_places(at.t_s)
+    near = Start(Pose(at.x_m, at.y_m, at.heading_rad, at.level), 0.2)
+    walk_rad = mean_angle(before.cloud.turn_rad, before.cloud.weight)
+    before.tracked = Hypothetical(
+        before._new_cloud(near, at.heading_rad - walk_rad), Plausibility(0.99), is_stated=True
+    )
+    assert tracker.beacon_places(at.t_s) == []
+    assert not tracker.own_beacons()
+    last = tracker.take(portion_of(walk.chunks[half:]))[-1]
+    places = tracker.beacon_places(last.t_s)
+    assert places
+    for p in places:
+        x, y, _ = walk.places[tracker.gateway.numbers[p.slot] - 1]
+        assert np.hypot(p.x_m - x, p.y_m - y) < 1.0
 
 
 def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, str]:

@@ -16,7 +16,13 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_beliefs import BeaconBeliefs, BeaconMeasurement, moments, place_covariance
+from echostep.localization.beacon_beliefs import (
+    BeaconBeliefs,
+    BeaconMeasurement,
+    empty_beliefs,
+    moments,
+    place_covariance,
+)
 from echostep.localization.beacon_model import BeaconSettings, beacon_model
 from echostep.localization.beacon_slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
 from echostep.localization.beacon_step import Beacons, Waiting, no_waiting, update_by_reading
@@ -73,6 +79,8 @@ class BeaconMap:
 
         `plan_supports`: whether echoes confirm the cloud by the plan.
         """
+        if not self._is_of(cloud):
+            self._begin_anew(cloud)
         length = math.hypot(segment.dx_m, segment.dy_m)
         if length > 0.0 and readings:
             propose_heading_jumps(cloud.turn_rad, cloud.log_weight, length, self._model, self._rng)
@@ -87,7 +95,9 @@ class BeaconMap:
             self._note_unexpected(cloud, segment.t1_s)
 
     def places(self, cloud: Cloud, t_s: float) -> list[BeaconPlace]:
-        """Every beacon with a place, by slot. One that was moved has none until it is located anew."""
+        """Every beacon with a place, by slot. One that was moved has none until it is located anew, nor has any when another cloud is tracked now."""
+        if not self._is_of(cloud):
+            return []
         beacons = moments(cloud.beliefs, cloud.weight)
         placed = np.flatnonzero(self._health.known & (self._health.each[:, SUSPECT] == 0.0)).tolist()
         return [self._place(cloud, slot, beacons[slot].tolist(), t_s) for slot in placed]
@@ -127,6 +137,16 @@ class BeaconMap:
         particles = cloud.arrays._replace(x_m=x, y_m=y)
         update_by_reading(particles, beacons, measurement, self._model, index, plan_supports, self._rng)
         cloud.x_m, cloud.y_m = x + since_x, y + since_y
+
+    def _is_of(self, cloud: Cloud) -> bool:
+        """Whether this cloud has placed the beacons: a search that is followed, or a cloud about a teammate, has placed none."""
+        return cloud.beliefs.mean.shape[1] == len(self._heard_s)
+
+    def _begin_anew(self, cloud: Cloud) -> None:
+        """Forget the places, which were those of a wrong cloud, and when each beacon was heard there."""
+        self._health, self._waiting = initial_health(0), no_waiting(0)
+        self._heard_s, self._reach_m, self._unexpected_s = [], [], []
+        cloud.beliefs = empty_beliefs(len(cloud.x_m), 0)
 
     def _make_room(self, cloud: Cloud, slot: int) -> None:
         """Extend the cloud's beliefs and the lists here, so that they hold this slot."""
