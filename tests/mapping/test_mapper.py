@@ -59,6 +59,13 @@ def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     assert 0.01 < plan.uncertainty_m < 0.2
 
 
+def test_the_solution_pivots_on_its_diagonal(mapped: Mapped) -> None:
+    """Other pivots fill the factor of an hour's walk ten times as much."""
+    factor = mapped.graph.factor
+    assert factor is not None
+    assert np.array_equal(factor.perm_r, factor.perm_c)
+
+
 def test_closures_state_their_odds_and_lead_to_the_right_place(walk: SimulatedWalk, mapped: Mapped) -> None:
     """The last corridor of the walk is the first one."""
     closures, graph = mapped.graph.closures, mapped.graph

@@ -96,13 +96,16 @@ def _add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
 
 @kernel
 def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools, cells: Cells) -> None:
+    cosine, sine = np.cos(lines.normal_rad), np.sin(lines.normal_rad)
     for k in range(len(range_m)):
         for line in range(len(cells.size)):
-            c, s = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line])
-            distance = lines.rho_m[line] - c * poses[k, 0] - s * poses[k, 1]
-            normal = lines.normal_rad[line]
+            c, s = cosine[line], sine[line]
+            distance, normal = lines.rho_m[line] - c * poses[k, 0] - s * poses[k, 1], lines.normal_rad[line]
             if distance < 0.0:
                 distance, normal = -distance, normal + math.pi
+            fits = abs(range_m[k] - distance) < FITS_M
+            if not fits and (distance >= SURE_M or range_m[k] < distance + BEYOND_M):
+                continue  # most lines, before anything is computed of them
             off_axis = abs((normal - poses[k, 2] + math.pi) % (2.0 * math.pi) - math.pi)
             if off_axis > HALF_CONE_RAD:
                 continue
@@ -110,12 +113,12 @@ def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: 
             cell = math.floor((along - cells.first_m[line]) / CELL_M)
             if cell < 0 or cell >= cells.size[line]:
                 continue
-            if abs(range_m[k] - distance) < FITS_M:
+            if fits:
                 near = lines.low_m[line] - NEAR_M < along < lines.high_m[line] + NEAR_M
                 if free[k] and cells.of[k] < 0 and near:
                     cells.heard[line, cell] += 1.0
                     cells.of[k] = line
-            elif straight[k] and off_axis < SURE_RAD and distance < SURE_M and not range_m[k] < distance + BEYOND_M:
+            elif straight[k] and off_axis < SURE_RAD:
                 cells.passed[line, cell] += 1.0
 
 
@@ -125,6 +128,7 @@ def explained_by_ends(segments: Floats, poses: Floats, range_m: Floats) -> Bools
     found = np.zeros(len(range_m), np.bool_)
     for x, y in ends:
         dx, dy = x - poses[:, 0], y - poses[:, 1]
-        off_axis = np.abs((np.arctan2(dy, dx) - poses[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-        found |= (np.abs(np.hypot(dx, dy) - range_m) < CORNER_M) & (off_axis < HALF_CONE_RAD + 0.1)
+        fits = np.flatnonzero(np.abs(np.hypot(dx, dy) - range_m) < CORNER_M)
+        off_axis = np.abs((np.arctan2(dy[fits], dx[fits]) - poses[fits, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+        found[fits] |= off_axis < HALF_CONE_RAD + 0.1
     return found

@@ -79,7 +79,10 @@ class Graph:
             n = 3 * len(self.nodes) + 2 * len(self.walls.rho_m)
             jacobian, residual = rows.matrix(n)
             normal = (jacobian.T @ jacobian + 1e-9 * sp.identity(n)).tocsc()
-            self.factor = splu(normal, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+            self.factor = None  # free its memory before the next one is made
+            self.factor = splu(
+                normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
             step = -self.factor.solve(jacobian.T @ residual)
             count = 3 * len(self.nodes)
             self.pose = self.pose + step[:count].reshape(-1, 3)

@@ -28,6 +28,9 @@ LONGER = 0.02  # of the way so far, by which the stretches of a replay are longe
 MOST_SEGMENTS = 40_000  # of a walk, about four hours; what comes later is tracked, not drawn
 NICE = 10  # the tracker goes first
 END_S = 5.0  # for the thread to end
+# Bytes from which an array has pages of its own, given back when it is freed. glibc raises this limit by itself: then the arrays of each drawing, a
+# little longer than those before, fit into no hole that these left, and an hour's walk takes 1 GB.
+PAGES = {"MALLOC_MMAP_THRESHOLD_": "262144"}
 CHILD = "from echostep.page.drawing_process import main; main()"
 Stretch = tuple[
     list[MeasuredSegment], Estimate, int
@@ -90,6 +93,7 @@ class DrawingProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
+                env=os.environ | PAGES,
                 start_new_session=True,  # Ctrl-C is for the run
             )
             return self._stretches.pop()
