@@ -25,7 +25,7 @@ from waiting import PATIENCE_S
 
 pytestmark = needs_twin
 PROBE = Path(__file__).parent / "twin_probe.c"
-TWI_AFTER_RESET, SPI_WRONG, STOPPED, PULLED_UP = range(4)
+TWI_AFTER_RESET, SPI_WRONG, STOPPED, PULLED_UP, TIMER_FLAGS = range(5)
 STAMP_STEP_TICKS = 2
 
 
@@ -84,6 +84,14 @@ def test_a_wrong_clock_on_spi_is_told(tmp_path: Path) -> None:
 def test_a_pull_up_does_not_override_what_drives_the_pin(tmp_path: Path) -> None:
     board = probe(tmp_path, PULLED_UP)
     board.advance(quiet_rows(9))
+    board.close()
+    assert words(board) == ["reset power", "trigger left"]
+
+
+def test_clearing_one_flag_of_a_timer_keeps_the_others(tmp_path: Path) -> None:
+    """By itself simavr clears all of them, which costs the clock an overflow in a few minutes of pulse rangers."""
+    board = probe(tmp_path, TIMER_FLAGS)
+    board.advance(quiet_rows(5))
     board.close()
     assert words(board) == ["reset power", "trigger left"]
 

@@ -8,7 +8,7 @@
 #include <util/delay.h>
 #include <stdint.h>
 
-enum { TWI_AFTER_RESET, SPI_WRONG, STOPPED, PULLED_UP };
+enum { TWI_AFTER_RESET, SPI_WRONG, STOPPED, PULLED_UP, TIMER_FLAGS };
 
 static void go(uint8_t control)
 {
@@ -72,6 +72,21 @@ static void spi_wrong(void)
 		;
 }
 
+/* An overflow of Timer1 that is flagged while interrupts are off stays flagged when the capture's flag is cleared, until its own is. */
+static void timer_flags(void)
+{
+	TCCR1B = _BV(CS10);
+	TIMSK1 = _BV(TOIE1);
+	TCNT1 = 0xFF00;
+	_delay_us(100);
+	TIFR1 = _BV(ICF1);
+	uint8_t kept = TIFR1 & _BV(TOV1);
+	TIFR1 = _BV(TOV1);
+	uint8_t cleared = !(TIFR1 & _BV(TOV1));
+	(void)start();
+	answer(kept && cleared);
+}
+
 /* SyncOut is driven low 3 ms after the start: neither its pull-up nor a write to another pin of its port makes it high. */
 static void pulled_up(void)
 {
@@ -94,6 +109,8 @@ int main(void)
 		spi_wrong();
 	if (MODE == PULLED_UP)
 		pulled_up();
+	if (MODE == TIMER_FLAGS)
+		timer_flags();
 	cli();
 	sleep_enable();
 	sleep_cpu();

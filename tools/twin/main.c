@@ -140,6 +140,7 @@ static void make_board(const char *path)
 	twi_init();
 	spi_init();
 	watchdog_init();
+	timer_flags_init();
 	for (int i = 0; i < avr->interrupts.vector_count; i++)
 		avr_irq_register_notify(avr->interrupts.vector[i]->irq + AVR_INT_IRQ_RUNNING, add_entry_cycles, NULL);
 	for (uint8_t i = 0; i < EXTERNAL_INTERRUPTS; i++)

@@ -208,6 +208,9 @@ bool hang_fault(const char *value);
 /* signature.c */
 void signature_init(void);
 
+/* timer_flags.c */
+void timer_flags_init(void);
+
 /* watchdog.c */
 void watchdog_init(void);
 
