@@ -38,6 +38,7 @@ SEED = 1
 BEGIN_S, END_S = 20.0, 50.0
 TAIL_S = 10.0  # that the walk goes on after the last judged second: a run that is behind uses its bytes meanwhile
 LEAST_GAP_S = 0.5  # shorter ones are the pace of a computer that does other things too
+LEAST_BYTES = 10_000  # of a recording that has begun: half a second of both ports
 ENDING_S = 60.0  # longest wait for a run to write its files
 LIVE = (sys.executable, "-m", "echostep")
 
@@ -143,12 +144,17 @@ class LiveWalk:
                     self._fault_ns, fault_s = now_ns(), self.board.t_s
                 if act := due.pop(0)[1]:
                     act(self)
-            if now_s >= self._end_s + TAIL_S:
+            if now_s >= self._end_s + TAIL_S and self._has_begun():
                 break
         self.late_s = self._walk_s(now_ns()) - now_s
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(ENDING_S)
         return self._outcome(scenario.truth[:, :3] + [began_s, 0.0, 0.0], fault_s)
+
+    def _has_begun(self) -> bool:
+        """Whether the newest run has recorded something, or has ended: on a busy computer it may take longer to begin than the walk."""
+        recorded = self.runs[-1] / "walk.mcap"
+        return self.process.poll() is not None or (recorded.exists() and recorded.stat().st_size > LEAST_BYTES)
 
     def _outcome(self, truth: Floats, fault_s: float) -> Outcome:
         """Judge the recordings of all runs, and their tracks; that of a killed run is its replay."""
