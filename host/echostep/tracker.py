@@ -151,9 +151,17 @@ class Tracker:
         return [] if self.filter is None else self.filter.beacon_map.places(self.filter.cloud, t_s)
 
     def own_beacons(self) -> tuple[SharedBeacon, ...] | None:
-        """The beacons that this walk has placed, for teammates; None unless the tracker says `tracking`."""
+        """The beacons that this walk has placed, for teammates; None unless the tracker says `tracking`, and echoes have confirmed it.
+
+        A stated start says so before any echo, and teammates would take over its error.
+        """
         last = self._estimate
-        if self.filter is None or last is None or last.status is not TrackStatus.TRACKING:
+        if (
+            self.filter is None
+            or last is None
+            or last.status is not TrackStatus.TRACKING
+            or not self.filter.plan_supports
+        ):
             return None
         return shared_beacons(self.filter.beacon_map, self.filter.cloud, last.t_s, self.gateway.numbers)
 

@@ -160,9 +160,7 @@ def test_a_right_angled_corner_answers_wherever_the_map_begins(
         assert left == pytest.approx(away_m, abs=2e-3)
 
 
-@given(
-    st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 360.0), st.floats(5.0, 40.0), st.floats(2.0, 4.0)
-)
+@given(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 360.0), st.floats(5.0, 40.0), st.floats(2.0, 4.0))
 def test_from_outside_a_corner_does_not_send_the_ping_back(
     x: float, y: float, turn_deg: float, bearing_deg: float, away_m: float
 ) -> None:

@@ -136,7 +136,7 @@ class MapFilter:
             self._search_after(gap, segment)
         if not segment.unobserved:
             self._follow(measured)
-        self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self._plan_supports)
+        self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
         right = self._right()
         if self._choose(right.here, segment.heading1_rad):
             right = self._right()
@@ -206,7 +206,7 @@ class MapFilter:
         return GATHERED * self._plan.probability
 
     @property
-    def _plan_supports(self) -> bool:
+    def plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
         return self._building.has_walls and self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
 
