@@ -12,14 +12,12 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.json_fields import LIMIT_M
 from echostep.ports.check_in import MOST_LEVELS
+from echostep.ports.payloads import Metres, Variance, decoded, has_covariance
 
 MEETING = "meeting"  # name of the port
 MOST_BYTES = 512  # of one encoded meeting, by reason
 MOST_RANGE_M = 1000.0  # beyond the reach of any radio for short ranges
-Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
-Variance = Annotated[float, Meta(ge=0.0, le=1e12)]
 
 
 class Meeting(msgspec.Struct, frozen=True):
@@ -53,11 +51,5 @@ _DECODER = msgspec.json.Decoder(Meeting)
 
 def parse_meeting(payload: bytes) -> Meeting | None:
     """The meeting in a chunk; None when the bytes are none, or hold no covariance."""
-    if len(payload) > MOST_BYTES:
-        return None
-    try:
-        meeting: Meeting = _DECODER.decode(payload)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError):
-        return None
-    m = meeting
-    return None if m.xy_m2**2 > m.xx_m2 * m.yy_m2 * (1.0 + 1e-9) + 1e-12 else m
+    meeting = decoded(payload, _DECODER, MOST_BYTES)
+    return meeting if meeting is not None and has_covariance(meeting) else None

@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from echostep.ports.check_in import MOST_LEVELS
-from echostep.ports.meeting import Metres, Variance
+from echostep.ports.payloads import Metres, Variance, decoded, has_covariance
 
 TEAM_BEACONS = "team_beacons"  # name of the port
 MOST_BYTES = 8192  # of one encoded message; 64 beacons have 6,500
@@ -52,15 +52,8 @@ _DECODER = msgspec.json.Decoder(TeamBeacons)
 
 def parse_team_beacons(payload: bytes) -> TeamBeacons | None:
     """The message in a chunk; None when the bytes are none, name a beacon twice, or hold no covariance."""
-    if len(payload) > MOST_BYTES:
-        return None
-    try:
-        told: TeamBeacons = _DECODER.decode(payload)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+    told = decoded(payload, _DECODER, MOST_BYTES)
+    if told is None:
         return None
     is_unique = len({b.number for b in told.beacons}) == len(told.beacons)
-    return told if is_unique and all(_has_covariance(b) for b in told.beacons) else None
-
-
-def _has_covariance(b: SharedBeacon) -> bool:
-    return b.xy_m2**2 <= b.xx_m2 * b.yy_m2 * (1.0 + 1e-9) + 1e-12
+    return told if is_unique and all(has_covariance(b) for b in told.beacons) else None

@@ -11,12 +11,11 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from echostep.plan.json_fields import LIMIT_M
 from echostep.ports.check_in import MOST_LEVELS
+from echostep.ports.payloads import Metres, decoded
 
 TEAM = "team"  # name of the port
 MOST_BYTES = 512  # of one encoded position, by reason
-Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
 
 
 class Teammate(msgspec.Struct, frozen=True):
@@ -39,10 +38,4 @@ _DECODER = msgspec.json.Decoder(Teammate)
 
 def parse_teammate(payload: bytes) -> Teammate | None:
     """The place in a chunk; None when the bytes are none."""
-    if len(payload) > MOST_BYTES:
-        return None
-    try:
-        teammate: Teammate = _DECODER.decode(payload)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError):
-        return None
-    return teammate
+    return decoded(payload, _DECODER, MOST_BYTES)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""What the payloads of chunks have in common: JSON of a bounded size that is checked against a structure, and covariances.
+
+In: bytes that may be damaged or hostile. Out: a structure, or None. Owns the limits of places.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Protocol, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from echostep.plan.json_fields import LIMIT_M
+
+Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]
+Variance = Annotated[float, Meta(ge=0.0, le=1e12)]
+T = TypeVar("T")
+
+
+class Spread(Protocol):
+    """Variances and covariance (m2) of a place."""
+
+    @property
+    def xx_m2(self) -> float: ...
+    @property
+    def xy_m2(self) -> float: ...
+    @property
+    def yy_m2(self) -> float: ...
+
+
+def decoded(payload: bytes, decoder: msgspec.json.Decoder[T], most_bytes: int) -> T | None:
+    """The structure in a payload; None when the bytes are too many, or none of it."""
+    if len(payload) > most_bytes:
+        return None
+    try:
+        return decoder.decode(payload)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+
+
+def has_covariance(place: Spread) -> bool:
+    """Whether the three numbers are a covariance, to rounding: its determinant is not negative."""
+    return place.xy_m2**2 <= place.xx_m2 * place.yy_m2 * (1.0 + 1e-9) + 1e-12
