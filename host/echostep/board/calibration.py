@@ -31,7 +31,7 @@ BELT = GYROS.index("belt")
 OFFSET_MAX_M_S2 = 1.5  # of an accelerometer: 65 mg when new, and soldering [ICM-20649 data sheet DS-000192, table 2], twice; by reason
 SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; by reason
 BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; by reason
-_AXES = ("x", "y", "z")
+AXES = ("x", "y", "z")
 
 
 class Echo(NamedTuple):
@@ -80,7 +80,7 @@ class ImuSettings:
 
     def __post_init__(self) -> None:
         """Raise ValueError for what is no part's error."""
-        for name in _AXES:
+        for name in AXES:
             for field, value, limit in (
                 (f"scale_{name}", getattr(self, f"scale_{name}") - 1.0, SCALE_ERROR_MAX),
                 (f"offset_{name}_m_s2", getattr(self, f"offset_{name}_m_s2"), OFFSET_MAX_M_S2),
@@ -92,17 +92,27 @@ class ImuSettings:
     @property
     def offset(self) -> Floats:
         """Offsets (3,) in m/s2."""
-        return np.array([getattr(self, f"offset_{name}_m_s2") for name in _AXES])
+        return np.array([getattr(self, f"offset_{name}_m_s2") for name in AXES])
 
     @property
     def scale(self) -> Floats:
         """Scales (3,)."""
-        return np.array([getattr(self, f"scale_{name}") for name in _AXES])
+        return np.array([getattr(self, f"scale_{name}") for name in AXES])
 
     @property
     def bias(self) -> Floats:
         """Biases (3,) of the rates in rad/s."""
-        return np.array([getattr(self, f"bias_{name}_rad_s") for name in _AXES])
+        return np.array([getattr(self, f"bias_{name}_rad_s") for name in AXES])
+
+    def true_forces(self, measured: Floats) -> Floats:
+        """Specific forces (n, 3) in m/s2 without the part's errors."""
+        found: Floats = (measured - self.offset) * self.scale
+        return found
+
+    def true_rates(self, measured: Floats) -> Floats:
+        """Rates (n, 3) in rad/s without the part's errors."""
+        found: Floats = measured - self.bias
+        return found
 
 
 class Imus(NamedTuple):
@@ -134,12 +144,18 @@ def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> Floats:
 def six_axes(samples: NDArray[np.void], place: str) -> tuple[Floats, Floats]:
     """Rates (n, 3) in rad/s and specific forces (n, 3) in m/s2 of one place of motion samples (n,), in the part's axes; NaN where not measured."""
     rates, forces = (
-        np.column_stack([samples[f"{place}_{kind}_{axis}"] for axis in "xyz"]).astype(np.float64)
+        np.column_stack([samples[f"{place}_{kind}_{axis}"] for axis in AXES]).astype(np.float64)
         for kind in ("rate", "acceleration")
     )
     for counts in (rates, forces):
         counts[counts == MOTION_INVALID] = np.nan
     return rates * LSM6DSO_RAD_S, forces * LSM6DSO_M_S2
+
+
+def foot_axes(samples: NDArray[np.void]) -> tuple[Floats, Floats]:
+    """Rates (n, 3) in rad/s and specific forces (n, 3) in m/s2 of samples (n,) of a foot board, in the part's axes."""
+    rates, forces = (np.column_stack([samples[f"{kind}_{axis}"] for axis in AXES]) for kind in ("rate", "acceleration"))
+    return ICM20649_RAD_S * rates, ICM20649_M_S2 * forces
 
 
 def compass_headings(samples: NDArray[np.void]) -> Floats:

@@ -11,13 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S, ImuSettings
+from echostep.board.calibration import ImuSettings, foot_axes
 from echostep.board.findings import BoardReports
 from echostep.board.frames import BoardReader
 from echostep.board.messages import BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
 
 _REPORTS = (Identity, Configuration, Status, BoardHealth, Parts, FootHealth)
-_AXES = ("x", "y", "z")
 
 
 class FootFrames(NamedTuple):
@@ -52,10 +51,10 @@ class FootBoardReader:
             self.reports.add(report)
         frame_row, found = frames.rows(Foot)
         self.samples += len(found)
-        rates = np.column_stack([found[f"rate_{axis}"] for axis in _AXES])
-        forces = np.column_stack([found[f"acceleration_{axis}"] for axis in _AXES])
-        errors = self._errors
-        accel = (ICM20649_M_S2 * forces - errors.offset) * errors.scale
+        rates, forces = foot_axes(found)
         return FootFrames(
-            found["ticks"].astype(np.int64), accel, ICM20649_RAD_S * rates - errors.bias, frames.end[frame_row]
+            found["ticks"].astype(np.int64),
+            self._errors.true_forces(forces),
+            self._errors.true_rates(rates),
+            frames.end[frame_row],
         )

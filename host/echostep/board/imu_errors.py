@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.board.calibration import ImuSettings
+from echostep.board.calibration import AXES, ImuSettings
 
 POSES = 6  # as many equations as unknowns; one for each side of a box
 LEAST_SAMPLES = 100  # of a pose
@@ -29,7 +29,6 @@ ALIKE_RAD = math.radians(35.0)  # by reason: sides of a box are 90 degrees apart
 POSE_ERROR_M_S2 = 0.02  # of a pose's mean: noise, and the 0.1 to 0.2 % by which parts are not linear; by reason
 OFFSET_SD_M_S2 = 0.06  # largest sd that the poses may leave, three times that of six sides; by reason
 TURNS = 8  # of Gauss and Newton; errors of 5 % need three
-_AXES = ("x", "y", "z")
 
 
 class Pose(NamedTuple):
@@ -91,7 +90,7 @@ def _check_geometry(slope: Floats) -> None:
         raise ValueError(f"its poses are too alike: {again}")
     sd = POSE_ERROR_M_S2 * np.sqrt(np.diag(np.linalg.inv(slope.T @ slope)))
     if sd.max() > OFFSET_SD_M_S2:
-        axis = _AXES[int(sd.argmax()) % 3]
+        axis = AXES[int(sd.argmax()) % 3]
         raise ValueError(f"its poses leave the error of its {axis} axis uncertain by {sd.max():.1f} m/s2: {again}")
 
 

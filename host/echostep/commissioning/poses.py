@@ -14,7 +14,7 @@ import numpy as np
 from rich.console import Console
 
 from echostep.arrays import Bools, Floats
-from echostep.board.calibration import GYROS, ICM20649_M_S2, ICM20649_RAD_S, ImuSettings, six_axes
+from echostep.board.calibration import GYROS, ImuSettings, foot_axes, six_axes
 from echostep.board.device_faults import foot_celsius, gyro_celsius
 from echostep.board.imu_errors import POSES, Pose, check_unlike, fit_errors, pose_of
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, ROWS, Foot, Gyro, Motion
@@ -51,14 +51,12 @@ def parts_of(probed: ProbeResult) -> dict[str, Lying]:
                 found[place] = Lying(forces[valid], rates[valid], 0.0 if gyro is None else gyro_celsius(gyro))
     if probed.foot:
         rows = np.array(probed.foot, ROWS[probed.foot[0].id])
-        rates, forces = (
-            np.column_stack([rows[f"{kind}_{axis}"] for axis in "xyz"]) for kind in ("rate", "acceleration")
-        )
+        rates, forces = foot_axes(rows)
         late = _settled(probed, Foot)
         health = probed.reports.foot
         counts = FOOT_HEALTH_TEMPERATURE_INVALID if health is None else health.temperature
         celsius = 0.0 if counts == FOOT_HEALTH_TEMPERATURE_INVALID else foot_celsius(counts)
-        found[FOOT_PLACE] = Lying(ICM20649_M_S2 * forces[late], ICM20649_RAD_S * rates[late], celsius)
+        found[FOOT_PLACE] = Lying(forces[late], rates[late], celsius)
     return found
 
 

@@ -68,7 +68,7 @@ def calibrated(samples: Samples, walked: Walk, seed: int) -> Samples:
         poses.append(pose_of(*measure_foot(lying, np.random.default_rng([seed, 13]))[1:]))
     errors = fit_errors(poses, GRAVITY_M_S2, 0.0)
     t_s, accel, gyro = samples
-    return t_s, (accel - errors.offset) * errors.scale, gyro - errors.bias
+    return t_s, errors.true_forces(accel), errors.true_rates(gyro)
 
 
 def errors_m(walked: Walk, samples: Samples, noise: Noise) -> list[float]:

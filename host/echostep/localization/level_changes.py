@@ -25,6 +25,7 @@ from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, end_of_co
 
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
+SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
 LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
 
 

@@ -24,7 +24,7 @@ from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_
 from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.hypothetical import Hypothetical
-from echostep.localization.level_changes import ClimbSettings, HeightChange
+from echostep.localization.level_changes import SAME_LEVEL_M, ClimbSettings, HeightChange
 from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
 from echostep.localization.meetings import CONTRADICTIONS, MeetingEffect, MeetingMemory, moved_probability
 from echostep.localization.particle_kernels import Move, PingBatch
@@ -42,7 +42,6 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reaso
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
 HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
 COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
-SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
 COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
 HEIGHT_SAMPLES = 9  # used at the end of a segment: a second

@@ -23,6 +23,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.localization.estimate import LOST_M, TAIL, ellipse95
+from echostep.localization.level_changes import SAME_LEVEL_M
 from echostep.localization.particles import Cloud
 from echostep.ports.check_in import MOST_SD_M, CheckIn
 from echostep.ports.meeting import Meeting
@@ -33,7 +34,6 @@ MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: 
 WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which it tells no more than the building does
 LEAST_SD_M = 0.1  # of a radio range: what bodies and antennas add
 WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by what the teammate's tracker says
-SAME_FLOOR_M = 1.5  # difference of height within one level
 LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
 FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
 FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
@@ -107,7 +107,7 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
         on_level, levels = np.full(len(place), meeting.level == 0), 1
     else:
         heights = cloud.sheet.height_m
-        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < SAME_FLOOR_M, len(heights)
+        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < SAME_LEVEL_M, len(heights)
     log_met, weight = log_density(meeting, place, on_level, levels), cloud.weight
     wrong = WRONG[meeting.status]
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))

@@ -19,7 +19,8 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from echostep.odometry.standing_direction import GRAVITY_M_S2, StandingDirection, Vector
+from echostep.foot.ins import GRAVITY_M_S2
+from echostep.odometry.standing_direction import StandingDirection, Vector
 from echostep.odometry.tenths import TENTH_S, Tenth
 
 # By reason, where no source is named.

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.foot.ins import GRAVITY_M_S2
 
 Vector = tuple[float, float, float]
 
-GRAVITY_M_S2 = 9.81
 AROUND_GRAVITY_M_S2 = (
     2.0  # of a stride's mean force from gravity's size; by reason: more is a damaged or saturated sensor
 )

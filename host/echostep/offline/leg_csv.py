@@ -48,6 +48,11 @@ class LegSamples:
     compass: Floats
     notes: tuple[str, ...] = ()
 
+    @property
+    def has_heading(self) -> bool:
+        """Whether a belt or a compass was worn."""
+        return not bool(np.isnan(self.belt).all() and np.isnan(self.compass).all())
+
 
 def load_pair(paths: Sequence[Path]) -> tuple[LegSamples, ...]:
     """Samples of one leg or of both, from one file or two; the notes on the other leg say so. Raises EchostepError."""

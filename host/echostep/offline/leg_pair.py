@@ -50,7 +50,7 @@ def track_pair(
     """
     if min(first.t_s[-1], other.t_s[-1]) <= max(first.t_s[0], other.t_s[0]):
         raise EchostepError("the two legs have no time in common: their times must be of the same clock")
-    trunk = first if _has_heading(first) else other
+    trunk = first if first.has_heading else other
     first, other = (_with_belt(leg, trunk) for leg in (first, other))
     found = [leg_strides(leg, settings) for leg in (first, other)]
     legs = found[0][0], found[1][0]
@@ -71,10 +71,6 @@ def track_pair(
     notes = (*notes, *loose, *heading_notes, *doubts(strides))
     counts = LegCounts(*(getattr(found[0][1], k) + getattr(found[1][1], k) for k in LegCounts.__slots__))
     return LegTrack(path_rows(t_s, distance, heading), strides, counts, source_of(trunk), float(angles[-1, 1]), notes)
-
-
-def _has_heading(leg: LegSamples) -> bool:
-    return not (np.isnan(leg.belt).all() and np.isnan(leg.compass).all())
 
 
 def _with_belt(leg: LegSamples, trunk: LegSamples) -> LegSamples:

@@ -82,7 +82,7 @@ def fused_heading(
 
     A second pass knows from the first one the gyro's bias and the iron beside the compass.
     """
-    if np.isnan(samples.belt).all() and np.isnan(samples.compass).all():
+    if not samples.has_heading:
         return np.zeros((len(samples.t_s), 2)), ()
     sign, notes = belt_sign(samples)
     still = standing(strides, samples.t_s)

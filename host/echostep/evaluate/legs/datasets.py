@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from echostep.arrays import Floats
+from echostep.arrays import Floats, spans
 from echostep.evaluate.recordings import Sets
 from echostep.foot.steps import walk_track
 from echostep.legs.kinematics import LegLengths
@@ -121,8 +121,7 @@ def moves_of(t_s: Floats, places_m: Floats) -> list[Move]:
     even = np.ones(SMOOTHED) / SMOOTHED
     slow = [np.convolve(np.pad(column, SMOOTHED // 2, "edge"), even, "valid") for column in places_m.T]
     stands = np.hypot(*np.gradient(slow, t_s, axis=1)) < STANDS_M_S
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(np.int8))).reshape(-1, 2)
-    stances = [(a, b) for a, b in edges.tolist() if t_s[b - 1] - t_s[a] > STANDS_S]
+    stances = [(a, b) for a, b in spans(stands).tolist() if t_s[b - 1] - t_s[a] > STANDS_S]
     places = [places_m[a:b].mean(axis=0) for a, b in stances]
     return [
         (float(t_s[end - 1]), float(t_s[begin]), later - place)
