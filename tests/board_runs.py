@@ -14,7 +14,9 @@ import pytest
 from numpy.typing import NDArray
 
 from echostep.board import messages as m
+from echostep.board.findings import BoardReports
 from echostep.board.frames import BoardReader, encode
+from echostep.board.health import board_findings
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
 
@@ -73,6 +75,21 @@ class Bench:
     def status(self) -> m.Status:
         """The newest status."""
         return next(x for x in reversed(self.messages) if isinstance(x, m.Status))
+
+    @property
+    def parts(self) -> m.Parts:
+        """The newest report of the parts, which must have been subscribed to."""
+        return next(x for x in reversed(self.messages) if isinstance(x, m.Parts))
+
+    @property
+    def all_findings(self) -> list[str]:
+        """Every finding that any status gave rise to."""
+        kept, found = BoardReports(), []
+        for message in self.messages:
+            kept.add(message)
+            if isinstance(message, m.Status):
+                found += [str(f) for f in board_findings(kept)]
+        return found
 
 
 def kinds(found: list[m.Message]) -> Counter[str]:

@@ -27,11 +27,6 @@ def reports(bench: Bench) -> BoardReports:
     return kept
 
 
-def parts(bench: Bench) -> m.Parts:
-    """The newest report of the parts, which the bench must have subscribed to."""
-    return next(x for x in reversed(bench.messages) if isinstance(x, m.Parts))
-
-
 def pressures(found: list[m.Message]) -> list[m.Pressure]:
     return [x for x in found if isinstance(x, m.Pressure)]
 
@@ -47,7 +42,7 @@ def barometer(bench: Bench) -> Bench:
 
 
 def test_the_bmp390_is_found_and_its_rate_and_pressure_are_right(barometer: Bench) -> None:
-    assert parts(barometer).part_pressure == m.Part.BMP390
+    assert barometer.parts.part_pressure == m.Part.BMP390
     assert part_text_of(reports(barometer), m.Healthy.PRESSURE) == "BMP390, identity 0x60"
     found = pressures(barometer.run(2_000))
     assert 24 <= len(found) <= 26  # 12.5 Hz
@@ -88,23 +83,13 @@ def test_a_bmp390_that_fails_is_named_and_comes_back(barometer: Bench, kind: str
     barometer.fault(f"bmp390={kind}")
     barometer.run(3_500)
     assert cause in {x.fault_pressure for x in barometer.messages if isinstance(x, m.Status)}
-    assert any(str(f).startswith(words) for f in all_findings(barometer))
+    assert any(str(f).startswith(words) for f in barometer.all_findings)
     barometer.fault("bmp390=ok")
     barometer.run(4_000)
     again = kinds(barometer.run(1_000))
     assert again["Pressure"] >= 12
     assert again["Gyros"] == pytest.approx(before["Gyros"], abs=2)
     assert barometer.status.healthy & m.Healthy.PRESSURE
-
-
-def all_findings(bench: Bench) -> list[str]:
-    """Every finding that any status gave rise to."""
-    kept, found = BoardReports(), []
-    for message in bench.messages:
-        kept.add(message)
-        if isinstance(message, m.Status):
-            found += [str(f) for f in board_findings(kept)]
-    return found
 
 
 @pytest.mark.parametrize(
@@ -124,7 +109,7 @@ def test_a_wrong_part_and_an_empty_memory_are_named_at_the_start(
     bench.run(2_500)
     assert not pressures(bench.messages)
     assert cause is None or bench.status.fault_pressure == cause
-    assert any(text.startswith(words) for text in all_findings(bench))
+    assert any(text.startswith(words) for text in bench.all_findings)
 
 
 def test_barometers_may_be_swapped_in_mid_walk(barometer: Bench) -> None:
@@ -132,7 +117,7 @@ def test_barometers_may_be_swapped_in_mid_walk(barometer: Bench) -> None:
         barometer.fault(f"part_pressure={part}")
         barometer.run(5_000)
         found = pressures(barometer.run(1_000))
-        assert parts(barometer).part_pressure == name
+        assert barometer.parts.part_pressure == name
         assert np.ptp([x.pressure for x in found]) <= 1
         assert abs(found[-1].pressure - 405_296) <= 8  # 15 bits of an SCP1000
 
@@ -145,7 +130,7 @@ def test_the_parts_of_the_papers_are_named(bench: Bench) -> None:
     bench.run(300)
     bench.ask(SUBSCRIBE)
     bench.run(2_000)
-    found = parts(bench)
+    found = bench.parts
     assert found[1:9] == (
         m.Part.SRF02, m.Part.SRF02, m.Part.CMPS10, m.Part.ADIS16100, m.Part.ADIS16100, m.Part.ADIS16100, m.Part.SCP1000, 0,
     )  # fmt: skip
@@ -176,7 +161,7 @@ def test_pulse_rangers_are_found_and_timed_to_two_microseconds(rangers: Bench) -
     rng = np.random.default_rng(1)
     rows["own_us"] = rng.integers(1_000, 26_000, rows["own_us"].shape)
     found = rangers.run(10_000, rows)
-    assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == m.Part.PULSE
+    assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == m.Part.PULSE
     for side, ranger in SIDES:
         answers = pings(found, ranger)
         assert len(answers) >= 145
@@ -227,7 +212,7 @@ def test_a_pulse_ranger_that_fails_is_named_and_comes_back(
     assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.BUS_ERROR}
     assert len(pings(found, m.Ranger.RIGHT)) >= 14
     assert rangers.status.fault_ranger_left == cause
-    assert any(text.startswith(words) for text in all_findings(rangers))
+    assert any(text.startswith(words) for text in rangers.all_findings)
     rangers.fault("pulse_left=ok")
     rangers.run(1_500)
     assert {p.outcome for p in pings(rangers.run(1_000), m.Ranger.LEFT)} == {m.Outcome.ECHO}
@@ -257,13 +242,13 @@ def test_rangers_of_two_kinds_are_refused_in_words(bench: Bench) -> None:
     found = bench.run(2_000)
     assert {p.outcome for p in pings(found, m.Ranger.LEFT)} == {m.Outcome.ECHO}
     assert {p.outcome for p in pings(found, m.Ranger.RIGHT)} == {m.Outcome.BUS_ERROR}
-    assert parts(bench).wiring == m.Wiring.MIXED_RANGERS
+    assert bench.parts.wiring == m.Wiring.MIXED_RANGERS
     (text,) = [str(f) for f in board_findings(reports(bench)) if "ranger" in f.subject]
     assert text.startswith("rangers: the left one is an SRF02, the right one a pulse ranger; the right one is not used")
     bench.fault("part_ranger_left=pulse")
     bench.run(2_500)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-    assert parts(bench).wiring == m.Wiring.OK
+    assert bench.parts.wiring == m.Wiring.OK
 
 
 def test_rangers_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
@@ -274,7 +259,7 @@ def test_rangers_may_be_swapped_in_mid_walk(rangers: Bench) -> None:
         found = rangers.run(1_000)
         assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
         assert kinds(found)["Ping"] >= 28
-        assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == name
+        assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == name
 
 
 def test_sync_pulses_are_not_taken_for_a_pulse_ranger(bench: Bench) -> None:
@@ -326,7 +311,7 @@ def test_all_axes_of_three_lsm6dso_come_at_200_hz(imus: Bench) -> None:
     assert (values[:, 0] == np.arange(9).reshape(3, 3) * 100 - 300).all()
     assert (values[:, 1] == np.arange(9).reshape(3, 3) * 1_000 - 4_000).all()
     assert gyros[-1][1:] == tuple(round(z * 0.035 / 0.2439) for z in (-100, 200, 500))
-    assert [parts(imus)[1 + k] for k in (3, 4, 5)] == [m.Part.LSM6DSO] * 3
+    assert [imus.parts[1 + k] for k in (3, 4, 5)] == [m.Part.LSM6DSO] * 3
     assert imus.status.dropped_gyros == imus.reader.counts.lost == 0
 
 
@@ -370,7 +355,7 @@ def test_an_lsm6dso_that_fails_is_named_and_comes_back(imus: Bench, kind: str, c
     assert {x.calf_acceleration_z for x in found if isinstance(x, m.Motion)} == {-32768}
     assert all(x.thigh == 41 and x.belt == 5 for x in found if isinstance(x, m.Gyros))
     assert cause in {x.fault_calf for x in found if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in all_findings(imus))
+    assert any(text.startswith(words) for text in imus.all_findings)
     imus.fault("imu_calf=ok")
     imus.run(1_500)
     assert {x.calf for x in imus.run(500) if isinstance(x, m.Gyros)} == {-82}
@@ -389,11 +374,11 @@ def test_old_and_new_gyros_may_be_mixed_and_swapped(imus: Bench) -> None:
     found = imus.run(500)
     assert {x[1:] for x in found if isinstance(x, m.Gyros)} == {(41, -82, 5)}
     assert {(x.calf_rate_z, x.thigh_rate_z) for x in found if isinstance(x, m.Motion)} == {(-32768, 286)}
-    assert (parts(imus).part_thigh, parts(imus).part_calf) == (m.Part.LSM6DSO, m.Part.ADIS16100)
+    assert (imus.parts.part_thigh, imus.parts.part_calf) == (m.Part.LSM6DSO, m.Part.ADIS16100)
     imus.fault("part_calf=lsm6dso")
     imus.run(2_500)
     assert {x[1:] for x in imus.run(500) if isinstance(x, m.Gyros)} == {(41, -82, 5)}
-    assert parts(imus).part_calf == m.Part.LSM6DSO
+    assert imus.parts.part_calf == m.Part.LSM6DSO
 
 
 def test_a_part_that_is_neither_gyro_is_not_read(bench: Bench) -> None:
@@ -424,8 +409,8 @@ def test_the_field_of_a_lis3mdl_comes_at_the_compass_rate(magnetometer: Bench) -
     assert 19 <= len(fields_of(found)) <= 21
     assert fields_of(found)[-1] == (1_000, -2_000, 3_000)
     assert not kinds(found)["Compass"]
-    assert parts(magnetometer).part_compass == m.Part.LIS3MDL
-    assert parts(magnetometer).identity_compass == 0x3D
+    assert magnetometer.parts.part_compass == m.Part.LIS3MDL
+    assert magnetometer.parts.identity_compass == 0x3D
     assert magnetometer.status.errors_compass == 0
     assert kinds(found)["Ping"] >= 56  # the bus is shared with SRF02
 
@@ -446,7 +431,7 @@ def test_a_lis3mdl_that_fails_is_named_and_comes_back(
     found = magnetometer.run(2_000)
     assert not fields_of(found)
     assert cause in {x.fault_compass for x in found if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in all_findings(magnetometer))
+    assert any(text.startswith(words) for text in magnetometer.all_findings)
     magnetometer.fault("lis3mdl=ok")
     magnetometer.run(3_000)
     assert len(fields_of(magnetometer.run(1_000))) >= 9
@@ -460,7 +445,7 @@ def test_a_wrong_magnetometer_is_named(bench: Bench) -> None:
     bench.ask(SUBSCRIBE)
     bench.run(2_000)
     words = "compass: holds a part that the firmware does not know (identity register 0x40)"
-    assert any(text.startswith(words) for text in all_findings(bench))
+    assert any(text.startswith(words) for text in bench.all_findings)
 
 
 def test_compasses_may_be_swapped_in_mid_walk(magnetometer: Bench) -> None:
@@ -468,7 +453,7 @@ def test_compasses_may_be_swapped_in_mid_walk(magnetometer: Bench) -> None:
         magnetometer.fault(f"part_compass={part}")
         magnetometer.run(3_500)
         assert kinds(magnetometer.run(1_000))[kind] >= 9
-        assert parts(magnetometer).part_compass == name
+        assert magnetometer.parts.part_compass == name
 
 
 def test_an_older_host_reads_the_kit_of_2026_but_for_its_compass(bench: Bench) -> None:

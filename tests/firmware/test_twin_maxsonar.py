@@ -8,8 +8,6 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep.board.findings import BoardReports
-from echostep.board.health import board_findings
 from echostep.board.subscription import SUBSCRIBE
 
 pytestmark = needs_twin
@@ -35,27 +33,13 @@ def rangers(bench: Bench) -> Bench:
     return bench
 
 
-def parts(bench: Bench) -> m.Parts:
-    return next(x for x in reversed(bench.messages) if isinstance(x, m.Parts))
-
-
-def findings(bench: Bench) -> list[str]:
-    """Every finding that any status gave rise to."""
-    kept, found = BoardReports(), []
-    for message in bench.messages:
-        kept.add(message)
-        if isinstance(message, m.Status):
-            found += [str(f) for f in board_findings(kept)]
-    return found
-
-
 def outcomes(found: list[m.Message], ranger: m.Ranger) -> set[int]:
     return {p.outcome for p in pings(found, ranger)}
 
 
 def test_maxsonars_are_found_and_ping_ten_times_a_second_each(rangers: Bench) -> None:
     found = rangers.run(10_000)
-    assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == m.Part.MAXSONAR
+    assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == m.Part.MAXSONAR
     for side, ranger in SIDES:
         answers = pings(found, ranger)
         assert 99 <= len(answers) <= 101
@@ -81,7 +65,7 @@ def test_a_range_is_given_in_centimetres_from_the_least_to_the_greatest(
     rangers.run(200, rows[:200])
     for _, ranger in SIDES:
         assert {p.time_of_flight_us for p in pings(rangers.run(1_000, rows), ranger)} == {range_cm * US_PER_CM}
-    assert parts(rangers).part_ranger_left == m.Part.MAXSONAR
+    assert rangers.parts.part_ranger_left == m.Part.MAXSONAR
 
 
 def test_in_turn_they_ping_five_times_a_second_each(rangers: Bench) -> None:
@@ -121,7 +105,7 @@ def test_a_maxsonar_that_fails_is_named_and_comes_back(rangers: Bench, kind: str
     assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
     assert len(pings(found, m.Ranger.RIGHT)) >= 9
     assert cause in {x.fault_ranger_left for x in rangers.messages if isinstance(x, m.Status)}
-    assert any(text.startswith(words) for text in findings(rangers))
+    assert any(text.startswith(words) for text in rangers.all_findings)
     rangers.fault("maxsonar_left=ok")
     rangers.run(2_500)
     found = rangers.run(1_000)
@@ -147,7 +131,7 @@ def test_rangers_of_all_kinds_may_be_swapped_in_mid_walk(rangers: Bench) -> None
         rangers.run(4_000)
         found = rangers.run(1_000)
         name, least = expected[part]
-        assert parts(rangers).part_ranger_left == parts(rangers).part_ranger_right == name
+        assert rangers.parts.part_ranger_left == rangers.parts.part_ranger_right == name
         assert {p.outcome for p in found if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
         assert least <= kinds(found)["Ping"] <= least + 3
 
@@ -162,13 +146,13 @@ def test_a_maxsonar_beside_another_kind_is_used_alone_and_named(bench: Bench, ot
     found = bench.run(2_000)
     assert outcomes(found, m.Ranger.RIGHT) == {m.Outcome.ECHO}
     assert outcomes(found, m.Ranger.LEFT) == {m.Outcome.BUS_ERROR}
-    assert parts(bench).wiring == m.Wiring.MIXED_RANGERS
+    assert bench.parts.wiring == m.Wiring.MIXED_RANGERS
     words = f"rangers: the left one is {name}, the right one a MaxSonar; the left one is not used"
-    assert any(text.startswith(words) for text in findings(bench))
+    assert any(text.startswith(words) for text in bench.all_findings)
     plug(bench, "maxsonar", "left")
     bench.run(3_000)
     assert {p.outcome for p in bench.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
-    assert parts(bench).wiring == m.Wiring.OK
+    assert bench.parts.wiring == m.Wiring.OK
 
 
 def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> None:
@@ -176,4 +160,4 @@ def test_maxsonars_survive_a_reset_in_the_middle_of_a_ping(rangers: Bench) -> No
     rangers.run(2_000)
     assert {p.outcome for p in rangers.run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
     rangers.run(1_000)
-    assert not [text for text in findings(rangers) if "ranger" in text]
+    assert not [text for text in rangers.all_findings if "ranger" in text]
