@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Public recordings of feet and trunks through the detection of falls: how many it claims where nobody falls.
+"""Public recordings of feet and trunks through the detection of falls: how many it claims where there is none.
 
 In: a folder laid out like ../shared/data. Out: rows. Owns nothing. The strides, by which the standing directions are learnt, are those of the foot.
 """
@@ -27,7 +27,7 @@ MOVING_M_S2 = 2.0  # of a walking chest, sum of the axes' standard deviations in
 
 
 def recorded(folder: Path) -> list[Row]:
-    """Every recording of feet and trunks, through the detection: how many falls it claims. Nobody falls in them."""
+    """Every recording of feet and trunks, through the detection: how many falls it claims. There is none in them."""
     rows: list[Row] = []
     for foot in read_sets(folder, FEET)[0]:
         rows.append(_of_foot("recorded: feet", np.asarray(foot.t_s, np.float64), foot.accel, foot.gyro))

@@ -142,7 +142,7 @@ class MapFilter:
         return self._estimate(segment, right)
 
     def meet(self, meeting: Meeting) -> MeetingEffect:
-        """Weigh the clouds by where a teammate is who stands beside the wearer, and decide which of them is tracked.
+        """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
 
         Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
         one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing; ranges to beacons of two teammates

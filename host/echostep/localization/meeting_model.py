@@ -56,7 +56,7 @@ def covariance(meeting: Meeting) -> Floats:
 
 
 def start_at(meeting: Meeting) -> CheckIn:
-    """Where a wearer is of whom nothing else is known: about the teammate, within the radio's range, facing anywhere."""
+    """A start by a meeting alone: about the teammate, within the radio's range, with any heading."""
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
     sd_m = math.sqrt(0.5 * float(np.trace(covariance(meeting))) + 0.5 * range_m**2)
     return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)

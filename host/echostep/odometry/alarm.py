@@ -140,7 +140,7 @@ class WearerAlarm:
             self._change(t_s, None)  # the team was not alarmed
 
     def _end_by_walking(self) -> None:
-        """A mayday that nobody asked for ends when the wearer walks, and so does the question about a fall."""
+        """A mayday without a call for help ends when the wearer walks, and so does the question about a fall."""
         alarm = self.alarm
         asks = alarm is not None and alarm.kind is AlarmKind.ASKING and alarm.reason is AlarmReason.FALL
         calls = alarm is not None and alarm.kind is AlarmKind.MAYDAY and alarm.reason is not AlarmReason.HELP

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Falls: an impact of a wearer who was upright, then lying with little motion.
+"""Falls: an impact just after an upright posture, then lying with little motion.
 
 In: tenths of a second of the belt (with the thigh's force beside them) and of the foot, and strides, in order of their messages. Out: `Fall`s; the
 trunk's tilt. Owns the standing directions and what was last upright.

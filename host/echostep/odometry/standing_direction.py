@@ -3,7 +3,7 @@
 
 In: tenths of strides. Out: tilts. Owns the learnt direction. Over a stride the specific force of a trunk, a thigh or a standing foot averages to
 gravity, so no mounting has to be known. Only long strides teach: a wearer on the knees makes none. Limits: a sensor that slips is followed within
-about 20 strides; a wearer who has not yet walked upright has no direction, hence no tilt.
+about 20 strides; before the first upright strides there is no direction, hence no tilt.
 """
 
 from __future__ import annotations

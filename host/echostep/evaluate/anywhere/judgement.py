@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools, Floats, Ints
 from echostep.evaluate.anywhere.filtering import Claim
 from echostep.localization.estimate import TrackStatus
 
@@ -22,6 +22,7 @@ FOUND_M = 1.0  # a wearer is found within this error
 SEARCH_M = 40.0  # of the way, after which a wearer must be found
 LISTED_M = 2.5  # a hypothesis is right within this error: a room
 FLOOR_M = 3.5  # least error on a wrong floor: the height of a storey
+TIE_M = 0.5  # within so much of the middle between two floors both are right
 FALSE_TRACKING_M = 1.0  # error above which "tracking" is false
 FALSE_LOST_M = 0.5  # error below which "lost" is false
 ALARM_M = 3.0  # error above which a claim must not say "tracking"
@@ -115,14 +116,25 @@ class JudgedRun:
         return float(self.t_s[-1] - self.t_s[0]) if len(self.t_s) else 0.0
 
 
+def true_levels(z_m: Floats, heights_m: Sequence[float]) -> Bools:
+    """Which of levels at `heights_m` are right (n, levels) at true heights of the floor (n,)."""
+    away = np.abs(z_m[:, None] - heights_m)
+    right: Bools = away <= away.min(1, keepdims=True) + 2.0 * TIE_M
+    return right
+
+
+def errors_m(place_m: Floats, level: Ints, true: Truth) -> Floats:
+    """Errors (n,) of places (n, 2) on levels (n,); on a wrong floor at least FLOOR_M."""
+    away = place_m - true.xy_m
+    error_m = np.hypot(away[:, 0], away[:, 1])
+    right = true.level_right[np.arange(len(level)), level]
+    return np.asarray(np.where(right, error_m, np.maximum(error_m, FLOOR_M)))
+
+
 def judge(claims: Sequence[Claim], true: Truth, walked_m: Floats, search_m: float = SEARCH_M) -> JudgedRun:
     """Claims (n,) against the truth at their times; `walked_m` (n,) since the search began."""
     place = np.array([(c.x_m, c.y_m) for c in claims]).reshape(-1, 2)
-    away = place - true.xy_m
-    error_m = np.hypot(away[:, 0], away[:, 1])
-    level = np.array([c.level for c in claims])
-    right = true.level_right[np.arange(len(claims)), level]
-    error_m = np.asarray(np.where(right, error_m, np.maximum(error_m, FLOOR_M)))
+    error_m = errors_m(place, np.array([c.level for c in claims]), true)
     return JudgedRun(
         np.array([c.t_s for c in claims]), walked_m, error_m, np.array([float(CODES[c.status]) for c in claims]),
         np.minimum([c.protection_m for c in claims], FARTHEST_M), _listed(claims[-1], error_m[-1], true), search_m,

@@ -16,7 +16,7 @@ from echostep.errors import EchostepError
 from echostep.evaluate.anywhere.amcl import track_by_amcl
 from echostep.evaluate.anywhere.columns import run_row, summaries, tables
 from echostep.evaluate.anywhere.filtering import FilterRun, track
-from echostep.evaluate.anywhere.judgement import SEARCH_M, JudgedRun, Truth, judge
+from echostep.evaluate.anywhere.judgement import SEARCH_M, JudgedRun, Truth, judge, true_levels
 from echostep.evaluate.anywhere.pictures import draw_stanford
 from echostep.evaluate.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
 from echostep.evaluate.anywhere.walks import T, X, Y, Z
@@ -24,7 +24,6 @@ from echostep.evaluate.report import Row, Table
 from echostep.evaluate.study import Study, StudyRequest
 
 PEER = "/amcl"  # ending of the rows of augmented MCL
-TIE_M = 0.5  # within so much of the middle between two floors both are right
 
 
 def one_run(names: tuple[str, ...], data: Path | None, seed: int) -> list[Row]:
@@ -43,8 +42,7 @@ def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
     walk, claims = trial.walk, [c for c in run.claims if c.t_s >= trial.from_s]
     t_s = np.array([c.t_s for c in claims])
     x, y, z = (np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y, Z))
-    away = np.abs(z[:, None] - [level.height_m for level in trial.plan.levels])
-    right = away <= away.min(1, keepdims=True) + 2.0 * TIE_M
+    right = true_levels(z, [level.height_m for level in trial.plan.levels])
     walked_m = walk.walked_m(t_s) - walk.walked_m(np.array([trial.from_s]))
     return judge(claims, Truth(np.column_stack([x, y]), right), walked_m)
 

@@ -44,18 +44,17 @@ class SimulatedWalk:
 
     def walked_m(self, t_s: Floats) -> Floats:
         """Length of the true way up to times (n,), seen from above."""
-        return np.interp(t_s, self.truth[:, T], self._way_m)
+        return np.interp(t_s, self.truth[:, T], way_m(self.truth))
 
     def time_at(self, walked_m: float) -> float:
         """When this length of the way was walked."""
-        way_m = self._way_m
-        return float(self.truth[min(int(np.searchsorted(way_m, walked_m)), len(way_m) - 1), T])
+        way = way_m(self.truth)
+        return float(self.truth[min(int(np.searchsorted(way, walked_m)), len(way) - 1), T])
 
-    @property
-    def _way_m(self) -> Floats:
-        """Length of the true way up to each row of the truth (n,)."""
-        steps = np.hypot(np.diff(self.truth[:, X]), np.diff(self.truth[:, Y]))
-        return np.concatenate([[0.0], np.cumsum(steps)])
+
+def way_m(truth: Floats) -> Floats:
+    """Length (n,) of the true way up to each row of a truth (n, 5), seen from above."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(truth[:, X]), np.diff(truth[:, Y])))])
 
 
 def simulate(site: Site, seed: int) -> SimulatedWalk:

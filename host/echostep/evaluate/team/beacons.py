@@ -17,7 +17,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.frames import encode
-from echostep.evaluate.team.walks import LEVEL_M, T, TeamWalks, X, Y, Z
+from echostep.evaluate.anywhere.walks import T, X, Y, Z, way_m
+from echostep.evaluate.team.walks import LEVEL_M, TeamWalks
 from echostep.ports.chunks import GATEWAY, Chunk
 from echostep.simulation.devices.beacon_gateway import ASIDE_M, PERIOD_S, SPACING_M, BeaconWorld, heard_at, message
 from echostep.simulation.scenario import START_NS
@@ -59,8 +60,8 @@ def with_dropped_beacons(walks: TeamWalks, seed: int) -> TeamWalks:
 
 def dropped_on(truth: Floats, who: int, rng: np.random.Generator) -> list[Dropped]:
     """The beacons of wearer `who`, beside its way, truth (n, 5)."""
-    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(truth[:, X]), np.diff(truth[:, Y])))])
-    rows = [int(np.searchsorted(way_m, k * SPACING_M)) for k in range(MOST_EACH) if k * SPACING_M <= way_m[-1]]
+    way = way_m(truth)
+    rows = [int(np.searchsorted(way, k * SPACING_M)) for k in range(MOST_EACH) if k * SPACING_M <= way[-1]]
     found = []
     for k, row in enumerate(rows):
         t_s, x, y, z = truth[row, [T, X, Y, Z]].tolist()

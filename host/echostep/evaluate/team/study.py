@@ -5,9 +5,9 @@ In: seeds. Out: rows `office/tap`, `tower/radio`, ... Owns the conditions. Simul
 
 All but the first wearer know their starts; the first is told a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
 apart; `beacons`: the same, each drops beacons, hears those of all and shares its own) or none (`unknown`, apart), or knows its own too and reports
-false places (`liar`, who is left out of all columns). `ratio`: mean error of all wearers and runs together over that alone. `worst`: the greatest
-such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other random numbers, over those alone:
-how much of `worst` means nothing. An error on a wrong floor is at least a storey.
+false places (`liar`: that wearer is left out of all columns). `ratio`: mean error of all wearers and runs together over that alone. `worst`: the
+greatest such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other random numbers, over
+those alone: how much of `worst` means nothing. An error on a wrong floor is at least a storey.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.evaluate.anywhere import sites
+from echostep.evaluate.anywhere import judgement, sites
+from echostep.evaluate.anywhere.judgement import FALSE_TRACKING_M, Truth, true_levels
 from echostep.evaluate.anywhere.tours import random_tour
+from echostep.evaluate.anywhere.walks import T, X, Y, Z
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.evaluate.team.beacons import with_dropped_beacons
 from echostep.evaluate.team.tracking import LIAR, How, track_team
-from echostep.evaluate.team.walks import WEARERS, T, TeamWalks, X, Y, Z, team_walks
+from echostep.evaluate.team.walks import WEARERS, TeamWalks, team_walks
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.start import Start
 from echostep.plan.model import Plan, Pose, load_plan
@@ -37,8 +39,6 @@ from echostep.simulation.world.tower import tower
 ASKED_RATIO, ASKED_WORST = 0.6, 1.05  # what a team asks for
 LENGTH_M = 100.0  # least length of each way
 WRONG_M = 5.0  # least distance of a wrong start from the true one: another room
-STOREY_M = 3.5  # least error on a wrong floor
-FALSE_M = 1.0  # error above which "tracking" is false
 FIRST = 0  # the wearer whose start is wrong or unknown
 OTHER_DRAWS = 1_000_000  # added to the seed of the filters
 TRIES = 200  # for a wrong start
@@ -114,7 +114,7 @@ def _row(name: str, walks: TeamWalks, who: int, runs: Sequence[Sequence[Estimate
     for key, estimates in zip(("alone", "together", "again"), runs, strict=True):
         error = errors_m(walks, who, estimates)
         sure = np.array([e.status is TrackStatus.TRACKING for e in estimates])
-        row |= {f"{key}_m": float(error.mean()), f"false_{key}": float((sure & (error > FALSE_M)).mean())}
+        row |= {f"{key}_m": float(error.mean()), f"false_{key}": float((sure & (error > FALSE_TRACKING_M)).mean())}
     return row
 
 
@@ -123,10 +123,9 @@ def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Float
     truth = walks.truth[who]
     t_s = np.array([e.t_s for e in estimates])
     x, y, z = (np.interp(t_s, truth[:, T], truth[:, k]) for k in (X, Y, Z))
-    error = np.hypot([e.x_m for e in estimates] - x, [e.y_m for e in estimates] - y)
-    heights = np.array([level.height_m for level in walks.plan.levels])
-    off = np.abs(heights[[e.level for e in estimates]] - z)
-    return np.asarray(np.where(off > np.abs(z[:, None] - heights).min(1) + 1.0, np.maximum(error, STOREY_M), error))
+    true = Truth(np.column_stack([x, y]), true_levels(z, [level.height_m for level in walks.plan.levels]))
+    places = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
+    return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 
 
 def _summary(rows: Sequence[Row]) -> Row:

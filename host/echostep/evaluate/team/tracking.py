@@ -15,7 +15,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from echostep.evaluate.team.walks import Encounter, T, TeamWalks
+from echostep.evaluate.anywhere.walks import T
+from echostep.evaluate.team.walks import Encounter, TeamWalks
 from echostep.localization.estimate import Estimate
 from echostep.localization.start import Start
 from echostep.plan.model import Pose
@@ -35,13 +36,13 @@ RADIO_SD_M, RADIO_BIAS_M = (
     0.15,
     0.1,
 )  # of a range by ultra-wideband radio between two bodies, by reason: it is hardly ever short
-LIAR = 0  # number of the wearer who reports a false place
+LIAR = 0  # number of the wearer whose reports are false
 LIE_M = (6.0, 0.0)  # from the true place
 LIE_SD_M = 0.05
 
 
 class How(StrEnum):
-    """Who is told what at an encounter."""
+    """What an encounter tells: a tap, a radio range, a tap of a wearer whose report is false, or shared beacons instead."""
 
     TAP = "tap"
     RADIO = "radio"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The walks of one team through one building, and who meets whom when.
+"""The walks of one team through one building, and when two of its wearers meet.
 
 In: a plan, a seed. Out: `TeamWalks`: bytes and truth of each wearer, encounters by the truth. Owns the definition of an encounter. Simulated: bytes
 of the simulated board and MTx. All wearers begin at one moment, each at a random place or all at the door, and walk a random tour.
@@ -17,6 +17,7 @@ import shapely
 
 from echostep.arrays import Bools, Floats, spans
 from echostep.evaluate.anywhere.tours import random_tour
+from echostep.evaluate.anywhere.walks import T, X, Y, Z
 from echostep.plan.model import Plan, Pose
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk
@@ -27,13 +28,12 @@ from echostep.simulation.scenario import Scenario
 WEARERS = 5
 CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs
 STOP_S = 4.0  # at each place of a tour: a room is looked at
-SIDE_M = 1.2  # between two who tap, at most: side by side
+SIDE_M = 1.2  # between two wearers at a tap, at most: side by side
 RING_M = 0.5  # radius of the ring in which a team stands at a door
 DOOR_S = 10.0  # for which it stands there
 BEGIN_S = 4.0  # after which people meet: trackers have an estimate then
 AGAIN_S = 30.0  # between two encounters of the same two
 LEVEL_M = 1.0  # difference of height on one floor
-T, X, Y, HEADING, Z = range(5)  # columns of the truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def _with_stops(tour: Sequence[Waypoint]) -> list[Waypoint]:
 
 
 def encounters(plan: Plan, truth: Sequence[Floats]) -> tuple[Encounter, ...]:
-    """Every time that two come within SIDE_M of each other on one floor without a wall between, at the moment when they are nearest."""
+    """Every time that two wearers come within SIDE_M of each other on one floor without a wall between, at the moment when they are nearest."""
     found = []
     for i, j in combinations(range(len(truth)), 2):
         rows = min(len(truth[i]), len(truth[j]))
