@@ -12,7 +12,7 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.map_filter import DOUBTED
 from echostep.path import MeasuredSegment
 from echostep.tracker import Tracker
-from echostep.tracker_state import TrackerState
+from echostep.tracker.state import TrackerState
 
 ECHOLESS_S = 5.0  # without a ping for so long there are no echoes; by reason: ten pings of each ranger at the slowest
 LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long. By reason: estimates come twice a second

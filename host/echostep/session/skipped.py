@@ -7,7 +7,7 @@ In: a recording that was read to its end, the tracker's counts. Out: lines of te
 from __future__ import annotations
 
 from echostep.recording.reading import Recording
-from echostep.tracker_state import StreamState
+from echostep.tracker.state import StreamState
 
 
 def skipped(recording: Recording, streams: StreamState) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from echostep.localization.meetings import MeetingEffect
-from echostep.tracker_state import TrackerState
+from echostep.tracker.state import TrackerState
 
 WORDS = {
     MeetingEffect.USED: "{} and you agree about the place.",

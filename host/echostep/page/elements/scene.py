@@ -21,7 +21,7 @@ from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
-from echostep.tracker_state import Particles
+from echostep.tracker.state import Particles
 
 KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
 MOST_SHOWN = 10_000  # particles in a frame

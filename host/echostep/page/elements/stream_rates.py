@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from echostep.board.health import Severity
 from echostep.tracker import Tracker
-from echostep.tracker_state import StreamState
+from echostep.tracker.state import StreamState
 
 WINDOW_NS = 2_000_000_000  # over which rates are averaged
 SHORTEST_S = 0.5  # no rate is given for a shorter time

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from echostep.localization.map_filter import BELIEVED, DOUBTED
-from echostep.tracker_state import TrackerState
+from echostep.tracker.state import TrackerState
 
 UNDO_NS = 10_000_000_000  # for so long the page offers to undo a check-in, and again once echoes contradict it
 

@@ -39,7 +39,7 @@ from echostep.ports.meeting import MEETING
 from echostep.ports.team_beacons import TEAM_BEACONS, SharedBeacon
 from echostep.ports.teammate import TEAM
 from echostep.settings import Settings
-from echostep.tracker_state import Particles, StreamState, TrackerState
+from echostep.tracker.state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
