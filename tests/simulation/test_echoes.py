@@ -160,6 +160,24 @@ def test_a_right_angled_corner_answers_wherever_the_map_begins(
         assert left == pytest.approx(away_m, abs=2e-3)
 
 
+@given(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 360.0), st.floats(5.0, 40.0), st.floats(2.0, 4.0))
+def test_from_outside_a_corner_does_not_send_the_ping_back(
+    x: float, y: float, turn_deg: float, bearing_deg: float, away_m: float
+) -> None:
+    """Along a wall, behind which another one ends (T), or which ends at a door (L): nothing there faces the ranger; the edge is too far."""
+
+    def at(distance_m: float, bearing_deg: float) -> list[float]:
+        angle = math.radians(turn_deg + bearing_deg)
+        return [x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)]
+
+    place = at(away_m, 180.0 - bearing_deg)
+    looking = math.degrees(math.atan2(y - place[1], x - place[0])) - 90.0
+    # The wall's own perpendicular is out of the cone.
+    for beyond_m in (0.0, 3.0):
+        walls = [[*at(5.0, 180.0), *at(beyond_m, 0.0)], [*at(0.0, 270.0), *at(4.0, 270.0)]]
+        assert ranges(listen(walls, at=(place[0], place[1]), heading_deg=looking))[0] == 0.0
+
+
 def test_edges_answer_from_outside_a_corner_only() -> None:
     outside = [[0.1, 1.0, 5.0, 1.0], [0.1, 1.0, 0.1, 5.0]]
     assert ranges(listen(outside))[0] == pytest.approx(math.hypot(0.1, 1.0), abs=1e-3)

@@ -26,6 +26,7 @@ from echostep.simulation.world.image_sources import (
     foot,
     in_double_cone,
     inside_corner,
+    is_before,
     mirror,
     reflection,
     wall_edges,
@@ -198,10 +199,10 @@ def _search_wall_pairs(rangers: RangerPair, search: Search) -> None:
             if first == last or way2 > reach2:
                 continue
             bx, by, reflects = reflection(px, py, jx, jy, walls[first])
-            if not reflects:
+            if not reflects or not is_before(px, py, bx, by, walls[first]):
                 continue
             cx, cy, reflects = reflection(bx, by, ix, iy, walls[last])
-            if reflects:
+            if reflects and is_before(px, py, cx, cy, walls[last]):
                 _consider_pair(rangers, (bx, by), (cx, cy), 0.5 * math.sqrt(way2), (first, last), search)
 
 

@@ -63,6 +63,17 @@ def reflection(px: float, py: float, qx: float, qy: float, wall: Floats) -> tupl
 
 
 @kernel
+def is_before(px: float, py: float, x: float, y: float, wall: Floats) -> bool:
+    """Whether p lies before a wall as seen from its point (x, y): at an end of the wall, p must be on the wall's side of that end.
+
+    From outside, the two walls of a corner meet the way to the corner's apex as well, to REFLECTED_M, but reflect nothing back.
+    """
+    more = REFLECTED_M / math.hypot(wall[2] - wall[0], wall[3] - wall[1])
+    at, of_p = foot(x, y, wall), foot(px, py, wall)
+    return (at > more or of_p > 0.0) and (at < 1.0 - more or of_p < 1.0)
+
+
+@kernel
 def blocked(px: float, py: float, qx: float, qy: float, walls: Floats, but: int, but_too: int) -> bool:
     """Whether a wall other than the two numbered stands between p and q; walls that only touch p or q do not."""
     way = math.hypot(qx - px, qy - py)
