@@ -112,16 +112,20 @@ def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> tuple[float, boo
 
 
 def _end(end_m: float, way: float, crossings: list[tuple[float, bool]], passed: Floats, first_m: float) -> float:
-    """The end moved outward to the nearest crossing within reach that no ping passed on the way, or inward to one that it hardly exceeds."""
+    """The end moved outward to the nearest crossing within reach that no ping passed on the way, or inward to one that it hardly exceeds.
+
+    A wall that stands there comes before one that would have to be extended, when both cross nearly there: two walls on nearly one line.
+    """
     best, best_m = end_m, math.inf
     for c, stands in crossings:
         beyond = (c - end_m) * way
-        if (-SNAP_M if stands else 0.0) < beyond < EXTEND_M and abs(beyond) < best_m:
+        away = abs(beyond) + (0.0 if stands else SNAP_M)
+        if (-SNAP_M if stands else 0.0) < beyond < EXTEND_M and away < best_m:
             low, high = sorted((int((end_m - first_m) / CELL_M), int((c - first_m) / CELL_M)))
             between = passed[max(low, 0) : max(high, 0)].sum()
             if between >= CROSSED or (beyond > SURE_M and between > 1.0):
                 continue
-            best, best_m = c, abs(beyond)
+            best, best_m = c, away
     return best
 
 
