@@ -19,11 +19,11 @@ from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.tile_points import CORNER, EDGE
 
-TRAVEL_M, ALIKE = 0.05, 0.2  # path between two pings; density of an echo like the one before
+TRAVEL_M, ALIKE, UNPLANNED = 0.05, 0.2, 0.6  # path between two pings; density like the one before, and by no plan
 MODEL = echo_model(EchoSettings())
 BOX = Walls(np.array([[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 2.0], [6.0, 2.0, 0.0, 2.0], [0.0, 2.0, 0.0, 0.0]]))
 NONE = np.zeros(0)
-NOTHING = PingBatch(NONE, NONE, NONE, NONE, np.zeros(0, np.int64), NONE, NONE, NONE)
+NOTHING = PingBatch(NONE, NONE, NONE, NONE, np.zeros(0, np.int64), NONE, NONE, NONE, NONE)
 Source = tuple[float, float, float]  # distance, degrees off the axis, kind
 
 
@@ -32,10 +32,10 @@ def cloud(size: int = 1000, heading: float = 0.0) -> Cloud:
 
 
 def heard(axis_rad: float, range_m: float, count: int = 1, power: float = 0.3) -> PingBatch:
-    share, axis, ranges, powers, travel, alike = np.tile(
-        [[0.5], [axis_rad], [range_m], [power], [TRAVEL_M], [ALIKE]], count
+    share, axis, ranges, powers, travel, alike, unplanned = np.tile(
+        [[0.5], [axis_rad], [range_m], [power], [TRAVEL_M], [ALIKE], [UNPLANNED]], count
     )
-    return PingBatch(share, axis, ranges, powers, np.zeros(count, np.int64), travel, np.zeros(count), alike)
+    return PingBatch(share, axis, ranges, powers, np.zeros(count, np.int64), travel, np.zeros(count), alike, unplanned)
 
 
 def log_p(range_m: float, sources: list[Source]) -> float:
@@ -128,6 +128,7 @@ def test_pings_count_where_they_were_triggered() -> None:
             np.full(10, 0.15),
             np.zeros(10),
             np.full(10, ALIKE),
+            np.full(10, UNPLANNED),
         )
         found.propagate_and_reweight(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)
         ends[name] = estimate(found, 0.0, 0.0, 0).x_m

@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 
-from echostep.localization.background import ALIKE_M, Background, RangeMemory
 from echostep.localization.building import Building
 from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.particles import CloudSettings
@@ -67,10 +66,3 @@ def test_weather_makes_a_long_pause_worthless() -> None:
         before = cloud._lag_variance
         cloud.let_lag_drift(3600.0 * hours)
         assert least_m < math.sqrt(cloud._lag_variance - before + 0.01) < most_m
-
-
-def test_a_rival_knows_the_last_echo_no_better_than_the_plan_its_walls() -> None:
-    anywhere = Background(np.full(200, -2.0))
-    ranger, range_m, power = np.zeros(2, np.int64), np.array([1.5, 1.5]), np.ones(2)
-    exact, off = (RangeMemory(anywhere, sd_m).densities(ranger, range_m, power).alike[1] for sd_m in (0.0, 0.1))
-    assert off / exact == pytest.approx(ALIKE_M / math.hypot(ALIKE_M, 0.1))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The echoes' density if nothing is known of the pose: what a wearer anywhere in the building receives, or what the last echo foretells.
+"""The echoes' density if nothing is known of the pose: what a wearer anywhere in the building receives, or what the last echoes foretell.
 
-In: walls, their floor, pings. Out: `Background`: log-density by range; `RangeMemory`: densities of a ping after those before. Owns the last ranges.
-A cloud that explains the echoes no better than this is wrong, or the plan is.
+In: walls, their floor, pings. Out: `Background`: log-density by range; `RangeMemory`: densities of a ping after those before. Owns the views.
+A cloud that explains the echoes no better than this is wrong, or the plan is. So it has to be as good as can be done without a plan: a wall that goes
+on is foretold as well as by the plan (`last_wall.py`), and only where a view changes does the plan know more.
 """
 
 from __future__ import annotations
@@ -14,15 +15,14 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
-from echostep.localization.echo_likelihood import EchoModel, echo_density
+from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_density
 from echostep.localization.missed_echoes import MissedEchoes
+from echostep.localization.view import View
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
 
-ALIKE = 0.5  # share of echoes that are like the one before, by reason
-ALIKE_M = 0.07  # mean difference of such, by reason: the error of two ranges, and the sway between them; the plan's error is added
-STAYS = 0.9  # probability that such a view still has an echo, or still none, by reason
+VIEW_M = 2.5  # mean length of the path between two changes of a view, by reason: walls, doors, corners
 POSES = 400  # drawn on the floor, by reason: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
 
@@ -50,10 +50,21 @@ def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
     return Background(np.log(density))
 
 
+class PlacedPings(NamedTuple):
+    """Pings (k,): `ranger`; place and axis in the walk frame; `range_m`, 0: no echo; `power`."""
+
+    ranger: Ints
+    x_m: Floats
+    y_m: Floats
+    axis_rad: Floats
+    range_m: Floats
+    power: Floats
+
+
 class UnplannedDensities(NamedTuple):
     """Of pings (k,): `missed`, odds that a silent one missed its echo, 0 for an echo; `alike`, the density if like the one before, without those.
 
-    Logs, to the pings' power, with them: `anywhere` in the building, `either`.
+    Logs of densities to the pings' power, with them: `anywhere` in the building, `either` that or like the one before.
     """
 
     missed: Floats
@@ -63,45 +74,29 @@ class UnplannedDensities(NamedTuple):
 
 
 class RangeMemory:
-    """The density of echoes without any plan: like the last echo of the same ranger, or as anywhere in the building.
+    """The density of echoes without any plan: the view of the same ranger goes on, or it has changed to any in the building."""
 
-    `plan_sd_m`: standard deviation of the plan's walls. A right cloud foretells no echo better than that, though a wall's error stays the same along
-    it; a rival that used this would beat it on every wall, so it knows the last echo no better either.
-    """
-
-    def __init__(self, background: Background, plan_sd_m: float = 0.0) -> None:
-        self._background = background
-        self._alike_m = math.hypot(ALIKE_M, plan_sd_m)
+    def __init__(self, background: Background, echo: EchoSettings) -> None:
+        self._background, self._echo = background, echo
         self._missed = MissedEchoes()
-        self._last_m = [math.nan, math.nan]  # range of each ranger's last ping; 0: no echo, NaN: no ping yet
+        self._views = [View(echo), View(echo)]
 
-    def densities(self, ranger: Ints, range_m: Floats, power: Floats) -> UnplannedDensities:
-        """For pings (k,) in order of time; range 0: no echo."""
-        log_anywhere = self._background.of(range_m)
+    def densities(self, pings: PlacedPings) -> UnplannedDensities:
+        """For pings (k,) in order of time."""
+        log_anywhere = self._background.of(pings.range_m)
         anywhere = np.exp(log_anywhere)
-        missed, alike = np.zeros(len(range_m)), np.empty(len(range_m))
-        for k, (which, value_m) in enumerate(zip(ranger.tolist(), range_m.tolist(), strict=True)):
-            alike[k] = _alike(value_m, self._last_m[which], float(anywhere[k]), self._alike_m)
-            if value_m <= 0.0:
-                missed[k] = self._missed.odds(which)
-            if (
-                missed[k] < 1.0 - STAYS
-            ):  # otherwise it is likelier that an echo was missed than that the view has changed
-                self._last_m[which] = value_m
-            self._missed.update(which, value_m)
-        either = power * np.log((1.0 - ALIKE) * anywhere + ALIKE * alike + missed)
-        return UnplannedDensities(missed, alike, power * np.log(anywhere + missed), either)
-
-
-def _alike(range_m: float, last_m: float, anywhere: float, alike_m: float) -> float:
-    """Density of a range after one that it is like: Laplace about it. After no echo, no echo is likely."""
-    if math.isnan(last_m):
-        return anywhere
-    if range_m <= 0.0 or last_m <= 0.0:
-        if last_m > 0.0:
-            return 1.0 - STAYS
-        return STAYS if range_m <= 0.0 else (1.0 - STAYS) * anywhere
-    return STAYS * math.exp(-abs(range_m - last_m) / alike_m) / (2.0 * alike_m)
+        missed, alike, changed = (np.zeros(len(anywhere)) for _ in range(3))
+        for k, which in enumerate(pings.ranger.tolist()):
+            view, range_m = self._views[which], float(pings.range_m[k])
+            missed[k] = self._missed.odds(which) if range_m <= 0.0 else 0.0
+            self._missed.update(which, range_m)
+            travel_m = view.move(float(pings.x_m[k]), float(pings.y_m[k]))
+            changed[k] = 1.0 - (1.0 - self._echo.outlier) * math.exp(-travel_m / VIEW_M)
+            alike[k] = view.density(range_m, float(pings.axis_rad[k]))
+            goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
+            view.update(range_m, float(pings.axis_rad[k]), float(pings.power[k]), goes_on)
+        either = changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (alike + missed) ** pings.power
+        return UnplannedDensities(missed, alike, pings.power * np.log(anywhere + missed), np.log(either))
 
 
 @kernel

@@ -88,14 +88,6 @@ class EchoModel(NamedTuple):
     outlier: float
 
 
-class EchoDensities(NamedTuple):
-    """Density per metre of a range (or probability of no echo): if the view is as planned, if it is hidden, and of an outlier."""
-
-    planned: float
-    hidden: float
-    outlier: float
-
-
 def echo_model(s: EchoSettings) -> EchoModel:
     """The settings in the kernels' units."""
     per_db = 1.0 / s.soft_db
@@ -108,10 +100,13 @@ def echo_model(s: EchoSettings) -> EchoModel:
 
 
 @lean_kernel
-def echo_densities(
-    range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
-) -> EchoDensities:
-    """Densities of a range given `count` sources, nearest first; range 0: probabilities of no echo."""
+def planned_density(
+    range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, stray: float, m: EchoModel
+) -> float:
+    """Density per metre of a range given `count` sources, nearest first, if the view is as planned; range 0: the probability of no echo.
+
+    `stray`: density of this range if it is a second reflection.
+    """
     unheard, hit = 1.0, 0.0
     for k in range(count):
         heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
@@ -122,13 +117,14 @@ def echo_densities(
         if unheard < NEGLIGIBLE:
             break
     if range_m <= 0.0:
-        return EchoDensities((1.0 - m.stray) * unheard, SILENT, SILENT)
-    span = m.maximum_m - m.minimum_m
-    first = distance_m[0] if count else m.maximum_m
-    before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
-    nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
-    hidden = (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) / span)
-    return EchoDensities(hit + unheard * m.stray / span, hidden, (1.0 - SILENT) / span)
+        return (1.0 - m.stray) * unheard
+    return hit + unheard * m.stray * stray
+
+
+@inline_kernel
+def outlier_density(range_m: float, m: EchoModel) -> float:
+    """Density per metre of a range that nothing foretells; range 0: the probability of no echo."""
+    return SILENT if range_m <= 0.0 else (1.0 - SILENT) / (m.maximum_m - m.minimum_m)
 
 
 @lean_kernel
@@ -136,8 +132,16 @@ def echo_density(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
 ) -> float:
     """Density per metre of a range whose view has no history: hidden with probability `hidden`; range 0: the probability of no echo."""
-    d = echo_densities(range_m, count, distance_m, off_axis_rad, kind, m)
-    return (1.0 - m.outlier) * ((1.0 - m.hidden) * d.planned + m.hidden * d.hidden) + m.outlier * d.outlier
+    outlier = outlier_density(range_m, m)
+    stray = 1.0 / (m.maximum_m - m.minimum_m)
+    planned = planned_density(range_m, count, distance_m, off_axis_rad, kind, stray, m)
+    hidden = SILENT
+    if range_m > 0.0:
+        first = distance_m[0] if count else m.maximum_m
+        before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
+        nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
+        hidden = (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) * stray)
+    return (1.0 - m.outlier) * ((1.0 - m.hidden) * planned + m.hidden * hidden) + m.outlier * outlier
 
 
 @lean_kernel

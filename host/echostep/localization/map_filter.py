@@ -14,7 +14,7 @@ from statistics import median
 
 import numpy as np
 
-from echostep.angles import mean_angle
+from echostep.angles import mean_angle, wrap
 from echostep.board.gateway import BeaconReading
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
@@ -29,7 +29,7 @@ from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
 from echostep.localization.meetings import CONTRADICTIONS, MeetingEffect, MeetingMemory, moved_probability
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, CloudSettings, Evidence
-from echostep.localization.plausibility import STATED, Plausibility
+from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.start import Start
 from echostep.localization.usable_pings import UsablePings
@@ -41,6 +41,7 @@ SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports 
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
 HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
+BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
 COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
 COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
@@ -88,8 +89,8 @@ class MapFilter:
         self._building = building
         self._rng = rng
         self._model, self._blurred = _echo_models(self._settings)
-        background, s = building.background(self._model), self._settings
-        self._pings = UsablePings(background, s.echo.correlation_m, s.plan_sd_m)
+        echo = with_plan_error(self._settings)
+        self._pings = UsablePings(building.background(self._model), echo)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
         self._plan = Plausibility(PLAN_FITS)
@@ -115,7 +116,7 @@ class MapFilter:
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = _echo_models(self._settings)
-            self._pings.hear_by(self._building.background(self._model), echo.correlation_m)
+            self._pings.hear_by(self._building.background(self._model), with_plan_error(self._settings))
 
     @property
     def cloud(self) -> Cloud:
@@ -267,16 +268,20 @@ class MapFilter:
             model = self._blurred if cloud.is_scattered else self._model
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
             if self._building.has_walls:
-                self._judge(each, evidence, unplanned, math.hypot(move.dx_m, move.dy_m))
+                self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
         cloud.change_levels(move, _height_change(measured))
 
-    def _judge(self, each: Hypothetical, evidence: Evidence, unplanned: UnplannedDensities, path_m: float) -> None:
+    def _judge(
+        self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float
+    ) -> None:
         """Update the probability that a cloud is right; one that has not contracted gains nothing, and a search's is judged against chance alone."""
         cloud, most = each.cloud, each.plausibility.probability
         judged = each.has_contracted and not cloud.is_scattered
         each.has_contracted = each.has_contracted or cloud.is_small  # what contracts it, it has not foretold
         rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
-        each.plausibility.update(evidence.log_pings - rival, evidence.log_path, path_m)
+        seen = 1.0 - cloud.hidden_shares[pings.ranger]
+        gain = beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
+        each.plausibility.update(gain, evidence.log_path, path_m)
         if not judged:
             each.plausibility.limit(min(most, self._gathered) if cloud.rescues else max(most, self._gathered))
 
@@ -370,13 +375,20 @@ class MapFilter:
 
 def _echo_models(s: FilterSettings) -> tuple[EchoModel, EchoModel]:
     """The echo model with the plan's error, and the one for scattered clouds."""
-    sd_m = math.hypot(s.echo.sd_m, s.plan_sd_m)
-    blurred_m = math.hypot(sd_m, s.cloud.rough_m)
-    return echo_model(replace(s.echo, sd_m=sd_m)), echo_model(replace(s.echo, sd_m=blurred_m))
+    echo = with_plan_error(s)
+    return echo_model(echo), echo_model(replace(echo, sd_m=math.hypot(echo.sd_m, s.cloud.rough_m)))
+
+
+def with_plan_error(s: FilterSettings) -> EchoSettings:
+    """The settings of the echoes, with the error of the plan's walls in that of the ranges."""
+    return replace(s.echo, sd_m=math.hypot(s.echo.sd_m, s.plan_sd_m))
 
 
 def _move(segment: PathSegment) -> Move:
-    return Move(segment.dx_m, segment.dy_m, segment.sd_m, segment.turn_sd_rad, segment.scale_sd)
+    """The segment's way; when the wearer turns, the trunk goes round the foot that was measured."""
+    turn_rad = wrap(segment.heading1_rad - segment.heading0_rad)
+    sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(turn_rad)) * BESIDE_M)
+    return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd)
 
 
 def _height_change(measured: MeasuredSegment) -> HeightChange:

@@ -13,11 +13,12 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, lean_kernel
-from echostep.localization.echo_likelihood import EchoModel, echo_densities
+from echostep.localization.echo_likelihood import EchoModel, outlier_density, planned_density
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex, crosses_wall
 
 NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed, by reason: the next resampling drops such particles
+LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 NOISE_TURN, NOISE_SCALE = 2, 3  # rows of the noise (4, n); rows 0 and 1 are x and y
 
 
@@ -45,8 +46,8 @@ class PingBatch(NamedTuple):
     """k pings on a move: share of the move at the trigger (ascending), axis of the ranger in the walk frame, range (0: none), power.
 
     `power`: share of independent information in the ping, the power of its densities. `ranger`: 0 left, 1 right. `travel_m`: length of
-    the path since this ranger's ping before. `missed`: odds that a silent ping missed its echo, 0 for an echo, and `alike`: density of an echo that
-    is like the one before (both: `background`).
+    the path since this ranger's ping before. `missed`: odds that a silent ping missed its echo, 0 for an echo, and `alike`: density of a
+    range that is like the one before, `unplanned`: density without any plan, to the power (all three: `background`).
     """
 
     share: Floats
@@ -57,6 +58,7 @@ class PingBatch(NamedTuple):
     travel_m: Floats
     missed: Floats
     alike: Floats
+    unplanned: Floats
 
 
 class Ping(NamedTuple):
@@ -68,6 +70,7 @@ class Ping(NamedTuple):
     travel_m: float
     missed: float
     alike: float
+    unplanned: float
 
 
 class EchoMemory(NamedTuple):
@@ -116,7 +119,13 @@ def propagate_and_reweight(
             done = until
         if k < len(pings.share):
             ping = Ping(
-                pings.axis_rad[k], pings.range_m[k], pings.power[k], pings.travel_m[k], pings.missed[k], pings.alike[k]
+                pings.axis_rad[k],
+                pings.range_m[k],
+                pings.power[k],
+                pings.travel_m[k],
+                pings.missed[k],
+                pings.alike[k],
+                pings.unplanned[k],
             )
             memory.log_evidence[k], size = reweight_by_ping(
                 particles, memory.hidden[pings.ranger[k]], ping, model.echo, walls
@@ -176,13 +185,15 @@ def reweight_by_ping(
 ) -> tuple[float, float]:
     """Add each particle's log-likelihood, and make the greatest log-weight 0.
 
-    `hidden` (n,): of this ranger, the probability that the particle's view is hidden. Along the path it returns to `model.hidden` within
-    `model.hidden_m`; the ping corrects it. The densities are raised to the ping's power, the probabilities of the view are not: a view that stays
-    hidden for long is unlikely, however often it is measured. Returns the log of the mean likelihood before, and the effective size after.
+    `hidden` (n,): of this ranger, the probability that the particle's view is hidden: then the plan tells nothing. Along the path it returns to
+    `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors are alike;
+    probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, and the effective size after.
     """
     x, y, turn, _, log_weight = particles
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    kept, inlier = math.exp(-ping.travel_m / model.hidden_m), 1.0 - model.outlier
+    kept = math.exp(-ping.travel_m / model.hidden_m)
+    outlier = model.outlier * (outlier_density(ping.range_m, model) + ping.missed) ** ping.power
+    stray = 0.5 * (ping.alike + 1.0 / (model.maximum_m - model.minimum_m))
     top = -np.inf
     weight, evidence, total, squares = 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
@@ -190,12 +201,11 @@ def reweight_by_ping(
         if w < NEGLIGIBLE:
             continue
         count = echo_sources(x[i], y[i], ping.axis_rad + turn[i], walls, distance_m, off_axis_rad, kind)
-        density = echo_densities(ping.range_m, count, distance_m, off_axis_rad, kind, model)
+        density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, stray, model) + ping.missed
+        planned = (1.0 - model.outlier) * math.exp(ping.power * math.log(max(density, LEAST_DENSITY))) + outlier
         before = model.hidden + kept * (hidden[i] - model.hidden)
-        outlier = model.outlier * density.outlier + ping.missed
-        hidden_density = 0.5 * (density.hidden + ping.alike)  # anything, or what hides the view goes on
-        by_hidden = before * math.exp(ping.power * math.log(inlier * hidden_density + outlier))
-        likelihood = by_hidden + (1.0 - before) * math.exp(ping.power * math.log(inlier * density.planned + outlier))
+        by_hidden = before * ping.unplanned
+        likelihood = by_hidden + (1.0 - before) * planned
         hidden[i] = by_hidden / likelihood
         weight += w
         w *= likelihood

@@ -193,9 +193,15 @@ class Cloud:
         return len(self.x_m) <= SMALL * self._minimum_size
 
     @property
+    def hidden_shares(self) -> Floats:
+        """Probability (2,) that the view of each ranger is hidden."""
+        shares: Floats = self.hidden @ self.weight
+        return shares
+
+    @property
     def hidden_share(self) -> float:
-        """Probability that a view is hidden, mean of both rangers."""
-        return float((self.hidden @ self.weight).mean())
+        """Their mean."""
+        return float(self.hidden_shares.mean())
 
     def level_at(self, x_m: float) -> int:
         """Level of an x on the sheet."""

@@ -4,7 +4,7 @@
 In: of each ping the log of its density under the cloud and without it (`background`). Out: a probability. Owns the log-odds.
 
 A hidden Markov model of two states, right and wrong [Rabiner 1989, forward algorithm]. If the cloud is right, echoes have the density that it
-foretells. If it is wrong, the wearer is anywhere: then an echo is like the one before, or as anywhere in the building (`unplanned`). So a cloud gains
+foretells. If it is wrong, the wearer is anywhere: then a view goes on as it was, or changes to any in the building (`background`). So a cloud gains
 nothing by foretelling that a corridor goes on, but by foretelling where it ends. On every metre a right cloud may become wrong (carried, a wall that
 is not on the plan, a door that is a wall): WRONG_PER_M.
 """
@@ -13,12 +13,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from echostep.arrays import Floats
 
 # All by reason.
 WRONG_PER_M = 2e-5  # probability that a right cloud becomes wrong on a metre of the path: once in 50 km
 UNPLANNED_DOOR = math.log(1 / 400)  # log-probability that a way leads through a wall of the plan all the same
 STATED = 0.99  # prior probability of a stated start
+# Of a ping's log-ratio, up to which it tells nothing: an error of one standard deviation that stays along a wall (plan, sway, speed of sound) is the
+# cloud's alone, for a rival that follows the wall learns it
+STAYS = 0.5
 LEAST, MOST = (
     -6.0,
     12.0,
@@ -28,6 +33,14 @@ LEAST, MOST = (
 def log_odds(probability: float) -> float:
     """Of a probability below 1."""
     return math.log(probability / (1.0 - probability))
+
+
+def beyond_errors_that_stay(log_ratio: Floats, power: Floats) -> Floats:
+    """What the log-ratios of pings (k,) tell of a cloud: nothing up to what errors that stay explain, less by that beyond.
+
+    `power` (k,): that of the ping, times the probability that the view is as planned: a hidden one has no such errors.
+    """
+    return np.asarray(np.sign(log_ratio) * np.maximum(np.abs(log_ratio) - STAYS * power, 0.0))
 
 
 class Plausibility:

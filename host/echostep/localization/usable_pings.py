@@ -13,7 +13,8 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
-from echostep.localization.background import Background, RangeMemory, UnplannedDensities
+from echostep.localization.background import Background, PlacedPings, RangeMemory, UnplannedDensities
+from echostep.localization.echo_likelihood import EchoSettings
 from echostep.localization.particle_kernels import PingBatch
 from echostep.path import MeasuredSegment
 
@@ -26,18 +27,17 @@ TURNING_RAD = math.radians(15.0)
 class UsablePings:
     """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `correlation_m`."""
 
-    def __init__(self, background: Background, correlation_m: float, plan_sd_m: float = 0.0) -> None:
-        """`plan_sd_m`: standard deviation of the plan's walls."""
+    def __init__(self, background: Background, echo: EchoSettings) -> None:
         self.path_m = 0.0  # length of the path so far
-        self._correlation_m = correlation_m
-        self._plan_sd_m = plan_sd_m
-        self._ranges = RangeMemory(background, plan_sd_m)
+        self._correlation_m = echo.correlation_m
+        self._ranges = RangeMemory(background, echo)
+        self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
-    def hear_by(self, background: Background, correlation_m: float) -> None:
+    def hear_by(self, background: Background, echo: EchoSettings) -> None:
         """Go on with rangers of another kind."""
-        self._correlation_m = correlation_m
-        self._ranges = RangeMemory(background, self._plan_sd_m)
+        self._correlation_m = echo.correlation_m
+        self._ranges = RangeMemory(background, echo)
 
     @property
     def silent_m(self) -> float:
@@ -58,11 +58,14 @@ class UsablePings:
         power = np.minimum(travel_m / self._correlation_m, 1.0) / (1.0 + (turn / TURNING_RAD) ** 2)
         self.path_m += length
         used = power > LEAST_POWER
-        ranger, range_m = measured.ranger[used], range_m[used]
-        unplanned = self._ranges.densities(ranger, range_m, power[used])
+        x_m, y_m = self._x_m + share * segment.dx_m, self._y_m + share * segment.dy_m
+        self._x_m, self._y_m = self._x_m + segment.dx_m, self._y_m + segment.dy_m
+        pings = PlacedPings(measured.ranger[used], x_m[used], y_m[used], axis[used], range_m[used], power[used])
+        unplanned = self._ranges.densities(pings)
         return PingBatch(
-            share[used], axis[used], range_m, power[used], ranger, travel_m[used], unplanned.missed, unplanned.alike
-        ), unplanned
+            share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used],
+            unplanned.missed, unplanned.alike, np.exp(unplanned.either),
+        ), unplanned  # fmt: skip
 
     def _travels(self, ranger: Ints, path_m: Floats) -> Floats:
         """Length of the path (k,) between each ping and the one before it of the same ranger."""
