@@ -22,6 +22,7 @@ from echostep.foot import ins
 from echostep.foot.ins import GYRO_BIAS, TILT, VEL, Nav, Vector
 from echostep.jit import lean_kernel
 
+UP = 2  # of the walk frame's axes
 RING = 64  # samples: 0.12 s at the highest rate, for the plateaus of `soft_limit`
 WINDOW_S = 0.03
 REST_RAD_S, REST_M_S2 = 1.6, 6.0  # rms over the window: `stillness_statistic` is 1 on the ellipse between them
@@ -30,6 +31,8 @@ GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three a
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
 GRAVITY_ALONE_M_S2 = 1.0  # of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4; by reason
+# At most, of a foot that stands on a floor which accelerates; by reason: people shift, a lift takes up to 1.2 m/s2.
+RIDING_RAD_S, RIDING_M_S2 = 0.15, 2.0
 LASTING_S = 0.15  # no swing is calm for so long: the stance is accepted, the velocity is corrected
 OVERDUE_S = 2.0  # no swing lasts so long
 PART_S, PARTS = 0.1, 5  # gyro bias: a rest is averaged in parts of this duration, so many for an update
@@ -143,16 +146,23 @@ def rolling_velocity(nav: Nav, gyro: Floats, height_m: float) -> Vector:
 
 
 @lean_kernel
-def normalized_innovation(nav: Nav, expected: Vector, variance: float, force: Vector) -> float:
-    """Chi-square of the innovations of velocity (from `expected`) and acceleration (from 0), given the mean specific force (3,)."""
+def normalized_innovation(nav: Nav, expected: Vector, variance: float, force: Vector) -> tuple[float, float]:
+    """Chi-square of the innovations of velocity (from `expected`) and acceleration (from 0), given the mean specific force (3,).
+
+    The part of the two level axes, and that of the vertical one.
+    """
     f = ins.apply(ins.rotation(nav.attitude), ins.difference(force, nav.accel_bias))
     accel = (f[0], f[1], f[2] - ins.GRAVITY_M_S2)
     lean = ins.GRAVITY_M_S2**2 * (nav.P[TILT, TILT] + nav.P[TILT + 1, TILT + 1])
-    total = 0.0
+    level, vertical = 0.0, 0.0
     for i in range(3):
-        total += (nav.velocity[i] - expected[i]) ** 2 / (nav.P[VEL + i, VEL + i] + variance)
-        total += accel[i] ** 2 / (ROLL_M_S2**2 + lean)
-    return total
+        part = (nav.velocity[i] - expected[i]) ** 2 / (nav.P[VEL + i, VEL + i] + variance)
+        part += accel[i] ** 2 / (ROLL_M_S2**2 + lean)
+        if i == UP:
+            vertical = part
+        else:
+            level += part
+    return level, vertical
 
 
 @lean_kernel
@@ -188,6 +198,21 @@ def inflate_covariance(nav: Nav, excess: float) -> None:
             for j in range(ins.SIZE):
                 nav.P[i, j] *= factor
                 nav.P[j, i] *= factor
+
+
+@lean_kernel
+def may_ride(rate2: float, force2: float) -> bool:
+    """Whether a foot with this `activity` may stand in a lift that starts or stops."""
+    return rate2 < RIDING_RAD_S**2 and force2 < RIDING_M_S2**2
+
+
+@lean_kernel
+def follow_floor(nav: Nav, expected: Vector, variance: float) -> None:
+    """A floor accelerates with the foot that stands on it: begin the vertical velocity anew, so that neither level nor biases learn from it."""
+    axis = VEL + UP
+    for j in range(ins.SIZE):
+        nav.P[axis, j] = nav.P[j, axis] = 0.0
+    nav.P[axis, axis], nav.velocity[UP] = variance, expected[UP]
 
 
 @lean_kernel

@@ -219,7 +219,8 @@ def _navigate(
 def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Sample) -> bool:
     """Detect rest by both tests of `stance` and apply the zero-velocity update; whether the foot rests.
 
-    A rest against the gate is accepted if it lasts, or if no rest was accepted for long; then the covariance is inflated first.
+    A rest against the gate is accepted if it lasts, or if no rest was accepted for long; then the covariance is inflated first. Where a foot has
+    rested and is still, and all that contradicts it is vertical, the floor moves: a lift.
     """
     dt, t_s, _, gyro = sample
     rate2, force2 = stance.activity(window, nav.gyro_bias)
@@ -229,14 +230,16 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Sam
         return False
     expected = stance.rolling_velocity(nav, gyro, s.height_m)
     variance = stance.rest_variance(nav, rate2)
-    innovation = stance.normalized_innovation(nav, expected, variance, stance.mean_force(window))
-    if innovation > stance.GATE:
+    level, vertical = stance.normalized_innovation(nav, expected, variance, stance.mean_force(window))
+    if s.rest_s >= SETTLE_S and level <= stance.GATE < level + vertical and stance.may_ride(rate2, force2):
+        stance.follow_floor(nav, expected, variance)
+    elif level + vertical > stance.GATE:
         since_s = t_s - s.rest_end_s
         if s.lasting_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
         s.doubt_s += dt
-        stance.inflate_covariance(nav, innovation / stance.GATE)
+        stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
         s.doubt_s = 0.0
     stance.zero_velocity_update(nav, expected, variance + stance.deceleration_variance(force2), dt)
