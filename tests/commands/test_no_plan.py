@@ -58,10 +58,10 @@ def test_the_height_follows_the_foot_and_the_pressure_holds_it() -> None:
     """Twenty steps of 0.17 m with an error of 1 cm each, then standing while the weather moves the pressure by 0.5 m in ten minutes."""
     height = RelativeHeight(0.02)
     for k in range(20):
-        height.update(HeightChange(0.18, 0.02, 100.0 + 0.17 * (k + 1), 0.14, 0.7))
+        height.update(HeightChange(0.18, 0.02, 100.0 + 0.17 * (k + 1), 0.14, 0.0, 0.7))
     assert height.height_m == pytest.approx(3.5, abs=0.15)
     for k in range(600):
-        height.update(HeightChange(0.0, 0.005, 103.4 + 0.5 * k / 600, 0.14, 1.0))
+        height.update(HeightChange(0.0, 0.005, 103.4 + 0.5 * k / 600, 0.14, 0.0, 1.0))
     assert height.height_m == pytest.approx(3.5, abs=0.4)
     assert 0.02 < height.sd_m < 0.6
 
@@ -69,10 +69,10 @@ def test_the_height_follows_the_foot_and_the_pressure_holds_it() -> None:
 def test_without_a_foot_the_pressure_alone_tells_the_height() -> None:
     height = RelativeHeight(0.02)
     for pressure_m in (50.0, 50.0, 53.0, 56.0, 56.0, 56.0):
-        height.update(HeightChange(0.0, math.inf, pressure_m, 0.14, 10.0))
+        height.update(HeightChange(0.0, math.inf, pressure_m, 0.14, 0.0, 10.0))
     assert height.height_m == pytest.approx(6.0, abs=0.3)
     for _ in range(30):
-        height.update(HeightChange(0.0, math.inf, 0.0, math.inf, 10.0))
+        height.update(HeightChange(0.0, math.inf, 0.0, math.inf, 0.0, 10.0))
     assert height.sd_m > 3.0
 
 

@@ -48,7 +48,7 @@ from echostep.walls.level_sheet import (
 from needs_data import needs_data
 from recordings import DATA
 
-FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 1.0)
+FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 0.0, 1.0)
 
 
 def tracked(
@@ -145,7 +145,7 @@ def naive_climb(
         for part in (0.0, 0.5, 1.0)
     ]
     connector = next((c for c in holds if c), None)
-    gain = 0.0
+    gain, height = 0.0, rise.height_m
     if connector is not None:
         ends = [plan.levels[k].height_m for k in connector.levels]
         low, high = min(ends) - s.landing_sd_m, max(ends) + s.landing_sd_m
@@ -155,7 +155,8 @@ def naive_climb(
             gain -= min(0.5 * beyond**2 / (s.flat_sd_m**2 + rise.felt_sd_m**2), s.unlikely)
             z -= beyond
         elif math.isfinite(rise.height_sd_m):
-            z = float(np.clip(rise.height_m - lag, low, high))
+            height = rise.riding_m
+            z = float(np.clip(height - lag, low, high))
         level = min(connector.levels, key=lambda k: abs(plan.levels[k].height_m - z))
     else:
         gain -= min(0.5 * rise.felt_m**2 / (s.flat_sd_m**2 + rise.felt_sd_m**2), s.unlikely)
@@ -164,7 +165,7 @@ def naive_climb(
         z = plan.levels[level].height_m
     if math.isfinite(rise.height_sd_m):
         spread = variance + rise.height_sd_m**2
-        wrong = rise.height_m - z - lag
+        wrong = height - z - lag
         gain -= min(2.0 * math.log(1.0 + wrong**2 / (3.0 * spread)), s.unlikely)
         lag += variance / spread * wrong if wrong**2 < 9.0 * spread else 0.0
     return here[0] + level * storeys.pitch_m, z, lag, gain
@@ -179,7 +180,7 @@ def test_heights_are_those_of_the_obvious_way(felt_m: float, height_sd_m: float)
     x = np.where(rng.random(n) < 0.5, rng.uniform(-6.0, 2.0, n), rng.uniform(29.0, 33.0, n)) + level * storeys.pitch_m
     y, turn, scale = rng.uniform(0.0, 3.0, n), rng.uniform(-3.0, 3.0, n), rng.normal(1.0, 0.02, n)
     z, lag, log_weight = level * STOREY_M + rng.normal(0.0, 0.8, n), rng.normal(0.0, 0.5, n), rng.normal(-1.0, 0.3, n)
-    move, rise = Move(0.6, 0.1, 0.02, 0.01), HeightChange(felt_m, 0.0, 4.0, height_sd_m, 1.0)
+    move, rise = Move(0.6, 0.1, 0.02, 0.01), HeightChange(felt_m, 0.0, 4.0, height_sd_m, 4.2, 1.0)
     particles = np.column_stack([x, y, turn, scale, z, lag])
     wanted = [naive_climb(row, move, rise, 0.3, s, plan, storeys) for row in particles]
     weights = log_weight + [row[3] for row in wanted]
@@ -199,7 +200,9 @@ def test_who_stays_on_the_flat_stays_on_his_level_whatever_the_weather_does() ->
     storeys = level_sheet_of(plan)
     standing = cloud(storeys, Pose(15.0, 1.5, 0.0, 1))
     for minute in range(60):
-        standing.change_levels(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 3.5 + 8.3 * minute / 60.0, 0.15, 60.0))
+        standing.change_levels(
+            Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 3.5 + 8.3 * minute / 60.0, 0.15, 3.5, 60.0)
+        )
     assert (standing.level == 1).all()
     assert np.allclose(standing.z_m, STOREY_M)
 
@@ -209,7 +212,8 @@ def test_a_lift_carries_those_who_are_in_it() -> None:
     storeys = level_sheet_of(plan)
     riding = Cloud(CloudSettings(), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), storeys)
     for half in range(20):
-        riding.change_levels(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, 100.0 + min(0.5 * half, 7.0), 0.15, 0.5))
+        height_m = 100.0 + min(0.5 * half, 7.0)
+        riding.change_levels(Move(0.0, 0.0, 0.0, 0.0), HeightChange(0.0, 0.0, height_m, 0.15, height_m, 0.5))
     assert np.bincount(riding.level, np.exp(riding.log_weight)).argmax() == 2
     order = np.argsort(riding.map_x_m)
     share = np.cumsum(riding.weight[order])

@@ -47,14 +47,15 @@ class ClimbSettings:
 class HeightChange(NamedTuple):
     """What is known of the height over a path segment of duration `span_s`.
 
-    `felt_m`: rise by the foot, with its standard deviation (infinite: no foot). `height_m`: height by pressure at the segment's end, with its
-    standard deviation (infinite: no pressure).
+    `felt_m`: rise by the foot, with its standard deviation (infinite: no foot). `height_m`: height by pressure on the segment, with its standard
+    deviation (infinite: no pressure). `riding_m`: the same at the segment's end, where the height changes (`riding_height`).
     """
 
     felt_m: float
     felt_sd_m: float
     height_m: float
     height_sd_m: float
+    riding_m: float
     span_s: float
 
 
@@ -97,7 +98,7 @@ def change_levels(
     for i in range(len(x)):
         level = level_on_sheet(x[i], sheet)
         inside = connector_at(x[i] - level * sheet.pitch_m, y[i], level, sheet)
-        connector = inside
+        connector, height = inside, change.height_m
         if inside < 0:
             dx = scale[i] * (math.cos(turn[i]) * move.dx_m - math.sin(turn[i]) * move.dy_m)
             dy = scale[i] * (math.sin(turn[i]) * move.dx_m + math.cos(turn[i]) * move.dy_m)
@@ -109,7 +110,8 @@ def change_levels(
                 log_weight[i] -= min(0.5 * (beyond / flat_sd) ** 2, model.unlikely)
                 z[i] -= beyond
             elif knows_lag:
-                z[i] = end_of_connector(change.height_m - lag[i], connector, model.landing_sd_m, sheet)
+                height = change.riding_m
+                z[i] = end_of_connector(height - lag[i], connector, model.landing_sd_m, sheet)
             new_level = nearest_level(z[i], connector, sheet)
             x[i] += (new_level - level) * sheet.pitch_m
             level = new_level
@@ -119,7 +121,7 @@ def change_levels(
             log_weight[i] -= min(0.5 * ((z[i] - sheet.height_m[level]) / model.landing_sd_m) ** 2, model.unlikely)
             z[i] = sheet.height_m[level]
         if has_pressure:
-            innovation = change.height_m - z[i] - lag[i]
+            innovation = height - z[i] - lag[i]
             log_weight[i] -= min(2.0 * math.log1p(innovation * innovation / (PRESSURE_TAIL * variance)), model.unlikely)
             if innovation * innovation < LAG_GATE * variance:
                 lag[i] += gain * innovation

@@ -31,6 +31,7 @@ from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, CloudSettings, Evidence
 from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
 from echostep.localization.relative_height import RelativeHeight
+from echostep.localization.riding_height import RidingHeight
 from echostep.localization.start import Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
@@ -101,6 +102,7 @@ class MapFilter:
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
+        self._riding = RidingHeight(HEIGHT_SD_M)
         self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
@@ -126,16 +128,17 @@ class MapFilter:
     def update(self, measured: MeasuredSegment, readings: Sequence[BeaconReading] = ()) -> Estimate:
         """Propagate along a segment, reweight by its pings, height change and beacon readings, and resample; returns the estimate at its end."""
         segment = measured.segment
-        if self._height is not None:
-            self._height.update(_height_change(measured))
         gap = self._gaps.ended(measured)
         self._follow_barometer(measured)
+        change = _height_change(measured, self._riding.height_m)
+        if self._height is not None:
+            self._height.update(change)
         if segment.unobserved:
-            self._scatter(measured)
+            self._scatter(segment, change)
         if gap is not None:
             self._search_after(gap, segment)
         if not segment.unobserved:
-            self._follow(measured)
+            self._follow(measured, change)
         self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
         right = self._right()
         if self._choose(right.here, segment.heading1_rad):
@@ -234,30 +237,32 @@ class MapFilter:
                 each.cloud.forget_lag()
             else:
                 each.cloud.let_lag_drift(self._gaps.pause_s)
+        if anew:
+            self._riding.forget()
+        self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
 
-    def _scatter(self, measured: MeasuredSegment) -> None:
+    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
         """Spread the cloud over an unobserved segment."""
         for each in self._clouds():
-            each.cloud.scatter(_move(measured.segment), _height_change(measured))
+            each.cloud.scatter(_move(segment), change)
             each.plausibility.doubt(UNOBSERVED_DOUBT)
 
-    def _follow(self, measured: MeasuredSegment) -> None:
+    def _follow(self, measured: MeasuredSegment, change: HeightChange) -> None:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         if segment.scale_sd > 0.0:
             self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
         for each in self._clouds():
-            self._follow_with(each, measured, pings, unplanned)
+            self._follow_with(each, _move(segment), pings, unplanned)
+            each.cloud.change_levels(_move(segment), change)
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
             self._plan.add(RESTORED_PER_M * math.hypot(segment.dx_m, segment.dy_m))
             self._plan.limit(PLAN_FITS)
 
-    def _follow_with(
-        self, each: Hypothetical, measured: MeasuredSegment, pings: PingBatch, unplanned: UnplannedDensities
-    ) -> None:
+    def _follow_with(self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities) -> None:
         """Propagate and reweight one cloud, and judge it by how well it foretold the pings."""
-        cloud, move = each.cloud, _move(measured.segment)
+        cloud = each.cloud
         legs = COARSE_FACTOR if self._pings.path_m < self._coarse_until_m else 0.0
         cloud.set_minimum_size(1.0 + legs + HIDDEN_FACTOR * cloud.hidden_share)
         if cloud.is_coarse:
@@ -269,7 +274,6 @@ class MapFilter:
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
             if self._building.has_walls:
                 self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
-        cloud.change_levels(move, _height_change(measured))
 
     def _judge(
         self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float
@@ -391,11 +395,11 @@ def _move(segment: PathSegment) -> Move:
     return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd)
 
 
-def _height_change(measured: MeasuredSegment) -> HeightChange:
+def _height_change(measured: MeasuredSegment, riding_m: float) -> HeightChange:
     """The foot's rise, and the median of the last heights by pressure: a slammed door moves a mean, but not a median."""
     segment, last = measured.segment, measured.height_m[-HEIGHT_SAMPLES:].tolist()
     span_s = segment.t1_s - segment.t0_s
     if not last:
-        return HeightChange(segment.rise_m, segment.rise_sd_m, 0.0, math.inf, span_s)
+        return HeightChange(segment.rise_m, segment.rise_sd_m, 0.0, math.inf, 0.0, span_s)
     height_sd_m = math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(last)))
-    return HeightChange(segment.rise_m, segment.rise_sd_m, median(last), height_sd_m, span_s)
+    return HeightChange(segment.rise_m, segment.rise_sd_m, median(last), height_sd_m, riding_m, span_s)

@@ -148,7 +148,7 @@ class AugmentedMcl:
         self._lag_variance += ClimbSettings().drift_m ** 2 * span_s if last else 0.0
         self._lag_variance = change_levels(
             self._particles, self._heights, Move(s.dx_m, s.dy_m, s.sd_m, s.turn_sd_rad), self._rng.standard_normal(SIZE),
-            HeightChange(s.rise_m, s.rise_sd_m, height_m, sd_m, span_s), self._lag_variance, level_change_model(ClimbSettings()),
+            HeightChange(s.rise_m, s.rise_sd_m, height_m, sd_m, height_m, span_s), self._lag_variance, level_change_model(ClimbSettings()),
             self._sheet,
         )  # fmt: skip
 

@@ -4,7 +4,8 @@
 In: seeds. Out: a row of all points, and one of each part. Simulated. The scores are those of `echostep score`, over the points of all runs together.
 
 `floor`: share of the points on the nearest floor; `floor_on`: of those where the wearer is on a floor, not between two. Estimates that say lost
-count in both. `search_s`: from the change of the battery on, until the new tracker says `tracking`.
+count in both, but not in the row `not lost`, of the points that availability counts too. `search_s`: from the change of the battery on, until the new
+tracker says `tracking`.
 """
 
 from __future__ import annotations
@@ -66,11 +67,11 @@ def _parts(walk: OperationWalk, row: Any, t_s: Floats) -> dict[str, Bools]:
     """Which points belong to each part, by name; those of a manner are of before the change of the battery."""
     begins, names = zip(*walk.manners, strict=True)
     manner = np.array(names)[np.maximum(np.searchsorted(np.array(begins), t_s, side="right") - 1, 0)]
-    tracking = np.array([e.status is TrackStatus.TRACKING for e in walk.estimates])[row]
+    says = np.array([e.status.value for e in walk.estimates])[row]
     known = t_s < walk.restart_s
     parts = {
-        ALL: np.ones(len(t_s), bool), "says tracking": tracking, "known start": known,
-        "unknown start": ~known,
+        ALL: np.ones(len(t_s), bool), "not lost": says != TrackStatus.LOST.value,
+        "says tracking": says == TrackStatus.TRACKING.value, "known start": known, "unknown start": ~known,
     }  # fmt: skip
     return parts | {name: (manner == name) & known for name in sorted(set(names))}
 
