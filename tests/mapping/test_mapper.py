@@ -15,10 +15,12 @@ from command_line import echostep
 from echostep.evaluate.anywhere.sites import Site
 from echostep.evaluate.anywhere.tours import clearance_m
 from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
+from echostep.evaluate.noplan.judgement import known_start, path_columns
 from echostep.mapping.graph import Closure, contradicted
 from echostep.mapping.growing import GrowingMap
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.plan import plan_of
+from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import NO_PLAN, load_plan
 from echostep.session.metadata import run_metadata
@@ -103,6 +105,47 @@ def test_walls_at_any_angle_are_no_building_with_two_directions(mapped: Mapped, 
         )
         turned += turn
     assert map_walk(bent).directions.evidence < math.log(1000.0)
+
+
+def test_a_walk_may_begin_out_of_hearing_of_any_wall(walk: SimulatedWalk) -> None:
+    """The first 30 m in silence, the walls at 20 degrees to the first heading: the building's directions are those of the walls heard later."""
+    turn, way_m, heard = math.radians(20.0), 0.0, []
+    c, sn = math.cos(turn), math.sin(turn)
+    for measured in walk.segments:
+        s = measured.segment
+        way_m += math.hypot(s.dx_m, s.dy_m)
+        moved = replace(
+            s,
+            dx_m=c * s.dx_m - sn * s.dy_m,
+            dy_m=sn * s.dx_m + c * s.dy_m,
+            heading0_rad=s.heading0_rad + turn,
+            heading1_rad=s.heading1_rad + turn,
+        )
+        silent = np.full(len(measured.range_m), np.nan)
+        heard.append(replace(measured, segment=moved, range_m=silent if way_m < 30.0 else measured.range_m))
+    graph = map_walk(heard).graph
+    truth = np.column_stack([np.interp(graph.nodes.t_s, walk.truth[:, 0], walk.truth[:, k]) for k in (1, 2)])
+    path = graph.pose[:, :2]
+    assert path_columns(known_start(path, truth).to_map(path), truth)["rmse_m"] < 0.5
+
+
+def test_a_person_who_goes_along_is_no_wall() -> None:
+    """Two seconds beside the left ranger, in an open place, draw nothing; eight seconds do."""
+    for span_s, drawn in ((2.0, False), (8.0, True)):
+        mapped = map_walk(beside(span_s))
+        walls = mapped.drawing.walls
+        assert bool(len(walls)) is drawn
+
+
+def beside(span_s: float) -> list[MeasuredSegment]:
+    """Straight on for 40 m at 1 m/s, with something 1.5 m to the left for a while."""
+    found = []
+    for k in range(40):
+        t_s = k + np.arange(0.0, 1.0, 0.07)
+        near = (t_s >= 15.0) & (t_s < 15.0 + span_s)
+        segment = PathSegment(k, k + 1.0, 1.0, 0.0, 0.0, 0.0, 0.02, math.radians(0.3), k)
+        found.append(MeasuredSegment(segment, t_s, np.zeros(len(t_s), np.int64), np.where(near, 1.5, np.nan)))
+    return found
 
 
 def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:

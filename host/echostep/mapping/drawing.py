@@ -17,10 +17,8 @@ from echostep.mapping.lines import Lines, find_lines, joined
 from echostep.mapping.nodes import Pings
 from echostep.mapping.segments import Run, find_runs, meets, segments_of
 
-LONE_M, LONE_ASKEW_M = (
-    1.6,
-    2.5,
-)  # of wall on one line; shorter ones must be heard again: a passer-by is beside a ranger for 1 to 2 m of path
+# Of wall on one line, at least; shorter ones must be heard again. One passer-by in 15, in 70, goes along for longer, when one second is the mean
+LONE_M, LONE_ASKEW_M = 2.5, 4.0
 PASSAGE_M = 5.0  # of path, between two passages
 
 

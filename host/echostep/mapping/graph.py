@@ -25,6 +25,9 @@ from echostep.mapping.storeys import Storeys
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
 HUBER = 2.0  # standard deviations from which a fragment counts less
 START_SD_M, START_SD_RAD = 0.001, 0.0005  # the first node is the origin
+FREE_SD_RAD = math.radians(
+    30.0
+)  # of its heading where the building's directions hold the map: until a wall is heard it is not known against them
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +141,9 @@ class Graph:
         rows.add(
             weight * ((b[:, 2] - a[:, 2]) - (odo[1:, 2] - odo[:-1, 2])), [(3 * i + 2, -weight), (3 * i + 5, weight)]
         )
-        for k, (value, sd) in enumerate(zip(odo[0], (START_SD_M, START_SD_M, START_SD_RAD), strict=True)):
+        free = self.base_rad is not None and self.nodes.begins[:1] == (0,)
+        start_sd = (START_SD_M, START_SD_M, FREE_SD_RAD if free else START_SD_RAD)
+        for k, (value, sd) in enumerate(zip(odo[0], start_sd, strict=True)):
             rows.add(np.array([(pose[0, k] - value) / sd]), [(np.array([k]), np.array([1.0 / sd]))])
 
     def _add_walls(self, rows: _Rows) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.mapping.directions import find_directions
+from echostep.mapping.directions import find_directions, right_angles_off
 from echostep.mapping.drawing import draw
 from echostep.mapping.fragments import find_fragments
 from echostep.mapping.graph import Graph
@@ -21,6 +21,8 @@ from echostep.mapping.mapper import Mapped, close_loops, find_walls, new_graph
 from echostep.mapping.nodes import nodes_of
 from echostep.mapping.storeys import find_storeys
 from echostep.path import MeasuredSegment
+
+SAME_RAD = math.radians(3.0)  # of two findings: the map is turned as a whole, its shape stays
 
 
 class GrowingMap:
@@ -41,8 +43,8 @@ class GrowingMap:
         directions = find_directions(nodes, fragments)
         graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
         graph.storeys = find_storeys(self._segments, nodes)
-        if solved is not None and solved.base_rad == graph.base_rad:
-            first = len(solved.nodes) - 1
+        if solved is not None and _same(solved.base_rad, graph.base_rad):
+            first, graph.base_rad = len(solved.nodes) - 1, solved.base_rad
             graph.pose = _continued(solved.pose, graph.pose)
             graph.closures = solved.closures
         find_walls(graph)
@@ -52,6 +54,13 @@ class GrowingMap:
             find_walls(graph)
         self._solved = graph
         return Mapped(graph, pings, draw(graph, pings), directions, tuple(undone))
+
+
+def _same(a: float | None, b: float | None) -> bool:
+    """Whether two findings of the building's directions are one."""
+    if a is None or b is None:
+        return a is b
+    return abs(right_angles_off(a - b)) < SAME_RAD
 
 
 def _continued(solved: Floats, pose: Floats) -> Floats:

@@ -45,7 +45,7 @@ def plan_as_walk(level: Level, sd_m: float) -> Mapped:
     graph = Graph(nodes, fragments, pose.copy(), none, base_rad=_base(normal, length))
     nothing, integers = np.zeros(0), np.zeros(0, np.int64)
     pings = Pings(np.zeros((0, 2)), nothing, nothing, integers, integers, nothing)
-    directions = Directions(graph.base_rad or 0.0, np.zeros(n), np.ones(n), 0.0)
+    directions = Directions(graph.base_rad or 0.0, np.zeros(n), 0.0)
     return Mapped(graph, pings, (), directions, ())
 
 
