@@ -14,128 +14,40 @@ import argparse
 import json
 import math
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import shapely
 from rich.console import Console
-from scipy.io import loadmat
 
 from echostep.arrays import Floats
-from echostep.board import messages as m
-from echostep.board.frames import encode
 from echostep.evaluate.feet.metrics import align, rmse
+from echostep.evaluate.noplan.real_feet import (
+    LONG_STEP_M,
+    SETTINGS,
+    START_S,
+    Hallway,
+    chunks,
+    names_in,
+    read_hallway,
+)
 from echostep.foot.steps import Step, walk_track
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.metrics import load_truth
 from echostep.output.track_plot import draw_track, write_track
-from echostep.plan.model import Plan, Pose, load_plan
-from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.plan.model import Pose, load_plan
 from echostep.recording.reading import open_recording
 from echostep.session.recording import start_recording
 from echostep.settings import parse_settings
-from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.people.walker import RATE_HZ, Walk
-from echostep.simulation.stimulus import BoardSensors
 from echostep.tracker import Tracker
-from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 from recordings import DATA
 
 NAME = "GX5 33"
 NOTE = "foot real (GX5 33, surveyed footprints); plan drawn around the surveyed path, echoes simulated from it at the true positions"
-MTX_RATE_HZ = 200
 TARGET_M = 0.30  # largest RMSE that passes
-LONG_STEP_M = 0.8  # a longer step shows the walking direction
-START_S = 1.0  # board time of the first sample
-LATENCY_S = 0.0071
-HALF_WIDTH_M = 1.0
-STRAIGHTEN_M = 0.3  # tolerance of the simplified path: deviations of single footprints do not bend the walls
-SETTINGS = f"[mtx]\nrate_hz = {MTX_RATE_HZ}\n\n[gait]\nfoot_left_m = 0.0\n"
 console = Console(soft_wrap=True)  # each message stays on one line, whatever the width of the terminal
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """The real walk: `t_s` (n,) from 0; `accel`, `gyro` (n, 3) in body axes (x toe, z up); footprints: times (k,), positions (k, 2)."""
-
-    t_s: Floats
-    accel: Floats
-    gyro: Floats
-    print_t_s: Floats
-    print_m: Floats
-
-
-def read_walk(folder: Path) -> Recorded:
-    """Read GX5 33 and rotate its samples to body axes; y of the footprints is negated, since their frame has z down."""
-    mat = loadmat(folder / "gx5_gcp/SensorConnectData_33_LLIO.mat")
-    t, imu = mat["timestamps"].ravel(), mat["imu_data"]
-    stride_index = mat["strideIndex"].ravel().astype(int) - 1
-    mount = mounting(t, imu[:, :3], imu[:, 3:])
-    prints = mat["GCP"][:, :2] * [1.0, -1.0]
-    return Recorded(
-        t - t[0], imu[:, :3] @ mount.T, imu[:, 3:] @ mount.T, t[np.minimum(stride_index, len(t) - 1)] - t[0], prints
-    )
-
-
-def mounting(t: Floats, accel: Floats, gyro: Floats) -> Floats:
-    """Rotation (3, 3) sensor -> body: up from the first second at rest, forward from the first long steps."""
-    up = accel[t - t[0] < 1.0].mean(0)
-    up /= np.linalg.norm(up)
-    side = np.cross(up, [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
-    level = np.stack([np.cross(side, up), side, up])
-    steps = [e for e in walk_track(t, accel @ level.T, gyro @ level.T).events if isinstance(e, Step)]
-    long = [e for e in steps if math.hypot(*e.move_m[:2]) > LONG_STEP_M][:5]
-    headings = np.array([math.atan2(e.move_m[1], e.move_m[0]) - e.heading_rad for e in long])
-    turn = math.atan2(np.sin(headings).mean(), np.cos(headings).mean())
-    c, s = math.cos(turn), math.sin(turn)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ level
-
-
-def corridor(prints: Floats) -> Floats:
-    """Walls (n, 4) of a corridor along the straightened path."""
-    path = shapely.LineString(prints).simplify(STRAIGHTEN_M)
-    floor = path.buffer(HALF_WIDTH_M, cap_style="square", join_style="mitre").buffer(0)
-    rings = [ring for part in getattr(floor, "geoms", [floor]) for ring in (part.exterior, *part.interiors)]
-    corners = [np.asarray(ring.coords) for ring in rings]
-    return np.vstack([np.hstack([c[:-1], c[1:]]) for c in corners])
-
-
-def true_walk(walk: Recorded) -> Walk:
-    """The true trunk at 1 kHz: above each surveyed footprint at its time, linear in between; the board starts START_S earlier."""
-    t = np.arange(int((walk.t_s[-1] + START_S) * RATE_HZ)) / RATE_HZ
-    trunk = np.column_stack([np.interp(t - START_S, walk.print_t_s, walk.print_m[:, k]) for k in (0, 1)])
-    strides = np.diff(walk.print_m, axis=0)
-    middle = 0.5 * (walk.print_t_s[1:] + walk.print_t_s[:-1])
-    heading = np.interp(t - START_S, middle, np.unwrap(np.arctan2(strides[:, 1], strides[:, 0])))
-    still = np.zeros((len(t), 3))
-    rate = np.zeros(len(t))
-    belt = np.gradient(heading) * RATE_HZ
-    return Walk(t, trunk, heading, still, still, rate, rate, belt, np.ones(len(t), bool), rate)
-
-
-def chunks(walk: Recorded, plan: Plan, seed: int) -> list[Chunk]:
-    """Chunks of both ports in order of arrival."""
-    rng = np.random.default_rng([seed, 9])
-    truth = true_walk(walk)
-    sync_t_s = START_S + walk.t_s
-    sensors = BoardSensors(truth, plan.levels, sync_t_s, rng)
-    board = PythonBoard(seed)
-    board.send(encode(m.Configure(m.Sensors.RANGER_LEFT | m.Sensors.RANGER_RIGHT | m.Sensors.SYNC, 0, 10, 1, 0), 0))
-    arrived = []
-    for start in range(0, len(truth.t_s), 50):
-        arrived += [
-            Chunk(BOARD, t_ns + 1_000_000, sent) for t_ns, sent in board.advance(sensors.rows(start, start + 50))
-        ]
-    samples = zip(sync_t_s.tolist(), walk.accel.tolist(), walk.gyro.tolist(), strict=True)
-    for n, (t, accel, gyro) in enumerate(samples):
-        sample = MtSample(n & 0xFFFF, tuple(accel), tuple(gyro), (0.4, 0.0, -0.9), (1.0, 0.0, 0.0, 0.0))
-        arrived.append(Chunk(MTX, round((t + LATENCY_S) * 1e9), encode_frame(MTDATA, pack_mtdata(sample))))
-    return sorted(arrived, key=lambda chunk: chunk.t_arrival_ns)
-
-
-def write_files(out: Path, walk: Recorded, seed: int) -> None:
+def write_files(out: Path, walk: Hallway, seed: int) -> None:
     """Write plan.json, truth.csv, settings.toml and walk.mcap."""
     out.mkdir(parents=True, exist_ok=True)
     first = walk.print_m[1] - walk.print_m[0]
@@ -144,7 +56,7 @@ def write_files(out: Path, walk: Recorded, seed: int) -> None:
         "y": walk.print_m[0, 1],
         "heading_deg": math.degrees(math.atan2(first[1], first[0])),
     }
-    level = {"name": "corridor", "height_m": 0.0, "walls": np.round(corridor(walk.print_m), 3).tolist()}
+    level = {"name": "corridor", "height_m": 0.0, "walls": np.round(walk.walls, 3).tolist()}
     plan = {"echostep_plan": 1, "name": f"Corridor drawn around {NAME}", "levels": [level], "start": start}
     (out / "plan.json").write_text(json.dumps(plan, indent=1) + "\n")
     (out / "settings.toml").write_text(SETTINGS)
@@ -174,13 +86,13 @@ def track(out: Path, seed: int) -> tuple[list[Estimate], float]:
     return estimates, time.perf_counter() - began
 
 
-def rmse_at_prints(walk: Recorded, t_s: Floats, xy_m: Floats) -> float:
+def rmse_at_prints(walk: Hallway, t_s: Floats, xy_m: Floats) -> float:
     """2D RMSE (m) at the footprints' times of positions xy_m (n, 2) given at t_s (n,); map frame, no alignment."""
     at_prints = np.column_stack([np.interp(walk.print_t_s, t_s, xy_m[:, k]) for k in (0, 1)])
     return float(np.sqrt(((at_prints - walk.print_m) ** 2).sum(1).mean()))
 
 
-def foot_alone(walk: Recorded, start: Pose) -> tuple[float, float]:
+def foot_alone(walk: Hallway, start: Pose) -> tuple[float, float]:
     """RMSE (m) of the foot's track alone, from the given start, and after the best rigid alignment (the metric of published results)."""
     foot = walk_track(walk.t_s, walk.accel, walk.gyro)
     steps = [e for e in foot.events if isinstance(e, Step) and math.hypot(*e.move_m[:2]) > LONG_STEP_M][:1]
@@ -199,7 +111,7 @@ def main() -> int:
     if not (DATA / "gx5_gcp").is_dir():
         console.print(f"skipped: no recordings in {DATA} (set ECHOSTEP_DATA)")
         return 0
-    walk = read_walk(DATA)
+    walk = read_hallway(names_in(DATA)[NAME.removeprefix("GX5 ")])
     write_files(options.out, walk, options.seed)
     plan = load_plan(options.out / "plan.json")
     assert plan.start is not None

@@ -7,8 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import real_walk
 from board_runs import ROOT
+from echostep.evaluate.noplan.real_feet import names_in, read_hallway
 from echostep.recording.reading import open_recording
 from needs_data import needs_data
 from recordings import DATA
@@ -27,7 +27,7 @@ def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
 
 
 def test_the_footprints_are_the_surveyed_ones() -> None:
-    walk = real_walk.read_walk(DATA)
+    walk = read_hallway(names_in(DATA)["33"])
     assert len(walk.print_m) == 48
     stride = ((walk.print_m[1:] - walk.print_m[:-1]) ** 2).sum(1) ** 0.5
     assert 60.0 < stride.sum() < 66.0

@@ -4,25 +4,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from board_runs import ROOT
+from carmen_logs import WALLS as WALLS_OF_LOG
+from carmen_logs import write_log
 from echostep.errors import EchostepError
 from echostep.evaluate.anywhere.sites import Site, plan_of
 from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.evaluate.noplan.footslam import RADIUS_M, footslam, hexagon
 from echostep.evaluate.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
 from echostep.evaluate.noplan.sites import furnished, loop_walls
-from echostep.evaluate.noplan.study import drawn_rows, names_of, noplan_study
+from echostep.evaluate.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from echostep.evaluate.study import StudyRequest
 from echostep.mapping.graph import Closure
 from echostep.mapping.nodes import Nodes
 from echostep.plan.check import check_plan
-from echostep.plan.model import load_plan
+from echostep.plan.model import Level, load_plan
 from echostep.simulation.scenario import DEMO_WAYPOINTS
+from needs_data import needs_data
+from recordings import DATA
 
 WALLS = np.array([[0.0, 0.0, 10.0, 0.0], [0.0, 3.0, 10.0, 3.0], [0.0, 6.0, 10.0, 6.0]])
 
@@ -45,11 +50,24 @@ def test_a_path_is_judged_from_its_known_start() -> None:
 def test_walls_are_judged_by_those_in_sight() -> None:
     """Of the two walls of the corridor one and a half are drawn, 10 cm off; a third of what is drawn is in no place."""
     drawn = np.array([[0.0, 0.1, 10.0, 0.1], [0.0, 3.1, 5.0, 3.1], [0.0, 10.0, 7.5, 10.0]])
-    row = wall_columns(drawn, along_the_corridor())
+    row = wall_columns([drawn], along_the_corridor())
     assert row["drawn"] == pytest.approx(0.77, abs=0.02), "the third wall is behind the second"
     assert row["absent"] == pytest.approx(1.0 / 3.0, abs=0.01)
     assert row["wall_median_m"] == pytest.approx(0.1, abs=1e-6)
-    assert wall_columns(drawn[:0], along_the_corridor())["drawn"] == 0.0
+    assert wall_columns([drawn[:0]], along_the_corridor())["drawn"] == 0.0
+
+
+def test_each_storey_is_judged_by_its_own_walls() -> None:
+    """The lower wall below, the upper one above: a drawing of the other storey's walls is in no place."""
+    levels = (Level("0", 0.0, WALLS[:1]), Level("1", 3.5, WALLS[2:]))
+    t = np.linspace(0.0, 20.0, 201)
+    z = np.where(t < 10.0, 0.0, 3.5)
+    truth = np.column_stack([t, np.minimum(t, 20.0 - t), np.where(t < 10.0, 1.5, 4.5), 0.0 * t, z])
+    walk = SimulatedWalk(replace(plan_of("two", WALLS), levels=levels), (), truth)
+    right = wall_columns([WALLS[:1], WALLS[2:]], walk)
+    assert (right["drawn"], right["absent"]) == (1.0, 0.0)
+    wrong = wall_columns([WALLS[2:], WALLS[:1]], walk)
+    assert (wrong["drawn"], wrong["absent"]) == (0.0, 1.0)
 
 
 def test_a_closure_is_wrong_along_what_it_claims_to_know() -> None:
@@ -113,7 +131,27 @@ def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
 
 
 def test_rows_without_recordings_and_unknown_rows() -> None:
-    """Without the recordings there is no westport-house; a pattern that names nothing is refused."""
-    assert "westport/10min" not in names_of(None)
+    """Without the recordings there is no westport-house and nothing real; a pattern that names nothing is refused."""
+    assert not {name.split("/")[0] for name in names_of(None)} & {"westport", "storeys", "feet", "clutter"}
     with pytest.raises(EchostepError, match="no row is named so"):
         noplan_study(None, "castle/*", StudyRequest(1, 1, None, Path()))
+
+
+@needs_data("gx5_gcp")
+def test_a_real_foot_is_drawn(tmp_path: Path) -> None:
+    """The surveyed hallway 34, with simulated echoes: nearly all that is drawn is there."""
+    assert "feet/34" in names_of(DATA)
+    (row,) = one_run(("feet/34",), DATA, tmp_path, 1, 1)
+    assert row["rmse_m"] < 0.5
+    assert row["absent"] < 0.05
+    assert row["rmse_m"] < row["footslam_rmse_m"]
+
+
+def test_a_log_is_drawn(tmp_path: Path) -> None:
+    """A made log of two rooms: by odometry without errors; what its few pings show is there."""
+    (tmp_path / "carmen").mkdir()
+    write_log(tmp_path / "carmen" / "made.log", WALLS_OF_LOG)
+    assert "clutter/made" in names_of(tmp_path)
+    (row,) = one_run(("clutter/made",), tmp_path, tmp_path, 1, 1)
+    assert row["rmse_m"] < 0.5
+    assert row["storeys"] == 1

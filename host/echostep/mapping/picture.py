@@ -26,14 +26,14 @@ WIDE_IN, HIGHEST = 12.0, 1.4  # width in inches; greatest height by width
 TRUNK_M = 0.5  # width of the floor that a person walks on
 
 
-def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], built: Level | None = None) -> None:
-    """Draw each level and the paths (n, 2) on it, over the true walls where they are known. Raises EchostepError."""
+def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], built: Sequence[Level] = ()) -> None:
+    """Draw each level and the paths (n, 2) on it, over the true walls of the level where they are known. Raises EchostepError."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     check_kind(path)
     points = [paths for paths_of in walked_m for paths in paths_of]
-    points += [level.walls.reshape(-1, 2) for level in (*plan.levels, *(() if built is None else (built,)))]
+    points += [level.walls.reshape(-1, 2) for level in (*plan.levels, *built)]
     low, high = np.concatenate(points).min(0) - 0.5, np.concatenate(points).max(0) + 0.5
     count = len(plan.levels)
     shape = min(count * (high[1] - low[1]) / (high[0] - low[0]), HIGHEST)
@@ -41,7 +41,7 @@ def draw_picture(path: Path, plan: Plan, walked_m: Sequence[Sequence[Floats]], b
     FigureCanvasAgg(figure)
     for k, level in enumerate(reversed(plan.levels)):
         axes = figure.add_subplot(count, 1, k + 1, aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        _draw_level(axes, level, walked_m[count - 1 - k], built)
+        _draw_level(axes, level, walked_m[count - 1 - k], built[count - 1 - k] if built else None)
         if count > 1:
             axes.set_title(f"storey {level.name}, {level.height_m:+.1f} m", fontsize="small")
     try:

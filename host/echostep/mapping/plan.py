@@ -8,6 +8,7 @@ through are open, of the others nothing is known.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,10 +28,11 @@ SQUARE_RAD = math.radians(6.0)
 
 
 Walked = tuple[tuple[Floats, ...], ...]  # of each level: the path (n, 2) of each walk, or its pieces there
+Moved = Callable[[Floats], Floats]  # points (n, 2) of the walk's own frame -> in the plan
 
 
 def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
-    """The plan with the first pose of the first walk at `start`, and what was walked of each level; heights are above the first storey."""
+    """The plan with the first pose of the first walk at `start`, and what was walked of each level."""
     first = mapped.graph.pose[0]
     turn = _turn(mapped, start.heading_rad)
     c, s = math.cos(turn), math.sin(turn)
@@ -40,6 +42,11 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
         found: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
         return found
 
+    return plan_in(mapped, moved, start, name)
+
+
+def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str) -> tuple[Plan, Walked]:
+    """The plan in the frame that `moved` leads to, and what was walked of each level; heights are above the first storey."""
     storeys, first_storey = mapped.graph.storeys, mapped.first_storey
     heights = np.zeros(1) if storeys is None else storeys.height_m - storeys.height_m[first_storey]
     wells = [] if storeys is None else wells_of(storeys, moved(mapped.graph.pose[:, :2]))

@@ -17,6 +17,7 @@ from echostep.evaluate.anywhere.sites import Site
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
+from echostep.settings import Settings
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Person
 from echostep.simulation.scenario import START_NS, Scenario
@@ -59,16 +60,16 @@ def way_m(truth: Floats) -> Floats:
 
 def simulate(site: Site, seed: int) -> SimulatedWalk:
     """The walk of a site."""
-    return _walk(site, *_chunks(site, seed))
+    return walk_of(site.built, *_chunks(site, seed))
 
 
 def simulate_with_gap(site: Site, seed: int, from_m: float, gap_s: float) -> tuple[SimulatedWalk, float]:
     """The walk without the bytes that arrive for `gap_s` after `from_m` of the way, as when a laptop sleeps; and when the gap is over."""
     chunks, truth = _chunks(site, seed)
-    begin_s = _walk(site, (), truth).time_at(from_m)
+    begin_s = walk_of(site.built, (), truth).time_at(from_m)
     gap_ns = [START_NS + int(1e9 * t_s) for t_s in (begin_s, begin_s + gap_s)]
     heard = [c for c in chunks if not gap_ns[0] <= c.t_arrival_ns < gap_ns[1]]
-    return _walk(site, heard, truth), begin_s + gap_s
+    return walk_of(site.built, heard, truth), begin_s + gap_s
 
 
 def _chunks(site: Site, seed: int) -> tuple[list[Chunk], Floats]:
@@ -76,8 +77,9 @@ def _chunks(site: Site, seed: int) -> tuple[list[Chunk], Floats]:
     return list(scenario.chunks()), scenario.truth
 
 
-def _walk(site: Site, chunks: Sequence[Chunk], truth: Floats) -> SimulatedWalk:
-    front_end = Tracker(site.built, waits=True).front_end
+def walk_of(built: Plan, chunks: Sequence[Chunk], truth: Floats, settings: Settings | None = None) -> SimulatedWalk:
+    """The walk that these bytes are."""
+    front_end = Tracker(built, None, settings, waits=True).front_end
     portions = (portion_of(chunks[k : k + PORTION]) for k in range(0, len(chunks), PORTION))
     pieces = [piece for portion in portions for piece in front_end.process(portion)]
-    return SimulatedWalk(site.built, tuple(p for p in pieces if isinstance(p, MeasuredSegment)), truth)
+    return SimulatedWalk(built, tuple(p for p in pieces if isinstance(p, MeasuredSegment)), truth)

@@ -28,13 +28,13 @@ def hear(log: CarmenLog, scans: Ints, rng: np.random.Generator, acoustics: Acous
             off_axis = np.abs(side * log.angles_rad - 0.5 * math.pi)
             inside = off_axis <= HALF_CONE_RAD
             threshold_db = acoustics.threshold_db + acoustics.threshold_sd_db * rng.standard_normal()
-            nearest = _nearest(log.range_m[scan, inside], off_axis[inside], threshold_db, acoustics)
+            nearest = nearest_return(log.range_m[scan, inside], off_axis[inside], threshold_db, acoustics)
             noisy = nearest + bias_m[ranger] + acoustics.noise_m * rng.standard_normal()
             heard[row, ranger] = max(noisy, acoustics.minimum_m)
     return heard
 
 
-def _nearest(range_m: Floats, off_axis_rad: Floats, threshold_db: float, acoustics: Acoustics) -> float:
+def nearest_return(range_m: Floats, off_axis_rad: Floats, threshold_db: float, acoustics: Acoustics) -> float:
     """The nearest of the returns (n,) that is louder than the threshold; NaN: none."""
     for k in np.argsort(range_m).tolist():
         if range_m[k] > acoustics.maximum_m:

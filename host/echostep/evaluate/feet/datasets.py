@@ -62,7 +62,7 @@ def _vicon(path: Path) -> Iterator[FootRecording]:
     yield FootRecording("vicon", name, t_s, imu[:, :3], imu[:, 3:], judge, None, t_s, truth)
 
 
-def _hallway(path: Path) -> Iterator[FootRecording]:
+def hallway(path: Path) -> Iterator[FootRecording]:
     """Every footprint surveyed with a ruler."""
     mat = _mat(path)
     t_s, imu = mat["timestamps"].ravel(), mat["imu_data"]
@@ -137,7 +137,7 @@ OPENSHOE_PEERS: Peers = {"2": ("openshoe", 0.67), "31": ("openshoe", 0.39), "44"
 XIO_PEERS: Peers = {"short_walk": ("pyshoe", 0.035)}
 SETS: Sets[FootRecording] = (
     ("vicon", "vicon_pyshoe/*.mat", _vicon),
-    ("hallway", "gx5_gcp/*_LLIO.mat", _hallway),
+    ("hallway", "gx5_gcp/*_LLIO.mat", hallway),
     ("openshoe", "openshoe/*.txt", _openshoe),
     ("xio", "xio_ngimu/*.csv", _xio),
     ("mtw", "xsens_mtw_voisard/*_?f.txt", _mtw),

@@ -50,7 +50,7 @@ def joined_row(name: str, walks: tuple[SimulatedWalk, SimulatedWalk], seed: int)
     frame = known_start(pose[:second], truth[:second])
     error = path_columns(frame.to_map(pose[second:]), truth[second:])["rmse_m"]
     walls = frame.to_map(mapped.drawing.walls.reshape(-1, 2)).reshape(-1, 4)
-    drawn = wall_columns(walls, walks[1])
+    drawn = wall_columns([walls], walks[1])
     row |= {
         "joined": 1,
         "misplaced": int(error > MISPLACED_M),

@@ -8,15 +8,18 @@ it, as two taps state them: nothing else is aligned.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats
-from echostep.evaluate.anywhere.walks import SimulatedWalk, T, X, Y
+from echostep.evaluate.anywhere.walks import SimulatedWalk, T, X, Y, Z
 from echostep.evaluate.report import Row
 from echostep.mapping.graph import Closure
+from echostep.mapping.mapper import Mapped
+from echostep.mapping.storeys import STAIRS
 
 COURSE_M = 15.0  # the trunk's place over the foot errs by 4 cm, 0.2 degrees of it
 SAMPLE_M = 0.05  # along walls
@@ -25,6 +28,7 @@ DRAWN_M = ABSENT_M  # a wall nearer than this to a drawn one is drawn
 PASSED_M = 2.5  # a wall in sight within this distance of the path was passed
 LOOK_S = 1.0  # between two looks around
 SHORT = 0.97  # of the way to a place: the wall itself hides nothing
+LEVEL_M = 0.5  # of height from a level, within which the path is on it
 WRONG_M = 0.5  # error of a closure along a direction that it claims to know
 
 
@@ -62,20 +66,52 @@ def path_columns(path: Floats, truth: Floats) -> Row:
     return {"rmse_m": float(np.sqrt(np.mean(error**2))), "max_m": float(error.max())}
 
 
-def wall_columns(drawn: Floats, walk: SimulatedWalk) -> Row:
-    """Errors of drawn walls (n, 4) in the map, and which of the walls that were passed are drawn."""
-    built = walk.built.levels[0].solid
-    places, true = sampled(drawn), sampled(built)
-    passed = true[in_sight(true, built, walk)]
-    if not len(places):
+def heights_m(walk: SimulatedWalk, t_s: Floats) -> Floats:
+    """True heights of the floor (n,) at times (n,)."""
+    return np.interp(t_s, walk.truth[:, T], walk.truth[:, Z])
+
+
+def levels_of(mapped: Mapped, walk: SimulatedWalk) -> list[int]:
+    """The true level of each drawn storey: the nearest one in height above the start."""
+    storeys, start = mapped.graph.storeys, float(walk.truth[0, Z])
+    above = np.zeros(1) if storeys is None else storeys.height_m
+    true = np.array([level.height_m for level in walk.built.levels])
+    return [int(np.argmin(np.abs(true - start - height))) for height in above]
+
+
+def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> Row:
+    """Share of the nodes on a level that are drawn on another one, and how many storeys are drawn of how many walked."""
+    z = heights_m(walk, mapped.graph.nodes.t_s)
+    on = np.array([np.abs(z - level.height_m) < LEVEL_M for level in walk.built.levels])
+    storey = mapped.graph.storey_of(np.arange(len(z)))
+    level = np.array(levels_of(mapped, walk))[np.maximum(storey, 0)]
+    wrong = on.any(0) & (storey != STAIRS) & ~on[level, np.arange(len(z))]
+    return {
+        "wrong_storey": float(wrong.mean()),
+        "storeys": len(mapped.drawings),
+        "storeys_walked": int(on.any(1).sum()),
+    }
+
+
+def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> Row:
+    """Errors of the drawn walls (n, 4) of each level in the map, and which of the walls that were passed are drawn."""
+    t_s = np.arange(walk.truth[0, T], walk.truth[-1, T], LOOK_S)
+    looks, z = true_path(walk, t_s), heights_m(walk, t_s)
+    away, missed = [], []
+    for level, walls in zip(walk.built.levels, drawn, strict=True):
+        true = sampled(level.solid)
+        passed = true[in_sight(true, level.solid, looks[np.abs(z - level.height_m) < LEVEL_M])]
+        away.append(distances(sampled(walls), level.solid))
+        missed.append(distances(passed, walls))
+    away_m, missed_m = np.concatenate(away), np.concatenate(missed)
+    if not len(away_m):
         return {"drawn": 0.0, "absent": 0.0, "drawn_m": 0.0}
-    away_m, missed_m = distances(places, built), distances(passed, drawn)
     return {
         "wall_median_m": float(np.median(away_m)),
         "wall95_m": float(np.quantile(away_m, 0.95)),
         "drawn": float(np.mean(missed_m < DRAWN_M)),
         "absent": float(np.mean(away_m > ABSENT_M)),
-        "drawn_m": len(places) * SAMPLE_M,
+        "drawn_m": len(away_m) * SAMPLE_M,
     }
 
 
@@ -113,10 +149,9 @@ def distances(places: Floats, walls: Floats) -> Floats:
     return found
 
 
-def in_sight(places: Floats, built: Floats, walk: SimulatedWalk) -> Bools:
-    """Which places (m, 2) on walls are in sight within PASSED_M of the true path at some time."""
+def in_sight(places: Floats, built: Floats, looks: Floats) -> Bools:
+    """Which places (m, 2) on walls are in sight within PASSED_M of one of the true places (k, 2)."""
     tree = shapely.STRtree(shapely.linestrings(built.reshape(-1, 2, 2)))
-    looks = true_path(walk, np.arange(walk.truth[0, T], walk.truth[-1, T], LOOK_S))
     seen = np.zeros(len(places), np.bool_)
     for eye in looks:
         near = np.flatnonzero(~seen & (np.hypot(*(places - eye).T) < PASSED_M))

@@ -28,6 +28,7 @@ ROOMS = (6, 4, 6, 4)  # south, east, north, west: 20
 CUPBOARD_M = ((0.8, 1.6), (0.4, 0.6))  # width and depth of a piece of furniture
 CLEAR_M = 0.9  # of furniture from the middle of a door
 WESTPORT_LEVEL = 2
+STOREYS = 3  # of its lowest levels, in the row of several
 
 
 def office(seed: int, length_m: float) -> Site:
@@ -50,8 +51,19 @@ def westport(seed: int, length_m: float, data: Path) -> Site:
     return _toured(furnished(plan, 8, rng), _westport_begin(plan), length_m, rng)
 
 
+def storeys(seed: int, length_m: float, data: Path) -> Site:
+    """The lowest STOREYS of westport-house with their stairs, furnished."""
+    rng = np.random.default_rng([seed, 87])
+    whole = open_plan(data / "maps" / "westport-house")
+    joined = (
+        replace(c, levels=tuple(k for k in c.levels if k < STOREYS)) for c in whole.connectors if c.kind == "stairs"
+    )
+    plan = replace(whole, levels=whole.levels[:STOREYS], connectors=tuple(c for c in joined if len(c.levels) > 1))
+    return _toured(furnished(plan, 8, rng), _westport_begin(plan), length_m, rng)
+
+
 def _westport_begin(plan: Plan) -> RoutePlace:
-    """Beside the widest door of the storey."""
+    """Beside the widest door of the lowest storey."""
     door = max(plan.levels[0].doors, key=lambda d: d.width_m)
     x0, y0, x1, y1 = door.line
     return RoutePlace(0.5 * (x0 + x1), 0.5 * (y0 + y1))
@@ -84,8 +96,12 @@ def loop_walls(rng: np.random.Generator) -> Floats:
 
 
 def furnished(plan: Plan, pieces: int, rng: np.random.Generator) -> Plan:
-    """The plan with so many cupboards along its walls, clear of doors and of each other."""
-    level = plan.levels[0]
+    """The plan with so many cupboards along the walls of each level, clear of doors, stairs and each other."""
+    stairs = shapely.union_all([shapely.Polygon(c.outline_m) for c in plan.connectors])
+    return replace(plan, levels=tuple(_furnished(level, pieces, stairs, rng) for level in plan.levels))
+
+
+def _furnished(level: Level, pieces: int, stairs: shapely.Geometry, rng: np.random.Generator) -> Level:
     doors = [door.line for door in (*level.doors, *door_gaps(level))]
     closed = shapely.MultiPoint([(0.5 * (x0 + x1), 0.5 * (y0 + y1)) for x0, y0, x1, y1 in doors])
     solid = shapely.STRtree(shapely.linestrings(level.solid.reshape(-1, 2, 2)))
@@ -95,12 +111,16 @@ def furnished(plan: Plan, pieces: int, rng: np.random.Generator) -> Plan:
             break
         box = _beside(level, rng)
         inner = box.buffer(-0.02)
-        if box.distance(closed) < CLEAR_M or len(solid.query(inner, predicate="intersects")):
+        if (
+            box.distance(closed) < CLEAR_M
+            or box.distance(stairs) < CLEAR_M
+            or len(solid.query(inner, predicate="intersects"))
+        ):
             continue
         if all(box.distance(other) > 1.2 for other in boxes):
             boxes.append(inner)
     outlines = tuple(np.array(box.exterior.coords)[:-1] for box in boxes)
-    return replace(plan, levels=(replace(level, obstacles=(*level.obstacles, *outlines)),))
+    return replace(level, obstacles=(*level.obstacles, *outlines))
 
 
 def _beside(level: Level, rng: np.random.Generator) -> shapely.Polygon:

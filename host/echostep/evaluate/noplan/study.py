@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The study `noplan`: each building drawn from one walk, beside the foot alone and FootSLAM on the same path; another person tracked on the drawing.
 
-In: seeds; the public recordings for westport-house. Out: the table, JSON, Parquet, a picture of each drawing of the first seed. Owns nothing.
+In: seeds; the public recordings for westport-house, real feet and real clutter. Out: the table, JSON, Parquet, a picture of each drawing of the
+first seed. Owns nothing.
 """
 
 from __future__ import annotations
@@ -17,29 +18,41 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.evaluate.anywhere.filtering import track
-from echostep.evaluate.anywhere.sites import Site, plan_of
+from echostep.evaluate.anywhere.sites import Site
 from echostep.evaluate.anywhere.walks import SimulatedWalk
-from echostep.evaluate.noplan import sites
+from echostep.evaluate.feet.metrics import rmse
+from echostep.evaluate.noplan import real_clutter, real_feet, sites
 from echostep.evaluate.noplan.footslam import footslam
 from echostep.evaluate.noplan.joined import again, joined_row, joined_summary, strangers_row, walked_pair
-from echostep.evaluate.noplan.judgement import closure_columns, known_start, path_columns, true_path, wall_columns
+from echostep.evaluate.noplan.judgement import (
+    closure_columns,
+    known_start,
+    levels_of,
+    path_columns,
+    storey_columns,
+    true_path,
+    wall_columns,
+)
 from echostep.evaluate.noplan.walks import walked
 from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.start import Start
 from echostep.mapping.mapper import map_walk
 from echostep.mapping.picture import draw_picture
-from echostep.plan.gaps import door_gaps
+from echostep.mapping.plan import plan_in
+from echostep.plan.model import Plan
 
 SPEED_M_S = 0.93  # of a tour with its pauses and turns, as simulated
 SECOND_M = 150.0  # way of the second person
 MINUTES = (10, 60)
-SITES = ("office", "corridors", "westport")
+SITES = ("office", "corridors", "westport", "storeys")
+REAL = ("westport", "storeys")  # of the public recordings
 JOINED_MIN = 5  # of each of two walks
 STRANGERS = {"office": "corridors", "corridors": "westport", "westport": "office"}  # another building
 COLUMNS = {
-    "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "foot_m": "foot alone", "footslam_m": "FootSLAM", "wall_median_m": "walls m",
-    "wall95_m": "95 %", "drawn_pc": "drawn %", "absent_pc": "not there %", "closures": "closures", "wrong": "wrong", "map_s": "s",
+    "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "shape_m": "shape m", "foot_rmse_m": "foot alone",
+    "footslam_rmse_m": "FootSLAM", "wall_median_m": "walls m", "wall95_m": "95 %", "drawn_pc": "drawn %", "absent_pc": "not there %",
+    "closures": "closures", "wrong": "wrong", "map_s": "s",
 }  # fmt: skip
 JOINED_COLUMNS = {
     "name": "row", "joined": "joined", "misplaced": "misplaced", "runs": "runs", "joined_rmse_m": "RMSE m", "worst_rmse_m": "worst",
@@ -50,11 +63,19 @@ SECOND_COLUMNS = {"name": "row", "mean_m": "mean m", "worst_m": "worst mean m", 
 
 def names_of(data: Path | None) -> list[str]:
     """Names of the rows; without the recordings there is no westport-house."""
-    known = [site for site in SITES if data or site != "westport"]
-    pairs = [f"{kind}/{site}" for kind in ("joined", "strangers") for site in known]
+    known = [site for site in SITES if data or site not in REAL]
+    pairs = [f"{kind}/{site}" for kind in ("joined", "strangers") for site in STRANGERS if site in known]
     if not data:
         pairs.remove("strangers/corridors")
-    return [f"{site}/{minutes}min" for minutes in MINUTES for site in known] + pairs
+    return [f"{site}/{minutes}min" for minutes in MINUTES for site in known] + pairs + _real_names(data)
+
+
+def _real_names(data: Path | None) -> list[str]:
+    """Rows of real feet, and of real clutter."""
+    if data is None:
+        return []
+    known = {"feet": real_feet.names_in(data), "clutter": real_clutter.names_in(data)}
+    return [f"{kind}/{name}" for kind, names in known.items() for name in names]
 
 
 def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: int, seed: int) -> list[Row]:
@@ -62,13 +83,26 @@ def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: in
     rows = []
     for name in names:
         kind, minutes = name.split("/")
+        picture = pictures / f"{name.replace('/', '-')}.png" if seed == first else None
         if kind in ("joined", "strangers"):
             rows.append(_pair_row(name, seed, data))
-            continue
-        site = _site(kind, seed, 60.0 * SPEED_M_S * int(minutes.removesuffix("min")), data)
-        picture = pictures / f"{name.replace('/', '-')}.png" if seed == first else None
-        rows += drawn_rows(name, site, seed, picture)
+        elif kind in ("feet", "clutter"):
+            assert data is not None
+            rows.append(_real_row(name, seed, data, picture))
+        else:
+            site = _site(kind, seed, 60.0 * SPEED_M_S * int(minutes.removesuffix("min")), data)
+            rows += drawn_rows(name, site, seed, picture)
     return rows
+
+
+def _real_row(name: str, seed: int, data: Path, picture: Path | None) -> Row:
+    """A recording with the echoes of this seed; a foot is judged at its footprints."""
+    kind, recording = name.split("/")
+    if kind == "clutter":
+        return drawn_row(name, real_clutter.walked_log(real_clutter.names_in(data)[recording], seed), seed, picture)[0]
+    hallway = real_feet.read_hallway(real_feet.names_in(data)[recording])
+    walk = real_feet.walked_hallway(hallway, seed)
+    return drawn_row(name, walk, seed, picture, real_feet.START_S + hallway.print_t_s)[0]
 
 
 def _pair_row(name: str, seed: int, data: Path | None) -> Row:
@@ -82,37 +116,54 @@ def _pair_row(name: str, seed: int, data: Path | None) -> Row:
 
 
 def _site(kind: str, seed: int, length_m: float, data: Path | None) -> Site:
-    if kind == "westport":
+    if kind in REAL:
         assert data is not None
-        return sites.westport(seed, length_m, data)
+        return {"westport": sites.westport, "storeys": sites.storeys}[kind](seed, length_m, data)
     return sites.office(seed, length_m) if kind == "office" else sites.corridors(seed, length_m)
 
 
 def drawn_rows(name: str, site: Site, seed: int, picture: Path | None) -> list[Row]:
     """One walk drawn and judged; its drawing tried by a second person."""
-    walk = walked(site, seed)
+    row, plan, levels = drawn_row(name, walked(site, seed), seed, picture)
+    return [row, {"name": f"second/{name}", "seed": seed} | _second(site, plan, levels, seed)]
+
+
+def drawn_row(
+    name: str, walk: SimulatedWalk, seed: int, picture: Path | None, at_s: Floats | None = None
+) -> tuple[Row, Plan, list[int]]:
+    """One walk drawn and judged, its path at times `at_s` (k,), or at every node; its plan in the map, and the true level of each drawn one."""
     begin_s = time.process_time()
     mapped = map_walk(walk.segments)
     map_s = time.process_time() - begin_s
     nodes, pose = mapped.graph.nodes, mapped.graph.pose
-    truth = true_path(walk, nodes.t_s)
+    truth, levels = true_path(walk, nodes.t_s), levels_of(mapped, walk)
     frame = known_start(pose[:, :2], truth)
-    walls = frame.to_map(mapped.drawing.walls.reshape(-1, 2)).reshape(-1, 4)
-    row: Row = {"name": name, "seed": seed, "map_s": map_s} | path_columns(frame.to_map(pose[:, :2]), truth)
-    row |= wall_columns(walls, walk) | closure_columns(mapped.graph.closures, pose, truth, frame)
-    peers = {"foot": nodes.pose[:, :2], "footslam": footslam(nodes, np.random.default_rng([seed, 85]))}
-    for peer, path in peers.items():
-        row[f"{peer}_m"] = path_columns(known_start(path, truth).to_map(path), truth)["rmse_m"]
+    drawn = [np.zeros((0, 4))] * len(walk.built.levels)
+    for level, drawing in zip(levels, mapped.drawings, strict=True):
+        walls = frame.to_map(drawing.walls.reshape(-1, 2)).reshape(-1, 4)
+        drawn[level] = np.concatenate([drawn[level], walls])
+    row: Row = {"name": name, "seed": seed, "map_s": map_s}
+    row |= wall_columns(drawn, walk) | storey_columns(mapped, walk)
+    row |= closure_columns(mapped.graph.closures, pose, truth, frame)
+    row["shape_m"] = rmse(pose[:, :2], truth)
+    at_s = nodes.t_s if at_s is None else at_s
+    paths = {"": pose, "foot_": nodes.pose, "footslam_": footslam(nodes, np.random.default_rng([seed, 85]))}
+    for of, path in paths.items():
+        placed = known_start(path[:, :2], truth).to_map(path[:, :2])
+        at = np.column_stack([np.interp(at_s, nodes.t_s, placed[:, k]) for k in (0, 1)])
+        row |= {of + key: value for key, value in path_columns(at, true_path(walk, at_s)).items()}
+    plan, walked_m = plan_in(mapped, frame.to_map, walk.pose_at(float(nodes.t_s[0])), name)
     if picture is not None:
         picture.parent.mkdir(parents=True, exist_ok=True)
-        plan = plan_of(name, walls)
-        draw_picture(picture, plan, [[frame.to_map(pose[:, :2])]], walk.built.levels[0])
-    sd_m = float(np.sqrt(np.mean(mapped.drawing.sd_m**2)))
-    return [row, {"name": f"second/{name}", "seed": seed} | _second(site, walls, sd_m, seed)]
+        draw_picture(picture, plan, walked_m, [walk.built.levels[level] for level in levels])
+    return row, plan, levels
 
 
-def _second(site: Site, walls: Floats, sd_m: float, seed: int) -> Row:
-    """Another person, from a known start, the other way round along the first one's tour."""
+def _second(site: Site, drawn: Plan, levels: list[int], seed: int) -> Row:
+    """Another person on the drawing, from a known start, the other way round along the first one's tour.
+
+    `levels`: the true level of each drawn one.
+    """
     way, points = 0.0, [site.waypoints[-1]]
     for point in site.waypoints[-2::-1]:
         way += float(np.hypot(point[0] - points[-1][0], point[1] - points[-1][1]))
@@ -120,10 +171,8 @@ def _second(site: Site, walls: Floats, sd_m: float, seed: int) -> Row:
         if way > SECOND_M:
             break
     walk: SimulatedWalk = walked(Site(site.built, tuple(points)), seed + 500_000)
-    plan = plan_of("drawn", walls)
-    level = replace(plan.levels[0], doors=door_gaps(plan.levels[0]))
-    drawn = replace(plan, levels=(level,), uncertainty_m=sd_m)
-    run = track(walk.segments, drawn, Start(walk.pose_at(walk.segments[0].segment.t0_s)), seed)
+    begin = walk.pose_at(walk.segments[0].segment.t0_s)
+    run = track(walk.segments, drawn, Start(replace(begin, level=levels.index(begin.level))), seed)
     places = np.array([(c.x_m, c.y_m) for c in run.claims])
     error = np.hypot(*(places - true_path(walk, np.array([c.t_s for c in run.claims]))).T)
     return {"mean_m": float(error.mean()), "end_m": float(error[-1])}
@@ -139,11 +188,15 @@ def _summary(group: list[Row]) -> Row:
         return float(np.mean([row[key] for row in group if key in row]))
 
     row: Row = {"name": group[0]["name"], "runs": len(group)}
-    row |= {key: mean(key) for key in ("rmse_m", "foot_m", "footslam_m", "wall_median_m", "wall95_m", "map_s")}
+    row |= {
+        key: mean(key)
+        for key in ("rmse_m", "shape_m", "foot_rmse_m", "footslam_rmse_m", "wall_median_m", "wall95_m", "map_s")
+    }
     row |= {
         "worst_rmse_m": max(r["rmse_m"] for r in group),
         "drawn_pc": 100.0 * mean("drawn"),
         "absent_pc": 100.0 * mean("absent"),
+        "wrong_storey_pc": 100.0 * mean("wrong_storey"),
     }
     return row | {key: sum(r[key] for r in group) for key in ("closures", "wrong")}
 

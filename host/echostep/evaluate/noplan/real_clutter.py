@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Real clutter: a robot's laser log as a walk by its raw odometry, with pings all along it.
+
+In: a log. Out: `SimulatedWalk` in the building that the full laser shows. Owns the rate of the pings. A ping hears like those of the study `clutter`,
+but what the scans before and after it show: scans are half a metre to a metre apart, pings of a belt 4 cm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.evaluate.anywhere.walks import SimulatedWalk
+from echostep.evaluate.clutter.building import building_of, walk_from
+from echostep.evaluate.clutter.carmen_log import CarmenLog, logs_in, name_of
+from echostep.evaluate.clutter.scan_pings import HALF_CONE_RAD, nearest_return
+from echostep.mapping.nodes import RANGER_AXES_RAD
+from echostep.path import MeasuredSegment
+from echostep.simulation.world.acoustics import SRF02
+from echostep.simulation.world.echoes import ranger_bias_m
+
+FOLDER = "carmen"
+PING_S = 0.036  # from the ping of one ranger to that of the other, as the board triggers SRF02
+
+
+def names_in(data: Path) -> dict[str, Path]:
+    """The logs by name; none where there is no such folder."""
+    folder = data / FOLDER
+    return {name_of(path): path for path in logs_in(folder)} if folder.is_dir() else {}
+
+
+def walked_log(path: Path, seed: int) -> SimulatedWalk:
+    """The walk along a log, true at its corrected poses."""
+    building = building_of(path, seed)
+    walk = walk_from(building, 0)
+    t_s = np.array([walk.segments[k].segment.t1_s for k in walk.at_scan])
+    truth = np.column_stack([t_s, walk.true, np.zeros(len(t_s))])
+    hearing = _Hearing(building.log, truth, np.random.default_rng([seed, 88]))
+    return SimulatedWalk(building.plans["full"], tuple(hearing.heard(s) for s in walk.segments), truth)
+
+
+class _Hearing:
+    """What two rangers hear between the scans of a log; `truth` (k, 5): t_s, x, y, heading, height at each scan."""
+
+    def __init__(self, log: CarmenLog, truth: Floats, rng: np.random.Generator) -> None:
+        self._truth, self._rng, self._pings = truth, rng, 0
+        self._heading = np.unwrap(truth[:, 3])
+        self._bias_m = ranger_bias_m(rng)
+        bearing = log.pose[:, 2:] + log.angles_rad
+        ends = log.pose[:, None, :2] + log.range_m[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+        near = (log.range_m > 0.0) & (log.range_m < SRF02.maximum_m + 1.0)
+        self._returns = [scan[seen] for scan, seen in zip(ends, near, strict=True)]
+
+    def heard(self, measured: MeasuredSegment) -> MeasuredSegment:
+        """The segment with its pings."""
+        s = measured.segment
+        first, last = (int(np.ceil(t / PING_S)) for t in (s.t0_s, s.t1_s))
+        number = np.arange(first, last)
+        t_s, ranger = np.asarray(number * PING_S, np.float64), number % 2
+        ranges = np.array([self._range_m(t, r) for t, r in zip(t_s.tolist(), ranger.tolist(), strict=True)])
+        return replace(measured, t_s=t_s, ranger=ranger, range_m=ranges.reshape(-1))
+
+    def _range_m(self, t_s: float, ranger: int) -> float:
+        scan = int(np.clip(np.searchsorted(self._truth[:, 0], t_s) - 1, 0, len(self._truth) - 2))
+        x, y = (np.interp(t_s, self._truth[:, 0], self._truth[:, k]) for k in (1, 2))
+        axis = np.interp(t_s, self._truth[:, 0], self._heading) + RANGER_AXES_RAD[ranger]
+        ahead = np.concatenate(self._returns[scan : scan + 2]) - [x, y]
+        away_m = np.hypot(*ahead.T)
+        off_axis = np.abs((np.arctan2(ahead[:, 1], ahead[:, 0]) - axis + np.pi) % (2.0 * np.pi) - np.pi)
+        inside = off_axis <= HALF_CONE_RAD
+        threshold_db = SRF02.threshold_db + SRF02.threshold_sd_db * self._rng.standard_normal()
+        nearest = nearest_return(away_m[inside], off_axis[inside], threshold_db, SRF02)
+        return max(nearest + self._bias_m[ranger] + SRF02.noise_m * self._rng.standard_normal(), SRF02.minimum_m)
