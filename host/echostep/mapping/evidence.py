@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
 from echostep.mapping.graph import Graph
@@ -49,14 +50,14 @@ def ping_poses(graph: Graph, pings: Pings) -> Floats:
     a = graph.pose[pings.node]
     b = graph.pose[np.minimum(pings.node + 1, len(graph.pose) - 1)]
     at = a[:, :2] + pings.share[:, None] * (b[:, :2] - a[:, :2])
-    turn = (b[:, 2] - a[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    turn = wrap(b[:, 2] - a[:, 2])
     return np.column_stack([at, a[:, 2] + pings.share * turn + RANGER_AXES_RAD[pings.ranger]])
 
 
 def is_straight(graph: Graph, pings: Pings) -> Bools:
     """Pings (k,) on a stride that turns little: in between two nodes the heading is interpolated."""
     after = np.minimum(pings.node + 1, len(graph.pose) - 1)
-    turn = (graph.pose[after, 2] - graph.pose[pings.node, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    turn = wrap(graph.pose[after, 2] - graph.pose[pings.node, 2])
     found: Bools = np.abs(turn) < TURNING_RAD
     return found
 

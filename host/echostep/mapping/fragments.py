@@ -25,6 +25,9 @@ FARTHEST_M = 5.0  # range: beyond, two walls are heard by turns
 CONE_RAD = math.radians(30.0)  # half of the ranger's cone, and the heading's own error
 SD_M, SD_RAD = 0.04, math.radians(1.0)  # least standard deviations: sway of the trunk, bias of a ranger
 RANGE_SD_M = 0.04
+NOISE_M = 0.025  # of one range, from a flat wall [Robot Electronics, sonar FAQ]: what residuals have beyond it is the surface's
+# Slope of the line fitted to a surface of this standard deviation, of half length 1: off by as much at each end
+SLOPE = math.sqrt(3.0)
 
 
 class Fragments(NamedTuple):
@@ -173,6 +176,7 @@ def _row(at: Floats, axis: Floats, member: Ints, fit: tuple[float, float, float]
     row[0], row[1] = c * rho - s * middle, s * rho + c * middle
     row[2], row[3] = normal, half
     row[4] = math.hypot(SD_M, rms / math.sqrt(n)) if off / n < CONE_RAD else math.inf
-    row[5] = math.hypot(SD_RAD, RANGE_SD_M / math.sqrt(spread * max(n / 3.0, 1.0)))
+    uneven = SLOPE * math.sqrt(max(rms * rms - NOISE_M**2, 0.0)) / max(half, 0.5 * SHORTEST_M)
+    row[5] = math.hypot(math.hypot(SD_RAD, uneven), RANGE_SD_M / math.sqrt(spread * max(n / 3.0, 1.0)))
     row[6] = n
     return row

@@ -23,7 +23,8 @@ from echostep.mapping.nodes import Nodes
 from echostep.mapping.storeys import Storeys
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
-HUBER = 2.0  # standard deviations from which a fragment counts less
+ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within:
+APART_M, TURNED_RAD = 0.5, math.radians(20.0)  # by reason
 START_SD_M, START_SD_RAD = 0.001, 0.0005  # the first node is the origin
 FREE_SD_RAD = math.radians(
     30.0
@@ -161,8 +162,10 @@ class Graph:
         cp, sp_ = np.cos(phi), np.sin(phi)
         r = (cp * q[:, 0] + sp_ * q[:, 1] - walls.rho_m[wall]) / f.sd_m[used]
         ra = wrap(theta + f.normal_rad[used] - phi) / f.sd_rad[used]
-        wt = np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-9)))
-        wd = wt / f.sd_m[used]
+        # The weight is the probability to be of this wall, so what does not fit lets go.
+        one = ONE_WALL * np.exp(-0.5 * (r**2 + ra**2)) / (2.0 * math.pi * f.sd_m[used] * f.sd_rad[used])
+        wt = np.sqrt(one / (one + (1.0 - ONE_WALL) / (4.0 * APART_M * TURNED_RAD)))
+        wd, wa = wt / f.sd_m[used], wt / f.sd_rad[used]
         rows.add(
             wt * r,
             [
@@ -170,8 +173,6 @@ class Graph:
                 (first + 2 * wall, wd * (cp * q[:, 1] - sp_ * q[:, 0])), (first + 2 * wall + 1, -wd),
             ],
         )  # fmt: skip
-        wt = np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(ra), 1e-9)))
-        wa = wt / f.sd_rad[used]
         rows.add(wt * ra, [(3 * node + 2, wa), (first + 2 * wall, -wa)])
 
     def _add_directions(self, rows: _Rows) -> None:

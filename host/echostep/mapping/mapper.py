@@ -15,11 +15,12 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.mapping.association import KNOWN_M, associate
 from echostep.mapping.closures import APART_M, STRETCH_M, find_closure
-from echostep.mapping.directions import LEAST_EVIDENCE, Directions, find_directions
+from echostep.mapping.directions import LEAST_EVIDENCE, Directions
 from echostep.mapping.drawing import Drawing, draw
 from echostep.mapping.fragments import Fragments, find_fragments
 from echostep.mapping.graph import ROUNDS, Closure, Graph, Walls, contradicted
 from echostep.mapping.nodes import Nodes, Pings, nodes_of
+from echostep.mapping.relief import find_relief
 from echostep.mapping.storeys import STAIRS, find_storeys
 from echostep.path import MeasuredSegment
 
@@ -63,8 +64,7 @@ def drawn(solved: Mapped) -> Mapped:
 def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
     """The corrected path of one walk; nothing is drawn yet."""
     nodes, pings = nodes_of(segments)
-    fragments = find_fragments(nodes, pings)
-    directions = find_directions(nodes, fragments)
+    fragments, directions = find_relief(nodes, find_fragments(nodes, pings))
     graph = new_graph(nodes, fragments, directions)
     graph.storeys = find_storeys(segments, nodes)
     for _ in range(LOCAL_ROUNDS):

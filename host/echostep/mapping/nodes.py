@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.path import MeasuredSegment
 
@@ -63,7 +62,7 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
     pings: list[Floats] = []
     for measured in segments:
         s = measured.segment
-        length, turn = math.hypot(s.dx_m, s.dy_m), float(wrap(s.heading1_rad - s.heading0_rad))
+        length, turn = math.hypot(s.dx_m, s.dy_m), s.turn_rad
         _, x, y, heading, way = rows[-1]
         moves = length > STILL_M or abs(turn) > STILL_RAD
         span_s = s.t1_s - s.t0_s

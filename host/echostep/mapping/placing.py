@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
+from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.mapping.graph import Graph
 
@@ -143,7 +144,7 @@ def find_place(old: Graph, new: Graph) -> Place | None:
 
 def _differ(a: Place, b: Place, middle: Floats) -> bool:
     """Whether two places are not one; `middle` (1, 2) of the new map."""
-    turned = abs((a.turn_rad - b.turn_rad + math.pi) % (2.0 * math.pi) - math.pi)
+    turned = abs(wrap(a.turn_rad - b.turn_rad))
     return bool(np.hypot(*(a.moved(middle) - b.moved(middle))[0]) > APART_M) or turned > APART_RAD
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.evaluate.clutter.building import building_of, walk_from
@@ -69,7 +70,7 @@ class _Hearing:
         axis = np.interp(t_s, self._truth[:, 0], self._heading) + RANGER_AXES_RAD[ranger]
         ahead = np.concatenate(self._returns[scan : scan + 2]) - [x, y]
         away_m = np.hypot(*ahead.T)
-        off_axis = np.abs((np.arctan2(ahead[:, 1], ahead[:, 0]) - axis + np.pi) % (2.0 * np.pi) - np.pi)
+        off_axis = np.abs(wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - axis))
         inside = off_axis <= HALF_CONE_RAD
         threshold_db = SRF02.threshold_db + SRF02.threshold_sd_db * self._rng.standard_normal()
         nearest = nearest_return(away_m[inside], off_axis[inside], threshold_db, SRF02)
