@@ -20,12 +20,6 @@ enum { TAKE_RANGE = 81, UNLOCK_1 = 170, UNLOCK_2 = 165 };
 #define STRETCH US(20)     /* after each byte; by reason */
 #define LONG_STRETCH US(500)
 #define NEVER UINT64_MAX
-#define PINGS 4 /* kept for cross echoes */
-
-struct ping {
-	avr_cycle_count_t emitted_at;
-	uint16_t cross_us; /* when it reaches the other ranger, 0: never */
-};
 
 static struct ranger {
 	struct twi_device twi;
@@ -37,30 +31,13 @@ static struct ranger {
 	avr_cycle_count_t began, busy_until;
 	bool listening;
 	uint16_t own_us, result;
-	struct ping pings[PINGS];
-	unsigned next_ping;
+	struct bursts bursts;
 } rangers[2] = { { .name = "left", .place = PLACE_RANGER_LEFT }, { .name = "right", .place = PLACE_RANGER_RIGHT } };
 static const char *const fault_names[FAULTS] = { "ok", "absent", "nack", "stretch", "mute", "deaf", "misread" };
 
-/* Earliest arrival at this ranger within its window, in us after its trigger; 0: none. */
-static uint32_t earliest(const struct ranger *r)
-{
-	const struct ranger *other = &rangers[r == rangers];
-	int64_t best = r->own_us && r->own_us <= WINDOW_US ? r->own_us : WINDOW_US + 1;
-
-	for (int k = 0; k < PINGS; k++) {
-		const struct ping *p = &other->pings[k];
-		int64_t arrival = ((int64_t)p->emitted_at - (int64_t)r->began) / 16 + p->cross_us;
-
-		if (p->cross_us && arrival > 0 && arrival < best)
-			best = arrival;
-	}
-	return r->fault == DEAF || best > WINDOW_US ? 0 : (uint32_t)best;
-}
-
 static void finish(struct ranger *r)
 {
-	uint32_t us = earliest(r);
+	uint32_t us = r->fault == DEAF ? 0 : bursts_first_echo(&rangers[r == rangers].bursts, r->began, r->own_us, 1, WINDOW_US);
 
 	r->listening = false;
 	r->result = (uint16_t)(!us ? NO_ECHO_CM : ((us < LEAST_US ? LEAST_US : us) + US_PER_CM / 2) / US_PER_CM);
@@ -73,7 +50,7 @@ static void begin(struct ranger *r)
 
 	if (other->listening && avr->cycle >= other->busy_until)
 		finish(other); /* this ping may overwrite one that the other ranger's result needs */
-	r->pings[r->next_ping++ % PINGS] = (struct ping){ avr->cycle, row.cross_us[r == rangers] };
+	bursts_add(&r->bursts, avr->cycle, row.cross_us[r == rangers]);
 	bench_trace("trigger %s", r->name);
 	r->began = avr->cycle;
 	r->own_us = (uint16_t)own_us;
@@ -144,7 +121,7 @@ void maxsonar_power(void)
 		r->busy_until = 0;
 		r->count = 0;
 		r->result = PART_INFORMATION;
-		memset(r->pings, 0, sizeof r->pings);
+		r->bursts = (struct bursts){ 0 };
 	}
 }
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures of the real firmware in the twin: rates, errors of time stamps, losses, memory, speed; each with its limit and PASS or FAIL.
+"""Figures of the real firmware in the twin: rates, errors of time stamps, losses, memory; each with its limit and PASS or FAIL.
 
 In: the ELF and the twin (`make measure` builds both). Out: a table for each kit of parts; exit status 1 when a limit is missed. Owns the limits.
+The speed has no limit, for it is that of the computer.
 """
 
 from __future__ import annotations
@@ -30,10 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
 SETTLED_S = 2.0  # enumeration and start-up take less
 TICK_US = 0.5
-SPEED = {
-    Kit.PAPERS: 20.0,
-    Kit.OF_2026: 10.0,
-}  # times real time on a quiet computer; the kit of 2026 moves four times the bytes on SPI
+Figure = tuple[str, str, str, bool | None]  # what, measured, limit, passed (None: no limit)
 RIGHT_US = 6123  # the right ranger's time of flight
 
 
@@ -105,8 +103,8 @@ def stamp_errors(stamps: list[int], truth_ns: list[int]) -> tuple[float, float]:
     return float(np.abs(error).max()), float(error.std())
 
 
-def figures(seconds: int, kit: Kit) -> list[tuple[str, str, str, bool]]:
-    """(what, measured, limit, passed) for every figure."""
+def figures(seconds: int, kit: Kit) -> list[Figure]:
+    """Every figure of a belt board."""
     result, trace = run(seconds, m.Schedule.CONCURRENT, "both rangers at once", kit)
     slow, _ = run(min(seconds, 30), m.Schedule.SEQUENTIAL, "in turn, as in the paper", kit)
     span, slow_span = result.seconds - SETTLED_S, slow.seconds - SETTLED_S
@@ -115,7 +113,6 @@ def figures(seconds: int, kit: Kit) -> list[tuple[str, str, str, bool]]:
     pings, gyros = result.counts["Ping"] / span, result.counts["Gyros"] / span
     truth = {side: [t for t, text in trace if text == f"trigger {side}"] for side in ("left", "right")}
     worst = [stamp_errors(result.triggers[k], truth[side]) for k, side in enumerate(("left", "right"))]
-    speed = result.seconds / result.wall_s
     trigger = max(w for w, _ in worst)
     return [
         ("pings/s, both rangers at once", f"{pings:.1f}", ">= 28", pings >= 28.0),
@@ -136,7 +133,7 @@ def figures(seconds: int, kit: Kit) -> list[tuple[str, str, str, bool]]:
             "< 2200 B",
             result.status.memory_used < 2200,
         ),
-        ("speed", f"{speed:.0f} x real time", f">= {SPEED[kit]:.0f} x", speed >= SPEED[kit]),
+        ("speed, with the reader", f"{result.seconds / result.wall_s:.0f} x real time", "", None),
     ]
 
 
@@ -145,12 +142,12 @@ def _trigger_limit(worst_us: float, kit: Kit) -> tuple[str, bool]:
     return f"<= {limit_us:g} us", worst_us <= limit_us
 
 
-def _of_the_papers(result: RunResult, trace: list[tuple[int, str]]) -> list[tuple[str, str, str, bool]]:
+def _of_the_papers(result: RunResult, trace: list[tuple[int, str]]) -> list[Figure]:
     worst, sd = stamp_errors(result.syncs, [t for t, text in trace if text == "sync"])
     return [("worst SyncOut stamp", f"{worst:.1f} us (sd {sd:.2f})", "<= 20 us", worst <= 20.0)]
 
 
-def _of_2026(result: RunResult, span: float) -> list[tuple[str, str, str, bool]]:
+def _of_2026(result: RunResult, span: float) -> list[Figure]:
     """All axes, fields, pressures, and the timing of the pulses."""
     motions, fields, pressures = (result.counts[kind] / span for kind in ("Motion", "Magnetic", "Pressure"))
     flight = result.worst_flight_us
@@ -170,8 +167,8 @@ def foot_rows() -> np.ndarray:
     return table
 
 
-def foot_figures(seconds: int) -> list[tuple[str, str, str, bool]]:
-    """(what, measured, limit, passed) of the foot board."""
+def foot_figures(seconds: int) -> list[Figure]:
+    """Every figure of the foot board."""
     board, reader, result, second = BoardProcess(TWIN), BoardReader(), RunResult(), foot_rows()
     board.fault("kit=foot")
     stamps: list[int] = []
@@ -200,7 +197,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0, help="simulated minutes")
     seconds = max(5, round(60 * parser.parse_args().minutes))
     passed = True
-    tables: dict[str, Callable[[], list[tuple[str, str, str, bool]]]] = {
+    tables: dict[str, Callable[[], list[Figure]]] = {
         "parts of the papers": lambda: figures(seconds, Kit.PAPERS),
         "parts of 2026, not built yet": lambda: figures(seconds, Kit.OF_2026),
         "the foot board of 2026, not built yet": lambda: foot_figures(seconds),
@@ -209,8 +206,8 @@ def main() -> int:
         title = f"The real firmware in the twin, {parts} (simulated hardware)"
         table = Table("figure", "measured", "limit", "", title=title)
         for what, measured, limit, good in measure():
-            table.add_row(what, measured, limit, "PASS" if good else "FAIL")
-            passed = passed and good
+            table.add_row(what, measured, limit, {True: "PASS", False: "FAIL", None: ""}[good])
+            passed = passed and good is not False
         Console().print(table)
     return 0 if passed else 1
 

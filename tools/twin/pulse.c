@@ -17,12 +17,6 @@
 #define WINDOW_US 26200u /* 4.5 m */
 #define NO_ECHO_US 38000u
 #define LONG_US 200000u /* some modules hold the line so long */
-#define BURSTS 4
-
-struct burst {
-	avr_cycle_count_t at;
-	uint16_t cross_us; /* when it reaches the other ranger, 0: never */
-};
 
 static struct ranger {
 	const char *name;
@@ -31,8 +25,7 @@ static struct ranger {
 	enum fault { GOOD, ABSENT, STUCK_LOW, STUCK_HIGH, DEAF, LONG, FAULTS } fault;
 	bool trigger, line;
 	avr_cycle_count_t triggered_at;
-	struct burst bursts[BURSTS];
-	unsigned next;
+	struct bursts bursts;
 } rangers[2] = {
 	{ .name = "left", .place = PLACE_RANGER_LEFT, .echo_port = 'D', .echo_pin = 4 },
 	{ .name = "right", .place = PLACE_RANGER_RIGHT, .echo_port = 'C', .echo_pin = 7 },
@@ -51,23 +44,6 @@ static void set_line(struct ranger *r, bool level)
 		drive_pin(r->echo_port, (uint8_t)r->echo_pin, is_here(r) && r->fault != STUCK_LOW && (level || r->fault == STUCK_HIGH));
 }
 
-/* The earliest arrival after the burst `at`, us; 0: none within the window. */
-static uint32_t arrival(const struct ranger *r, avr_cycle_count_t at)
-{
-	const struct ranger *other = &rangers[r == rangers];
-	uint16_t own = row.own_us[r - rangers];
-	int64_t best = own >= BLANKED_US && own <= WINDOW_US ? own : WINDOW_US + 1;
-
-	for (int k = 0; k < BURSTS; k++) {
-		const struct burst *b = &other->bursts[k];
-		int64_t us = ((int64_t)b->at - (int64_t)at) / 16 + b->cross_us;
-
-		if (b->cross_us && us >= BLANKED_US && us < best)
-			best = us;
-	}
-	return r->fault == DEAF || best > WINDOW_US ? 0 : (uint32_t)best;
-}
-
 static avr_cycle_count_t fall(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	(void)a;
@@ -81,9 +57,10 @@ static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	struct ranger *r = param;
 
-	r->bursts[r->next++ % BURSTS] = (struct burst){ when, row.cross_us[r == rangers] };
-	uint32_t us = arrival(r, when);
+	const struct ranger *other = &rangers[r == rangers];
+	uint32_t us = r->fault == DEAF ? 0 : bursts_first_echo(&other->bursts, when, row.own_us[r - rangers], BLANKED_US, WINDOW_US);
 
+	bursts_add(&r->bursts, when, row.cross_us[r == rangers]);
 	if (!us)
 		us = r->fault == LONG ? LONG_US : NO_ECHO_US;
 	set_line(r, true);
@@ -115,7 +92,7 @@ static void power(struct ranger *r)
 {
 	avr_cycle_timer_cancel(avr, rise, r);
 	avr_cycle_timer_cancel(avr, fall, r);
-	memset(r->bursts, 0, sizeof r->bursts);
+	r->bursts = (struct bursts){ 0 };
 	set_line(r, false);
 }
 

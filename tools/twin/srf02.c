@@ -29,12 +29,6 @@ enum { INCHES, CENTIMETRES, MICROSECONDS };
 #define US_PER_CM 58u     /* out and back */
 #define US_PER_INCH 148u
 #define STRETCH US(500)
-#define PINGS 4 /* kept for cross echoes */
-
-struct ping {
-	avr_cycle_count_t emitted_at;
-	uint16_t cross_us; /* when it reaches the other ranger, 0: never */
-};
 
 static struct ranger {
 	struct twi_device twi;
@@ -48,34 +42,17 @@ static struct ranger {
 	bool emitted, listening; /* of the ranging under way: has an own ping; not finished */
 	uint8_t unit;            /* of the result */
 	uint16_t own_us, result;
-	struct ping pings[PINGS];
-	unsigned next_ping;
+	struct bursts bursts;
 } rangers[2] = { { .name = "left", .side = 0 }, { .name = "right", .side = 1 } };
-
-/* Earliest arrival at this ranger within its window, in us after its trigger; 0: none. */
-static uint16_t earliest(const struct ranger *r)
-{
-	const struct ranger *other = &rangers[1 - r->side];
-	int64_t best = r->emitted && r->own_us >= RING_DOWN_US && r->own_us <= WINDOW_US ? r->own_us : WINDOW_US + 1;
-
-	for (int k = 0; k < PINGS; k++) {
-		const struct ping *p = &other->pings[k];
-		int64_t arrival = ((int64_t)p->emitted_at - (int64_t)r->began) / 16 + p->cross_us;
-
-		if (p->cross_us && arrival >= RING_DOWN_US && arrival < best)
-			best = arrival;
-	}
-	return best > WINDOW_US ? 0 : (uint16_t)best;
-}
 
 static void finish(struct ranger *r)
 {
-	uint16_t us = earliest(r);
+	uint32_t us = bursts_first_echo(&rangers[1 - r->side].bursts, r->began, r->emitted ? r->own_us : 0, RING_DOWN_US, WINDOW_US);
 
 	r->listening = false;
 	if (r->deaf)
 		us = 0;
-	r->result = r->unit == MICROSECONDS ? us : (uint16_t)(us / (r->unit == CENTIMETRES ? US_PER_CM : US_PER_INCH));
+	r->result = (uint16_t)(r->unit == MICROSECONDS ? us : us / (r->unit == CENTIMETRES ? US_PER_CM : US_PER_INCH));
 }
 
 static void begin(struct ranger *r, uint8_t command)
@@ -86,7 +63,7 @@ static void begin(struct ranger *r, uint8_t command)
 	if (other->listening && avr->cycle >= other->busy_until)
 		finish(other); /* this ping may overwrite one that the other ranger's result needs */
 	if (burst) {
-		r->pings[r->next_ping++ % PINGS] = (struct ping){ avr->cycle, row.cross_us[1 - r->side] };
+		bursts_add(&r->bursts, avr->cycle, row.cross_us[1 - r->side]);
 		bench_trace("trigger %s", r->name);
 	}
 	if (command == BURST)
@@ -173,7 +150,7 @@ void srf02_power(void)
 		r->listening = false;
 		r->busy_until = 0;
 		r->count = r->sequence = 0;
-		memset(r->pings, 0, sizeof r->pings);
+		r->bursts = (struct bursts){ 0 };
 	}
 }
 

@@ -105,6 +105,19 @@ void usb_host_stall(bool on); /* the program on the host does not read */
 void usb_host_open(bool on);  /* a program has the port open (DTR) */
 void usb_host_send(const uint8_t *bytes, unsigned length);
 
+/* bursts.c: of one ranger, as the other one hears them. */
+#define BURSTS 4
+struct bursts {
+	struct burst {
+		avr_cycle_count_t at;
+		uint16_t cross_us; /* when it reaches the other ranger, 0: never */
+	} last[BURSTS];
+	unsigned count;
+};
+void bursts_add(struct bursts *own, avr_cycle_count_t at, uint16_t cross_us);
+/* The first echo after `began`, from `least_us` on and within the window, in us: of the own burst, or of the other ranger's; 0: none. */
+uint32_t bursts_first_echo(const struct bursts *others, avr_cycle_count_t began, uint16_t own_us, uint32_t least_us, uint32_t window_us);
+
 /* twi.c */
 struct twi_device {
 	uint8_t address;                                       /* 7-bit */
