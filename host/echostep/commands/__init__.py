@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that are not a tracked run: offline files, floors, plans, recordings, beacons, studies.
+"""The commands: their arguments and options (`options`, and each module with an `app`), and what those do that are not a tracked run.
 
-In: options of the command line. Out: files and text. Owns nothing. Each module is imported when its command runs.
+In: options of the command line. Out: files and text. Owns nothing. Slow imports wait until a command runs.
 """

@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from echostep.commands.options import Seed
+
 app = typer.Typer(no_args_is_help=True, help="Beacons: a simulated gateway.")
 
 
@@ -32,7 +34,7 @@ def simulate(
         float, typer.Option("--spacing", metavar="M", help="Distance between beacons along the walk.", min=0.5)
     ] = 5.0,
     pace: Annotated[float, typer.Option("--pace", help="Speed, as a multiple of real time.", min=0.01)] = 1.0,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)] = 1,
+    seed: Seed = 1,
 ) -> None:
     """Simulate beacons along a walk, and send what they measure as their gateway does, in real time."""
     from echostep.commands.beacon_player import simulate_gateway

@@ -12,6 +12,8 @@ from typing import Annotated
 
 import typer
 
+from echostep.commands.options import Plan, RecordedSeed, SettingsFile
+
 app = typer.Typer()
 
 Recording = Annotated[Path, typer.Argument(metavar="FILE", help="A recording (.mcap).")]
@@ -42,7 +44,7 @@ def cut(
 @app.command()
 def export(
     file: Recording,
-    plan: Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")],
+    plan: Plan,
     out: Annotated[
         Path,
         typer.Option(
@@ -52,8 +54,8 @@ def export(
     start: Annotated[
         str | None, typer.Option("--start", metavar="X,Y,DEG", help="Position and heading of the wearer at the start.")
     ] = None,
-    settings: Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)] = None,
+    settings: SettingsFile = None,
+    seed: RecordedSeed = None,
 ) -> None:
     """Track a recording and write its track for other programs."""
     from echostep.output.track_files import export as export_track

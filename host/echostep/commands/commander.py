@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""`echostep command`: the commander's table, live or of a recorded operation.
+
+In: the command's arguments and options. Out: a page, a table, a recording. Slow imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from echostep.commands.options import LOCAL, Host, Plan, Port, Seconds
+
+app = typer.Typer()
+
+
+@app.command()
+def command(
+    broker: Annotated[
+        str,
+        typer.Argument(
+            metavar="URL",
+            help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, mesh:///dev/PORT, or a recorded operation (.mcap)",
+        ),
+    ],
+    plan: Plan,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="The recording to write; each run gets a new number.")
+    ] = Path("out/command/operation.mcap"),
+    team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
+    seconds: Seconds = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw the team on its plan at the end: .png or .svg."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the roster as JSON at the end, instead of the table.")
+    ] = False,
+    page: Annotated[bool, typer.Option("--page/--no-page", help="Serve the commander's page, or do not.")] = True,
+    host: Host = LOCAL,
+    port: Port = None,
+) -> None:
+    """Follow a team on one plan, lost and silent ones first, on a page and as a table, and record it; or show a recording again."""
+    from echostep.operation import command as commander
+    from echostep.operation.views import Views
+    from echostep.page.server import Address
+
+    views = Views(Address(host, port) if page else None, picture, as_json=as_json)
+    commander.command(plan, broker, team, seconds, views, out)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""`echostep doctor`, `flash` and `calibrate`: commands about boards and sensors.
+
+In: the command's arguments and options. Out: findings, a flashed board, settings. Slow imports wait until a command runs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer()
+
+
+@app.command()
+def doctor(
+    board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
+    mtx: Annotated[str | None, typer.Option("--mtx", metavar="PORT", help="Port of the MTx.")] = None,
+    foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
+    seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 6.0,
+    udev: Annotated[bool, typer.Option("--udev", help="Only print the udev rules.")] = False,
+) -> None:
+    """Check ports, boards and MTx, and say what to do about each fault. Exit status 1 when there is a fault."""
+    from echostep.commissioning import doctor as examination
+
+    if udev:
+        typer.echo(examination.rules_text(), nl=False)
+    elif not examination.run(board, mtx, seconds, foot):
+        raise typer.Exit(1)
+
+
+@app.command()
+def flash(
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="Port of the board; without it, it is searched for.")
+    ] = None,
+    hex_file: Annotated[
+        Path | None,
+        typer.Option("--hex", metavar="FILE", help="Firmware (Intel HEX); without it, the one of this package."),
+    ] = None,
+) -> None:
+    """Write the firmware to a board (needs avrdude)."""
+    from rich.console import Console
+
+    from echostep.commissioning import flash as flashing
+
+    flashing.flash(port, hex_file, Console(soft_wrap=True, highlight=False))
+
+
+@app.command()
+def calibrate(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="gyros, mounting, compass, legs; without any, these four. accelerometers: of the parts on six sides."
+        ),
+    ] = None,
+    board: Annotated[
+        str | None, typer.Option("--board", metavar="PORT", help="Port of the board; without it, it is searched for.")
+    ] = None,
+    foot: Annotated[
+        str | None,
+        typer.Option(
+            "--foot", metavar="PORT", help="Port of a foot board, for accelerometers; without it, it is searched for."
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
+    ] = Path("calibration.toml"),
+    thigh: Annotated[float, typer.Option("--thigh", metavar="M", help="Hip to knee, metres.")] = 0.43,
+    shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, metres.")] = 0.43,
+    walked: Annotated[
+        float, typer.Option("--walked", metavar="M", help="Length of the walk that calibrates the legs, metres.")
+    ] = 10.0,
+) -> None:
+    """Calibrate gyros, mounting, compass and legs, or the accelerometers. Writes the results as settings."""
+    from rich.console import Console
+
+    from echostep.commissioning import calibrate as calibration
+
+    wearer = calibration.Wearer(thigh, shank, walked)
+    calibration.calibrate(
+        calibration.Ports(board, foot), parts or [], wearer, out, Console(soft_wrap=True, highlight=False)
+    )

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""Options that several commands share: their names, help and types.
+
+In: nothing. Out: annotated types for the parameters of commands. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+LOCAL = "127.0.0.1"
+Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
+OptionalPlan = Annotated[
+    Path | None,
+    typer.Option(
+        "--plan",
+        help="The building's plan (JSON, metres). Without it the map begins where the walk begins, and nothing is drawn on it.",
+    ),
+]
+Start = Annotated[
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="X,Y,DEG[,LEVEL]|ROOM|?|last",
+        help="Position and heading of the wearer at the start (level 0 is the plan's first, ? any), a room, ? for anywhere, or last: "
+        "where the last live run of this folder ended (live only).",
+    ),
+]
+StartSd = Annotated[
+    str | None,
+    typer.Option("--start-sd", metavar="M,DEG", help="Standard deviations of the start: metres per axis, degrees."),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
+SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)]
+RecordedSeed = Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)]
+Seconds = Annotated[float | None, typer.Option(help="Stop after this many seconds.", min=0.0)]
+Headless = Annotated[bool, typer.Option("--headless", help="Neither terminal view nor page.")]
+Page = Annotated[
+    bool | None,
+    typer.Option(
+        "--page/--no-page",
+        help="Serve the live page (the default; --page keeps it after the end of a replay), or do not.",
+        show_default=False,
+    ),
+]
+Host = Annotated[
+    str,
+    typer.Option(
+        "--host", metavar="ADDRESS", help="Serve the page to other computers too; its URL then holds a token."
+    ),
+]
+Port = Annotated[
+    int | None, typer.Option("--port", help="TCP port of the page [8420, or a free one].", min=0, max=65535)
+]
+BoardPort = Annotated[
+    str | None,
+    typer.Option("--board", metavar="PORT", help="Serial port of the sensor board; without it, both are searched for."),
+]
+MtxPort = Annotated[
+    str | None,
+    typer.Option("--mtx", metavar="PORT", help="Serial port of the MTx; without one the board's leg gyros are used."),
+]
+FootPort = Annotated[
+    str | None,
+    typer.Option("--foot", metavar="PORT", help="Serial port of a foot board, in the place of an MTx."),
+]
+Foxglove = Annotated[
+    str | None,
+    typer.Option(
+        "--foxglove",
+        metavar="[HOST:]PORT",
+        help="Serve estimates, echoes and the scene to Foxglove, as 8765; on this computer alone unless a host is given.",
+    ),
+]
+Keep = Annotated[
+    int | None,
+    typer.Option(
+        "--keep",
+        metavar="N",
+        help="Remove the oldest recordings of the folder until N are left; all are kept without it.",
+        min=2,
+    ),
+]
+Publish = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--publish",
+        metavar="URL",
+        help="Send estimates to a commander: mqtt:// mqtts:// cot+udp:// cot+tcp:// cot+tls:// mesh://; may be given several times.",
+    ),
+]
+Name = Annotated[str, typer.Option("--name", help="The wearer's name, for --publish.")]
+Team = Annotated[str, typer.Option("--team", help="The team's name, for --publish.")]
+BeaconsPort = Annotated[
+    str | None,
+    typer.Option("--beacons", metavar="PORT", help="Port of a beacon gateway: serial, or udp://127.0.0.1:9000."),
+]
+GuideTo = Annotated[
+    str | None,
+    typer.Option(
+        "--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], start, or wearer:NAME of the team."
+    ),
+]
