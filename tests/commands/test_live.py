@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import csv
+import json
+import math
 import os
 import re
 import signal
@@ -11,6 +13,7 @@ import subprocess
 import sys
 import time
 import tty
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -18,8 +21,10 @@ import pytest
 from board_runs import ROOT, needs_twin
 from command_line import PROGRAM, echostep
 from echostep.errors import EchostepError
+from echostep.plan.model import load_plan
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.reading import open_recording
+from echostep.session.last_place import read_kept
 from waiting import PATIENCE_S, until
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
@@ -34,7 +39,11 @@ def sha_of(text: str) -> str:
 @needs_twin
 @pytest.mark.parametrize("wears_mtx", [True, False])
 def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bool) -> None:
-    """With foot and board, and with the board alone."""
+    """With foot and board from the plan's start, and with the board alone from where the last run ended."""
+    (tmp_path / "live").mkdir()
+    place = {"x_m": 2.0, "y_m": 7.5, "sd_m": 0.1, "level": 0, "air": None}
+    kept = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": load_plan(PLAN).digest, "board": "", "place": place}
+    (tmp_path / "live/last.json").write_text(json.dumps(kept))
     twin = subprocess.Popen(
         [sys.executable, ROOT / "tools/twin/run.py", "--out", tmp_path], stdout=subprocess.PIPE, text=True
     )
@@ -47,7 +56,7 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bo
             PLAN,
             "--board",
             board,
-            *(("--mtx", mtx) if wears_mtx else ()),
+            *(("--mtx", mtx) if wears_mtx else ("--start", "last")),
             "--out",
             tmp_path / "live",
             "--headless",
@@ -62,6 +71,10 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bo
     assert live.returncode == 0, live.stderr
     rows = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))
     assert float(rows[-1]["t_s"]) > 8.0
+    assert ("Start: where the last run ended, " in live.stdout) is not wears_mtx
+    assert math.dist((float(rows[0]["x_m"]), float(rows[0]["y_m"])), (2.0, 7.5)) < 0.5
+    assert read_kept(tmp_path / "live").place.air is None
+    assert not wears_mtx or read_kept(tmp_path / "live").place.x_m != 2.0
     again = echostep("replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--out", tmp_path / "again", "--headless")
     assert again.returncode == 0, again.stderr
     assert sha_of(again.stdout) == sha_of(live.stdout)

@@ -65,4 +65,7 @@ def test_a_short_operation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     manners = [rows[m]["points"] for m in {m.name for m in MANNERS} if m in rows]
     assert rows["known start"]["points"] == sum(manners)
     assert rows["known start"]["ce95_m"] < 0.5
-    assert rows["known start"]["floor_on"] == 1.0
+    assert rows["known start"]["floor_tied"] == 1.0
+    assert rows["all, resumed"]["points"] == rows["known start"]["points"] + rows["resumed"]["points"]
+    assert rows["resumed"]["floor_tied"] == 1.0
+    assert rows["resumed"]["ce95_m"] < rows["unknown start"]["ce95_m"]

@@ -26,12 +26,21 @@ TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn ev
 
 
 @dataclass(frozen=True, slots=True)
+class Air:
+    """The height by pressure that one barometer shows at the plan's height 0, and its standard deviation (m): the weather, and its own error."""
+
+    zero_m: float
+    sd_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Start:
     """Where the trunk may be at the beginning.
 
     `pose`: its mean, with a standard deviation `sd_m` per axis and `heading_sd_rad`; a pose with level ANY_LEVEL may be on any. Without a pose:
     evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if there is one; a share of them
-    `near` a pose, if there is one.
+    `near` a pose, if there is one: with level ANY_LEVEL, above and below it too, with any heading. `air`: what is known of the heights by pressure.
+    `after_pause`: at the pose an earlier run ended, and the wearer may have gone on since, so the whole building is searched beside it.
     """
 
     pose: Pose | None = None
@@ -40,6 +49,8 @@ class Start:
     room_m: Floats | None = None
     level: int = ANY_LEVEL
     near: Pose | None = None
+    air: Air | None = None
+    after_pause: bool = False
 
 
 def draw_poses(
@@ -65,12 +76,13 @@ def draw_poses(
 def _drawn_near(
     near: Pose, x: Floats, y: Floats, heading: Floats, sheet: LevelSheet | None, rng: np.random.Generator
 ) -> tuple[Floats, Floats, Floats]:
-    """The same poses, the first NEAR_SHARE of them about a pose instead."""
+    """The same poses, the first NEAR_SHARE of them about a pose instead; on any level, with any heading, if its level is not known."""
     count = round(NEAR_SHARE * len(x))
     noise = rng.standard_normal((3, count))
-    east = near.x_m if sheet is None else near.x_m + near.level * sheet.pitch_m
+    east = near.x_m if sheet is None else near.x_m + _levels(near.level, count, sheet) * sheet.pitch_m
     x[:count], y[:count] = east + NEAR_M * noise[0], near.y_m + NEAR_M * noise[1]
-    heading[:count] = near.heading_rad + NEAR_RAD * noise[2]
+    if near.level != ANY_LEVEL:
+        heading[:count] = near.heading_rad + NEAR_RAD * noise[2]
     return x, y, heading
 
 

@@ -11,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
+from datetime import UTC, datetime
 from pathlib import Path
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
@@ -18,13 +19,16 @@ from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.errors import EchostepError
 from echostep.interruption import raise_lost
+from echostep.localization.start import Start
+from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.recorder import Recorder
 from echostep.session.chunk_streams import portions_of, recorded, with_check_ins, with_team, with_teammates
 from echostep.session.console import console, print_notices
-from echostep.session.metadata import clock_metadata, plan_of, run_metadata, start_given, version_metadata
+from echostep.session.last_place import PlaceKeeper, board_number, read_kept, start_last
+from echostep.session.metadata import LAST, clock_metadata, plan_of, run_metadata, start_given, version_metadata
 from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
 from echostep.session.port_roles import with_role_check
 from echostep.session.progress import with_bar
@@ -32,7 +36,7 @@ from echostep.session.recording import start_recording
 from echostep.session.results import output_folder
 from echostep.session.session import Session
 from echostep.session.starts import check_start
-from echostep.settings import parse_settings, read_settings
+from echostep.settings import Settings, parse_settings, read_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.tracker import Tracker
 from echostep.xsens.reader import warm_up
@@ -47,11 +51,14 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
     path = tracking.settings_path
     settings_toml = read_settings(path) if path else ""
     settings, seed = parse_settings(settings_toml, str(path)), tracking.seed or 0
-    tracker = Tracker(plan, start_given(tracking, plan), settings, seed)
-    check_start(plan, tracker.start, given=tracking.start is not None)
+    number, is_last = board_number(ports.board), tracking.start == LAST
+    start = _last_start(output.folder, plan, number, settings) if is_last else start_given(tracking, plan)
+    tracker = Tracker(plan, start, settings, seed)
+    check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
     session = Session(tracker, "echostep live", "live", output, tracking.guide_to)
     session.prepare()
     folder = output_folder(output.folder)
+    tracker.watchers.append(PlaceKeeper(folder, tracker, number).note)
     with closing(_open_ports(ports)) as opened:
         _identify(opened)
         metadata = run_metadata(plan, tracker.start, seed, "live", settings_toml) | clock_metadata()
@@ -61,6 +68,13 @@ def live(tracking: TrackingOptions, ports: PortOptions, output: OutputOptions) -
                 session.track(portions_of(chunks, 1), None, recorder)
             print_notices(recorder.notices)
             session.finish("live")
+
+
+def _last_start(folder: Path, plan: Plan, board: str, settings: Settings) -> Start:
+    """The start where the last run in a folder ended, told on the terminal."""
+    start, words = start_last(read_kept(folder), plan, board, settings.climb, datetime.now(UTC))
+    console.print(words, markup=False, highlight=False)
+    return start
 
 
 def record(ports: PortOptions, out: Path) -> None:

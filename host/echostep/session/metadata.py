@@ -12,14 +12,16 @@ import json
 import math
 import platform
 from collections.abc import Mapping
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.localization.start import ANY_LEVEL, Start
+from echostep.localization.start import ANY_LEVEL, Air, Start
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.arrival_clock import now_ns
@@ -29,6 +31,7 @@ from echostep.session.options import TrackingOptions
 ANYWHERE = "anywhere"  # value of the field `start`: the walk begins anywhere in the building, or in a room
 ROOM_M = 2.0  # standard deviation of a start in a room without an outline; by reason: half a large room
 CHECK_IN_START = "tapped"  # value of the field `start`: the walk begins at a check-in
+LAST = "last"  # value of `--start`: where the last live run ended
 SIMULATED = "simulated"  # value of the field `source`
 START_LIMIT_M = 1e6  # of a start's x and y; by reason: no plan is larger
 
@@ -55,6 +58,8 @@ def _start_fields(start: Pose | Start) -> dict[str, str]:
     if isinstance(start, Pose):
         return {"start_x_y_rad": _pose_text(start)}
     fields = {"start_sd_m_rad": f"{start.sd_m!r},{start.heading_sd_rad!r}"}
+    if start.after_pause:
+        fields["start_after_pause"] = json.dumps({"air": start.air and asdict(start.air)})
     if start.pose is not None:
         return fields | {"start_x_y_rad": _pose_text(start.pose)}
     room = None if start.room_m is None else start.room_m.tolist()
@@ -99,8 +104,11 @@ def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | No
         if "start_sd_m_rad" not in metadata:
             return pose
         sd_m, sd_rad = (float(part) for part in metadata["start_sd_m_rad"].split(","))
-        return Start(pose, sd_m, sd_rad)
-    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        if "start_after_pause" not in metadata:
+            return Start(pose, sd_m, sd_rad)
+        air = air_of(json.loads(metadata["start_after_pause"])["air"])
+        return Start(pose, sd_m, sd_rad, air=air, after_pause=True)
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
 
 
@@ -129,6 +137,11 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
     return Start(plan.start, sd_m, math.radians(sd_deg))
 
 
+def air_of(tree: Any) -> Air | None:
+    """What JSON says of the heights by pressure; raises ValueError, TypeError or KeyError when it is damaged."""
+    return None if tree is None else Air(float(tree["zero_m"]), float(tree["sd_m"]))
+
+
 def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:
     """The start of `--start` and `--start-sd`: X,Y,DEG[,LEVEL], the name of a room, or `?` for anywhere. Raises EchostepError."""
     sd = None if spread is None else _parse_spread(spread)
@@ -136,6 +149,8 @@ def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:
         return Start()
     if (room := _room(text, plan)) is not None:
         return room
+    if text == LAST:
+        raise EchostepError("--start last: only of a live run; a replay begins where the recorded run did")
     pose = _parse_pose(text, plan)
     return pose if sd is None else Start(pose, sd[0], math.radians(sd[1]))
 

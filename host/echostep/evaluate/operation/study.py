@@ -3,71 +3,80 @@
 
 In: seeds. Out: a row of all points, and one of each part. Simulated. The scores are those of `echostep score`, over the points of all runs together.
 
-`floor`: share of the points on the nearest floor; `floor_on`: of those where the wearer is on a floor, not between two. Estimates that say lost
-count in both, but not in the row `not lost`, of the points that availability counts too. `search_s`: from the change of the battery on, until the new
-tracker says `tracking`.
+`floor`: share of the points on the nearest floor; `floor_tied`: the same, where both floors are right within TIE_M of the middle between them, as in
+the study `anywhere` (`judgement.true_levels`). Estimates that say lost count in both, but not in the row `not lost`, of the points that availability
+counts too. `search_s`: from the change of the battery on, until the new tracker says `tracking`. The rows `resumed` have the estimates of the tracker
+that begins where the first one ended, the others those of the one that knows nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats
+from echostep.evaluate.anywhere.judgement import true_levels
 from echostep.evaluate.operation.walks import HALF_M, OperationWalk, operation
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.error_statistics import error_statistics, quantile
-from echostep.localization.estimate import TrackStatus
+from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.scorecard.card import FLOOR_PENALTY_M, score
 from echostep.scorecard.own import track_of, truth_of
 
 ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for: by reason, a door; hardly ever another floor
-BETWEEN_M = 0.5  # from the nearest floor, beyond which a wearer is between two
-ALL = "all"  # the row of all points
+ALL, RESUMED = "all", "all, resumed"  # the rows of all points
+Parts = Callable[[OperationWalk, Floats, Any], dict[str, Bools]]
 COLUMNS = {
     "name": "", "points": "points", "ce50_m": "CE50 m", "ce95_m": "CE95 m", "se95_m": "SE95 m", "max_m": "max m",
-    "evaal_m": "EvAAL m", "floor": "floor %", "floor_on": "on floors %",
+    "evaal_m": "EvAAL m", "floor": "floor %", "floor_tied": "both at a tie %",
 }  # fmt: skip
-PERCENT = ("floor", "floor_on")
+PERCENT = ("floor", "floor_tied")
 
 
 def one_run(half_m: float, seed: int) -> list[Row]:
     """Rows of one operation: its points, all of them and by part."""
     walk = operation(seed, half_m)
-    truth = truth_of(walk.truth, walk.plan)
-    scored = score(track_of(walk.estimates), truth, walk.plan)
+    return _rows(walk, walk.after, seed, _parts) + _rows(walk, walk.resumed, seed, _resumed_parts)
+
+
+def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Parts) -> list[Row]:
+    """Rows of the parts of one operation, with the estimates of one of the trackers after the change of the battery."""
+    estimates = [*walk.before, *after]
+    scored = score(track_of(estimates), truth_of(walk.truth, walk.plan), walk.plan)
     at = scored.matched
     assert at.level is not None
     assert at.true_level is not None
     assert at.height_m is not None
     assert at.true_height_m is not None
-    heights = np.array([level.height_m for level in walk.plan.levels])
+    right = true_levels(at.true_height_m, [level.height_m for level in walk.plan.levels])
     points = {
         "error_m": at.error_m,
         "above_m": at.height_m - at.true_height_m,
         "floors_off": np.abs(at.level - at.true_level),
-        "on_floor": np.abs(at.true_height_m[:, None] - heights).min(1) < BETWEEN_M,
+        "tied_right": right[np.arange(len(at.level)), at.level.astype(np.int64)],
     }
+    found = [e.t_s for e in after if e.status is TrackStatus.TRACKING]
     whole: Row = {
-        "zone": scored.card.zone_probability, "available": scored.card.availability, "search_s": _search_s(walk),
+        "zone": scored.card.zone_probability, "available": scored.card.availability,
+        "search_s": found[0] - walk.restart_s if found else None,
     }  # fmt: skip
     rows = []
-    for name, chosen in _parts(walk, at.row, at.t_s).items():
+    says = np.array([e.status.value for e in estimates])[at.row]
+    for name, chosen in parts(walk, at.t_s, says).items():
         row: Row = {"name": name, "seed": seed} | {key: values[chosen].tolist() for key, values in points.items()}
-        rows.append(row | (whole if name == ALL else {}))
+        rows.append(row | (whole if name in (ALL, RESUMED) else {}))
     return rows
 
 
-def _parts(walk: OperationWalk, row: Any, t_s: Floats) -> dict[str, Bools]:
+def _parts(walk: OperationWalk, t_s: Floats, says: Any) -> dict[str, Bools]:
     """Which points belong to each part, by name; those of a manner are of before the change of the battery."""
     begins, names = zip(*walk.manners, strict=True)
     manner = np.array(names)[np.maximum(np.searchsorted(np.array(begins), t_s, side="right") - 1, 0)]
-    says = np.array([e.status.value for e in walk.estimates])[row]
     known = t_s < walk.restart_s
     parts = {
         ALL: np.ones(len(t_s), bool), "not lost": says != TrackStatus.LOST.value,
@@ -76,19 +85,20 @@ def _parts(walk: OperationWalk, row: Any, t_s: Floats) -> dict[str, Bools]:
     return parts | {name: (manner == name) & known for name in sorted(set(names))}
 
 
-def _search_s(walk: OperationWalk) -> float | None:
-    """How long the new tracker searches before it says `tracking` for the first time; None where it never does."""
-    found = [e.t_s for e in walk.after if e.status is TrackStatus.TRACKING]
-    return found[0] - walk.restart_s if found else None
+def _resumed_parts(walk: OperationWalk, t_s: Floats, says: Any) -> dict[str, Bools]:
+    """The same where the new tracker begins at the last place."""
+    return {
+        RESUMED: np.ones(len(t_s), bool), "not lost, resumed": says != TrackStatus.LOST.value,
+        "says tracking, resumed": says == TrackStatus.TRACKING.value, "resumed": t_s >= walk.restart_s,
+    }  # fmt: skip
 
 
 def _summary(rows: Sequence[Row]) -> Row:
     """Scores of the points of all runs together."""
-    error, above, off, on = (
+    error, above, off, right = (
         np.concatenate([np.asarray(row[key]) for row in rows])
-        for key in ("error_m", "above_m", "floors_off", "on_floor")
+        for key in ("error_m", "above_m", "floors_off", "tied_right")
     )
-    on = on.astype(bool)
     found: Row = {"name": rows[0]["name"], "runs": len(rows), "points": len(error)}
     if not len(error):
         return found
@@ -97,7 +107,7 @@ def _summary(rows: Sequence[Row]) -> Row:
         "mean_m": statistics.mean_m, "ce50_m": statistics.median_m, "ce95_m": statistics.p95_m,
         "max_m": statistics.max_m, "ve95_m": quantile(np.abs(above), 0.95), "se95_m": quantile(np.hypot(error, above), 0.95),
         "evaal_m": quantile(error + FLOOR_PENALTY_M * off, 0.75), "floor": float((off == 0.0).mean()),
-        "floor_on": float((off[on] == 0.0).mean()) if on.any() else None,
+        "floor_tied": float(right.mean()),
     }  # fmt: skip
     for key, how in (("zone", np.mean), ("available", np.mean), ("search_s", np.max)):
         values = [row[key] for row in rows if row.get(key) is not None]
@@ -110,15 +120,18 @@ def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
         {key: 100.0 * value if key in PERCENT and value is not None else value for key, value in row.items()}
         for row in rows
     ]
-    whole = rows[0]
-    told = [
-        f"Asked: CE95 at most {ASKED_CE95_M} m: {_met(whole['ce95_m'] <= ASKED_CE95_M)}; "
-        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(whole['floor'] >= ASKED_FLOOR)} of all points, "
-        f"{_met(whole['floor_on'] >= ASKED_FLOOR)} of those on floors.",
-        f"Zone detection {100 * whole['zone']:.1f} %, availability {100 * whole['available']:.1f} %, "
-        f"search after the change at most {whole['search_s'] or math.inf:.0f} s. Simulated.",
-    ]
+    told = [_told(row) for row in rows if row["name"] in (ALL, RESUMED)]
     return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, told)]
+
+
+def _told(row: Row) -> str:
+    """What was asked for and is met, of a row of all points."""
+    return (
+        f"{row['name']}: asked were CE95 at most {ASKED_CE95_M} m: {_met(row['ce95_m'] <= ASKED_CE95_M)}; "
+        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(row['floor'] >= ASKED_FLOOR)} by the nearest floor, "
+        f"{_met(row['floor_tied'] >= ASKED_FLOOR)} with both at a tie. Zone detection {100 * row['zone']:.1f} %, "
+        f"availability {100 * row['available']:.1f} %, search after the change at most {row['search_s'] or math.inf:.0f} s. Simulated."
+    )
 
 
 def _met(is_met: bool) -> str:

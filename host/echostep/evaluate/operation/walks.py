@@ -20,6 +20,7 @@ from echostep.arrays import Floats, spans
 from echostep.evaluate.anywhere.sites import LOBBY
 from echostep.evaluate.anywhere.tours import random_tour
 from echostep.localization.estimate import Estimate
+from echostep.localization.last_place import start_after
 from echostep.localization.start import Start
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
@@ -44,8 +45,9 @@ MANNERS = (
 
 @dataclass(frozen=True, slots=True)
 class OperationWalk:
-    """`estimates` before and after the change of the battery, which ends at `restart_s`; `truth` (n, 5): t_s, x, y, heading, height of the floor.
+    """Estimates before and after the change of the battery, which ends at `restart_s`; `truth` (n, 5): t_s, x, y, heading, height of the floor.
 
+    `after`: of a new tracker that knows nothing; `resumed`: of one that begins where the first ended, as with `--start last`.
     `manners`: when each piece of the way begins, and how it is moved along.
     """
 
@@ -53,17 +55,13 @@ class OperationWalk:
     truth: Floats
     before: tuple[Estimate, ...]
     after: tuple[Estimate, ...]
+    resumed: tuple[Estimate, ...]
     restart_s: float
     manners: tuple[tuple[float, str], ...]
 
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """All of them."""
-        return self.before + self.after
-
 
 def operation(seed: int, half_m: float = HALF_M) -> OperationWalk:
-    """An operation from a known start; after the change of the battery a new tracker knows nothing."""
+    """An operation from a known start; after the change of the battery one new tracker knows nothing, another one the last place."""
     plan = tower(STOREYS)
     way, stop = waypoints(plan, seed, half_m)
     person = Person(corner_m=CORNER_M, manners=MANNERS)
@@ -73,9 +71,12 @@ def operation(seed: int, half_m: float = HALF_M) -> OperationWalk:
     change_ns = [START_NS + int(1e9 * (change_s + s)) for s in (0.0, CHANGE_S)]
     early = [c for c in chunks if c.t_arrival_ns < change_ns[0]]
     late = [c for c in chunks if c.t_arrival_ns >= change_ns[1]]
+    first = Tracker(plan, scenario.start, seed=seed)
+    before, last = _tracked(first, early), first.last_place()
+    start = Start() if last is None else start_after(last, CHANGE_S, first.settings.climb)
     return OperationWalk(
-        plan, scenario.truth, _tracked(Tracker(plan, scenario.start, seed=seed), early),
-        _tracked(Tracker(plan, Start(), seed=seed), late), change_s + CHANGE_S, scenario.walk.manners,
+        plan, scenario.truth, before, _tracked(Tracker(plan, Start(), seed=seed), late),
+        _tracked(Tracker(plan, start, seed=seed), late), change_s + CHANGE_S, scenario.walk.manners,
     )  # fmt: skip
 
 

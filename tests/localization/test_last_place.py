@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""A run that begins where another one ended: the storey by the barometer's last height, the place with any heading, and a search beside it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.localization.building import Building
+from echostep.localization.last_place import MOVED_M, LastPlace, start_after
+from echostep.localization.level_changes import ClimbSettings
+from echostep.localization.map_filter import UNOBSERVED_DOUBT, FilterSettings, MapFilter
+from echostep.localization.particles import CloudSettings
+from echostep.localization.plausibility import STATED
+from echostep.localization.start import Air, Start
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.simulation.world.tower import LIFT_AT, STOREY_M, tower
+from echostep.walls.level_sheet import lay_out_levels
+
+ZERO_M = 100.0  # height by pressure on the lowest floor
+AWAY_S = 60.0
+CLIMBING = ClimbSettings()
+SETTINGS = FilterSettings(CloudSettings(searching=5_000))
+
+
+def filter_of(start: Start) -> MapFilter:
+    laid_out = lay_out_levels(tower(3))
+    return MapFilter(Building(laid_out.walls, laid_out.sheet), start, 0.0, np.random.default_rng(1), SETTINGS)
+
+
+def standing(k: int, height_m: float) -> MeasuredSegment:
+    """Half a second of standing, number k, with five heights by pressure."""
+    path = PathSegment(0.5 * k, 0.5 * k + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
+    return MeasuredSegment(path, np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.full(5, height_m))
+
+
+def test_the_start_is_wider_than_the_place_and_has_any_heading() -> None:
+    start = start_after(LastPlace(3.0, 4.0, 0.2, 1, Air(ZERO_M, 0.1)), AWAY_S, CLIMBING)
+    assert start.pose is not None
+    assert (start.pose.x_m, start.pose.y_m, start.pose.level) == (3.0, 4.0, 1)
+    assert (start.sd_m, start.heading_sd_rad) == (math.hypot(0.2, MOVED_M), math.pi)
+    assert start.after_pause
+    assert start.air is not None
+    assert start.air.zero_m == ZERO_M
+    assert 0.15 < start.air.sd_m < 0.25
+
+
+def test_hours_make_the_pressure_worthless() -> None:
+    start = start_after(LastPlace(3.0, 4.0, 0.2, 1, Air(ZERO_M, 0.1)), 3600.0, CLIMBING)
+    assert start.air is not None
+    assert start.air.sd_m > STOREY_M
+
+
+@pytest.mark.parametrize("storey", [0, 1, 2])
+def test_the_pressure_tells_the_storey_of_an_unknown_place(storey: int) -> None:
+    anywhere = filter_of(Start(air=Air(ZERO_M, 0.2)))
+    for k in range(6):
+        levels = anywhere.update(standing(k, ZERO_M + storey * STOREY_M)).levels
+    assert levels[storey] > 0.99
+
+
+def test_without_it_all_storeys_stay() -> None:
+    anywhere = filter_of(Start())
+    for k in range(6):
+        levels = anywhere.update(standing(k, ZERO_M + STOREY_M)).levels
+    assert max(levels) < 0.5
+
+
+@pytest.mark.parametrize("storey", [0, 1, 2])
+def test_after_a_change_of_the_storey_meanwhile_the_last_one_is_not_claimed(storey: int) -> None:
+    """The search beside the last place is on the storey of the pressure; the last place is believed only there."""
+    resumed = filter_of(start_after(LastPlace(LIFT_AT[0] + 4.0, LIFT_AT[1], 0.1, 0, Air(ZERO_M, 0.1)), 20.0, CLIMBING))
+    for k in range(6):
+        right = resumed.update(standing(k, ZERO_M + storey * STOREY_M)).right
+    assert resumed.search is not None
+    search = resumed.search.cloud
+    assert np.bincount(search.level, search.weight, 3)[storey] > 0.99
+    assert right < 0.5
+    assert resumed.tracked.plausibility.probability == pytest.approx(STATED * (1.0 - UNOBSERVED_DOUBT), abs=1e-3)
