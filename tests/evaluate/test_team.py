@@ -15,9 +15,10 @@ from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.board.gateway import Gateway
 from echostep.evaluate.study import StudyRequest, run_study
-from echostep.evaluate.team import study, walks
+from echostep.evaluate.team import study, tracking, walks
 from echostep.evaluate.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons
 from echostep.evaluate.team.walks import AGAIN_S, TeamWalks, encounters
+from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.model import load_plan
 from echostep.simulation.scenario import START_NS
 
@@ -81,20 +82,27 @@ def test_the_columns_are_those_of_all_wearers() -> None:
 
 
 def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two wearers; the first one's start is wrong. An encounter is put at 16 s, when echoes have cast doubt on it and the other's say tracking.
+    """Two wearers on one way; the first one's start is wrong. They meet when, alone, it says lost and the other says tracking.
 
     It changes the first one's track alone.
     """
     for module in (walks, study):
         monkeypatch.setattr(module, "WEARERS", 2)
-    made = walks.team_walks
+    made, alone = walks.team_walks, []
 
-    def with_encounter(*args: Any, **more: Any) -> walks.TeamWalks:
+    def on_one_way(*args: Any, **more: Any) -> walks.TeamWalks:
         team = made(*args, **more)
-        same = replace(team, chunks=(team.chunks[0],) * 2, truth=(team.truth[0],) * 2, starts=(team.starts[0],) * 2)
-        return replace(same, encounters=(walks.Encounter(16.0, (0, 1), 0.0),))
+        return replace(team, chunks=(team.chunks[0],) * 2, truth=(team.truth[0],) * 2, starts=(team.starts[0],) * 2)
 
-    monkeypatch.setattr(study, "team_walks", with_encounter)
+    def with_encounter(team: walks.TeamWalks, told: Any, how: tracking.How | None, seed: int) -> list[list[Estimate]]:
+        if how is None:
+            alone.append(tracking.track_team(team, told, None, seed))
+            return alone[-1]
+        encounter = walks.Encounter(meeting_time_s(*alone[0]), (0, 1), 0.0)
+        return tracking.track_team(replace(team, encounters=(encounter,)), told, how, seed)
+
+    monkeypatch.setattr(study, "team_walks", on_one_way)
+    monkeypatch.setattr(study, "track_team", with_encounter)
     short = replace(study.team_study("office/tap", 12.0), journal=False)
     run_study(short, StudyRequest(1, 3, tmp_path / "rows.json", tmp_path))
     (row,) = json.loads((tmp_path / "rows.json").read_text())["rows"]
@@ -102,3 +110,12 @@ def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert row["first_alone_m"] > 3.0
     assert row["first_together_m"] < row["first_alone_m"]
     assert row["worst"] == pytest.approx(1.0, abs=0.05)
+
+
+def meeting_time_s(first: list[Estimate], second: list[Estimate]) -> float:
+    """From when on the first wearer says lost and the second one tracking, for as long as a tap may take."""
+    fits = [
+        (a.t_s, (a.status, b.status) == (TrackStatus.LOST, TrackStatus.TRACKING))
+        for a, b in zip(first, second, strict=True)
+    ]
+    return next(t_s for t_s, _ in fits if all(fit for at_s, fit in fits if t_s <= at_s <= t_s + 2.0 * tracking.TAP_S))

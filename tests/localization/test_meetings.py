@@ -16,7 +16,7 @@ from echostep.arrays import Floats
 from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.meeting_model import WRONG, best_omega, covariance, information, weigh
-from echostep.localization.meetings import MOST_NAMES, RENEWED_M, MeetingEffect, MeetingMemory
+from echostep.localization.meetings import MOST_NAMES, PLACE_M, RENEWED_M, MeetingEffect, MeetingMemory
 from echostep.localization.particles import Cloud, CloudSettings
 from echostep.localization.plausibility import STATED, Plausibility
 from echostep.localization.start import Start
@@ -147,10 +147,22 @@ def test_an_agreement_answers_a_contradiction() -> None:
     assert effects == [MeetingEffect.CONTRADICTS, MeetingEffect.USED, MeetingEffect.CONTRADICTS]
 
 
-def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap_alone() -> None:
+def test_a_far_radio_range_moves_no_cloud() -> None:
+    doubted = filter_at(4.0, 7.5, 0.4)
+    by_radio = Meeting("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025, range_m=PLACE_M + 0.1, range_sd_m=0.1)
+    assert doubted.meet(by_radio) is MeetingEffect.CONTRADICTS
+
+
+def test_a_near_radio_range_moves_a_doubted_cloud_about_the_teammate() -> None:
     doubted = filter_at(4.0, 7.5, 0.4)
     by_radio = Meeting("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025, range_m=1.0, range_sd_m=0.1)
-    assert doubted.meet(by_radio) is MeetingEffect.CONTRADICTS
+    assert doubted.meet(by_radio) is MeetingEffect.MOVED
+    cloud = doubted.cloud
+    near = np.hypot(cloud.map_x_m - 20.0, cloud.y_m - 2.0) < 2.5
+    assert float(cloud.weight @ near) > 0.95
+
+
+def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:
     doubted = filter_at(4.0, 7.5, 0.4)
     assert doubted.meet(FAR) is MeetingEffect.MOVED
     mean = doubted.cloud.weight @ np.column_stack([doubted.cloud.map_x_m, doubted.cloud.y_m])

@@ -94,6 +94,17 @@ def test_walls_take_the_weight_and_the_rest_carries_on() -> None:
     assert found.rescues == 0
 
 
+@pytest.mark.parametrize(("bend_m", "passes"), [(0.83, True), (0.0, False)])
+def test_a_turn_leads_round_the_end_of_a_wall(bend_m: float, passes: bool) -> None:
+    """North, then west by an arc of 90 degrees: the chord from begin to end cuts the wall's end by 0.1 m."""
+    jamb = Walls(np.array([[-3.0, 1.5, 0.6, 1.5]]))
+    found = cloud(200)
+    found.x_m[:], found.y_m[:], found.turn_rad[:] = 1.0, 1.0, 0.0
+    pings = heard(math.pi / 2, 0.0, 3)._replace(share=np.array([0.25, 0.5, 0.75]))
+    move = Move(-0.8, 0.8, 0.01, 0.0, 0.0, bend_m * 0.8, bend_m * 0.8)
+    assert (found.propagate_and_reweight(move, pings, MODEL, jamb).log_path > -0.1) == passes
+
+
 def test_a_move_through_a_wall_is_survived_wider() -> None:
     found = cloud()
     found.x_m[:], found.y_m[:], found.turn_rad[:] = 1.0, 1.0, 0.0

@@ -60,7 +60,6 @@ def test_weather_makes_a_long_pause_worthless() -> None:
         Building(laid_out.walls, laid_out.sheet), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0,
         np.random.default_rng(1), SETTINGS,
     ).cloud  # fmt: skip
-    cloud.adopt_lag(cloud)
     cloud._lag_variance = 0.01
     for hours, least_m, most_m in ((0.01, 0.1, 0.2), (1.0, 3.0, 5.0), (8.0, 20.0, 40.0)):
         before = cloud._lag_variance

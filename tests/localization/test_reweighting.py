@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echo_likelihood import GATE_SD, EchoSettings, echo_model
 from echostep.localization.particle_kernels import ParticleArrays, Ping, reweight_by_ping
 from echostep.walls.echo_sources import Walls
 
@@ -24,8 +24,8 @@ def written_out(distance_m: float, hidden: float, ping: Ping) -> tuple[float, fl
     level_db = 20.0 * math.log10(6.0 / distance_m) + 2.6 * (6.0 - distance_m)
     heard = 1.0 / (1.0 + math.exp(-level_db / 2.0))
     if ping.range_m > 0.0:
-        even = 0.8 / SPAN_M
-        normal = math.exp(-0.5 * ((ping.range_m - distance_m) / 0.036) ** 2) / (0.036 * math.sqrt(2.0 * math.pi))
+        even, off = 0.8 / SPAN_M, abs(ping.range_m - distance_m) / 0.036
+        normal = math.exp(-0.5 * off**2) / (0.036 * math.sqrt(2.0 * math.pi)) if off < GATE_SD else 0.0
         planned = heard * normal + (1.0 - heard) * 0.3 * 0.5 * (ping.alike + 1.0 / SPAN_M)
     else:
         even, planned = 0.2, 0.7 * (1.0 - heard)

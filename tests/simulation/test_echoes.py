@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -38,6 +39,17 @@ def listen(
 def ranges(found: Echoes) -> tuple[float, float]:
     left, right = (found.own_us[0] * 0.5e-6 * SPEED_M_S).tolist()
     return left, right
+
+
+def polar(x: float, y: float, turn_deg: float, distance_m: float, bearing_deg: float) -> list[float]:
+    """The place at this distance and bearing from (x, y) on a map that is turned."""
+    angle = math.radians(turn_deg + bearing_deg)
+    return [x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)]
+
+
+def towards(x: float, y: float, place: list[float]) -> float:
+    """Heading (degrees) at a place with which the left ranger looks at (x, y)."""
+    return math.degrees(math.atan2(y - place[1], x - place[0])) - 90.0
 
 
 @pytest.mark.parametrize("distance_m", [0.3, 1.0, 2.5, 4.0])
@@ -147,13 +159,9 @@ def test_a_right_angled_corner_answers_wherever_the_map_begins(
     x: float, y: float, turn_deg: float, bearing_deg: float, away_m: float
 ) -> None:
     """Both walls reflect at the end where they meet; a wall that goes on beyond the corner changes nothing."""
-
-    def at(distance_m: float, bearing_deg: float) -> list[float]:
-        angle = math.radians(turn_deg + bearing_deg)
-        return [x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)]
-
+    at = partial(polar, x, y, turn_deg)
     place = at(away_m, bearing_deg)
-    looking = math.degrees(math.atan2(y - place[1], x - place[0])) - 90.0
+    looking = towards(x, y, place)
     for beyond_m in (0.0, 3.0):
         walls = [[*at(beyond_m, 180.0), *at(6.0, 0.0)], [*at(0.0, 90.0), *at(6.0, 90.0)]]
         left, _ = ranges(listen(walls, at=(place[0], place[1]), heading_deg=looking))
@@ -165,13 +173,9 @@ def test_from_outside_a_corner_does_not_send_the_ping_back(
     x: float, y: float, turn_deg: float, bearing_deg: float, away_m: float
 ) -> None:
     """Along a wall, behind which another one ends (T), or which ends at a door (L): nothing there faces the ranger; the edge is too far."""
-
-    def at(distance_m: float, bearing_deg: float) -> list[float]:
-        angle = math.radians(turn_deg + bearing_deg)
-        return [x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)]
-
+    at = partial(polar, x, y, turn_deg)
     place = at(away_m, 180.0 - bearing_deg)
-    looking = math.degrees(math.atan2(y - place[1], x - place[0])) - 90.0
+    looking = towards(x, y, place)
     # The wall's own perpendicular is out of the cone.
     for beyond_m in (0.0, 3.0):
         walls = [[*at(5.0, 180.0), *at(beyond_m, 0.0)], [*at(0.0, 270.0), *at(4.0, 270.0)]]

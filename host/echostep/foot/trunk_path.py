@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The trunk's path from the steps and stances of one foot.
 
-In: `Step` and `Stance` of one foot (walk frame). Out: `PathSegment`s: straight pieces of the trunk's path between anchors. Owns the last anchor.
+In: `Step` and `Stance` of one foot (walk frame). Out: `PathSegment`s: pieces of the trunk's path between anchors. Owns the last anchor.
 
 The trunk passes over the foot in the middle of the stance [Perry 1992, mid stance]; between two such moments it moves evenly.
 While the wearer stands, the trunk stays over the foot, except for half a usual stance at either end.

@@ -26,6 +26,7 @@ from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, end_of_co
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
 SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
+WEATHER_M_S = 1e-3  # standard deviation of the height by pressure's speed, by reason: a front changes the pressure by 0.4 hPa in an hour
 LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
 
 
@@ -42,6 +43,11 @@ class ClimbSettings:
     landing_sd_m: float = 0.35
     drift_m: float = 0.02
     unlikely: float = 8.0
+
+
+def drift_m(climbing: ClimbSettings, pause_s: float) -> float:
+    """Standard deviation of the drift of the height by pressure while nothing was measured for so long."""
+    return math.hypot(climbing.drift_m * math.sqrt(pause_s), WEATHER_M_S * pause_s)
 
 
 class HeightChange(NamedTuple):

@@ -14,7 +14,7 @@ from statistics import median
 
 import numpy as np
 
-from echostep.angles import mean_angle, wrap
+from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
@@ -26,13 +26,13 @@ from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.hypothetical import Hypothetical
 from echostep.localization.level_changes import SAME_LEVEL_M, ClimbSettings, HeightChange
 from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
-from echostep.localization.meetings import CONTRADICTIONS, MeetingEffect, MeetingMemory, moved_probability
+from echostep.localization.meetings import CONTRADICTIONS, PLACE_M, MeetingEffect, MeetingMemory, moved_probability
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, CloudSettings, Evidence
 from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
-from echostep.localization.start import Start
+from echostep.localization.start import ANY_LEVEL, Air, Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
@@ -107,6 +107,9 @@ class MapFilter:
         self._met = MeetingMemory()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
+        if start.after_pause:
+            self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
+            self._search_beside(start.air, walk_heading_rad)
 
     @property
     def echo(self) -> EchoSettings:
@@ -149,8 +152,8 @@ class MapFilter:
         """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
 
         Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
-        one only when a second teammate says so, and that is the likelier. A radio range alone moves nothing; ranges to beacons of two teammates
-        can begin a search.
+        one only when a second teammate says so, and that is the likelier. A radio range beyond PLACE_M moves nothing; ranges to beacons of two
+        teammates can begin a search.
         """
         area_m2 = self._building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
@@ -171,7 +174,7 @@ class MapFilter:
         count = self._met.contradict(self._pings.path_m)
         moved = moved_probability(plausibility.probability, meeting, count)
         is_alone = count < CONTRADICTIONS and plausibility.probability >= DOUBTED
-        if meeting.range_m is not None or is_alone or moved < FITS:
+        if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < FITS:
             return MeetingEffect.CONTRADICTS
         self._met.agree()
         self._track_from(meeting, moved, search_fits=fits[-1] >= FITS)
@@ -214,18 +217,22 @@ class MapFilter:
         return self._building.has_walls and self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
 
     def _search_after(self, gap: Gap, segment: PathSegment) -> None:
-        """Doubt the tracked cloud after a gap, and search the whole building from where the path goes on.
-
-        The tracked cloud stands for what is near.
-        """
-        cloud = self.tracked.cloud
+        """Doubt the tracked cloud after a gap, and search from where the path goes on; a gap is a rest, a ride in a lift, or a walk."""
         if gap is not Gap.UNOBSERVED:
             self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
-        if cloud.is_coarse or not len(self._building.floor.x_m):
+        self._search_beside(self.cloud.air, segment.heading1_rad)
+
+    def _search_beside(self, air: Air | None, walk_heading_rad: float) -> None:
+        """Search the whole building beside the tracked cloud, which stands for what is near.
+
+        `air`: what is known of the heights by pressure; None: nothing tells the level, so what is above and below is searched more than the rest.
+        """
+        if self.cloud.is_coarse or not len(self._building.floor.x_m):
             return
         self._is_elsewhere = True
-        self.search = self._new_search(Start(), segment.heading1_rad)
-        self.search.cloud.adopt_lag(cloud)
+        on_levels = self.cloud.sheet is not None and air is None
+        near = replace(self._believed(walk_heading_rad), level=ANY_LEVEL) if on_levels else None
+        self.search = self._new_search(Start(near=near, air=air), walk_heading_rad)
 
     def _follow_barometer(self, measured: MeasuredSegment) -> None:
         """The lag of the height by pressure drifts in a pause, and is not known after a restart of the board: it may be another one."""
@@ -253,9 +260,10 @@ class MapFilter:
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         if segment.scale_sd > 0.0:
             self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
+        move = _move(segment)
         for each in self._clouds():
-            self._follow_with(each, _move(segment), pings, unplanned)
-            each.cloud.change_levels(_move(segment), change)
+            self._follow_with(each, move, pings, unplanned)
+            each.cloud.change_levels(move, change)
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
             self._plan.add(RESTORED_PER_M * math.hypot(segment.dx_m, segment.dy_m))
             self._plan.limit(PLAN_FITS)
@@ -390,9 +398,8 @@ def with_plan_error(s: FilterSettings) -> EchoSettings:
 
 def _move(segment: PathSegment) -> Move:
     """The segment's way; when the wearer turns, the trunk goes round the foot that was measured."""
-    turn_rad = wrap(segment.heading1_rad - segment.heading0_rad)
-    sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(turn_rad)) * BESIDE_M)
-    return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd)
+    sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(segment.turn_rad)) * BESIDE_M)
+    return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd, *segment.bend_m)
 
 
 def _height_change(measured: MeasuredSegment, riding_m: float) -> HeightChange:

@@ -18,6 +18,7 @@ from echostep.ports.meeting import Meeting, parse_meeting
 # By reason: in so much of the path a wearer's own echoes, or drift, have renewed what the filter knows.
 RENEWED_M = 10.0
 CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
+PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, as after a tap; reflections are longer, hardly ever shorter
 MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a team's beacons that a tracker keeps
 MOST_WAITING = 64  # meetings that wait for their segment
 

@@ -33,13 +33,15 @@ class ParticleArrays(NamedTuple):
 
 
 class Move(NamedTuple):
-    """A straight piece of the path in the walk frame, and the standard deviations that it adds: per axis, of the rotation, of the scale."""
+    """A piece of the path in the walk frame, its bend [PathSegment], and standard deviations: per axis, of the rotation, of the scale."""
 
     dx_m: float
     dy_m: float
     sd_m: float
     turn_sd_rad: float
     scale_sd: float = 0.0
+    bend_x_m: float = 0.0
+    bend_y_m: float = 0.0
 
 
 class PingBatch(NamedTuple):
@@ -110,10 +112,8 @@ def propagate_and_reweight(
     while done < 1.0 or k < len(pings.share):
         until = max(pings.share[k], done) if k < len(pings.share) else 1.0
         if until > done:
-            part = until - done
-            best, left = propagate(
-                particles, part * move.dx_m, part * move.dy_m, part / rest, noise, model.wall_cost, walls
-            )
+            dx, dy = piece_of(move, done, until)
+            best, left = propagate(particles, dx, dy, (until - done) / rest, noise, model.wall_cost, walls)
             lowest = min(lowest, best)
             passed += left
             done = until
@@ -136,6 +136,13 @@ def propagate_and_reweight(
         if size < model.resample_below * len(particles.x_m):
             break
     return MoveProgress(done, k), lowest, passed
+
+
+@kernel
+def piece_of(move: Move, begin: float, end: float) -> tuple[float, float]:
+    """The chord (m, walk frame) of a move between two shares of it: of a parabola [`PathSegment.way_m`]."""
+    part, bend = end - begin, (end - begin) * (1.0 - begin - end)
+    return part * move.dx_m + bend * move.bend_x_m, part * move.dy_m + bend * move.bend_y_m
 
 
 @lean_kernel

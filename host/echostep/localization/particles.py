@@ -26,6 +26,7 @@ from echostep.localization.level_changes import (
     HeightArrays,
     HeightChange,
     change_levels,
+    drift_m,
     level_change_model,
     set_levels_by_pressure,
 )
@@ -37,11 +38,12 @@ from echostep.localization.particle_kernels import (
     ParticleArrays,
     PingBatch,
     effective_size,
+    piece_of,
     propagate,
     propagate_and_reweight,
     systematic,
 )
-from echostep.localization.start import Start, draw_poses
+from echostep.localization.start import Air, Start, draw_poses
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -65,7 +67,6 @@ GATHERED_M, GATHERED_REST = (
     2.5,
     1e-4,
 )  # a cloud has gathered when no more than this weight is further from its mean, by reason
-WEATHER_M_S = 1e-3  # standard deviation of the height by pressure's speed, by reason: a front changes the pressure by 0.4 hPa in an hour
 KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 
 
@@ -129,7 +130,7 @@ class Cloud:
         self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
         self._climbing = climbing or ClimbSettings()
         self._level_changes = level_change_model(self._climbing)
-        self._lag_variance = UNKNOWN_LAG_M2
+        self._lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
         self._settings = settings
         self._rng = rng
         self._minimum_size = settings.size
@@ -149,7 +150,7 @@ class Cloud:
         self.x_m, self.y_m, heading = draw_poses(start, count, floor, self.sheet, self._rng)
         self.turn_rad: Floats = heading - walk_heading_rad
         self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
-        self.lag_m: Floats = np.zeros(count)
+        self.lag_m: Floats = np.full(count, 0.0 if start.air is None else start.air.zero_m)
         self.log_weight: Floats = np.zeros(count)
         self.hidden: Floats = np.zeros((2, count))
         self.beliefs = empty_beliefs(count, 0)
@@ -219,7 +220,9 @@ class Cloud:
         while progress.share < 1.0 or progress.ping < len(log_evidence):
             rest = 1.0 - progress.share
             noise = self._noise(move, rest)
-            index = walls.near(self.x_m, self.y_m, rest * math.hypot(move.dx_m, move.dy_m))
+            index = walls.near(
+                self.x_m, self.y_m, rest * math.hypot(move.dx_m, move.dy_m, move.bend_x_m, move.bend_y_m)
+            )
             progress, lowest, passed = propagate_and_reweight(
                 self.arrays, move, noise, progress, pings, cloud_model, index, EchoMemory(self.hidden, log_evidence)
             )
@@ -239,7 +242,7 @@ class Cloud:
             if is_ping and self._path_m + share * length < self._last_used_m[pings.ranger[k]] + COARSE_M:
                 continue
             if share > done:
-                self._propagate_coarsely(move, share - done, walls)
+                self._propagate_coarsely(move, done, share, walls)
                 done = share
             if is_ping:
                 self._last_used_m[pings.ranger[k]] = self._path_m + share * length
@@ -249,9 +252,10 @@ class Cloud:
             self.resample_if_needed()
         self._path_m += length
 
-    def _propagate_coarsely(self, move: Move, share: float, walls: Walls) -> None:
-        noise = self._noise(move, share)
-        propagate(self.arrays, share * move.dx_m, share * move.dy_m, 1.0, noise, COARSE_WALL_COST, walls.index)
+    def _propagate_coarsely(self, move: Move, begin: float, end: float, walls: Walls) -> None:
+        """Between two shares of a move."""
+        noise = self._noise(move, end - begin)
+        propagate(self.arrays, *piece_of(move, begin, end), 1.0, noise, COARSE_WALL_COST, walls.index)
 
     def change_levels(self, move: Move, change: HeightChange) -> None:
         """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
@@ -272,13 +276,17 @@ class Cloud:
 
     def let_lag_drift(self, pause_s: float) -> None:
         """Nothing was measured for so long."""
-        drift_m = math.hypot(self._climbing.drift_m * math.sqrt(pause_s), WEATHER_M_S * pause_s)
-        self._lag_variance = min(self._lag_variance + drift_m**2, UNKNOWN_LAG_M2)
+        drifted_m2 = self._lag_variance + drift_m(self._climbing, pause_s) ** 2
+        self._lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
 
-    def adopt_lag(self, other: Cloud) -> None:
-        """Take over what another cloud knows of the lag of the height by pressure."""
-        self.lag_m[:] = float(other.weight @ other.lag_m)
-        self._lag_variance = other._lag_variance
+    @property
+    def air(self) -> Air | None:
+        """Mean and standard deviation of the lag of the height by pressure; None where nothing is known of it."""
+        if self.sheet is None or self._lag_variance >= UNKNOWN_LAG_M2:
+            return None
+        weight = self.weight
+        mean = float(weight @ self.lag_m)
+        return Air(mean, math.sqrt(self._lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
         """Spread by an unobserved move: no wall is asked, the path to its end is not known. The level is that of the height by pressure, if any."""

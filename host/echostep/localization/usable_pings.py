@@ -11,7 +11,6 @@ import math
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.localization.background import Background, PlacedPings, RangeMemory, UnplannedDensities
 from echostep.localization.echo_likelihood import EchoSettings
@@ -29,13 +28,12 @@ class UsablePings:
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self.path_m = 0.0  # length of the path so far
-        self._correlation_m = echo.correlation_m
-        self._ranges = RangeMemory(background, echo)
+        self.hear_by(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
     def hear_by(self, background: Background, echo: EchoSettings) -> None:
-        """Go on with rangers of another kind."""
+        """From now on the pings are those of rangers with these settings."""
         self._correlation_m = echo.correlation_m
         self._ranges = RangeMemory(background, echo)
 
@@ -48,17 +46,17 @@ class UsablePings:
         """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
         segment = measured.segment
         length, span_s = math.hypot(segment.dx_m, segment.dy_m), segment.t1_s - segment.t0_s
-        turn = wrap(segment.heading1_rad - segment.heading0_rad)
         share = np.ones(len(measured.t_s))
         if span_s > 0.0:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
-        axis = segment.heading0_rad + share * turn + RANGER_AXES_RAD[measured.ranger]
+        axis = segment.heading0_rad + share * segment.turn_rad + RANGER_AXES_RAD[measured.ranger]
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
         travel_m = self._travels(measured.ranger, self.path_m + share * length)
-        power = np.minimum(travel_m / self._correlation_m, 1.0) / (1.0 + (turn / TURNING_RAD) ** 2)
+        power = np.minimum(travel_m / self._correlation_m, 1.0) / (1.0 + (segment.turn_rad / TURNING_RAD) ** 2)
         self.path_m += length
         used = power > LEAST_POWER
-        x_m, y_m = self._x_m + share * segment.dx_m, self._y_m + share * segment.dy_m
+        way_x_m, way_y_m = segment.way_m(share)
+        x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m
         self._x_m, self._y_m = self._x_m + segment.dx_m, self._y_m + segment.dy_m
         pings = PlacedPings(measured.ranger[used], x_m[used], y_m[used], axis[used], range_m[used], power[used])
         unplanned = self._ranges.densities(pings)

@@ -17,8 +17,7 @@ class View:
 
     def __init__(self, echo: EchoSettings) -> None:
         self._echo = echo
-        self._wall: LastWall | None = None
-        self._is_silent = True
+        self._wall: LastWall | None = None  # None: nothing was heard
         self._x_m, self._y_m = math.nan, math.nan
 
     def move(self, x_m: float, y_m: float) -> float:
@@ -34,15 +33,15 @@ class View:
     def density(self, range_m: float, axis_rad: float) -> float:
         """Density (1/m) of a range if the view goes on; range 0: the probability of no echo."""
         if range_m <= 0.0:
-            return 1.0 if self._is_silent else 0.0
-        return 0.0 if self._is_silent or self._wall is None else self._wall.density(range_m, axis_rad)
+            return 1.0 if self._wall is None else 0.0
+        return 0.0 if self._wall is None else self._wall.density(range_m, axis_rad)
 
     def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
         """Take a ping in; `goes_on`: whether the view goes on, by the densities."""
         if range_m <= 0.0:
-            self._is_silent = self._is_silent or not goes_on  # otherwise it is likelier that an echo was missed
+            if not goes_on:  # otherwise it is likelier that an echo was missed
+                self._wall = None
         elif goes_on and self._wall is not None:
             self._wall.update(range_m, axis_rad, power)
         else:
             self._wall = LastWall(range_m, axis_rad, self._echo.sd_m, self._echo.slant_m)
-            self._is_silent = False

@@ -176,7 +176,7 @@ class FootLegsHandover:
 def _is_straight(segment: PathSegment) -> bool:
     """Whether a segment is an observed stride straight on."""
     is_long = math.hypot(segment.dx_m, segment.dy_m) > STRAIGHT_M
-    return is_long and not segment.unobserved and abs(wrap(segment.heading1_rad - segment.heading0_rad)) < STRAIGHT_RAD
+    return is_long and not segment.unobserved and abs(segment.turn_rad) < STRAIGHT_RAD
 
 
 def _length_m(segments: Iterable[PathSegment], begin_s: float, end_s: float) -> float:

@@ -21,6 +21,7 @@ from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.before_check_in import BeforeCheckIn
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
+from echostep.localization.last_place import LastPlace, last_place
 from echostep.localization.map_filter import FilterSettings, MapFilter
 from echostep.localization.meeting_model import carries_position, start_at
 from echostep.localization.meetings import MeetingEffect, MeetingQueue
@@ -164,6 +165,10 @@ class Tracker:
         ):
             return None
         return shared_beacons(self.filter.beacon_map, self.filter.cloud, last.t_s, self.gateway.numbers)
+
+    def last_place(self) -> LastPlace | None:
+        """Where the next run may begin; None unless the newest estimate says `tracking`."""
+        return last_place(self._estimate, None if self.filter is None else self.filter.cloud.air)
 
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""

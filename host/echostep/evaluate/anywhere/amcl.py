@@ -14,7 +14,6 @@ from statistics import median
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.evaluate.anywhere.amcl_kernels import weight_by_ping
 from echostep.evaluate.anywhere.filtering import WARM_UP, Claim, FilterRun
@@ -92,7 +91,7 @@ class AugmentedMcl:
             done = share
             if self._travel_m[ranger] >= EchoSettings().correlation_m:
                 self._travel_m[ranger] = 0.0
-                turn = wrap(segment.heading1_rad - segment.heading0_rad)
+                turn = segment.turn_rad
                 axis = segment.heading0_rad + share * turn + RANGER_AXES_RAD[ranger]
                 self._weight(axis, range_m, segment.heading0_rad + share * turn)
         self._move(segment, 1.0 - done)

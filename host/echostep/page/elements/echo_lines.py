@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.jit import kernel
 from echostep.localization.echo_likelihood import EchoModel, detection
 from echostep.localization.estimate import Estimate
@@ -65,11 +64,11 @@ def _trunk_pose(measured: MeasuredSegment, estimate: Estimate, t_s: float) -> tu
     turn = estimate.heading_rad - segment.heading1_rad  # from the segment's frame to the map
     span_s = segment.t1_s - segment.t0_s
     share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
-    heading = segment.heading0_rad + share * float(wrap(segment.heading1_rad - segment.heading0_rad))
-    back, c, s = share - 1.0, math.cos(turn), math.sin(turn)
-    x = estimate.x_m + back * (c * segment.dx_m - s * segment.dy_m)
-    y = estimate.y_m + back * (s * segment.dx_m + c * segment.dy_m)
-    return x, y, turn + heading
+    way_x, way_y = segment.way_m(share)
+    back_x, back_y, c, s = segment.dx_m - way_x, segment.dy_m - way_y, math.cos(turn), math.sin(turn)
+    x = estimate.x_m - (c * back_x - s * back_y)
+    y = estimate.y_m - (s * back_x + c * back_y)
+    return x, y, turn + segment.heading0_rad + share * segment.turn_rad
 
 
 @kernel
