@@ -8,12 +8,16 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest import mock
 
+import pytest
+
 from echostep.cli import main
+from echostep.output.foxglove import POSE
+from echostep.recording.recorder import DerivedMessage, Recorder
 
 PROGRAM = [sys.executable, "-m", "echostep"]  # for tests that need a process: signals, kills, pipes
 
@@ -40,6 +44,20 @@ def echostep(
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else int(end.code is not None)
     return subprocess.CompletedProcess(command, status, _text(out), _text(err))
+
+
+def interrupt_after(estimates: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A live run of this process gets SIGINT, as by Ctrl-C, once so many estimates are recorded."""
+    write, written = Recorder.write_derived, list[DerivedMessage]()
+
+    def counting(recorder: Recorder, messages: Iterable[DerivedMessage]) -> None:
+        new = list(messages)
+        write(recorder, new)
+        written.extend(message for message in new if message.topic.name == POSE.name)
+        if len(written) >= estimates:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Recorder, "write_derived", counting)
 
 
 def _text(stream: io.TextIOWrapper) -> str:

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT, needs_twin
-from command_line import PROGRAM, echostep
+from command_line import PROGRAM, echostep, interrupt_after
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
 from echostep.ports.serial_ports import SerialPorts
@@ -38,7 +38,9 @@ def sha_of(text: str) -> str:
 
 @needs_twin
 @pytest.mark.parametrize("wears_mtx", [True, False])
-def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bool) -> None:
+def test_a_live_run_replays_to_identical_estimates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wears_mtx: bool
+) -> None:
     """With foot and board from the plan's start, and with the board alone from where the last run ended."""
     (tmp_path / "live").mkdir()
     place = {"x_m": 2.0, "y_m": 7.5, "sd_m": 0.1, "level": 0, "air": None}
@@ -50,6 +52,7 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bo
     try:
         assert twin.stdout is not None
         board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
+        interrupt_after(10, monkeypatch)
         live = echostep(
             "live",
             "--plan",
@@ -61,7 +64,7 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bo
             tmp_path / "live",
             "--headless",
             "--seconds",
-            14 if wears_mtx else 18,
+            PATIENCE_S,
         )
     finally:
         twin.send_signal(signal.SIGINT)
@@ -70,7 +73,7 @@ def test_a_live_run_replays_to_identical_estimates(tmp_path: Path, wears_mtx: bo
         twin.stdout.close()
     assert live.returncode == 0, live.stderr
     rows = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))
-    assert float(rows[-1]["t_s"]) > 8.0
+    assert len(rows) >= 10
     assert ("Start: where the last run ended, " in live.stdout) is not wears_mtx
     assert math.dist((float(rows[0]["x_m"]), float(rows[0]["y_m"])), (2.0, 7.5)) < 0.5
     assert read_kept(tmp_path / "live").place.air is None

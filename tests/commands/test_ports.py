@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT, needs_twin
-from command_line import echostep
+from command_line import echostep, interrupt_after
 from echostep.board.findings import Severity
 from echostep.commissioning import port_search
 from echostep.commissioning.doctor import examine
@@ -132,11 +132,13 @@ def two_boards(folder: Path) -> Iterator[tuple[str, str]]:
 
 @needs_twin
 def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    track = tmp_path / "live/track.csv"
     with two_boards(tmp_path) as (board, foot):
         seen = [PortSeen(port, Role.BOARD, "", number) for port, number in ((foot, "17"), (board, "4"))]
         monkeypatch.setattr(port_search, "list_seen", lambda: seen)
         swapped = echostep("record", "--board", foot, "--foot", board, "--out", tmp_path / "a.mcap", "--seconds", 30)
-        live = echostep("live", "--plan", PLAN, "--headless", "--out", tmp_path / "live", "--seconds", 14)
+        interrupt_after(10, monkeypatch)
+        live = echostep("live", "--plan", PLAN, "--headless", "--out", tmp_path / "live", "--seconds", PATIENCE_S)
         monkeypatch.setattr("echostep.commissioning.doctor.list_seen", lambda: seen)
         report = examine(None, None, 3.0)
     assert swapped.returncode == 2
@@ -145,9 +147,8 @@ def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, mo
     assert f"Ports: --board {board} --foot {foot}" in live.stdout
     assert {chunk.port for chunk in open_recording(tmp_path / "live/walk.mcap").chunks()} == {"board", "foot"}
     echostep("replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--out", tmp_path / "again", "--headless")
-    track = (tmp_path / "live/track.csv").read_bytes()
-    assert track.count(b"\n") > 10
-    assert (tmp_path / "again/track.csv").read_bytes() == track
+    assert track.read_bytes().count(b"\n") > 10
+    assert (tmp_path / "again/track.csv").read_bytes() == track.read_bytes()
     text = "\n".join(report.lines)
     assert f"board     {board}: firmware 1.5.0" in text
     assert f"foot board {foot}: firmware 1.5.0" in text
