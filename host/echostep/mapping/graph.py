@@ -75,14 +75,8 @@ class Graph:
     def solve(self, rounds: int = ROUNDS) -> None:
         """Gauss-Newton from the present poses."""
         for _ in range(rounds):
-            rows = _Rows()
-            self._add_path(rows)
-            self._add_walls(rows)
-            self._add_directions(rows)
-            self._add_closures(rows)
-            n = 3 * len(self.nodes) + 2 * len(self.walls.rho_m)
-            jacobian, residual = rows.matrix(n)
-            normal = (jacobian.T @ jacobian + 1e-9 * sp.identity(n)).tocsc()
+            jacobian, residual = self.linearized()
+            normal = (jacobian.T @ jacobian + 1e-9 * sp.identity(jacobian.shape[1])).tocsc()
             self.factor = None  # free its memory before the next one is made
             self.factor = splu(
                 normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -94,6 +88,15 @@ class Graph:
             self.walls = Walls(self.walls.normal_rad + w[:, 0], self.walls.rho_m + w[:, 1], self.walls.of)
             if float(np.abs(step).max(initial=0.0)) < 1e-3:
                 break
+
+    def linearized(self) -> tuple[sp.csr_matrix, Floats]:
+        """Residuals (r,) at the present poses and walls, and their derivatives (r, 3 n + 2 w) at fixed weights."""
+        rows = _Rows()
+        self._add_path(rows)
+        self._add_walls(rows)
+        self._add_directions(rows)
+        self._add_closures(rows)
+        return rows.matrix(3 * len(self.nodes) + 2 * len(self.walls.rho_m))
 
     def covariance(self, new: int, old: int) -> Floats:
         """Covariance (3, 3) of the pose of `new` less that of `old`, as factored last."""
@@ -169,7 +172,7 @@ class Graph:
         rows.add(
             wt * r,
             [
-                (3 * node, wd * cp), (3 * node + 1, wd * sp_), (3 * node + 2, wd * (sp_ * arm[:, 0] - cp * arm[:, 1]) * -1.0),
+                (3 * node, wd * cp), (3 * node + 1, wd * sp_), (3 * node + 2, wd * (sp_ * arm[:, 0] - cp * arm[:, 1])),
                 (first + 2 * wall, wd * (cp * q[:, 1] - sp_ * q[:, 0])), (first + 2 * wall + 1, -wd),
             ],
         )  # fmt: skip
