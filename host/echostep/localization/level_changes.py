@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, lean_kernel
 from echostep.localization.particle_kernels import Move, ParticleArrays
 from echostep.walls.level_sheet import LIFT, LevelSheet, connector_at, end_of_connector, level_on_sheet, nearest_level
 
@@ -85,7 +85,7 @@ class HeightArrays(NamedTuple):
     lag_m: Floats
 
 
-@kernel
+@lean_kernel
 def change_levels(
     particles: ParticleArrays, heights: HeightArrays, move: Move, noise: Floats, change: HeightChange,
     lag_variance: float, model: LevelChangeModel, sheet: LevelSheet,
