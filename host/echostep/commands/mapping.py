@@ -27,7 +27,7 @@ from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
-from echostep.session.metadata import START_LIMIT_M, recorded_start
+from echostep.session.metadata import recorded_start
 from echostep.session.options import TrackingOptions
 from echostep.session.progress import bar, with_bar
 from echostep.session.replay import tracker_of
@@ -142,12 +142,7 @@ def _start_of(recording: Recording) -> Pose:
     except EchostepError:
         _say(f"{recording.path}: its recorded start is damaged: the drawing begins at the origin")
         return NO_PLAN.start
-    if not isinstance(start, Pose):
-        return NO_PLAN.start
-    if not all(abs(value) < START_LIMIT_M for value in (start.x_m, start.y_m, start.heading_rad)):
-        _say(f"{recording.path}: its recorded start is out of range: the drawing begins at the origin")
-        return NO_PLAN.start
-    return start
+    return start if isinstance(start, Pose) else NO_PLAN.start
 
 
 def _say(line: str) -> None:

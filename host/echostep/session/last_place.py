@@ -22,9 +22,8 @@ from echostep.localization.last_place import LastPlace, start_after
 from echostep.localization.level_changes import ClimbSettings
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment
-from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import Plan
-from echostep.session.metadata import LAST, air_of
+from echostep.session.metadata import LAST, air_of, bounded
 from echostep.tracker import Tracker
 
 FILE = "last.json"
@@ -81,9 +80,9 @@ def read_kept(folder: Path) -> Kept:
         with path.open("rb") as file:
             tree = json.loads(file.read(MOST_BYTES))
         place, air = tree["place"], air_of(tree["place"]["air"])
-        x, y, sd = (float(place[name]) for name in ("x_m", "y_m", "sd_m"))
-        numbers = (x, y, sd) if air is None else (x, y, sd, air.zero_m, air.sd_m)
-        if not all(abs(v) < LIMIT_M for v in numbers) or min(place["sd_m"], place["level"]) < 0:
+        x, y = bounded([float(place["x_m"]), float(place["y_m"])])
+        (sd,) = bounded([float(place["sd_m"])], least=0.0)
+        if place["level"] < 0:
             raise ValueError
         last = LastPlace(x, y, sd, int(place["level"]), air)
         utc = datetime.fromisoformat(tree["utc"])

@@ -11,7 +11,7 @@ import importlib.metadata
 import json
 import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -93,17 +93,17 @@ def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | No
             room = json.loads(metadata.get("start_room", "{}"))
             outline = room.get("outline_m")
             return Start(
-                room_m=None if outline is None else np.array(outline, np.float64).reshape(-1, 2),
+                room_m=None if outline is None else np.array(bounded(np.ravel(outline))).reshape(-1, 2),
                 level=int(room.get("level", ANY_LEVEL)),
             )
         text = metadata.get("start_x_y_rad")
         if text is None:
             return None
-        x, y, heading, *level = (float(part) for part in text.split(","))
+        x, y, heading, *level = bounded(float(part) for part in text.split(","))
         pose = Pose(x, y, heading, int(level[0]) if level else 0)
         if "start_sd_m_rad" not in metadata:
             return pose
-        sd_m, sd_rad = (float(part) for part in metadata["start_sd_m_rad"].split(","))
+        sd_m, sd_rad = bounded((float(part) for part in metadata["start_sd_m_rad"].split(",")), least=0.0)
         if "start_after_pause" not in metadata:
             return Start(pose, sd_m, sd_rad)
         air = air_of(json.loads(metadata["start_after_pause"])["air"])
@@ -139,7 +139,19 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
 
 def air_of(tree: Any) -> Air | None:
     """What JSON says of the heights by pressure; raises ValueError, TypeError or KeyError when it is damaged."""
-    return None if tree is None else Air(float(tree["zero_m"]), float(tree["sd_m"]))
+    if tree is None:
+        return None
+    (zero_m,) = bounded([float(tree["zero_m"])])
+    (sd_m,) = bounded([float(tree["sd_m"])], least=0.0)
+    return Air(zero_m, sd_m)
+
+
+def bounded(values: Iterable[float], least: float = -START_LIMIT_M) -> list[float]:
+    """The values (m or rad); raises ValueError for one that is not finite, or out of bounds."""
+    found = list(values)
+    if not all(least <= value < START_LIMIT_M for value in found):
+        raise ValueError
+    return found
 
 
 def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:
