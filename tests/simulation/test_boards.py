@@ -80,6 +80,31 @@ def test_commands_are_answered_and_obeyed() -> None:
     assert {x.ranger for x in later if isinstance(x, m.Ping)} == {m.Ranger.LEFT}
 
 
+@pytest.mark.parametrize("block_ms", [1, 7, 50, 100])
+@pytest.mark.parametrize("schedule", m.Schedule)
+def test_no_echo_is_looked_at_in_other_milliseconds_than_those_announced(schedule: m.Schedule, block_ms: int) -> None:
+    """The schedule changes on the way, and the left ranger is off for a while."""
+    knowing, all_ears, rng, asked = PythonBoard(seed=1), PythonBoard(seed=1), np.random.default_rng(2), 0
+    orders = {
+        700: (0xFF, schedule),
+        2_100: (0xFF & ~m.Sensors.RANGER_LEFT, schedule),
+        2_800: (0xFF, m.Schedule.CONCURRENT),
+    }
+    for start in range(0, 5_600, block_ms):
+        if start in orders:
+            sensors, then = orders[start]
+            for board in (knowing, all_ears):
+                board.send(encode(m.Configure(sensors, then, 200, 10, 0), 0))
+        rows = rows_of(block_ms)
+        rows["own_us"], rows["cross_us"] = rng.integers(1_000, 30_000, (2, block_ms, 2))
+        ranging = knowing.may_range(block_ms)
+        asked += int(ranging.sum())
+        fewer = rows.copy()
+        fewer["own_us"][~ranging], fewer["cross_us"][~ranging] = 0, 0
+        assert knowing.advance(fewer) == all_ears.advance(rows)
+    assert asked < 5_600 / 3 or block_ms == 100
+
+
 def test_sequential_pings_take_turns_every_seventy_milliseconds() -> None:
     board, reader = PythonBoard(seed=1), BoardReader()
     board.send(encode(m.Configure(0xFF, m.Schedule.SEQUENTIAL, 100, 5, 0), 0))

@@ -19,7 +19,7 @@ from echostep.board.messages import Configure
 from echostep.board.subscription import SUBSCRIBE
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.simulation.devices.board import Board
+from echostep.simulation.devices.board import Board, PythonBoard
 from echostep.simulation.devices.foot_board import FootBoardPort, foot_rng
 from echostep.simulation.devices.kit_2026 import Kit2026Sensors
 from echostep.simulation.devices.mtx import MtxModel, stream
@@ -106,7 +106,8 @@ class Scenario:
     def _board_chunks(self, start: int, stop: int) -> list[Chunk]:
         """The board's bytes of these milliseconds as a USB host gets them, those of one instant together."""
         gathered: dict[int, bytes] = {}
-        for t_ns, part in self._board.advance(self.sensors.rows(start, stop)):
+        ranging = self._board.may_range(stop - start) if isinstance(self._board, PythonBoard) else None
+        for t_ns, part in self._board.advance(self.sensors.rows(start, stop, ranging)):
             arrival = START_NS + t_ns + USB_LATENCY_NS
             gathered[arrival] = gathered.get(arrival, b"") + part
         return [Chunk(BOARD, t_ns, part) for t_ns, part in gathered.items()]

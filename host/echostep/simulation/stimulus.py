@@ -60,8 +60,11 @@ class BoardSensors:
         self._barometer = barometer or Scp1000Model(rest[3])
         self._compass = CompassModel(magnetism, rest[4])
 
-    def rows(self, start: int, stop: int) -> NDArray[np.void]:
-        """Rows of the milliseconds start..stop-1 of the walk; past its end the last posture goes on."""
+    def rows(self, start: int, stop: int, ranging: NDArray[np.bool_] | None = None) -> NDArray[np.void]:
+        """Rows of the milliseconds start..stop-1 of the walk; past its end the last posture goes on.
+
+        `ranging` (n,): milliseconds whose echoes are needed; they are most of the work.
+        """
         w = self._walk
         at = np.minimum(np.arange(start, stop), len(w.t_s) - 1)
         rows = np.zeros(len(at), ROW)
@@ -73,7 +76,8 @@ class BoardSensors:
         for end in [*(np.flatnonzero(np.diff(self._level[at])) + 1).tolist(), len(at)]:
             one = slice(begin, end)
             walls = self._walls[self._level[at[begin]]]
-            heard = echoes(trunk[one], heading[one], walls, self._range_bias_m, self._echo_rng, self._acoustics)
+            asked = None if ranging is None else ranging[one]
+            heard = echoes(trunk[one], heading[one], walls, self._range_bias_m, self._echo_rng, self._acoustics, asked)
             rows["own_us"][one], rows["cross_us"][one] = heard.own_us, heard.cross_us
             begin = end
         rows["bearing"] = self._compass.bearings(trunk, heading)

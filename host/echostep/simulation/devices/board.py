@@ -75,6 +75,10 @@ class PythonBoard:
         self._ms += len(rows)
         return [self._sent(us, message) for us, message in found]
 
+    def may_range(self, count: int) -> NDArray[np.bool_]:
+        """Of the next `count` milliseconds those whose echoes may be looked at; orders in between may change them."""
+        return self._rangers.may_fire(1000 * self._ms, count)
+
     def send(self, sent: bytes) -> None:
         """Answer identify, clock_query and configure, with the next millisecond."""
         for message in self._inbox.feed(sent):

@@ -57,11 +57,11 @@ class Kit2026Sensors:
         self._angles = [np.cumsum(rate) / RATE_HZ for rate in (walk.thigh_rad_s, walk.calf_rad_s)]
         self._trunk_m_s2 = _accelerations(walk.trunk_m)
 
-    def rows(self, start: int, stop: int) -> NDArray[np.void]:
+    def rows(self, start: int, stop: int, ranging: NDArray[np.bool_] | None = None) -> NDArray[np.void]:
         """Extended rows of the milliseconds start..stop-1 of the walk; past its end the last posture goes on."""
         at = np.minimum(np.arange(start, stop), len(self._walk.t_s) - 1)
         rows = np.zeros(len(at), EXTENDED_ROW)
-        rows["row"] = self._plain.rows(start, stop)
+        rows["row"] = self._plain.rows(start, stop, ranging)
         rates, forces = self._rates(at), self._forces(at)
         rows["motion"]["rate"] = _counts(rates, self._gyro_bias, GYRO_NOISE_RAD_S, GYRO_RAD_S, self._rng)
         rows["motion"]["force"] = _counts(forces, self._force_bias, FORCE_NOISE_M_S2, FORCE_M_S2, self._rng)

@@ -70,6 +70,23 @@ class Rangers:
             else:
                 self._next_slot(ranger, now_us)
 
+    def may_fire(self, start_us: int, count: int) -> NDArray[np.bool_]:
+        """Of the next `count` milliseconds those in which a ranger may fire (count,): the others' echoes are never asked for.
+
+        A ranger that is ranging fires next in the slot after, at a moment that is drawn when it has been read.
+        """
+        if 1000 * count > RANGING_US:
+            return np.ones(count, bool)  # a ranger may fire twice
+        found = np.zeros(count, bool)
+        for ranger in self._both:
+            due_us = ranger.due_us, ranger.due_us
+            if ranger.reads_us is not None:
+                slot_us = self._slot_after(ranger, ranger.reads_us)
+                due_us = max(slot_us, ranger.reads_us), max(slot_us + self._jitter_us, ranger.reads_us)
+            first, last = ((max(us, start_us) - start_us) // 1000 for us in due_us)
+            found[first : last + 1] = True
+        return found
+
     def _next_us(self, index: int) -> int:
         ranger = self._both[index]
         return ranger.due_us if ranger.reads_us is None else ranger.reads_us
@@ -91,11 +108,14 @@ class Rangers:
         return Ping((fired_us * TICKS_US) & 0xFFFFFFFF, Ranger(index), outcome, min(heard, default=0))
 
     def _next_slot(self, ranger: _Ranger, now_us: int) -> None:
-        """A ranger that lags by more than half a period gives up slots; the grid stays."""
-        ranger.slot_us += 2 * self._half_us
-        while ranger.slot_us + self._half_us <= now_us:
-            ranger.slot_us += 2 * self._half_us
+        ranger.slot_us = self._slot_after(ranger, now_us)
         ranger.due_us = ranger.slot_us + self._delay_us()
+
+    def _slot_after(self, ranger: _Ranger, now_us: int) -> int:
+        """A ranger that lags by more than half a period gives up slots; the grid stays."""
+        period_us = 2 * self._half_us
+        slot_us = ranger.slot_us + period_us
+        return slot_us + period_us * max(0, (now_us - slot_us + self._half_us) // period_us)
 
     def _delay_us(self) -> int:
         return int(self._rng.integers(self._jitter_us)) if self._jitter_us else 0

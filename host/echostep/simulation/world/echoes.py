@@ -58,17 +58,21 @@ def echoes(
     bias_m: Floats,
     rng: np.random.Generator,
     acoustics: Acoustics = SRF02,
+    asked: NDArray[np.bool_] | None = None,
 ) -> Echoes:
-    """Echoes for trunk positions (n, 2) and headings (n,); the left ranger points to +90 degrees of the heading, the right one to -90."""
+    """Echoes for trunk positions (n, 2) and headings (n,); the left ranger points to +90 degrees of the heading, the right one to -90.
+
+    `asked` (n,): poses whose echoes are wanted, all if None; the others have none. The noise of a pose is the same in any case.
+    """
     n = len(heading_rad)
     noise = rng.standard_normal((n, 2, 4))
     range_m = np.zeros((n, 2, 2))
-    for start in range(0, n, CHUNK_POSES):
-        poses = slice(start, start + CHUNK_POSES)
-        near = _near_walls(trunk_m[poses], walls, acoustics.maximum_m)
-        _nearest_echoes(
-            trunk_m[poses], heading_rad[poses], near, wall_edges(near), noise[poses], acoustics, range_m[poses]
-        )
+    wanted = np.arange(n) if asked is None else np.flatnonzero(asked)
+    for start in range(0, len(wanted), CHUNK_POSES):
+        poses = wanted[start : start + CHUNK_POSES]
+        near, found = _near_walls(trunk_m[poses], walls, acoustics.maximum_m), np.zeros((len(poses), 2, 2))
+        _nearest_echoes(trunk_m[poses], heading_rad[poses], near, wall_edges(near), noise[poses], acoustics, found)
+        range_m[poses] = found
     own = range_m[..., OWN]
     range_m[..., OWN] = np.where(own > 0.0, np.maximum(own + bias_m, acoustics.minimum_m), 0.0)
     us = np.rint(range_m * (2e6 / acoustics.speed_m_s)).astype(np.uint16)

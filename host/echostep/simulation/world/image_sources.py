@@ -128,7 +128,9 @@ def _edge(walls: Floats, w: int, e: int, edge: Floats) -> bool:
     vx, vy = ux, uy
     meeting = 0
     for v in range(len(walls)):
-        if v == w or distance(x, y, walls[v, 0], walls[v, 1], walls[v, 2], walls[v, 3]) > TOUCH_M:
+        if v == w or _is_beside(x, y, walls[v]):
+            continue
+        if distance(x, y, walls[v, 0], walls[v, 1], walls[v, 2], walls[v, 3]) > TOUCH_M:
             continue
         at_start = math.hypot(walls[v, 0] - x, walls[v, 1] - y) <= TOUCH_M
         at_end = math.hypot(walls[v, 2] - x, walls[v, 3] - y) <= TOUCH_M
@@ -138,6 +140,15 @@ def _edge(walls: Floats, w: int, e: int, edge: Floats) -> bool:
     straight = meeting == 1 and abs(ux * vy - uy * vx) < 1e-3 * math.hypot(ux, uy) * math.hypot(vx, vy)
     edge[0], edge[1], edge[2], edge[3], edge[4], edge[5] = x, y, ux, uy, vx, vy
     return meeting < 2 and not straight
+
+
+@kernel
+def _is_beside(x: float, y: float, wall: Floats) -> bool:
+    """Whether a point lies more than 2 TOUCH_M outside of the box around a wall: a quick answer for nearly all walls."""
+    more = 2.0 * TOUCH_M
+    if x < min(wall[0], wall[2]) - more or x > max(wall[0], wall[2]) + more:
+        return True
+    return y < min(wall[1], wall[3]) - more or y > max(wall[1], wall[3]) + more
 
 
 @kernel
