@@ -144,8 +144,9 @@ def math_run(seed: int) -> list[Row]:
     return [{"name": "m", "value": float(np.random.default_rng(seed).random())}]
 
 
-def test_no_cluster_is_one_clear_error(tmp_path: Path) -> None:
+def test_no_cluster_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="skipped: no Dask (pip install 'echostep[cluster]')")
+    monkeypatch.setattr("echostep.evaluate.runs.SCHEDULER_TIMEOUT", "1s")
     with pytest.raises(EchostepError, match="no Dask scheduler answers there"):
         SeededRuns("s", 2, 1, math_run, tmp_path, "tcp://127.0.0.1:9").rows()
 
