@@ -8,15 +8,17 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import pytest
 
 from echostep.cli import main
 from echostep.output.foxglove import POSE
+from echostep.ports.chunks import Chunk
 from echostep.recording.recorder import DerivedMessage, Recorder
 
 PROGRAM = [sys.executable, "-m", "echostep"]  # for tests that need a process: signals, kills, pipes
@@ -44,6 +46,34 @@ def echostep(
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else int(end.code is not None)
     return subprocess.CompletedProcess(command, status, _text(out), _text(err))
+
+
+def interrupt_when(suffices: Callable[[Chunk], object], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of this process gets SIGINT, as by Ctrl-C, once a recorded chunk suffices."""
+    write = Recorder.write
+
+    def watched(recorder: Recorder, chunk: Chunk) -> None:
+        write(recorder, chunk)
+        if suffices(chunk):
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Recorder, "write", watched)
+
+
+def interrupt_once_called(
+    owner: type, method: str, monkeypatch: pytest.MonkeyPatch, suffices: Callable[[Any], object] = lambda _: True
+) -> None:
+    """A run of this process gets SIGINT, as by Ctrl-C, once a method has been called of an object that then suffices."""
+    called, interrupted = getattr(owner, method), list[Any]()
+
+    def then_interrupted(instance: Any, *arguments: Any) -> Any:
+        done = called(instance, *arguments)
+        if not interrupted and suffices(instance):
+            interrupted.append(instance)
+            signal.raise_signal(signal.SIGINT)
+        return done
+
+    monkeypatch.setattr(owner, method, then_interrupted)
 
 
 def interrupt_after(estimates: int, monkeypatch: pytest.MonkeyPatch) -> None:

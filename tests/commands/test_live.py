@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 import tty
+from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -193,23 +194,31 @@ def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
     for _, theirs in pairs:
         tty.setraw(theirs)
     names = [os.ttyname(theirs) for _, theirs in pairs]
+    path = tmp_path / "x.mcap"
     recorder = subprocess.Popen(
-        [*PROGRAM, "record", "--board", names[0], "--mtx", names[1], "--out", tmp_path / "x.mcap", "--seconds", "4"],
+        [*PROGRAM, "record", "--board", names[0], "--mtx", names[1], "--out", path],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     sent = [b"", b""]
-    while recorder.poll() is None:
+
+    def enough_is_recorded() -> bool:
         for k, (ours, _) in enumerate(pairs):
             part = bytes([k + 1, len(sent[k]) % 256]) * 20
             sent[k] += part
             os.write(ours, part)
-        time.sleep(0.05)
+        kept = Counter[str]()
+        for chunk in open_recording(path).chunks() if records(path) else ():
+            kept[chunk.port] += len(chunk.data)
+        return min(kept["board"], kept["mtx"]) > 500
+
+    assert until(enough_is_recorded)
+    recorder.send_signal(signal.SIGINT)
     out, err = recorder.communicate(timeout=PATIENCE_S)
     for pair in pairs:
         for end in pair:
             os.close(end)
     assert recorder.returncode == 0, err
-    chunks = list(open_recording(tmp_path / "x.mcap").chunks())
+    chunks = list(open_recording(path).chunks())
     for k, port in enumerate(("board", "mtx")):
         kept = b"".join(c.data for c in chunks if c.port == port)
         assert len(kept) > 500

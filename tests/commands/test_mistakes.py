@@ -6,18 +6,24 @@ from __future__ import annotations
 import errno
 import os
 import re
+import signal
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from board_runs import ROOT
-from command_line import echostep
+from command_line import echostep, interrupt_once_called
 from echostep.board import messages as m
 from echostep.board.frames import encode
+from echostep.recording.background_writer import BackgroundWriter
+from echostep.session.console import print_notices
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
+from echostep.team.outbox import Outbox
 from mt_lines import on_a_terminal
 from players import babbling_port, pseudo_terminal, python_board
+from waiting import PATIENCE_S
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 PAGE = ROOT / "host/docs/mistakes.md"
@@ -28,7 +34,7 @@ Mistake = Callable[
 
 def live(folder: Path, *arguments: object, plan: object = PLAN) -> str:
     """What `live` prints as its error, which is one line."""
-    done = echostep("live", "--plan", plan, "--headless", "--out", folder / "out", "--seconds", 20, *arguments)
+    done = echostep("live", "--plan", plan, "--headless", "--out", folder / "out", "--seconds", PATIENCE_S, *arguments)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stdout + done.stderr
     return done.stderr.removeprefix("echostep: ").strip()
 
@@ -74,12 +80,25 @@ def no_rights(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
         return {"said": live(folder, "--board", port), "PORT": port, "OWNER:GROUP": owner, "GROUP": Path(port).group()}
 
 
-def no_broker(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
+def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
     url = "mqtt://127.0.0.1:9"
+    said, say = list[str](), Outbox._print_state
+
+    def heard(box: Outbox, text: str) -> None:
+        say(box, text)
+        said.append(text)
+
+    def ending(notices: deque[str]) -> None:
+        print_notices(notices)
+        if said and said.pop():
+            signal.raise_signal(signal.SIGINT)
+
+    patch.setattr(Outbox, "_print_state", heard)
+    patch.setattr("echostep.session.live.print_notices", ending)
     with pseudo_terminal() as (_, port):
         done = echostep(
             "live", "--plan", PLAN, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",
-            "--seconds", 1,
+            "--seconds", PATIENCE_S,
         )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return {"said": next(line for line in done.stdout.splitlines() if "tracking goes on" in line), "URL": url}
@@ -94,9 +113,10 @@ def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
         return write(file, data)
 
     patch.setattr(os, "write", refused)
+    interrupt_once_called(BackgroundWriter, "_write_to_file", patch, lambda writer: writer.failed)
     patch.setattr("echostep.recording.background_writer.CLOSE_S", 0.5)
     with python_board() as port:
-        done = echostep("record", "--board", port, "--out", folder / "walk.mcap", "--seconds", 1)
+        done = echostep("record", "--board", port, "--out", folder / "walk.mcap", "--seconds", PATIENCE_S)
     said = next(line for line in done.stdout.splitlines() if "tracking goes on" in line)
     return {"said": re.sub(r"\S+\.mcap", "FILE", said)}
 

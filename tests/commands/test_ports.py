@@ -14,12 +14,13 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT, needs_twin
-from command_line import echostep, interrupt_after
+from command_line import echostep, interrupt_after, interrupt_when
 from echostep.board.findings import Severity
 from echostep.commissioning import port_search
 from echostep.commissioning.doctor import examine
 from echostep.commissioning.port_search import find_ports
 from echostep.commissioning.serial_ports import PortSeen, Role
+from echostep.ports.chunks import Chunk
 from echostep.recording.device import sender
 from echostep.recording.reading import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
@@ -99,7 +100,14 @@ def test_live_finds_both_ports_by_what_they_say(tmp_path: Path, monkeypatch: pyt
         monkeypatch.setattr(port_search, "list_seen", lambda: seen)
         monkeypatch.setattr(port_search, "ROLES", {})
         assert (find_ports().board, find_ports().mtx) == (board, mtx)
-        done = echostep("record", "--out", tmp_path / "a.mcap", "--seconds", 1)
+        heard = set[str]()
+
+        def both_are_heard(chunk: Chunk) -> bool:
+            heard.add(chunk.port)
+            return heard >= {"board", "mtx"}
+
+        interrupt_when(both_are_heard, monkeypatch)
+        done = echostep("record", "--out", tmp_path / "a.mcap", "--seconds", PATIENCE_S)
     assert f"Ports: --board {board} --mtx {mtx}" in done.stdout
     assert {chunk.port for chunk in open_recording(tmp_path / "a.mcap").chunks()} == {"board", "mtx"}
 

@@ -11,11 +11,14 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT
-from command_line import echostep
+from command_line import echostep, interrupt_once_called, interrupt_when
+from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
 from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT, MtxReader, OutputFormat
+from echostep.xsens.startup import MtxStart
 from mt_lines import on_a_terminal
+from waiting import PATIENCE_S
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 
@@ -32,11 +35,20 @@ def mute_port() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("output", [FACTORY, PROJECT])
-def test_record_sets_the_device_up_and_keeps_every_byte(tmp_path: Path, output: OutputFormat) -> None:
-    device = MtxDevice(output)
+def test_record_sets_the_device_up_and_keeps_every_byte(
+    tmp_path: Path, output: OutputFormat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device, measured = MtxDevice(output), list[bytes]()
     device.period = 2304
+
+    def has_measured(chunk: Chunk) -> bool:
+        """Whether a tenth of a second and more has come in the wanted format."""
+        measured.append(chunk.data)
+        return device.output == PROJECT and len(MtxReader().feed_batch(b"".join(measured)).counter) > 20
+
+    interrupt_when(has_measured, monkeypatch)
     with on_a_terminal(device) as mtx, mute_port() as board:
-        done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", 2.5)
+        done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", PATIENCE_S)
     assert done.returncode == 0, done.stderr
     assert "MTx: configured" in done.stdout
     assert (device.output, device.rate_hz, device.pulses) == (PROJECT, 100.0, True)
@@ -50,7 +62,18 @@ def test_record_sets_the_device_up_and_keeps_every_byte(tmp_path: Path, output: 
 def test_live_stops_at_a_device_that_is_set_wrongly_and_does_not_listen(tmp_path: Path) -> None:
     with on_a_terminal(MtxDevice(FACTORY, deaf=True)) as mtx, mute_port() as board:
         done = echostep(
-            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--out", tmp_path, "--headless", "--seconds", 20
+            "live",
+            "--plan",
+            PLAN,
+            "--board",
+            board,
+            "--mtx",
+            mtx,
+            "--out",
+            tmp_path,
+            "--headless",
+            "--seconds",
+            PATIENCE_S,
         )
     assert done.returncode == 2
     assert "MTData of 18 bytes instead of 54" in done.stderr
@@ -60,9 +83,12 @@ def test_live_stops_at_a_device_that_is_set_wrongly_and_does_not_listen(tmp_path
 
 
 @pytest.mark.parametrize("output", [PROJECT, None])
-def test_record_goes_on_with_a_device_that_is_right_or_silent(tmp_path: Path, output: OutputFormat | None) -> None:
+def test_record_goes_on_with_a_device_that_is_right_or_silent(
+    tmp_path: Path, output: OutputFormat | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupt_once_called(MtxStart, "_report_result", monkeypatch)
     with on_a_terminal(MtxDevice(output, deaf=True)) if output else mute_port() as mtx, mute_port() as board:
-        done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", 2)
+        done = echostep("record", "--board", board, "--mtx", mtx, "--out", tmp_path / "r.mcap", "--seconds", PATIENCE_S)
     assert done.returncode == 0, done.stderr
     assert ("does not answer, but sends the wanted format" if output else "MTx: silent") in done.stdout
 
