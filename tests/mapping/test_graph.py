@@ -22,11 +22,9 @@ def bent_path_along_walls(seed: int) -> Graph:
     n, walls = 8, 3
     turns, steps = rng.normal(0.0, 0.4, n), rng.uniform(0.5, 1.5, n)
     heading = np.cumsum(turns)
-    pose = np.column_stack(
-        [np.cumsum(steps * np.cos(heading)), np.cumsum(steps * np.sin(heading)), heading]
-    ) + rng.normal(0.0, 0.05, (n, 3))  # the odometry disagrees
+    pose = np.column_stack([np.cumsum(steps * np.cos(heading)), np.cumsum(steps * np.sin(heading)), heading])
     odometry = pose + rng.normal(0.0, 0.05, (n, 3))
-    nodes = Nodes(np.arange(n) * 1.0, odometry, np.full(n - 1, 0.03), np.full(n - 1, 0.01), np.cumsum(steps))
+    nodes = Nodes(np.linspace(0.0, n - 1.0, n), odometry, np.full(n - 1, 0.03), np.full(n - 1, 0.01), np.cumsum(steps))
     normal, rho = rng.uniform(-math.pi, math.pi, walls), rng.uniform(1.0, 3.0, walls)
     of, node = np.arange(2 * n) % walls, np.repeat(np.arange(n), 2)
     normals = np.column_stack([np.cos(normal), np.sin(normal)])[of]
