@@ -23,6 +23,7 @@ from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model
 from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.gaps import Gap, Gaps
+from echostep.localization.hypotheses import hypotheses
 from echostep.localization.hypothetical import Hypothetical
 from echostep.localization.level_changes import SAME_LEVEL_M, ClimbSettings, HeightChange
 from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
@@ -318,7 +319,7 @@ class MapFilter:
         `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
         """
         tracked, search = self.tracked, self.search
-        if tracked.cloud.is_coarse and self._pings.path_m - self._search_m > self._found_within_m:
+        if self._is_astray(tracked.cloud):
             self._plan.add(math.log(FAILS))
             self.tracked = self._new_search(Start(), walk_heading_rad)
         elif search is None:
@@ -334,6 +335,13 @@ class MapFilter:
         else:
             return False
         return True
+
+    def _is_astray(self, cloud: Cloud) -> bool:
+        """Whether a coarse cloud holds no probable place after the path within which one is found."""
+        if not cloud.is_coarse or self._pings.path_m - self._search_m <= self._found_within_m:
+            return False
+        places = hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad, cloud.weight)
+        return not places or places[0].probability < DOUBTED
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""

@@ -52,7 +52,8 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 ROUGHENED = 10
 SMALL = 2  # times the least size, by reason: a cloud has contracted
 COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
-COARSE_POWER = 0.3  # share of information in such a ping, by reason: walls go on
+COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
+COARSE_REST = 0.01  # weight of the scattered particles that a coarse cloud leaves behind when the others have gathered in few cells, by reason
 START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
 WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
 COARSE_WALL_COST = (
@@ -245,12 +246,17 @@ class Cloud:
                 self._propagate_coarsely(move, done, share, walls)
                 done = share
             if is_ping:
-                self._last_used_m[pings.ranger[k]] = self._path_m + share * length
+                power = self._coarse_power(int(pings.ranger[k]), self._path_m + share * length)
                 axis_rad, range_m, missed = (float(v[k]) for v in (pings.axis_rad, pings.range_m, pings.missed))
-                ping = CoarsePing(axis_rad, range_m, COARSE_POWER, missed)
+                ping = CoarsePing(axis_rad, range_m, power, missed)
                 reweight_coarsely(self.arrays, ping, field, model, table)
             self.resample_if_needed()
         self._path_m += length
+
+    def _coarse_power(self, ranger: int, path_m: float) -> float:
+        """Share of information in a ping of a ranger at this length of the path, which is used."""
+        travel_m, self._last_used_m[ranger] = path_m - float(self._last_used_m[ranger]), path_m
+        return min(travel_m / COARSE_INDEPENDENT_M, 1.0)
 
     def _propagate_coarsely(self, move: Move, begin: float, end: float, walls: Walls) -> None:
         """Between two shares of a move."""
@@ -322,11 +328,11 @@ class Cloud:
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
-        self.is_coarse = self.is_coarse and wanted > self._settings.largest
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self._far_weight() > COARSE_REST
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
-        self.is_gathered = self.is_gathered or self._has_gathered()
+        self.is_gathered = self.is_gathered or self._far_weight() < GATHERED_REST
         if self.is_coarse:
             self._roughen(*COARSE_ROUGH)
         elif self.is_scattered:
@@ -351,11 +357,11 @@ class Cloud:
         mass = np.bincount(cell, self.weight)
         return np.log(np.maximum(mass, LEAST_MODE))[cell]
 
-    def _has_gathered(self) -> bool:
-        """Whether nearly all of the weight lies about its mean."""
+    def _far_weight(self) -> float:
+        """Weight further than GATHERED_M from the mean."""
         weight = self.weight
         far = np.hypot(self.x_m - weight @ self.x_m, self.y_m - weight @ self.y_m) > GATHERED_M
-        return bool(weight @ far < GATHERED_REST)
+        return float(weight @ far)
 
     def _noise(self, move: Move, share: float) -> Floats:
         """Noise of this share of a move in x, y, turn and scale of each particle, (4, n)."""
@@ -389,12 +395,22 @@ class Cloud:
         self.hidden = np.ascontiguousarray(self.hidden[:, chosen])
         self.log_weight = np.zeros(len(chosen))
 
+    def _heaviest(self, share: float) -> Ints:
+        """The particles that carry this share of the weight."""
+        weight = self.weight
+        order = np.argsort(-weight)
+        return order[: int(np.searchsorted(np.cumsum(weight[order]), share)) + 1]
+
     def _size_by_spread(self) -> int:
-        """Size for the present spread, from the number of cells that hold particles [Fox 2003, eq. 7]; more than `largest` for a coarse cloud."""
+        """Size for the present spread, from the number of cells that hold particles [Fox 2003, eq. 7]; more than `largest` for a coarse cloud.
+
+        The lightest of a coarse cloud, COARSE_REST of its weight, do not count.
+        """
         s = self._settings
-        cells = np.floor(self.x_m / s.cell_m)
-        cells += 1e6 * np.floor(self.y_m / s.cell_m)
-        cells += 1e12 * np.floor(self.turn_rad / math.radians(s.cell_deg))
+        kept = self._heaviest(1.0 - COARSE_REST) if self.is_coarse else slice(None)
+        cells = np.floor(self.x_m[kept] / s.cell_m)
+        cells += 1e6 * np.floor(self.y_m[kept] / s.cell_m)
+        cells += 1e12 * np.floor(self.turn_rad[kept] / math.radians(s.cell_deg))
         cells.sort()
         k = np.count_nonzero(cells[1:] != cells[:-1])
         if k < 1:
