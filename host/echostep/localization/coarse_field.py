@@ -30,7 +30,7 @@ FAR_SHARE, FAR_FACTOR = (
     0.3,
     3.0,
 )  # of the expected ranges are off by so many times as much: edges, corners, the next wall
-LIKELY = 0.5  # probability of detection that the sources up to the expected range have together
+LIKELY = 0.05  # probability of detection that the sources up to the expected range have together: a weak echo foretold in vain costs little
 MISSED, HIDDEN, EXTRA = (
     0.1,
     0.25,

@@ -337,11 +337,12 @@ class MapFilter:
         return True
 
     def _is_astray(self, cloud: Cloud) -> bool:
-        """Whether a coarse cloud holds no probable place after the path within which one is found."""
-        if not cloud.is_coarse or self._pings.path_m - self._search_m <= self._found_within_m:
+        """Whether a coarse cloud holds no probable place on the path within which one is found, or is coarse on twice that."""
+        path_m = self._pings.path_m - self._search_m
+        if not cloud.is_coarse or path_m <= self._found_within_m:
             return False
         places = hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad, cloud.weight)
-        return not places or places[0].probability < DOUBTED
+        return not places or places[0].probability < DOUBTED or path_m > 2.0 * self._found_within_m
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
@@ -370,6 +371,8 @@ class MapFilter:
         """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing probable for long."""
         if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
             return True
+        if search.cloud.is_coarse:
+            return self._is_astray(search.cloud)
         # Storeys that are alike stay several places, and no new search would tell them apart.
         is_probable = search.has_contracted and search.plausibility.probability > FOUND
         return not is_probable and self._pings.path_m - self._search_m > self._found_within_m

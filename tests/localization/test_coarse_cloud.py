@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""The cloud of an unknown start: how much a ping tells it, when it turns fine, and when it is begun anew."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echostep.localization.building import Building
+from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.map_filter import DOUBTED, FOUND_WITHIN_M, FilterSettings, MapFilter
+from echostep.localization.particle_kernels import Move, PingBatch
+from echostep.localization.particles import COARSE_INDEPENDENT_M, COARSE_REST, Cloud, CloudSettings
+from echostep.localization.start import Start
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.walls.echo_sources import Walls
+
+NONE, NO_RANGERS = np.zeros(0), np.zeros(0, np.int64)
+SILENCE = PingBatch(NONE, NONE, NONE, NONE, NO_RANGERS, NONE, NONE, NONE, NONE)
+ROOM = Building(Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], float)), None)
+MODEL = echo_model(EchoSettings())
+SETTINGS = CloudSettings(searching=30_000)
+STEP_M = 0.5
+
+
+def coarse_cloud(resample_below: float = 0.5) -> Cloud:
+    settings = replace(SETTINGS, resample_below=resample_below)
+    return Cloud(settings, Start(), 0.0, np.random.default_rng(1), floor=ROOM.floor)
+
+
+def gather(cloud: Cloud, share: float) -> None:
+    """Give the particles within half a metre of the middle of the room this share of the weight."""
+    near = np.hypot(cloud.x_m - 6.0, cloud.y_m - 4.0) < 0.5
+    cloud.log_weight = np.where(near, math.log(share / near.sum()), math.log((1.0 - share) / (~near).sum()))
+    cloud.log_weight -= cloud.log_weight.max()
+
+
+def told(way_m: float) -> float:
+    """The range of the log-weights after one ping, this way after one of the same ranger."""
+    one = np.ones(1)
+    ping = PingBatch(one, 0.0 * one, 1.2 * one, one, np.zeros(1, np.int64), one, 0.0 * one, one, one)
+    cloud = coarse_cloud(resample_below=0.0)
+    for move, pings in ((Move(0.0, 0.0, 0.0, 0.0), ping), (Move(way_m, 0.0, 0.0, 0.0), SILENCE)):
+        cloud.propagate_and_reweight_coarsely(move, pings, MODEL, ROOM.walls, ROOM.field(MODEL))
+    cloud.log_weight[:] = 0.0
+    cloud.propagate_and_reweight_coarsely(Move(0.0, 0.0, 0.0, 0.0), ping, MODEL, ROOM.walls, ROOM.field(MODEL))
+    return float(np.ptp(cloud.log_weight))
+
+
+def test_a_ping_tells_by_the_way_since_the_one_before() -> None:
+    whole = told(COARSE_INDEPENDENT_M)
+    assert told(0.5 * COARSE_INDEPENDENT_M) == pytest.approx(0.5 * whole, rel=0.05)
+    assert told(3.0 * COARSE_INDEPENDENT_M) == pytest.approx(whole, rel=0.05)
+
+
+@pytest.mark.parametrize(("share", "is_coarse"), [(0.8, True), (1.0 - 0.3 * COARSE_REST, False)])
+def test_a_cloud_is_fine_when_nearly_all_of_its_weight_is_in_one_place(share: float, is_coarse: bool) -> None:
+    cloud = coarse_cloud()
+    gather(cloud, share)
+    cloud.resample_if_needed()
+    assert cloud.is_coarse == is_coarse
+
+
+@pytest.mark.parametrize(
+    ("share", "path_m", "is_kept"),
+    [
+        (0.4 * DOUBTED, FOUND_WITHIN_M - 1.0, True),
+        (0.4 * DOUBTED, FOUND_WITHIN_M + 1.0, False),
+        (1.2 * DOUBTED, FOUND_WITHIN_M + 1.0, True),
+        (1.2 * DOUBTED, 2.0 * FOUND_WITHIN_M + 1.0, False),
+    ],
+)
+def test_a_search_with_a_probable_place_goes_on(share: float, path_m: float, is_kept: bool) -> None:
+    """To and fro, without pings; the weights are set before the last step."""
+    map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1), FilterSettings(cloud=SETTINGS))
+    begun = map_filter.cloud
+    for k in range(round(path_m / STEP_M)):
+        gather(map_filter.cloud, DOUBTED * 1.2 if (k + 1) * STEP_M < path_m - STEP_M else share)
+        step = PathSegment(
+            k, k + 1.0, STEP_M * (-1.0) ** k, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0
+        )
+        map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
+    assert (map_filter.cloud is begun) == is_kept
