@@ -7,6 +7,7 @@ import json
 import math
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,15 @@ def test_a_killed_study_goes_on_where_it_was(tmp_path: Path) -> None:
     journal.write_text(journal.read_text().replace('"fingerprint": "', '"fingerprint": "x'))
     assert SeededRuns("s", 2, 10, one, tmp_path).rows() == whole[:2]
     assert ran(tmp_path) >= 6  # other code's rows are not taken
+
+
+def named(name: str, _seed: int) -> list[Row]:
+    return [{"name": name}]
+
+
+def test_rows_of_other_arguments_are_not_taken(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        assert SeededRuns("s", 1, 10, partial(named, name), tmp_path).rows() == [{"name": name}]
 
 
 def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import re
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -72,7 +73,7 @@ class SeededRuns:
 
     def _fingerprint(self) -> str:
         """Digest of the package's source and of the name of `run` with its arguments: rows of other code are not reused."""
-        sha = hashlib.sha256(repr(self.run).split(" at 0x")[0].encode())
+        sha = hashlib.sha256(re.sub(" at 0x[0-9a-f]+", "", repr(self.run)).encode())
         for path in sorted(Path(__file__).parents[1].rglob("*.py")):
             sha.update(path.read_bytes())
         return sha.hexdigest()[:16]
