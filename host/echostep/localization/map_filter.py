@@ -65,6 +65,7 @@ FAILS = 0.05  # probability that a search fails although the plan fits, over tha
 RESTORED_PER_M = -math.log(FAILS) / FOUND_WITHIN_M  # log-odds that the plan gains back on the path of a believed cloud
 # The same of a stated start that is rejected on the first EARLY_M of the path: taps and plans are wrong about as often.
 STATED_FAILS, EARLY_M = 0.05, 20.0
+CROSSED_M = 2.5  # from one way through a wall, within which another is through the same one, by reason
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
 
 
@@ -106,6 +107,7 @@ class MapFilter:
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
+        self._crossed: list[tuple[float, float, int]] = []  # x, y (m), level where a believed cloud went through a wall
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
         if start.after_pause:
@@ -280,9 +282,21 @@ class MapFilter:
         else:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model
+            before = cloud.rescues
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
+            if cloud.rescues > before and each is self.tracked:
+                self._count_crossing()
             if self._building.has_walls:
                 self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
+
+    def _count_crossing(self) -> None:
+        """A believed cloud has gone through a wall: the plan is wrong there, which counts once a wall."""
+        if self.tracked.plausibility.probability < BELIEVED:
+            return
+        at = self._believed(0.0)
+        if all(math.hypot(at.x_m - x, at.y_m - y) > CROSSED_M or at.level != level for x, y, level in self._crossed):
+            self._crossed.append((at.x_m, at.y_m, at.level))
+            self._plan.add(math.log(FAILS))
 
     def _judge(
         self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float
@@ -351,6 +365,8 @@ class MapFilter:
             return False
         if tracked.is_stated and self._pings.path_m < EARLY_M:
             self._plan.add(math.log(STATED_FAILS))
+        elif not tracked.is_stated and self._pings.path_m - self._search_m < self._found_within_m + EARLY_M:
+            self._plan.add(math.log(FAILS))  # the search had gathered in a wrong place
         self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
         return True
 
