@@ -119,13 +119,13 @@ def ran(folder: Path) -> int:
 def test_a_killed_study_goes_on_where_it_was(tmp_path: Path) -> None:
     one = Counted(tmp_path)
     first = SeededRuns("s", 3, 10, one, tmp_path).rows()
-    journal = tmp_path / "s.journal.jsonl"
+    (journal,) = tmp_path.glob("s.*.journal.jsonl")
     journal.write_text(journal.read_text() + '{"seed": 13, "rows": [{"na')  # killed while writing
     whole = SeededRuns("s", 5, 10, one, tmp_path).rows()
     assert whole[:3] == first
     assert [row["value"] for row in whole] == [math.sqrt(seed) for seed in range(10, 15)]
     assert ran(tmp_path) == 5
-    journal.write_text(journal.read_text().replace('"fingerprint": "', '"fingerprint": "x'))
+    journal.rename(tmp_path / "s.other.journal.jsonl")
     assert SeededRuns("s", 2, 10, one, tmp_path).rows() == whole[:2]
     assert ran(tmp_path) >= 6  # other code's rows are not taken
 
@@ -135,8 +135,9 @@ def named(name: str, _seed: int) -> list[Row]:
 
 
 def test_rows_of_other_arguments_are_not_taken(tmp_path: Path) -> None:
-    for name in ("first", "second"):
+    for name in ("first", "second", "first"):
         assert SeededRuns("s", 1, 10, partial(named, name), tmp_path).rows() == [{"name": name}]
+    assert len(list(tmp_path.glob("s.*.journal.jsonl"))) == 2  # neither was overwritten
 
 
 def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ class SeededRuns:
     def _open_journal(self) -> Journal:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            return Journal(self.folder / f"{self.name}.journal.jsonl", self._fingerprint())
+            return Journal(self.folder / f"{self.name}.{self._fingerprint()}.journal.jsonl")
         except OSError as error:
             raise EchostepError(f"{self.folder}: cannot write there: {error.strerror}") from error
 
@@ -72,7 +72,7 @@ class SeededRuns:
             finished.close()
 
     def _fingerprint(self) -> str:
-        """Digest of the package's source and of the name of `run` with its arguments: rows of other code are not reused."""
+        """Digest of the package's source and of the name of `run` with its arguments: rows of other code, rows or data are not reused."""
         sha = hashlib.sha256(re.sub(" at 0x[0-9a-f]+", "", repr(self.run)).encode())
         for path in sorted(Path(__file__).parents[1].rglob("*.py")):
             sha.update(path.read_bytes())
@@ -82,24 +82,21 @@ class SeededRuns:
 class Journal:
     """Rows of the finished runs of a study: a JSON file with one line per run, readable after a kill at any moment.
 
-    The first line holds the fingerprint. A file with another fingerprint is overwritten.
+    Its name has the fingerprint, so journals of other code, rows or data stay beside it.
     """
 
-    def __init__(self, path: Path, fingerprint: str) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.runs: dict[int, list[Row]] = {}
-        head = json.dumps({"fingerprint": fingerprint})
-        lines = path.read_text(errors="replace").splitlines(keepends=True) if path.exists() else []
-        if not lines or lines[0].strip() != head:
-            path.write_text(head + "\n")
-            return
-        for line in lines[1:]:
+        path.touch()
+        lines = path.read_text(errors="replace").splitlines(keepends=True)
+        for line in lines:
             try:
                 run = json.loads(line)
                 self.runs[run["seed"]] = run["rows"]
             except (ValueError, KeyError, TypeError):
                 continue  # the last line before a kill may be incomplete
-        if not lines[-1].endswith("\n"):
+        if lines and not lines[-1].endswith("\n"):
             with path.open("a") as file:
                 file.write("\n")
 
