@@ -133,7 +133,7 @@ def estimate(
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     places: tuple[Hypothesis, ...] = ()
     if search is not None or xx + yy > SPREAD_M**2:
-        places = _places(search or cloud, walk_heading_rad)
+        places = likely_places(search or cloud, walk_heading_rad)
     status = _status(np.hypot(dx, dy), weight, right, max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
     protection_m = _protection_m(xx, xy, yy, right.here)
@@ -145,7 +145,8 @@ def estimate(
     )  # fmt: skip
 
 
-def _places(cloud: Cloud, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
+def likely_places(cloud: Cloud, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
+    """The hypotheses of a cloud, the likeliest first."""
     return hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, cloud.weight)
 
 

@@ -21,9 +21,8 @@ from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.beacon_model import BeaconSettings
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model
-from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
+from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate, likely_places
 from echostep.localization.gaps import Gap, Gaps
-from echostep.localization.hypotheses import hypotheses
 from echostep.localization.hypothetical import Hypothetical
 from echostep.localization.level_changes import SAME_LEVEL_M, ClimbSettings, HeightChange
 from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
@@ -204,6 +203,11 @@ class MapFilter:
         return Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
 
     @property
+    def _searched_m(self) -> float:
+        """Length of the path since the last search began."""
+        return self._pings.path_m - self._search_m
+
+    @property
     def _found_within_m(self) -> float:
         """Path within which a search finds."""
         sheet = self._building.sheet
@@ -352,11 +356,12 @@ class MapFilter:
 
     def _is_astray(self, cloud: Cloud) -> bool:
         """Whether a coarse cloud holds no probable place on the path within which one is found, or is coarse on twice that."""
-        path_m = self._pings.path_m - self._search_m
-        if not cloud.is_coarse or path_m <= self._found_within_m:
+        if not cloud.is_coarse or self._searched_m <= self._found_within_m:
             return False
-        places = hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad, cloud.weight)
-        return not places or places[0].probability < DOUBTED or path_m > 2.0 * self._found_within_m
+        if self._searched_m > 2.0 * self._found_within_m:
+            return True
+        places = likely_places(cloud, 0.0)
+        return not places or places[0].probability < DOUBTED
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
@@ -365,7 +370,7 @@ class MapFilter:
             return False
         if tracked.is_stated and self._pings.path_m < EARLY_M:
             self._plan.add(math.log(STATED_FAILS))
-        elif not tracked.is_stated and self._pings.path_m - self._search_m < self._found_within_m + EARLY_M:
+        elif not tracked.is_stated and self._searched_m < self._found_within_m + EARLY_M:
             self._plan.add(math.log(FAILS))  # the search had gathered in a wrong place
         self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
         return True
@@ -391,7 +396,7 @@ class MapFilter:
             return self._is_astray(search.cloud)
         # Storeys that are alike stay several places, and no new search would tell them apart.
         is_probable = search.has_contracted and search.plausibility.probability > FOUND
-        return not is_probable and self._pings.path_m - self._search_m > self._found_within_m
+        return not is_probable and self._searched_m > self._found_within_m
 
     def _estimate(self, segment: PathSegment, right: Right) -> Estimate:
         """The estimate at the end of a segment."""
