@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -48,27 +48,15 @@ def echostep(
     return subprocess.CompletedProcess(command, status, _text(out), _text(err))
 
 
-def interrupt_when(suffices: Callable[[Chunk], object], monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run of this process gets SIGINT, as by Ctrl-C, once a recorded chunk suffices."""
-    write = Recorder.write
-
-    def watched(recorder: Recorder, chunk: Chunk) -> None:
-        write(recorder, chunk)
-        if suffices(chunk):
-            signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(Recorder, "write", watched)
-
-
 def interrupt_once_called(
-    owner: type, method: str, monkeypatch: pytest.MonkeyPatch, suffices: Callable[[Any], object] = lambda _: True
+    owner: type, method: str, monkeypatch: pytest.MonkeyPatch, suffices: Callable[..., object] = lambda *_: True
 ) -> None:
-    """A run of this process gets SIGINT, as by Ctrl-C, once a method has been called of an object that then suffices."""
+    """A run of this process gets SIGINT, as by Ctrl-C, once a method has been called with an object and arguments that suffice."""
     called, interrupted = getattr(owner, method), list[Any]()
 
     def then_interrupted(instance: Any, *arguments: Any) -> Any:
         done = called(instance, *arguments)
-        if not interrupted and suffices(instance):
+        if not interrupted and suffices(instance, *arguments):
             interrupted.append(instance)
             signal.raise_signal(signal.SIGINT)
         return done
@@ -76,18 +64,20 @@ def interrupt_once_called(
     monkeypatch.setattr(owner, method, then_interrupted)
 
 
+def interrupt_when(suffices: Callable[[Chunk], object], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same once a recorded chunk suffices."""
+    interrupt_once_called(Recorder, "write", monkeypatch, lambda _, chunk: suffices(chunk))
+
+
 def interrupt_after(estimates: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A live run of this process gets SIGINT, as by Ctrl-C, once so many estimates are recorded."""
-    write, written = Recorder.write_derived, list[DerivedMessage]()
+    written = list[DerivedMessage]()
 
-    def counting(recorder: Recorder, messages: Iterable[DerivedMessage]) -> None:
-        new = list(messages)
-        write(recorder, new)
-        written.extend(message for message in new if message.topic.name == POSE.name)
-        if len(written) >= estimates:
-            signal.raise_signal(signal.SIGINT)
+    def are_enough(_: Recorder, messages: list[DerivedMessage]) -> bool:
+        written.extend(message for message in messages if message.topic.name == POSE.name)
+        return len(written) >= estimates
 
-    monkeypatch.setattr(Recorder, "write_derived", counting)
+    interrupt_once_called(Recorder, "write_derived", monkeypatch, are_enough)
 
 
 def _text(stream: io.TextIOWrapper) -> str:

@@ -113,7 +113,7 @@ def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
         return write(file, data)
 
     patch.setattr(os, "write", refused)
-    interrupt_once_called(BackgroundWriter, "_write_to_file", patch, lambda writer: writer.failed)
+    interrupt_once_called(BackgroundWriter, "_write_to_file", patch, lambda writer, *_: writer.failed)
     patch.setattr("echostep.recording.background_writer.CLOSE_S", 0.5)
     with python_board() as port:
         done = echostep("record", "--board", port, "--out", folder / "walk.mcap", "--seconds", PATIENCE_S)
