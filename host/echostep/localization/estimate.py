@@ -18,6 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.hypotheses import Hypothesis, hypotheses
+from echostep.localization.moments import moments
 from echostep.localization.particles import Cloud
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
@@ -124,17 +125,13 @@ def estimate(
     """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
-    map_x = cloud.map_x_m
-    x, y = float(weight @ map_x), float(weight @ cloud.y_m)
-    dx, dy = map_x - x, cloud.y_m - y
-    xx, xy, yy = float(weight @ (dx * dx)), float(weight @ (dx * dy)), float(weight @ (dy * dy))
-    heading = cloud.turn_rad + walk_heading_rad
-    east, north = float(weight @ np.cos(heading)), float(weight @ np.sin(heading))
+    m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
+    x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     places: tuple[Hypothesis, ...] = ()
     if search is not None or xx + yy > SPREAD_M**2:
         places = likely_places(search or cloud, walk_heading_rad)
-    status = _status(np.hypot(dx, dy), weight, right, max(levels))
+    status = _status(right.here * near, max(right.here * about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
     protection_m = _protection_m(xx, xy, yy, right.here)
     if status is not TrackStatus.TRACKING and elsewhere is not None:
@@ -150,10 +147,8 @@ def likely_places(cloud: Cloud, walk_heading_rad: float) -> tuple[Hypothesis, ..
     return hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, cloud.weight)
 
 
-def _status(error_m: Floats, weight: Floats, right: Right, level: float) -> TrackStatus:
-    """Status from the distances (n,) of the particles from the estimate, and the probabilities of the cloud and of the likeliest level."""
-    near, about = (right.here * float(weight @ (error_m < limit)) for limit in (TRACKING_M, LOST_M))
-    about = max(about, right.about)
+def _status(near: float, about: float, level: float) -> TrackStatus:
+    """Status from the probabilities of errors below TRACKING_M and below LOST_M, and that of the likeliest level."""
     if near >= SURE and level >= SURE_OF_LEVEL:
         return TrackStatus.TRACKING
     return TrackStatus.UNCERTAIN if about >= UNSURE else TrackStatus.LOST

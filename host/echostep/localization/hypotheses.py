@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The few places at which a cloud says that the wearer may be.
+"""The few places at which a cloud says that the trunk may be.
 
 In: a cloud's places and weights. Out: `Hypothesis`, the likeliest first. Owns nothing.
 """
@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
+from echostep.jit import kernel
 
 # All by reason.
-REACH_M = 2.5  # particles so near to the heaviest square metre are one hypothesis: a room
+REACH_M = 2.5  # particles so near to the heaviest square are one hypothesis: a room
 MOST = 5  # hypotheses that are listed
 LEAST = 0.02  # probability of one that is listed
+SQUARE_M = 1.0  # side of a square, doubled until there are at most MOST_SQUARES
+MOST_SQUARES = 1_000_000  # memory: 8 MB
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,30 +39,91 @@ class Hypothesis:
         return f"{self.probability:.2f}:{self.x_m:.1f},{self.y_m:.1f},{self.level}"
 
 
+class _Particles(NamedTuple):
+    """n places in the map (m), each with its level, heading (rad), and the number of its square."""
+
+    x_m: Floats
+    y_m: Floats
+    level: Ints
+    heading_rad: Floats
+    square: Ints
+
+
 def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[Hypothesis, ...]:
-    """At most MOST, from places (n,) in the map with weights that sum to 1. Each takes the particles near the heaviest square metre that is left."""
-    square = (np.floor(x_m) - np.floor(x_m.min())) + 1e4 * (np.floor(y_m) - np.floor(y_m.min())) + 1e9 * level
-    _, member = np.unique(square, return_inverse=True)
+    """At most MOST, from places (n,) in the map with weights that sum to 1. Each takes the particles near the heaviest square that is left."""
+    particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
-    found: list[Hypothesis] = []
+    mass, found = np.bincount(particles.square, left), list[Hypothesis]()
     while len(found) < MOST:
-        heaviest = int(np.bincount(member, left).argmax())
-        inside = (member == heaviest) & (left > 0.0)
-        if not inside.any():
+        probability, *place = _take(int(mass.argmax()), particles, left, mass)
+        if probability < LEAST:
             break
-        w = left[inside]
-        x, y, k = float(np.average(x_m[inside], weights=w)), float(np.average(y_m[inside], weights=w)), level[inside][0]
-        near = (np.hypot(x_m - x, y_m - y) < REACH_M) & (level == k) & (left > 0.0)
-        part = left[near]
-        total = float(part.sum())
-        if total < LEAST:
-            break
-        found.append(_hypothesis(total, x_m[near], y_m[near], int(k), heading_rad[near], part / total))
-        left[near] = 0.0
+        found.append(_hypothesis(probability, *place))
     return tuple(sorted(found, key=lambda h: -h.probability))
 
 
-def _hypothesis(probability: float, x: Floats, y: Floats, level: int, heading: Floats, weight: Floats) -> Hypothesis:
-    mean_x, mean_y = float(weight @ x), float(weight @ y)
-    variance = float(weight @ ((x - mean_x) ** 2 + (y - mean_y) ** 2))
-    return Hypothesis(probability, mean_x, mean_y, level, math.sqrt(0.5 * variance), mean_angle(heading, weight))
+def _squares(x_m: Floats, y_m: Floats, level: Ints) -> Ints:
+    """Number (n,) of the square of each place, below MOST_SQUARES."""
+    side_m = SQUARE_M
+    while True:
+        east, north = np.floor(x_m / side_m), np.floor(y_m / side_m)
+        east, north = east - east.min(), north - north.min()
+        columns, rows = east.max() + 1.0, north.max() + 1.0
+        if columns * rows * (level.max() + 1) <= MOST_SQUARES:
+            return np.asarray((level * rows + north) * columns + east, np.int64)
+        side_m *= 2.0
+
+
+def _hypothesis(
+    probability: float, x_m: float, y_m: float, level: float, square_m2: float, east: float, north: float
+) -> Hypothesis:
+    sd_m = math.sqrt(max(0.5 * square_m2, 0.0))
+    return Hypothesis(probability, x_m, y_m, int(level), sd_m, math.atan2(north, east))
+
+
+@kernel
+def _take(
+    heaviest: int, particles: _Particles, left: Floats, mass: Floats
+) -> tuple[float, float, float, float, float, float, float]:
+    """Take the particles within REACH_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST of the weight.
+
+    Returns their weight, mean x and y, level, mean square of the distance from there, and the mean of their unit vectors.
+    """
+    x, y, level, heading, square = particles
+    at_x, at_y, storey = _middle(heaviest, particles, left)
+    total, mean_x, mean_y = 0.0, 0.0, 0.0
+    for i in range(len(x)):
+        if level[i] == storey and _is_near(x[i] - at_x, y[i] - at_y):
+            total += left[i]
+            mean_x += left[i] * x[i]
+            mean_y += left[i] * y[i]
+    if total < LEAST:
+        return total, at_x, at_y, float(storey), 0.0, 0.0, 0.0
+    mean_x, mean_y = mean_x / total, mean_y / total
+    spread, east, north = 0.0, 0.0, 0.0
+    for i in range(len(x)):
+        if left[i] > 0.0 and level[i] == storey and _is_near(x[i] - at_x, y[i] - at_y):
+            spread += left[i] * ((x[i] - mean_x) ** 2 + (y[i] - mean_y) ** 2)
+            east += left[i] * math.cos(heading[i])
+            north += left[i] * math.sin(heading[i])
+            mass[square[i]] -= left[i]
+            left[i] = 0.0
+    return total, mean_x, mean_y, float(storey), spread / total, east / total, north / total
+
+
+@kernel
+def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, float, int]:
+    """Mean place and level of what is left in a square."""
+    total, x_m, y_m, storey = 0.0, 0.0, 0.0, -1
+    for i in range(len(left)):
+        if particles.square[i] == heaviest and left[i] > 0.0:
+            total += left[i]
+            x_m += left[i] * particles.x_m[i]
+            y_m += left[i] * particles.y_m[i]
+            storey = particles.level[i]
+    return x_m / total, y_m / total, storey
+
+
+@kernel
+def _is_near(dx_m: float, dy_m: float) -> bool:
+    return dx_m * dx_m + dy_m * dy_m < REACH_M * REACH_M
