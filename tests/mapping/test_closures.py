@@ -81,4 +81,7 @@ def test_what_the_graph_knew_is_no_news() -> None:
     assert found is not None
     assert found[1][0] == pytest.approx([0.0, 0.0, 0.0])
     assert found[1][1, 1] == pytest.approx(1.0 / 0.05**2 - 1.0 / 0.2**2)
-    assert gained(np.zeros(3), before, before) is None
+    same = gained(np.zeros(3), before, before)
+    assert same is not None
+    assert not same[1].any()  # the place is recognised, nothing else
+    assert gained(np.zeros(3), 9.0 * before, 9.0 * before) is None  # known on no axis

@@ -26,7 +26,7 @@ SHIFTS, TURNS = 31, 5  # of the grid to either side of three standard deviations
 LEAST_SD_M, LEAST_SD_RAD = 0.04, math.radians(0.4)
 MOST_SD_M = 4.0  # of the graph's uncertainty, beyond which no closure is tried: too many places look alike
 KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
-NEW_SHARE = 0.5  # of the graph's variance on an axis, below which what is left is news
+NEW_SHARE = 0.5  # of the graph's variance on an axis: what is left of it, up to which the match counts
 LEAST_OLD = 4
 
 
@@ -86,19 +86,20 @@ def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, c
 def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:
     """What a match alone says of a shift, if the prior (zero, `before`) became the posterior (`mean`, `after`) by it: shift (3,) and information (3, 3).
 
-    Of x, y (m) along the axes on which the posterior is known and new, and of the heading where that is new; None where there is no such axis. The
-    informations of posterior and prior differ by that of the match, whose shift is so much farther from zero.
+    Of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and prior differ by that of the match,
+    whose shift is so much farther from zero. Where little differs the match is silent: it confirms what the graph knew.
     """
     root = np.linalg.cholesky(before[:2, :2])
     white = np.linalg.inv(root)
     left, turn = np.linalg.eigh(white @ after[:2, :2] @ white.T)  # share of the prior's variance that is left on each axis
     axes = white.T @ turn  # (2, 2): a column gives the place along one axis, in standard deviations of the prior
-    known = (left < NEW_SHARE) & (np.sqrt(left) / np.hypot(*axes) < KNOWN_SD_M)
+    known = np.sqrt(left) / np.hypot(*axes) < KNOWN_SD_M
     if not known.any():
         return None
+    new = known & (left < NEW_SHARE)
     information, shift = np.zeros((3, 3)), mean.copy()
-    information[:2, :2] = (axes * np.where(known, 1.0 / left - 1.0, 0.0)) @ axes.T
-    shift[:2] = root @ turn @ (axes.T @ mean[:2] / np.where(known, 1.0 - left, 1.0))
+    information[:2, :2] = (axes * np.where(new, 1.0 / left - 1.0, 0.0)) @ axes.T
+    shift[:2] = root @ turn @ (axes.T @ mean[:2] / np.where(new, 1.0 - left, 1.0))
     left_rad = after[2, 2] / before[2, 2]
     if left_rad < NEW_SHARE:
         information[2, 2] = (1.0 / left_rad - 1.0) / before[2, 2]

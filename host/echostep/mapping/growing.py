@@ -15,11 +15,9 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.mapping.directions import right_angles_off
 from echostep.mapping.drawing import draw
-from echostep.mapping.fragments import find_fragments
 from echostep.mapping.graph import Graph
-from echostep.mapping.mapper import Mapped, close_loops, find_walls, new_graph
+from echostep.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
 from echostep.mapping.nodes import nodes_of
-from echostep.mapping.relief import find_relief
 from echostep.mapping.storeys import find_storeys
 from echostep.path import MeasuredSegment
 
@@ -40,7 +38,7 @@ class GrowingMap:
         """
         self._segments += segments
         nodes, pings = nodes_of(self._segments)
-        fragments, directions = find_relief(nodes, find_fragments(nodes, pings))
+        fragments, directions = find_pieces(nodes, pings)
         graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
         graph.storeys = find_storeys(self._segments, nodes)
         if solved is not None and _same(solved.base_rad, graph.base_rad):
