@@ -14,6 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.mapping.association import KNOWN_M, associate
+from echostep.mapping.bias import find_bias, without_bias
 from echostep.mapping.closures import APART_M, STRETCH_M, find_closure
 from echostep.mapping.directions import LEAST_EVIDENCE, Directions
 from echostep.mapping.drawing import Drawing, draw
@@ -65,6 +66,7 @@ def drawn(solved: Mapped) -> Mapped:
 def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
     """The corrected path of one walk; nothing is drawn yet."""
     nodes, pings = nodes_of(segments)
+    nodes, pings = without_bias(nodes, pings, find_bias(nodes, pings))
     fragments, directions = find_pieces(nodes, pings)
     graph = new_graph(nodes, fragments, directions)
     graph.storeys = find_storeys(segments, nodes)
