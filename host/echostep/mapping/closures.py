@@ -58,7 +58,7 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
 
 
 def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, covariance: Floats) -> Closure | None:
-    """The closure that the posterior of the shift says, None if it is not sure or says nothing new."""
+    """The closure that the posterior of the shift says, None if it is not sure or known on no axis."""
     covariance = covariance + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
     sd = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
     shifts = np.linspace(-3.0 * sd, 3.0 * sd, SHIFTS if sd < 0.6 else 2 * SHIFTS + 1)
@@ -84,14 +84,14 @@ def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, c
 
 
 def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:
-    """What a match alone says of a shift, if the prior (zero, `before`) became the posterior (`mean`, `after`) by it: shift (3,) and information (3, 3).
+    """What a match alone says of a shift, if the prior (zero, `before`) became the posterior (`mean`, `after`) by it.
 
-    Of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and prior differ by that of the match,
-    whose shift is so much farther from zero. Where little differs the match is silent: it confirms what the graph knew.
+    Shift (3,) and information (3, 3), of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and
+    prior differ by that of the match, whose shift is so much farther from zero. Where little differs the match is silent: it confirms the graph.
     """
     root = np.linalg.cholesky(before[:2, :2])
     white = np.linalg.inv(root)
-    left, turn = np.linalg.eigh(white @ after[:2, :2] @ white.T)  # share of the prior's variance that is left on each axis
+    left, turn = np.linalg.eigh(white @ after[:2, :2] @ white.T)  # shares of the prior's variance that are left
     axes = white.T @ turn  # (2, 2): a column gives the place along one axis, in standard deviations of the prior
     known = np.sqrt(left) / np.hypot(*axes) < KNOWN_SD_M
     if not known.any():

@@ -65,7 +65,12 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     cells = cell_counts(straight, poses, pings.range_m, free, ahead)
     add_crossings(straight, paths, cells)
     runs = _without_lone(
-        find_runs(cells, ACROSS if lines.aligned.any() else ANY), straight, straight.aligned | ~lines.aligned.any(), poses, way_m, cells.of
+        find_runs(cells, ACROSS if lines.aligned.any() else ANY),
+        straight,
+        straight.aligned | ~lines.aligned.any(),
+        poses,
+        way_m,
+        cells.of,
     )
     walls, _ = segments_of(straight, runs, cells)
     if not aligned.all():

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, spans
+from echostep.arrays import Floats, spans
 from echostep.mapping.evidence import CELL_M, CROSSED, Cells
 from echostep.mapping.lines import Lines
 from echostep.mapping.spots import SPOT_HALF_M

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Places of walls that are heard while the trunk turns on the spot: at the end of a room, where no ranger is ever carried along the wall.
 
-In: pings of no fragment, the directions of the building. Out: fragments of one spot each. Owns the limits. From one place a wall, a corner and an edge
-sound alike: the range is the same while the axis sweeps over them, and the middle of that sweep is where they are [Kuc and Siegel 1987]. A building
-with two directions decides: what is across one of them is taken for a wall.
+In: pings of no fragment, the directions of the building. Out: fragments of one spot each. Owns the limits. From one place a wall, a corner and an
+edge sound alike: the range is the same while the axis sweeps over them, and the middle of that sweep is where they are [Kuc and Siegel 1987]. A
+building with two directions decides: what is across one of them is taken for a wall.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
-from echostep.mapping.directions import LEAST_EVIDENCE, Directions, right_angles_off
+from echostep.mapping.directions import LEAST_EVIDENCE, RIGHT_RAD, Directions
 from echostep.mapping.fragments import FARTHEST_M, SD_M, Fragments, nearest_nodes
 from echostep.mapping.nodes import Nodes, Pings
 
@@ -22,8 +22,12 @@ LEAST, MISSED = 5, 1  # pings of a ranger, and how many may be none of the spot 
 SWEEP_RAD = math.radians(25.0)  # of the axis, with the same range: half of the cone
 FITS_M = 0.08  # of a range from the mean: three standard deviations
 SPOT_M = 0.15  # from the first ping to the last: the trunk moves over the feet
-ACROSS_RAD = math.radians(20.0)  # of the middle of the sweep from a direction of the building; also its standard deviation: it turns nothing
-CORNER = ACROSS_RAD**2 / 6.0  # of the range: mean of 1 - cos, by which a corner within ACROSS_RAD is farther than its wall
+ACROSS_RAD = math.radians(
+    20.0
+)  # of the middle of the sweep from a direction of the building; also its standard deviation: it turns nothing
+CORNER = (
+    ACROSS_RAD**2 / 6.0
+)  # of the range: mean of 1 - cos, by which a corner within ACROSS_RAD is farther than its wall
 SPOT_HALF_M = 0.1  # half the width that reflects: the first Fresnel zone at 2.5 m, sqrt(wavelength * range / 2), wavelength 8.6 mm
 
 
@@ -39,18 +43,28 @@ def with_spots(nodes: Nodes, pings: Pings, fragments: Fragments, directions: Dir
         return fragments
     spots, of_ping = _both_rangers(pings, fragments.ping < 0)
     node = nearest_nodes(pings, of_ping, len(spots))
-    off = right_angles_off(spots[:, 2] - (directions.base_rad - directions.drift_rad[node]))
+    direction = directions.base_rad - directions.drift_rad[node]
+    off = (spots[:, 2] - direction + 0.5 * RIGHT_RAD) % RIGHT_RAD - 0.5 * RIGHT_RAD
     kept, first = np.abs(off) < ACROSS_RAD, len(fragments.node)
     number = np.append(np.where(kept, first + np.cumsum(kept) - 1, -1), -1)
-    spots, node, normal = spots[kept], node[kept], (spots[:, 2] - off)[kept]
-    on_wall = spots[:, :2] + spots[:, 3:4] * np.column_stack([np.cos(normal), np.sin(normal)])
-    count, pose = len(spots), nodes.pose[node]
-    found = (
-        node, _in_frames(on_wall, pose), normal - pose[:, 2], np.full(count, SPOT_HALF_M), np.hypot(SD_M, CORNER * spots[:, 3]),
-        np.full(count, ACROSS_RAD), spots[:, 4].astype(np.int64),
-    )  # fmt: skip
-    both = (np.concatenate([a, b]) for a, b in zip(fragments[:-1], found, strict=True))
-    return Fragments(*both, np.where(of_ping < 0, fragments.ping, number[of_ping]))
+    found = _on_walls(nodes, node[kept], spots[kept], (spots[:, 2] - off)[kept])
+    columns = [np.concatenate([a, b]) for a, b in zip(fragments[:-1], found, strict=True)]
+    return Fragments(*[*columns, np.where(of_ping < 0, fragments.ping, number[of_ping])])
+
+
+def _on_walls(nodes: Nodes, node: Ints, spots: Floats, normal_rad: Floats) -> tuple[Floats | Ints, ...]:
+    """The columns of `Fragments`, without `ping`, of spots (s, 5) on walls with these normals by odometry."""
+    count, pose, range_m = len(spots), nodes.pose[node], spots[:, 3]
+    on_wall = spots[:, :2] + range_m[:, None] * np.column_stack([np.cos(normal_rad), np.sin(normal_rad)])
+    return (
+        node,
+        _in_frames(on_wall, pose),
+        normal_rad - pose[:, 2],
+        np.full(count, SPOT_HALF_M),
+        np.hypot(SD_M, CORNER * range_m),
+        np.full(count, ACROSS_RAD),
+        spots[:, 4].astype(np.int64),
+    )
 
 
 def _in_frames(points: Floats, pose: Floats) -> Floats:

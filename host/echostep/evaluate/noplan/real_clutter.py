@@ -64,7 +64,9 @@ def with_stated_drift(segments: Sequence[MeasuredSegment], truth: Floats) -> lis
         return list(segments)
     grown = wrap(error[later[first]] - error[first])
     share = float(grown.std() / np.sqrt(np.mean(variance[later[first]] - variance[first])))
-    return [replace(s, segment=replace(p, turn_sd_rad=share * p.turn_sd_rad)) for s, p in zip(segments, pieces, strict=True)]
+    return [
+        replace(s, segment=replace(p, turn_sd_rad=share * p.turn_sd_rad)) for s, p in zip(segments, pieces, strict=True)
+    ]
 
 
 class _Hearing:
