@@ -18,11 +18,13 @@ from echostep.evaluate.anywhere.sites import Site, plan_of
 from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.evaluate.noplan.footslam import RADIUS_M, footslam, hexagon
 from echostep.evaluate.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
+from echostep.evaluate.noplan.real_clutter import with_stated_drift
 from echostep.evaluate.noplan.sites import furnished, loop_walls
 from echostep.evaluate.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from echostep.evaluate.study import StudyRequest
 from echostep.mapping.graph import Closure
 from echostep.mapping.nodes import Nodes
+from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import Level, load_plan
 from echostep.simulation.scenario import DEMO_WAYPOINTS
@@ -145,6 +147,24 @@ def test_a_real_foot_is_drawn(tmp_path: Path) -> None:
     assert row["rmse_m"] < 0.5
     assert row["absent"] < 0.05
     assert row["rmse_m"] < row["footslam_rmse_m"]
+
+
+def test_a_log_states_how_its_heading_errs_over_ten_metres() -> None:
+    """Headings that jitter by 3 degrees and drift by 0.5 per square root of a metre: 4.5 degrees in ten metres, not 4.2 in each."""
+    rng = np.random.default_rng(4)
+    count, stated = 2000, math.radians(4.0)
+    drift = np.cumsum(rng.normal(0.0, math.radians(0.5), count + 1))
+    heading = drift + rng.normal(0.0, math.radians(3.0), count + 1)
+    pieces = [PathSegment(k, k + 1.0, 1.0, 0.0, heading[k], heading[k + 1], 0.02, stated, k) for k in range(count)]
+    none = np.zeros(0)
+    segments = [MeasuredSegment(piece, none, none.astype(np.int64), none) for piece in pieces]
+    truth = np.zeros((count + 1, 5))
+    truth[:, 0] = truth[:, 1] = np.arange(count + 1.0)
+    found = with_stated_drift(segments, truth)
+    grown = math.sqrt(2.0 * 3.0**2 + 10.0 * 0.5**2)  # degrees, over ten metres
+    assert math.degrees(found[0].segment.turn_sd_rad) == pytest.approx(grown / math.sqrt(10.0), rel=0.1)
+    short = with_stated_drift(segments[:5], truth)
+    assert short == segments[:5]
 
 
 def test_a_log_is_drawn(tmp_path: Path) -> None:

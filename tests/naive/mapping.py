@@ -39,7 +39,7 @@ def _said(at: Floats, normal_rad: float, new: Pieces, i: int, old: Pieces, j: in
     common = min(along + half, old.half_m[j]) - max(along - half, -old.half_m[j])
     if common <= 0.0:
         return 0.0, 0.0
-    shared = min(common / max(2.0 * min(half, old.half_m[j]), matching.LEAST_HALF_M), 1.0)
+    shared = min(common / max(2.0 * half, matching.LEAST_HALF_M), 1.0)
     ratio = 0.0
     if abs(turned) < matching.CHANCE_RAD and abs(off) < matching.CHANCE_M:
         sd = math.sqrt(matching.OFF_SD_RAD**2 + new.sd_rad[i] ** 2 + old.sd_rad[j] ** 2)

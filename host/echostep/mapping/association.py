@@ -17,6 +17,7 @@ from echostep.jit import inline_kernel, kernel
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.graph import Walls
 from echostep.mapping.nodes import Nodes
+from echostep.mapping.spots import is_spot
 from echostep.mapping.storeys import STAIRS
 
 APART_M = 0.15  # of a fragment's middle from the line of its wall: three standard deviations of either
@@ -34,8 +35,9 @@ def associate(
     `storey` (f,): a wall is on one; fragments on stairs are of none.
     """
     order = np.lexsort((-fragments.half_m, fragments.node))
-    long = order[fragments.half_m[order] * 2.0 >= SMALL_M]
-    short = order[fragments.half_m[order] * 2.0 < SMALL_M]
+    size_m, spot = fragments.half_m[order] * 2.0, is_spot(fragments.half_m[order])
+    long = np.concatenate([order[size_m >= SMALL_M], order[spot]])
+    short = order[(size_m < SMALL_M) & ~spot]
     way_m = nodes.way_m[fragments.node]
     placed = _Placed(centre_m, normal_rad, fragments.half_m, fragments.sd_rad, way_m, anchored)
     of, normals, rhos, count = np.full(len(order), -1, np.int64), [], [], 0

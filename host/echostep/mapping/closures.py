@@ -14,7 +14,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.mapping.graph import Closure, Graph
-from echostep.mapping.matching import Pieces, match
+from echostep.mapping.matching import match
+from echostep.mapping.stretches import pieces, stretches
 
 STRETCH_M = 8.0  # of path that is matched as one
 APART_M = 20.0  # of path between a stretch and what is older
@@ -25,15 +26,8 @@ SHIFTS, TURNS = 31, 5  # of the grid to either side of three standard deviations
 LEAST_SD_M, LEAST_SD_RAD = 0.04, math.radians(0.4)
 MOST_SD_M = 4.0  # of the graph's uncertainty, beyond which no closure is tried: too many places look alike
 KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
+NEW_SHARE = 0.5  # of the graph's variance on an axis: what is left of it, up to which the match counts
 LEAST_OLD = 4
-
-
-def pieces(graph: Graph, which: Ints) -> Pieces:
-    """Fragments in the map."""
-    f = graph.fragments
-    centre, normal = graph.places()
-    range_m = np.hypot(*(centre[which] - graph.pose[f.node[which], :2]).T)
-    return Pieces(centre[which, 0], centre[which, 1], normal[which], f.half_m[which], f.sd_rad[which], range_m)
 
 
 def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure | None:
@@ -64,12 +58,12 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
 
 
 def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, covariance: Floats) -> Closure | None:
-    """The closure that the posterior of the shift says, None if it is not sure or says nothing new."""
+    """The closure that the posterior of the shift says, None if it is not sure or known on no axis."""
     covariance = covariance + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
     sd = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
     shifts = np.linspace(-3.0 * sd, 3.0 * sd, SHIFTS if sd < 0.6 else 2 * SHIFTS + 1)
     turns = np.linspace(-2.0, 2.0, TURNS) * math.sqrt(covariance[2, 2])
-    score = match(pieces(graph, new), pieces(graph, older), graph.pose[node, :2], shifts, turns)
+    score = match(pieces(graph, new), stretches(graph, older), graph.pose[node, :2], shifts, turns)
     t, x, y = np.meshgrid(turns, shifts, shifts, indexing="ij")
     grid = np.stack([x.ravel(), y.ravel(), t.ravel()], axis=1)
     prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(covariance), grid))
@@ -83,22 +77,31 @@ def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, c
     mean = found @ grid
     spread = (grid - mean) * np.sqrt(found)[:, None]
     after = spread.T @ spread + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
-    return _gained(graph, node, old_node, mean, after, covariance, log_odds)
-
-
-def _gained(
-    graph: Graph, node: int, old_node: int, mean: Floats, after: Floats, before: Floats, log_odds: float
-) -> Closure | None:
-    """What the posterior (mean, `after`) knows that the graph (`before`) does not, along the axes that are known well."""
-    value, vector = np.linalg.eigh(after[:2, :2])
-    information = np.zeros((3, 3))
-    for k in (0, 1):
-        e = np.array([vector[0, k], vector[1, k], 0.0])
-        if math.sqrt(value[k]) < KNOWN_SD_M:
-            information += np.outer(e, e) / value[k]
-    if not information.any():
+    if (news := gained(mean, after, covariance)) is None:
         return None
-    if after[2, 2] < 0.5 * before[2, 2]:
-        information[2, 2] = 1.0 / after[2, 2] - 1.0 / before[2, 2]
-    between = graph.pose[node] - graph.pose[old_node] + mean
-    return Closure(old_node, node, between, information, log_odds)
+    shift, information = news
+    return Closure(old_node, node, graph.pose[node] - graph.pose[old_node] + shift, information, log_odds)
+
+
+def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:
+    """What a match alone says of a shift, if the prior (zero, `before`) became the posterior (`mean`, `after`) by it.
+
+    Shift (3,) and information (3, 3), of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and
+    prior differ by that of the match, whose shift is so much farther from zero. Where little differs the match is silent: it confirms the graph.
+    """
+    root = np.linalg.cholesky(before[:2, :2])
+    white = np.linalg.inv(root)
+    left, turn = np.linalg.eigh(white @ after[:2, :2] @ white.T)  # shares of the prior's variance that are left
+    axes = white.T @ turn  # (2, 2): a column gives the place along one axis, in standard deviations of the prior
+    known = np.sqrt(left) / np.hypot(*axes) < KNOWN_SD_M
+    if not known.any():
+        return None
+    new = known & (left < NEW_SHARE)
+    information, shift = np.zeros((3, 3)), mean.copy()
+    information[:2, :2] = (axes * np.where(new, 1.0 / left - 1.0, 0.0)) @ axes.T
+    shift[:2] = root @ turn @ (axes.T @ mean[:2] / np.where(new, 1.0 - left, 1.0))
+    left_rad = after[2, 2] / before[2, 2]
+    if left_rad < NEW_SHARE:
+        information[2, 2] = (1.0 / left_rad - 1.0) / before[2, 2]
+        shift[2] = mean[2] / (1.0 - left_rad)
+    return shift, information

@@ -15,7 +15,7 @@ from echostep.mapping.evidence import add_crossings, cell_counts, explained_by_e
 from echostep.mapping.graph import Graph
 from echostep.mapping.lines import Lines, find_lines, joined
 from echostep.mapping.nodes import Pings
-from echostep.mapping.segments import Run, find_runs, meets, segments_of
+from echostep.mapping.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 
 # Of wall on one line, at least; shorter ones must be heard again. One passer-by in 15, in 70, goes along for longer, when one second is the mean
 LONE_M, LONE_ASKEW_M = 2.5, 4.0
@@ -64,9 +64,13 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     straight = _selected(lines, aligned)
     cells = cell_counts(straight, poses, pings.range_m, free, ahead)
     add_crossings(straight, paths, cells)
-    every = np.ones(len(straight.rho_m), np.bool_)
     runs = _without_lone(
-        find_runs(cells, every), straight, straight.aligned | ~lines.aligned.any(), poses, way_m, cells.of
+        find_runs(cells, ACROSS if lines.aligned.any() else ANY),
+        straight,
+        straight.aligned | ~lines.aligned.any(),
+        poses,
+        way_m,
+        cells.of,
     )
     walls, _ = segments_of(straight, runs, cells)
     if not aligned.all():
@@ -75,7 +79,7 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
         more = cell_counts(askew, poses, pings.range_m, free, ahead)
         add_crossings(askew, paths, more)
         none = np.zeros(len(askew.rho_m), np.bool_)
-        found = _without_lone(find_runs(more, none), askew, none, poses, way_m, more.of)
+        found = _without_lone(find_runs(more, ASKEW), askew, none, poses, way_m, more.of)
         kept = sorted({run.line for run in found})
         both = joined(straight, _selected(askew, np.isin(np.arange(len(none)), kept)))
         runs += [run._replace(line=len(straight.rho_m) + kept.index(run.line)) for run in found]

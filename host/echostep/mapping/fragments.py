@@ -58,7 +58,7 @@ def find_fragments(nodes: Nodes, pings: Pings) -> Fragments:
         owner[own[of_ping >= 0]] = of_ping[of_ping >= 0] + sum(len(r) for r in rows)
         rows.append(found)
     table = np.concatenate(rows)
-    middle, node = table[:, 0:2], _nearest_nodes(pings, owner, len(table))
+    middle, node = table[:, 0:2], nearest_nodes(pings, owner, len(table))
     pose = nodes.pose[node]
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     dx, dy = middle[:, 0] - pose[:, 0], middle[:, 1] - pose[:, 1]
@@ -75,7 +75,7 @@ def find_fragments(nodes: Nodes, pings: Pings) -> Fragments:
     )
 
 
-def _nearest_nodes(pings: Pings, owner: Ints, count: int) -> Ints:
+def nearest_nodes(pings: Pings, owner: Ints, count: int) -> Ints:
     """The node nearest to the middle ping of each of `count` fragments; `owner` (k,): fragment of each ping."""
     order = np.argsort(owner, kind="stable")
     first, end = (np.searchsorted(owner[order], np.arange(count), side) for side in ("left", "right"))

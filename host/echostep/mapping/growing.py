@@ -13,13 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.mapping.bias import find_bias, without_bias
 from echostep.mapping.directions import right_angles_off
 from echostep.mapping.drawing import draw
-from echostep.mapping.fragments import find_fragments
 from echostep.mapping.graph import Graph
-from echostep.mapping.mapper import Mapped, close_loops, find_walls, new_graph
+from echostep.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
 from echostep.mapping.nodes import nodes_of
-from echostep.mapping.relief import find_relief
 from echostep.mapping.storeys import find_storeys
 from echostep.path import MeasuredSegment
 
@@ -32,15 +31,20 @@ class GrowingMap:
     def __init__(self) -> None:
         self._segments: list[MeasuredSegment] = []
         self._solved: Graph | None = None
+        self._bias_rad_m = 0.0
 
     def grow(self, segments: Sequence[MeasuredSegment]) -> Mapped:
         """The drawing of all segments so far, of which these are new.
 
-        Once it shows that the building has two directions, or other ones, all is solved anew.
+        Once it shows that the building has two directions, or other ones, or that odometry has a bias, all is solved anew.
         """
         self._segments += segments
         nodes, pings = nodes_of(self._segments)
-        fragments, directions = find_relief(nodes, find_fragments(nodes, pings))
+        bias = find_bias(nodes, pings, self._bias_rad_m)
+        if bias != self._bias_rad_m:
+            self._bias_rad_m, self._solved = bias, None
+        nodes, pings = without_bias(nodes, pings, bias)
+        fragments, directions = find_pieces(nodes, pings)
         graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
         graph.storeys = find_storeys(self._segments, nodes)
         if solved is not None and _same(solved.base_rad, graph.base_rad):

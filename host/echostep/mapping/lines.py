@@ -13,6 +13,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.mapping.graph import Graph
+from echostep.mapping.spots import is_spot
 
 SAME_M = 0.12  # two walls nearer than this, beside each other, are one: less is no wall's thickness but two errors
 SAME_RAD = math.radians(4.0)
@@ -41,7 +42,7 @@ def find_lines(graph: Graph) -> Lines:
     lines: list[Floats] = []
     for wall in range(len(graph.walls.rho_m)):
         own = np.flatnonzero(of == wall)
-        if 2.0 * f.half_m[own].sum() >= LEAST_M:
+        if 2.0 * f.half_m[own].sum() >= LEAST_M or is_spot(f.half_m[own]).any():
             lines.append(_line(centre[own], graph.walls.normal_rad[wall], f.half_m[own], graph.base_rad))
     lines.sort(key=lambda line: -line[5])
     merged: list[Floats] = []

@@ -14,6 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.mapping.association import KNOWN_M, associate
+from echostep.mapping.bias import find_bias, without_bias
 from echostep.mapping.closures import APART_M, STRETCH_M, find_closure
 from echostep.mapping.directions import LEAST_EVIDENCE, Directions
 from echostep.mapping.drawing import Drawing, draw
@@ -21,6 +22,7 @@ from echostep.mapping.fragments import Fragments, find_fragments
 from echostep.mapping.graph import ROUNDS, Closure, Graph, Walls, contradicted
 from echostep.mapping.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.relief import find_relief
+from echostep.mapping.spots import with_spots
 from echostep.mapping.storeys import STAIRS, find_storeys
 from echostep.path import MeasuredSegment
 
@@ -64,7 +66,8 @@ def drawn(solved: Mapped) -> Mapped:
 def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
     """The corrected path of one walk; nothing is drawn yet."""
     nodes, pings = nodes_of(segments)
-    fragments, directions = find_relief(nodes, find_fragments(nodes, pings))
+    nodes, pings = without_bias(nodes, pings, find_bias(nodes, pings))
+    fragments, directions = find_pieces(nodes, pings)
     graph = new_graph(nodes, fragments, directions)
     graph.storeys = find_storeys(segments, nodes)
     for _ in range(LOCAL_ROUNDS):
@@ -72,6 +75,12 @@ def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda 
     undone = close_loops(graph, progress)
     undone += settle(graph)
     return Mapped(graph, pings, (), directions, tuple(undone))
+
+
+def find_pieces(nodes: Nodes, pings: Pings) -> tuple[Fragments, Directions]:
+    """The pieces of walls that the pings show, and the directions that they have."""
+    fragments, directions = find_relief(nodes, find_fragments(nodes, pings))
+    return with_spots(nodes, pings, fragments, directions), directions
 
 
 def settle(graph: Graph) -> list[Closure]:

@@ -95,7 +95,7 @@ def _add_older(fits: Floats, free: Floats, piece: Piece, old: Pieces, j: int, sh
             common = min(along + half, old_half) - max(along - half, -old_half)
             if common <= 0.0:
                 continue
-            shared = min(common / max(2.0 * min(half, old_half), LEAST_HALF_M), 1.0)
+            shared = min(common / max(2.0 * half, LEAST_HALF_M), 1.0)
             if fitting:
                 value = math.log(OUTLIER + (1.0 - OUTLIER) * normal(off, OFF_SD_M) * 2.0 * CHANCE_M * angle)
                 fits[a, b] = max(fits[a, b], shared * value)

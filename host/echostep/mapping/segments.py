@@ -11,17 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, spans
+from echostep.arrays import Floats, spans
 from echostep.mapping.evidence import CELL_M, CROSSED, Cells
 from echostep.mapping.lines import Lines
+from echostep.mapping.spots import SPOT_HALF_M
 
 SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of one that passed it
-LEAST_PINGS, LEAST_M = 8, 0.6  # of a run
-LEAST_PINGS_ASKEW, LEAST_ASKEW_M = (
-    12,
-    0.8,
-)  # where the building has directions and this is none: corners and edges seem so
+# Pings of a run, and its length: of a line that has a direction of the building, what reflects; of any line where the building has none; of one
+# askew to them, as corners and edges seem to be
+ACROSS, ANY, ASKEW = (8, 2.0 * SPOT_HALF_M), (8, 0.6), (12, 0.8)
 BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
 EXTEND_M = (
     2.6  # farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
@@ -40,13 +39,12 @@ class Run(NamedTuple):
     pings: float
 
 
-def find_runs(cells: Cells, aligned: Bools) -> list[Run]:
-    """Runs of all lines; those of lines that are not `aligned` (l,) must be longer."""
+def find_runs(cells: Cells, least: tuple[int, float]) -> list[Run]:
+    """Runs of all lines, of so many pings and so long at least; one on a line ACROSS a direction of the building is as wide as what reflects."""
     runs = []
     kernel = np.ones(2 * SMOOTH + 1)
     for line, first in enumerate(cells.first_m.tolist()):
         h, p = cells.heard[line, : cells.size[line]], cells.passed[line, : cells.size[line]]
-        least = (LEAST_PINGS, LEAST_M) if aligned[line] else (LEAST_PINGS_ASKEW, LEAST_ASKEW_M)
         near, near_passed = np.convolve(h, kernel, "same"), np.convolve(p, kernel, "same")
         there = (near > 0.0) & (HEARD_ODDS * near > PASSED_ODDS * near_passed)
         for low, high in _bridged(spans(there).tolist(), near_passed):
@@ -55,6 +53,9 @@ def find_runs(cells: Cells, aligned: Bools) -> list[Run]:
                 continue
             low_m, high_m = first + at[0] * CELL_M, first + (at[-1] + 1) * CELL_M
             pings = float(h[low:high].sum())
+            if least is ACROSS:
+                middle_m = 0.5 * (low_m + high_m)
+                low_m, high_m = min(low_m, middle_m - SPOT_HALF_M), max(high_m, middle_m + SPOT_HALF_M)
             if pings >= least[0] and high_m - low_m >= least[1]:
                 runs.append(Run(line, low_m, high_m, pings))
     return runs

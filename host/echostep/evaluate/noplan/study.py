@@ -38,6 +38,7 @@ from echostep.evaluate.report import LOST_M, Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.start import Start
 from echostep.mapping.mapper import map_walk
+from echostep.mapping.nodes import nodes_of
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import plan_in
 from echostep.plan.model import Plan
@@ -147,7 +148,8 @@ def drawn_row(
     row |= closure_columns(mapped.graph.closures, pose, truth, frame)
     row["shape_m"] = rmse(pose[:, :2], truth)
     at_s = nodes.t_s if at_s is None else at_s
-    paths = {"": pose, "foot_": nodes.pose, "footslam_": footslam(nodes, np.random.default_rng([seed, 85]))}
+    foot, _ = nodes_of(walk.segments)  # as it was measured: the mapper takes a bias out of it
+    paths = {"": pose, "foot_": foot.pose, "footslam_": footslam(foot, np.random.default_rng([seed, 85]))}
     for of, path in paths.items():
         placed = known_start(path[:, :2], truth).to_map(path[:, :2])
         at = np.column_stack([np.interp(at_s, nodes.t_s, placed[:, k]) for k in (0, 1)])
