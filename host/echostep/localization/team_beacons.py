@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
+from echostep.localization.meetings import TimedMeeting
 from echostep.localization.particles import Cloud
 from echostep.ports.meeting import Meeting
 from echostep.ports.team_beacons import SharedBeacon, parse_team_beacons
@@ -58,15 +59,15 @@ class TeamBeaconMap:
         if len(self.told) > MOST_TEAMMATES:
             self.told.pop(next(iter(self.told)))
 
-    def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[Meeting]:
-        """Of these readings, those of beacons whose place a teammate told; `numbers`: of the beacon in each slot."""
+    def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[TimedMeeting]:
+        """Of these readings, those of beacons whose place a teammate told, with their times; `numbers`: of the beacon in each slot."""
         if not self.told:
             return []
         return [
-            Meeting(
+            (reading.t_s, Meeting(
                 name, "uncertain", b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2,
                 range_m=reading.range_m, range_sd_m=TEAM_RANGE_SD_M, beacon=b.number,
-            )
+            ))
             for reading in readings
             for name, beacons in self.told.items()
             if (b := beacons.get(numbers[reading.slot])) is not None
