@@ -18,7 +18,7 @@ from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.meeting_model import (
     WRONG,
-    MetOnTheWay,
+    PreparedMeeting,
     best_omega,
     covariance,
     information,
@@ -151,7 +151,7 @@ def test_the_way_to_a_meeting_ends_with_its_segment_and_a_guess_is_none() -> Non
     segment = PathSegment(10.0, 12.0, 1.2, 0.4, 0.0, 0.0, 0.02, 0.001, 1)
     for t_s, share in ((-math.inf, 0.0), (9.0, 0.0), (11.0, 0.5), (13.0, 1.0)):
         met = on_the_way(KIM, segment, t_s)
-        assert isinstance(met, MetOnTheWay)
+        assert isinstance(met, PreparedMeeting)
         assert (met.way_x_m, met.way_y_m) == pytest.approx((1.2 * share, 0.4 * share))
         assert start_at(met).sd_m >= start_at(KIM).sd_m
     assert on_the_way(KIM, replace(segment, sd_m=50.0), 11.0) is KIM

@@ -3,8 +3,8 @@
 
 In: a cloud, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it. Owns the model and its constants.
 
-The cloud is that of the begin of a segment, the meeting was at a moment of it, up to a stride later: `MetOnTheWay` carries the way until then, and
-each particle is weighed at the place to which it leads.
+The cloud is that of the begin of a segment, the meeting was at a moment of it, up to a stride later: `PreparedMeeting` carries the way until then,
+and each particle is weighed at the place to which it leads.
 
 If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
 range_sd_m^2); the teammate's own covariance is added to both. With probability `wrong` (another name was tapped, the teammate is sure of a wrong
@@ -45,11 +45,12 @@ FITS = 0.5  # probability that the meeting is right, given the cloud, below whic
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
 
 
-class MetOnTheWay(Meeting, frozen=True):
-    """A meeting after a way (m, walk frame) since the moment of the cloud."""
+class PreparedMeeting(Meeting, frozen=True):
+    """A meeting after a way (m, walk frame) since the moment of the cloud; `share`: one by the number of teammates who tell of one measurement."""
 
     way_x_m: float = 0.0
     way_y_m: float = 0.0
+    share: float = 1.0
 
 
 def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
@@ -58,7 +59,8 @@ def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
     if segment.unobserved or span_s <= 0.0:
         return meeting
     share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0)
-    return MetOnTheWay(**msgspec.structs.asdict(meeting), way_x_m=share * segment.dx_m, way_y_m=share * segment.dy_m)
+    way = {"way_x_m": share * segment.dx_m, "way_y_m": share * segment.dy_m}
+    return PreparedMeeting(**(msgspec.structs.asdict(meeting) | way))
 
 
 def carries_position(meeting: Meeting) -> bool:
@@ -76,10 +78,15 @@ def covariance(meeting: Meeting) -> Floats:
     return found
 
 
+def share_of(meeting: Meeting) -> float:
+    """The power of a meeting's likelihood: of one measurement that several teammates tell of all powers sum to 1."""
+    return meeting.share if isinstance(meeting, PreparedMeeting) else 1.0
+
+
 def start_at(meeting: Meeting) -> CheckIn:
     """A start by a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
-    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, MetOnTheWay) else 0.0
+    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, PreparedMeeting) else 0.0
     sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
     return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)
 
@@ -125,7 +132,7 @@ def best_omega(own: Floats, other: Floats) -> float:
 def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
     """Places (n, 2) of the particles at the meeting, map frame."""
     place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
-    if isinstance(meeting, MetOnTheWay):
+    if isinstance(meeting, PreparedMeeting):
         c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
         x, y = meeting.way_x_m, meeting.way_y_m
         place += cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
@@ -147,7 +154,8 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     right = density / (density + wrong * anywhere)
     factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
     if factor is not None:  # a gathered cloud elsewhere is left alone
-        factor = factor - factor.max()
+        factor = share_of(meeting) * factor
+        factor -= factor.max()
         factor -= math.log(float(weight @ np.exp(factor)))
         # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
         cloud.reweight(np.log(np.maximum(right * np.exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))
