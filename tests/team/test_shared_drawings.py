@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,16 +14,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line import echostep
+from command_line import echostep, interrupt_once_called
 from echostep.errors import EchostepError
+from echostep.operation.operation import Operation
 from echostep.plan.model import load_plan
 from echostep.team import inbox, wearer_plan
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import MOST_TRIES, Receiver
 from echostep.team.mqtt import Listener
+from echostep.team.report import WITHOUT_PLAN
 from echostep.team.shared_drawings import MOST_BYTES, MOST_STOREYS, MOST_WALLS, checked_drawing, drawing_topic
 from echostep.team.wearer_plan import drawing_wearer, plan_file
+from team.network import box_to
 from team.team_broker import Broker, needs_broker
+from team.team_reports import report
 from waiting import until
 
 WALLS = [[0.0, 0.0, 9.0, 0.0], [0.0, 2.0, 9.0, 2.0]]
@@ -136,6 +141,30 @@ def fetcher(broker: Broker, folder: Path, said: list[str]) -> Callable[[str], Pa
         return path
 
     return fetch
+
+
+@needs_broker
+def test_a_commander_sees_those_who_are_on_a_drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One wearer is on it, the one who draws it on none."""
+    interrupt_once_called(Operation, "update", monkeypatch, lambda operation, *_: len(operation.roster.keys) == 2)
+    with Broker(tmp_path) as broker:
+        keep(broker, drawing())
+        on_it = report("bo", plan_sha256=hashlib.sha256(drawing()).hexdigest())
+        draws = report("anna", plan_sha256=WITHOUT_PLAN)
+        boxes = [box_to(broker.url, name=made.name) for made in (on_it, draws)]
+        for box, made in zip(boxes, (on_it, draws), strict=True):
+            box.offer(made)
+        assert until(lambda: all(box.counts.sent == 1 for box in boxes))
+        arguments = (broker.url, "--plan", "wearer:anna", "--no-page", "--json")
+        done = echostep("command", *arguments, "--out", "out/operation.mcap", cwd=tmp_path)
+        for box in boxes:
+            box.close()
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["plan"] == "drawn by anna"
+    notes = {member["name"]: [note for note in member["notes"] if "plan" in note] for member in told["members"]}
+    assert notes == {"bo": [], "anna": ["tracked without a plan"]}
+    assert len(list((tmp_path / "out").glob("drawing-anna-*.json"))) == 1
 
 
 @needs_broker

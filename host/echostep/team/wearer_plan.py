@@ -61,7 +61,7 @@ def plan_file(
 def _fetched(broker: Endpoint, topic: str, print_line: PrintLine) -> bytes | None:
     """The first payload on a topic that is not empty; None after WAIT_S."""
     heard = queue.SimpleQueue[bytes]()
-    listener = Listener(broker, [topic], lambda _topic, payload, _kept: heard.put(payload), MOST_BYTES + 1024)
+    listener = Listener(broker, [topic], lambda _topic, payload, _retained: heard.put(payload), MOST_BYTES + 1024)
     receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))
     end_s = time.monotonic() + WAIT_S
     try:
