@@ -105,9 +105,10 @@ class Session:
         from echostep.session.drawing_share import UnseenDrawing, shared_drawing
 
         assert self.output.outlet
-        self._drawing = shared_drawing(self.tracker, self.output.outlet.name)
+        name, say = self.output.outlet.name, partial(console.print, markup=False, highlight=False)
+        self._drawing = shared_drawing(self.tracker, name)
+        say(f"What the walk draws goes to {self._broker}: teammates are tracked on it by --plan wearer:{name}")
         if self.output.page is None:
-            say = partial(console.print, markup=False, highlight=False)
             opened.callback(UnseenDrawing(self.tracker, self._drawing, say).close)
 
     @property
@@ -262,6 +263,8 @@ class Session:
         """
         if self.page:
             self.page.end(summary_words(self.estimates, truth))
+        if self._drawing and self._drawing.too_long:
+            console.print("The drawing became too large for the team: the broker keeps an earlier one")
         write_results(
             self.output.folder,
             self.tracker,
