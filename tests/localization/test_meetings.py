@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,11 +16,22 @@ from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.meeting_model import WRONG, best_omega, covariance, information, weigh
+from echostep.localization.meeting_model import (
+    WRONG,
+    PreparedMeeting,
+    best_omega,
+    covariance,
+    information,
+    on_the_way,
+    places_at,
+    start_at,
+    weigh,
+)
 from echostep.localization.meetings import MOST_NAMES, PLACE_M, RENEWED_M, MeetingEffect, MeetingMemory
 from echostep.localization.particles import Cloud, CloudSettings
 from echostep.localization.plausibility import STATED, Plausibility
 from echostep.localization.start import Start
+from echostep.path import PathSegment
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.meeting import MEETING, Meeting, parse_meeting
@@ -109,6 +121,41 @@ def test_a_sure_cloud_is_not_changed_by_a_bit() -> None:
     assert weigh(own, KIM, AREA_M2) > 0.99
     assert np.array_equal(own.log_weight, before)
     assert own._rng.bit_generator.state == drawn
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.0, 1.0))
+@settings(max_examples=20)
+def test_a_meeting_on_the_way_is_at_the_places_to_which_it_leads(turn_rad: float, share: float) -> None:
+    """Of each particle by its own turn and scale."""
+    own, segment = cloud((4.3, 5.2), (1.5, 1.0), 200), PathSegment(10.0, 12.0, 1.2, 0.3, 0.0, 0.0, 0.02, 0.001, 1)
+    own.turn_rad = turn_rad + np.linspace(-0.5, 0.5, len(own.x_m))
+    own.scale = np.linspace(0.9, 1.1, len(own.x_m))
+    found = places_at(own, on_the_way(KIM, segment, 10.0 + 2.0 * share))
+    for k in (0, len(found) // 3, len(found) - 1):
+        way = share * own.scale[k] * complex(1.2, 0.3) * np.exp(1j * own.turn_rad[k])
+        assert found[k] == pytest.approx([own.x_m[k] + way.real, own.y_m[k] + way.imag])
+
+
+def test_a_range_is_from_the_place_at_which_it_was_measured() -> None:
+    """The cloud of a stride's begin is 3 m from the beacon, at its end 1.8 m."""
+    segment = PathSegment(10.0, 11.0, 1.2, 0.0, 0.0, 0.0, 0.02, 0.001, 1)
+    measured = msgspec.structs.replace(KIM, range_m=1.8, range_sd_m=0.2)
+    rights = [
+        weigh(cloud((1.0, 5.0), (0.05, 0.05), 500), on_the_way(measured, segment, t_s), AREA_M2) for t_s in (10.0, 11.0)
+    ]
+    assert rights[0] < 0.1
+    assert rights[1] > 0.95
+
+
+def test_the_way_to_a_meeting_ends_with_its_segment_and_a_guess_is_none() -> None:
+    segment = PathSegment(10.0, 12.0, 1.2, 0.4, 0.0, 0.0, 0.02, 0.001, 1)
+    for t_s, share in ((-math.inf, 0.0), (9.0, 0.0), (11.0, 0.5), (13.0, 1.0)):
+        met = on_the_way(KIM, segment, t_s)
+        assert isinstance(met, PreparedMeeting)
+        assert (met.way_x_m, met.way_y_m) == pytest.approx((1.2 * share, 0.4 * share))
+        assert start_at(met).sd_m >= start_at(KIM).sd_m
+    assert on_the_way(KIM, replace(segment, sd_m=50.0), 11.0) is KIM
+    assert on_the_way(KIM, replace(segment, t1_s=10.0), 10.0) is KIM
 
 
 def test_two_who_meet_again_and_again_do_not_become_sure() -> None:

@@ -141,10 +141,10 @@ def test_readings_of_told_beacons_become_ranges() -> None:
     beacons.hear(told(BEACON, SharedBeacon(9, 1.0, 1.0, 0, 0.1, 0.0, 0.1)).encode(), 1)
     beacons.hear(told(BEACON, name="bo").encode(), 1)
     readings = [BeaconReading(1.0, 0, 2.5, math.nan), BeaconReading(1.1, 1, 4.0, math.nan)]
-    ranges = beacons.ranges(readings, [7, 8])
+    ranges = [met for _, met in beacons.ranges(readings, [7, 8])]
     assert [(m.name, m.beacon, m.range_m) for m in ranges] == [("kim", 7, 2.5), ("bo", 7, 2.5)]
     beacons.hear(told(name="kim").encode(), 1)  # a newer message replaces it
-    assert [m.name for m in beacons.ranges(readings, [7, 8])] == ["bo"]
+    assert [m.name for _, m in beacons.ranges(readings, [7, 8])] == ["bo"]
 
 
 def test_only_so_many_teammates_are_kept_the_newest() -> None:

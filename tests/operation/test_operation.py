@@ -78,7 +78,7 @@ def test_places_are_those_of_the_reports() -> None:
 
 def test_a_wearer_on_another_plan_has_no_place_on_this_one_and_it_is_said() -> None:
     team = Team(now_s=0.0)
-    team.hear("Kim", place(TOWER, 1.0, 2.0, 1), plan_sha256="0" * 64)
+    team.hear("Kim", place(TOWER, 1.0, 2.0, 1), plan_sha256="f" * 64)
     (row,) = team.scene().rows
     assert row.level is None
     assert "tracked on another plan" in row.notes[0]

@@ -23,8 +23,9 @@ from echostep.page.elements.drawn_walls import (
 )
 from echostep.page.live import LivePage
 from echostep.page.mailbox import Mailbox
+from echostep.page.shared_drawing import SharedDrawing
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import NO_PLAN
+from echostep.plan.model import NO_PLAN, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from page.browser import DESK, LOCAL, PHONE, demo_walk, loaded_page, overflow, picture, wait_for
@@ -144,6 +145,14 @@ def test_a_drawing_that_cannot_go_on_is_said_once_and_nothing_waits_for_it() -> 
     process.add(step(1.0, STRETCH_M), told(), 1)
     process.close()
     assert said == ["the walls are no longer drawn: EOFError"]
+
+
+def test_the_newest_plan_is_taken_once_and_none_that_is_too_long() -> None:
+    shared = SharedDrawing(Pose(0.0, 0.0, 0.0), "test", most_bytes=4)
+    assert shared.take() is None
+    for plan in (b"old", b"new", b"", b"too long"):
+        shared.put(plan)
+    assert (shared.take(), shared.take(), shared.too_long) == (b"new", None, 1)
 
 
 def test_the_drawing_meets_the_wearer() -> None:

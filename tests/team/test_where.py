@@ -7,10 +7,12 @@ import json
 from dataclasses import replace
 
 import pytest
+from rich.console import Console
 
-from echostep.plan.model import load_plan
+from echostep.operation.words import level_on
+from echostep.plan.model import NO_PLAN, load_plan
 from echostep.team import report as reports
-from echostep.team.commander import table
+from echostep.team.commander import notes, table
 from echostep.team.cot import remarks
 from echostep.team.endpoint import Outlet
 from echostep.team.publish import Publishing
@@ -48,3 +50,26 @@ def test_an_older_report_has_no_place_in_words_and_a_hostile_one_is_refused() ->
     assert position.where == ""
     with pytest.raises(BadReportError, match="unprintable"):
         decode(reports.encode(report(position=replace(POSITION, where="in \x1b[2J"))))
+
+
+def test_a_wearer_without_a_plan_is_believed_and_meets_nobody_on_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its frame is its own: it is listed, and on no plan."""
+    offered: list[Report] = []
+    publishing = Publishing(Outlet((), "anna", "red"), Tracker(NO_PLAN), "live", print)
+    monkeypatch.setattr(publishing, "_offer", offered.append)
+    publishing.publish([told(6.0, 9.0)])
+    made = replace(report(), position=offered[0].position, plan=offered[0].plan, plan_sha256=offered[0].plan_sha256)
+    roster, plan = Roster(), load_plan(PLAN)
+    assert roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
+    (member,) = roster.members(0.0)
+    assert "tracked without a plan" in notes(member, plan, 0.0, set())
+    assert level_on(plan, member) is None
+    assert made.plan_sha256 not in (plan.digest, NO_PLAN.digest)
+
+
+def test_the_name_of_a_plan_is_no_markup() -> None:
+    (grid, *_) = table(Roster(), replace(load_plan(PLAN), name="[/wrong]"), 0.0, connected=True).renderables
+    console = Console(width=80)
+    with console.capture() as shown:
+        console.print(grid)
+    assert "[/wrong]: 0 trackers" in shown.get()

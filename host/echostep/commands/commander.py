@@ -6,12 +6,13 @@ In: the command's arguments and options. Out: a page, a table, a recording. Slow
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from echostep.commands.options import LOCAL, Host, Plan, Port, Seconds
+from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan
 
 app = typer.Typer()
 
@@ -25,7 +26,7 @@ def command(
             help="mqtt://HOST[:PORT], mqtts://HOST[:PORT]?ca=FILE, mesh:///dev/PORT, or a recorded operation (.mcap)",
         ),
     ],
-    plan: Plan,
+    plan: TeamPlan,
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FILE", help="The recording to write; each run gets a new number.")
     ] = Path("out/command/operation.mcap"),
@@ -48,4 +49,20 @@ def command(
     from echostep.page.server import Address
 
     views = Views(Address(host, port) if page else None, picture, as_json=as_json)
-    commander.command(plan, broker, team, seconds, views, out)
+    commander.command(_plan_file(plan, broker, team, out.parent), broker, team, seconds, views, out)
+
+
+def _plan_file(plan: Path, url: str, team: str | None, folder: Path) -> Path:
+    """The file of `--plan`; that of wearer:NAME comes from the broker at `url`, of any team unless one is given."""
+    from echostep.team.endpoint import BROKERS, parse_endpoint
+    from echostep.team.report import checked_name
+    from echostep.team.wearer_plan import drawing_wearer, plan_file
+
+    if drawing_wearer(plan) is None:
+        return plan
+    broker = parse_endpoint(url) if url.startswith(tuple(f"{scheme}://" for scheme in BROKERS)) else None
+    found = plan_file(
+        plan, broker, checked_name("--team", team) if team else "+", folder, partial(typer.echo, err=True)
+    )
+    assert found is not None
+    return found

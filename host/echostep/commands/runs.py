@@ -69,7 +69,12 @@ def demo(
     host: Host = LOCAL,
     port: Port = None,
     plan: Annotated[
-        Path | None, typer.Option("--plan", help="Walk through the rooms of this plan instead of the demo's.")
+        Path | None,
+        typer.Option(
+            "--plan",
+            metavar="FILE|wearer:NAME",
+            help="Walk through the rooms of this plan instead of the demo's, or of what that wearer of the team has drawn by now.",
+        ),
     ] = None,
     speed: Annotated[
         float | None,
@@ -96,6 +101,7 @@ def demo(
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, browser and sys.stdout.isatty())
+    plan = _plan_file(plan, outlet, out)
     demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit), output)
 
 
@@ -129,7 +135,7 @@ def live(
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, foxglove=_foxglove(foxglove))
-    tracking = TrackingOptions(plan, start, start_sd, settings, seed, guide)
+    tracking = TrackingOptions(_plan_file(plan, outlet, out), start, start_sd, settings, seed, guide)
     board, mtx, foot = _ports(board, mtx, foot)
     live_run.live(tracking, PortOptions(board, mtx, beacons, seconds, keep, foot), output)
 
@@ -184,13 +190,37 @@ def replay(
     output = OutputOptions(
         out, not headless, address, bool(page) or sys.stdout.isatty(), outlet, foxglove=_foxglove(foxglove)
     )
-    replay_run.replay(recording, TrackingOptions(plan, start, start_sd, settings, seed, guide), truth, output)
+    replay_run.replay(
+        recording, TrackingOptions(_recorded_plan(plan), start, start_sd, settings, seed, guide), truth, output
+    )
 
 
 def _outlet(publish: list[str] | None, name: str, team: str) -> Outlet | None:
     from echostep.team.endpoint import parse_outlet
 
     return parse_outlet(publish, name, team) if publish else None
+
+
+def _plan_file(plan: Path | None, outlet: Outlet | None, folder: Path) -> Path | None:
+    """The file of `--plan`; that of wearer:NAME comes from the broker that the run publishes to, into the folder of its results."""
+    if plan is None:
+        return None
+    from echostep.team.wearer_plan import plan_file
+
+    return plan_file(plan, outlet.broker if outlet else None, outlet.team if outlet else "", folder, typer.echo)
+
+
+def _recorded_plan(plan: Path | None) -> Path | None:
+    """The file of a replay's `--plan`."""
+    if plan is None:
+        return None
+    from echostep.team.wearer_plan import drawing_wearer
+
+    if name := drawing_wearer(plan):
+        raise EchostepError(
+            f"--plan {plan}: a replay needs the drawing that the run was tracked on: the file drawing-{name}-... beside the recording"
+        )
+    return plan
 
 
 def _foxglove(text: str | None) -> FoxgloveAddress | None:

@@ -14,9 +14,9 @@ from typing import Any
 from echostep.board.gateway import BeaconReading
 from echostep.localization.estimate import Estimate
 from echostep.localization.map_filter import MapFilter
+from echostep.localization.meetings import TimedMeeting
 from echostep.path import MeasuredSegment
 from echostep.ports.check_in import CheckIn
-from echostep.ports.meeting import Meeting
 
 UNDO_S = (
     120.0  # for so long a check-in can be undone. By reason: 10 s for a person, in a demo at several times real time
@@ -35,9 +35,9 @@ class BeforeCheckIn:
     check_in: CheckIn | None
     estimate: Estimate | None
     random_state: Any
-    since: list[tuple[MeasuredSegment, list[BeaconReading], list[Meeting]]] = field(default_factory=list)
+    since: list[tuple[MeasuredSegment, list[BeaconReading], list[TimedMeeting]]] = field(default_factory=list)
 
-    def add(self, measured: MeasuredSegment, readings: list[BeaconReading], meetings: list[Meeting]) -> bool:
+    def add(self, measured: MeasuredSegment, readings: list[BeaconReading], meetings: list[TimedMeeting]) -> bool:
         """Keep a segment after the check-in; False when the check-in is too long ago to be undone."""
         self.since.append((measured, readings, meetings))
         begin_s = self.since[0][0].segment.t0_s

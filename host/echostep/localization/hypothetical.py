@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from echostep.localization.meeting_model import WRONG, weigh
+from echostep.localization.meeting_model import WRONG, share_of, weigh
 from echostep.localization.particles import Cloud
 from echostep.localization.plausibility import Plausibility
 from echostep.ports.meeting import Meeting
@@ -40,7 +40,7 @@ class Hypothetical:
         right = weigh(self.cloud, meeting, area_m2)
         if self.has_contracted or self.is_stated:
             before = self.doubts.get(meeting.name, 0.0)
-            after = before + math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
+            after = before + share_of(meeting) * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
             self.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)
             self.plausibility.add(self.doubts[meeting.name] - before)
         return right

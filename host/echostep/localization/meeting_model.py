@@ -3,6 +3,9 @@
 
 In: a cloud, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it. Owns the model and its constants.
 
+The cloud is that of the begin of a segment, the meeting was at a moment of it, up to a stride later: `PreparedMeeting` carries the way until then,
+and each particle is weighed at the place to which it leads.
+
 If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
 range_sd_m^2); the teammate's own covariance is added to both. With probability `wrong` (another name was tapped, the teammate is sure of a wrong
 place, the range is a reflection) the meeting says nothing: then the teammate is anywhere on the floor.
@@ -19,12 +22,14 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.localization.estimate import LOST_M, TAIL, ellipse95
 from echostep.localization.level_changes import SAME_LEVEL_M
 from echostep.localization.particles import Cloud
+from echostep.path import PathSegment
 from echostep.ports.check_in import MOST_SD_M, CheckIn
 from echostep.ports.meeting import Meeting
 
@@ -38,6 +43,24 @@ LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
 FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
 FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
+
+
+class PreparedMeeting(Meeting, frozen=True):
+    """A meeting after a way (m, walk frame) since the moment of the cloud; `share`: one by the number of teammates who tell of one measurement."""
+
+    way_x_m: float = 0.0
+    way_y_m: float = 0.0
+    share: float = 1.0
+
+
+def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
+    """The meeting of this time with the way since the begin of its segment; of a segment that is a guess, as it is."""
+    span_s = segment.t1_s - segment.t0_s
+    if segment.unobserved or span_s <= 0.0:
+        return meeting
+    share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0)
+    way = {"way_x_m": share * segment.dx_m, "way_y_m": share * segment.dy_m}
+    return PreparedMeeting(**(msgspec.structs.asdict(meeting) | way))
 
 
 def carries_position(meeting: Meeting) -> bool:
@@ -55,10 +78,16 @@ def covariance(meeting: Meeting) -> Floats:
     return found
 
 
+def share_of(meeting: Meeting) -> float:
+    """The power of a meeting's likelihood: of one measurement that several teammates tell of all powers sum to 1."""
+    return meeting.share if isinstance(meeting, PreparedMeeting) else 1.0
+
+
 def start_at(meeting: Meeting) -> CheckIn:
-    """A start by a meeting alone: about the teammate, within the radio's range, with any heading."""
+    """A start by a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
-    sd_m = math.sqrt(0.5 * float(np.trace(covariance(meeting))) + 0.5 * range_m**2)
+    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, PreparedMeeting) else 0.0
+    sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
     return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)
 
 
@@ -100,9 +129,19 @@ def best_omega(own: Floats, other: Floats) -> float:
     return min(max((2.0 * b - c) / (2.0 * curvature), 0.0), 1.0)
 
 
+def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
+    """Places (n, 2) of the particles at the meeting, map frame."""
+    place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
+    if isinstance(meeting, PreparedMeeting):
+        c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
+        x, y = meeting.way_x_m, meeting.way_y_m
+        place += cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
+    return place
+
+
 def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
-    place = np.column_stack([cloud.map_x_m, cloud.y_m])
+    place = places_at(cloud, meeting)
     if cloud.sheet is None:
         on_level, levels = np.full(len(place), meeting.level == 0), 1
     else:
@@ -115,7 +154,8 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     right = density / (density + wrong * anywhere)
     factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
     if factor is not None:  # a gathered cloud elsewhere is left alone
-        factor = factor - factor.max()
+        factor = share_of(meeting) * factor
+        factor -= factor.max()
         factor -= math.log(float(weight @ np.exp(factor)))
         # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
         cloud.reweight(np.log(np.maximum(right * np.exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))

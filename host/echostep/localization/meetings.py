@@ -23,6 +23,9 @@ MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a te
 MOST_WAITING = 64  # meetings that wait for their segment
 
 
+TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is not known
+
+
 class MeetingEffect(StrEnum):
     """What a meeting did.
 
@@ -97,7 +100,7 @@ class MeetingQueue:
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.news: MeetingNews | None = None
-        self._waiting: list[tuple[float, Meeting]] = []
+        self._waiting: list[TimedMeeting] = []
 
     def hear(self, payload: bytes, levels: int) -> Meeting | None:
         """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
@@ -111,9 +114,9 @@ class MeetingQueue:
         """Keep a meeting of this time; of too many the oldest are dropped."""
         self._waiting = [*self._waiting, (-math.inf if math.isnan(t_s) else t_s, meeting)][-MOST_WAITING:]
 
-    def pop(self, t_s: float) -> list[Meeting]:
+    def pop(self, t_s: float) -> list[TimedMeeting]:
         """The waiting meetings up to a time."""
-        ready = [meeting for met_s, meeting in self._waiting if met_s <= t_s]
+        ready = [(met_s, meeting) for met_s, meeting in self._waiting if met_s <= t_s]
         self._waiting = [(met_s, meeting) for met_s, meeting in self._waiting if met_s > t_s]
         return ready
 

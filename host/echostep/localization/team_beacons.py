@@ -6,7 +6,8 @@ reading of a teammate's beacon, a range from the place that the teammate told; `
 teammate, and counts those that are none.
 
 Such a range is fused as one by radio (`meeting_model`): by covariance intersection, for the beacon's error is its teammate's, which may be this
-wearer's own. One reading in five is an outlier (`BeaconSettings.range_outliers`), as often as a meeting with an `uncertain` teammate is wrong.
+wearer's own. One reading in five is an outlier (`BeaconSettings.range_outliers`), as often as a meeting with an `uncertain` teammate is wrong. A
+reading of a beacon of which k teammates tell is a range to each of these places, but one measurement: each range has the power 1/k.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from collections.abc import Sequence
 
 from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
+from echostep.localization.meeting_model import PreparedMeeting
+from echostep.localization.meetings import TimedMeeting
 from echostep.localization.particles import Cloud
-from echostep.ports.meeting import Meeting
 from echostep.ports.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest; by reason
@@ -58,16 +60,19 @@ class TeamBeaconMap:
         if len(self.told) > MOST_TEAMMATES:
             self.told.pop(next(iter(self.told)))
 
-    def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[Meeting]:
-        """Of these readings, those of beacons whose place a teammate told; `numbers`: of the beacon in each slot."""
-        if not self.told:
-            return []
-        return [
-            Meeting(
-                name, "uncertain", b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2,
-                range_m=reading.range_m, range_sd_m=TEAM_RANGE_SD_M, beacon=b.number,
-            )
-            for reading in readings
-            for name, beacons in self.told.items()
-            if (b := beacons.get(numbers[reading.slot])) is not None
-        ]  # fmt: skip
+    def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[TimedMeeting]:
+        """Of these readings, those of beacons whose place a teammate told, with their times; `numbers`: of the beacon in each slot."""
+        found: list[TimedMeeting] = []
+        for reading in readings if self.told else ():
+            number = numbers[reading.slot]
+            told = {name: beacons[number] for name, beacons in self.told.items() if number in beacons}
+            found += [(reading.t_s, _range_to(name, b, reading, 1.0 / len(told))) for name, b in told.items()]
+        return found
+
+
+def _range_to(name: str, b: SharedBeacon, reading: BeaconReading, share: float) -> PreparedMeeting:
+    """A reading as a range to where the teammate `name` has told the beacon."""
+    return PreparedMeeting(
+        name, "uncertain", b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2,
+        range_m=reading.range_m, range_sd_m=TEAM_RANGE_SD_M, beacon=b.number, share=share,
+    )  # fmt: skip

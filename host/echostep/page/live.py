@@ -33,6 +33,7 @@ from echostep.page.elements.true_position import TruePath
 from echostep.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
+from echostep.page.shared_drawing import SharedDrawing
 from echostep.path import MeasuredSegment
 from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
@@ -61,14 +62,16 @@ class LivePage:
         *,
         replay: bool = False,
         keeps: bool = False,
+        shared: SharedDrawing | None = None,
     ) -> None:
         """`guided` must have been made before: then it watches the tracker first, and its cue exists when the page gets an estimate.
 
-        `keeps`: keep the scenes of a live run, so that it can be played again after `end`.
+        `keeps`: keep the scenes of a live run, so that it can be played again after `end`. `shared` gets the plan of what a walk without one draws.
         """
         self._tracker = tracker
         self._guided = guided
         self._replay = replay
+        self._shared = shared
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.has_team = False  # the run's reports go somewhere
@@ -115,7 +118,7 @@ class LivePage:
         self.server.__enter__()
         if not self._tracker.plan.is_drawn:
             fail = self.server.shared.faults.note_text
-            self._drawing = DrawingProcess(self._mailbox.add_drawing, fail, live=not self._replay)
+            self._drawing = DrawingProcess(self._mailbox.add_drawing, fail, live=not self._replay, shared=self._shared)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:

@@ -40,9 +40,11 @@ from echostep.tracker import Tracker
 if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
+    from echostep.page.shared_drawing import SharedDrawing
     from echostep.session.marks_ear import MarksEar
     from echostep.session.team_ear import TeamEar
     from echostep.session.teammates_ear import TeammatesEar
+    from echostep.team.endpoint import Endpoint
     from echostep.team.publish import Publishing, Source
 
 PAGE_POLL_S = 0.2
@@ -77,12 +79,14 @@ class Session:
         self.teammates: TeammatesEar | None = None  # hears whom the wearer can have met, and beacons of theirs
         self._publishing: Publishing | None = None
         self._marks: MarksEar | None = None  # hears what commanders mark
+        self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
         self._foxglove: FoxgloveServer | None = None
         self._opened = ExitStack()
         self._interrupted = False
 
     def __enter__(self) -> Self:
         with ExitStack() as opened:  # closes what is open already when a later part cannot be opened
+            self._open_drawing(opened)
             self._open_page(opened)
             self._open_publishing(opened)
             self._open_ear(opened)
@@ -93,6 +97,24 @@ class Session:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._opened.__exit__(kind, error, at)
+
+    def _open_drawing(self, opened: ExitStack) -> None:
+        """A live walk without a plan is drawn for the team, by the page or, without one, unseen."""
+        if self.recorded is not None or self.tracker.plan.is_drawn or self._broker is None:
+            return
+        from echostep.session.drawing_share import UnseenDrawing, shared_drawing
+
+        assert self.output.outlet
+        name, say = self.output.outlet.name, partial(console.print, markup=False, highlight=False)
+        self._drawing = shared_drawing(self.tracker, name)
+        say(f"What the walk draws goes to {self._broker}: teammates are tracked on it by --plan wearer:{name}")
+        if self.output.page is None:
+            opened.callback(UnseenDrawing(self.tracker, self._drawing, say).close)
+
+    @property
+    def _broker(self) -> Endpoint | None:
+        """The first broker that the run publishes to."""
+        return self.output.outlet.broker if self.output.outlet else None
 
     def _open_page(self, opened: ExitStack) -> None:
         address = self.output.page
@@ -107,6 +129,7 @@ class Session:
             self.guided,
             replay=self.recorded is not None,
             keeps=self.source == "simulated",
+            shared=self._drawing,
         )
         console.print(f"The page: {page.url}", highlight=False)
         self.page = opened.enter_context(page)
@@ -157,12 +180,9 @@ class Session:
         opened.callback(self.ear.close)
 
     def _open_marks(self, opened: ExitStack) -> None:
-        """By the first broker that a live run publishes to, beacons are shared; its page shows what commanders say, and offers meetings."""
-        outlet, publishing = self.output.outlet, self._publishing
-        if outlet is None or publishing is None or self.recorded is not None:
-            return
-        broker = next((e for e in outlet.endpoints if e.scheme in ("mqtt", "mqtts")), None)
-        if broker is None:
+        """By the first broker of a live run beacons and drawings are shared; its page shows what commanders say, and offers meetings."""
+        outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
+        if outlet is None or publishing is None or broker is None or self.recorded is not None:
             return
         from echostep.session.marks_ear import MarksEar
         from echostep.session.teammates_ear import TeammatesEar
@@ -213,6 +233,8 @@ class Session:
         names = self.teammates.news() if self.teammates else None
         if self.teammates and estimates:
             self.teammates.share(self.tracker.own_beacons)
+        if self.teammates and self._drawing:
+            self.teammates.share_drawing(self._drawing)
         if self.page:
             if self._marks and (marks := self._marks.news()) is not None:
                 self.page.set_marks(marks)
@@ -241,6 +263,8 @@ class Session:
         """
         if self.page:
             self.page.end(summary_words(self.estimates, truth))
+        if self._drawing and self._drawing.too_long:
+            console.print("The drawing became too large for the team: the broker keeps an earlier one")
         write_results(
             self.output.folder,
             self.tracker,

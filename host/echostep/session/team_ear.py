@@ -29,16 +29,16 @@ class TeamEar:
 
     def __init__(self, outlet: Outlet | None, name: str, plan: Plan, print_line: Callable[[str], None]) -> None:
         """Raises EchostepError without a broker to listen at."""
-        brokers = [e for e in (outlet.endpoints if outlet else ()) if e.scheme in ("mqtt", "mqtts")]
-        if not brokers or outlet is None:
+        broker = outlet.broker if outlet else None
+        if broker is None or outlet is None:
             raise EchostepError(f"--guide wearer:{name} needs the team's broker: --publish mqtt://HOST --name YOURS")
         self._name, self._team, self._plan, self._print_line = name, outlet.team, plan, print_line
         self._inbox, self._roster = Inbox(), Roster()
         self._last: Teammate | None = None
         self._looked_s = self._told_s = -math.inf
         self._warned = False
-        listener = Listener(brokers[0], [f"echostep/+/{name}/+"], self._inbox.put)
-        self._receiver = Receiver(listener, lambda text: print_line(f"{brokers[0]}: {text}"))
+        listener = Listener(broker, [f"echostep/+/{name}/+"], self._inbox.put)
+        self._receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))
 
     def pop(self) -> Iterator[bytes]:
         """The wearer's place as the bytes of a chunk, when it is new; never waits."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The teammates' ear: whom a wearer can have met, from the broker that a run publishes to.
 
-In: messages of the own team; the beacons that this wearer has placed. Out: names of teammates who are heard on this plan, when they change; the bytes
-of a `Meeting` with one of them, and of the beacons that they share; this wearer's own for the broker. Owns the subscription, its thread and the
-roster of what was heard; the tracker never waits for it.
+In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates who are heard on this
+plan, when they change; the bytes of a `Meeting` with one of them, and of the beacons that they share; this wearer's own and its drawing for the
+broker. Owns the subscription, its thread and the roster of what was heard; the tracker never waits for it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from echostep.localization.team_beacons import MOST_TEAMMATES
+from echostep.page.shared_drawing import SharedDrawing
 from echostep.plan.model import Plan
 from echostep.ports.team_beacons import SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.team.commander import take_messages
@@ -23,6 +24,7 @@ from echostep.team.meeting import meeting_with
 from echostep.team.mqtt import Listener
 from echostep.team.roster import Member, MemberState, Roster
 from echostep.team.shared_beacons import BEACONS, SHARE_S, beacons_message
+from echostep.team.shared_drawings import drawing_topic
 
 LOOK_S = 0.5  # between two looks at what was heard, by reason
 HEARD_S = 60.0  # a teammate who has been silent for longer is not listed, by reason
@@ -39,7 +41,7 @@ class TeammatesEar:
         self._inbox, self._roster = Inbox(), Roster()
         self.rejected = self._roster.rejected
         self._names: tuple[str, ...] = ()
-        self._looked_s = self._shared_s = -math.inf
+        self._looked_s = self._shared_s = self._drawing_s = -math.inf
         self._placed: dict[str, bytes] = {}  # newest beacons of each teammate that were not taken yet, by name
         self._taken: dict[str, tuple[float, bytes]] = {}  # those that were taken, and when
         self._shared = b""
@@ -86,6 +88,15 @@ class TeammatesEar:
         topic, payload = beacons_message(self._own[0], told)
         if payload != self._shared and (beacons or self._shared) and self._receiver.send(topic, payload):
             self._shared, self._shared_s = payload, now_s
+
+    def share_drawing(self, drawing: SharedDrawing) -> None:
+        """Tell the team the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
+        now_s = time.monotonic()
+        if now_s - self._drawing_s < SHARE_S or not self._receiver.sent_all:
+            return
+        plan = drawing.take()
+        if plan is not None and self._receiver.send(drawing_topic(*self._own), plan):
+            self._drawing_s = now_s
 
     def close(self) -> None:
         """End the subscription."""

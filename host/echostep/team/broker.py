@@ -22,7 +22,7 @@ from echostep.team.endpoint import Endpoint
 ANSWER_S = 5.0  # longest wait for an answer of the broker
 KEEPALIVE_S = 6  # the broker sends the last will after 1.5 times as long [MQTT 3.1.1, 3.1.2.10]
 LOOP_S = 0.05  # longest wait for a packet in one call of `run_once`
-MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this
+MAX_PACKET = 65_536  # bytes; a broker of MQTT 5 sends no longer packet than this, unless it was asked for
 CLIENT_ERRORS = (  # what paho raises on broken connections and malformed packets
     OSError,
     ValueError,
@@ -51,8 +51,11 @@ def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = F
     return client
 
 
-def connect(client: paho.Client, endpoint: Endpoint) -> None:
-    """Connect and wait for the broker's acceptance; raises OSError, which is a RefusedError when the host answers."""
+def connect(client: paho.Client, endpoint: Endpoint, most_bytes: int = MAX_PACKET) -> None:
+    """Connect and wait for the broker's acceptance; raises OSError, which is a RefusedError when the host answers.
+
+    `most_bytes`: of a packet that a broker of MQTT 5 sends.
+    """
     refused: list[str] = []
 
     def answered(_client: paho.Client, _user: Any, _flags: Any, code: Any, _properties: Any) -> None:
@@ -63,7 +66,7 @@ def connect(client: paho.Client, endpoint: Endpoint) -> None:
     properties = None
     if client.protocol == paho.MQTTv5:
         properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
-        properties.MaximumPacketSize = MAX_PACKET
+        properties.MaximumPacketSize = most_bytes
     try:
         client.connect(endpoint.host, endpoint.port, keepalive=KEEPALIVE_S, properties=properties)
     except (OSError, ValueError) as error:

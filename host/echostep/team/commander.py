@@ -20,6 +20,7 @@ from rich.text import Text
 from echostep.plan.model import Plan
 from echostep.team.cot import alarm_words
 from echostep.team.inbox import Inbox, ReceivedMessage
+from echostep.team.report import WITHOUT_PLAN
 from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
 
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
@@ -67,7 +68,10 @@ def table(
     """The roster as a table, a line per member, `columns` characters wide; `lines`: of the most urgent members only, as many as there is room for."""
     members = roster.members(now_s)
     grid = Table(
-        title=f"{plan.name}: {summary(members, now_s)}", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+        title=Text(f"{plan.name}: {summary(members, now_s)}"),
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     names = [name for name in COLUMNS if columns >= LEAST_WIDTHS.get(name, 0)]
     duplicates = roster.duplicates(now_s)
@@ -144,7 +148,9 @@ def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]])
         remarks.append(f"still for {r.motion.still_s:.0f} s")
     if r.source != "live":
         remarks.append(r.source)
-    if r.plan_sha256 != plan.digest:
+    if r.plan_sha256 == WITHOUT_PLAN:
+        remarks.append("tracked without a plan")
+    elif r.plan_sha256 != plan.digest:
         remarks.append(f"tracked on another plan ({r.plan})")
     if not m.retained and abs(m.clock_ahead_s) > CLOCK_OFF_S:
         remarks.append(f"clock {'ahead' if m.clock_ahead_s > 0 else 'behind'} by {abs(m.clock_ahead_s):.0f} s")

@@ -17,6 +17,7 @@ from echostep.team.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
 FILES = ("ca", "cert", "key")
+BROKERS = ("mqtt", "mqtts")  # schemes of brokers, which keep messages
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +101,11 @@ class Outlet:
     endpoints: tuple[Endpoint, ...]
     name: str
     team: str
+
+    @property
+    def broker(self) -> Endpoint | None:
+        """The first broker."""
+        return next((e for e in self.endpoints if e.scheme in BROKERS), None)
 
 
 def parse_outlet(urls: Sequence[str], name: str, team: str) -> Outlet:

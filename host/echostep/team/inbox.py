@@ -19,6 +19,7 @@ from echostep.team.report import MAX_PAYLOAD
 MESSAGES_PER_TOPIC = 8  # kept until the next look; by reason: trackers send about two a second
 MAX_TOPICS = 1024
 MOST_OUTGOING = 64  # messages to the broker that wait
+MOST_TRIES = 5  # to publish a message; one at which the connection breaks every time holds up those behind it
 PACKET_WAIT_S = 0.1
 
 
@@ -87,6 +88,7 @@ class Receiver:
     def __init__(self, listener: Subscription, print_line: Callable[[str], None]) -> None:
         self.connected = False
         self._outgoing: deque[tuple[str, bytes]] = deque()
+        self._tries = 0  # to publish the first of these
         self._listener, self._print_line = listener, print_line
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._work, name="receiver", daemon=True)
@@ -98,6 +100,11 @@ class Receiver:
             return False
         self._outgoing.append((topic, payload))
         return True
+
+    @property
+    def sent_all(self) -> bool:
+        """Whether no message waits."""
+        return not self._outgoing
 
     def close(self) -> None:
         """Disconnect and end the thread."""
@@ -114,8 +121,7 @@ class Receiver:
                 failures, self.connected = 0, True
                 while not self._closing.is_set():
                     while self._outgoing:
-                        self._listener.publish(*self._outgoing[0])
-                        self._outgoing.popleft()
+                        self._publish_first()
                     self._listener.run_once(PACKET_WAIT_S)
             except Exception as error:  # any fault is printed, then the connection is tried again
                 self.connected = False
@@ -125,3 +131,22 @@ class Receiver:
                 self._closing.wait(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
                 failures += 1
         self._listener.close()
+
+    def _publish_first(self) -> None:
+        """Publish the message that has waited longest; after MOST_TRIES it is given up. Raises OSError."""
+        topic, payload = self._outgoing[0]
+        self._tries += 1
+        try:
+            self._listener.publish(topic, payload)
+        except OSError:
+            if self._tries >= MOST_TRIES:
+                self._drop_first()
+                self._print_line(
+                    f"a message of {len(payload)} bytes on {topic} is given up: the broker does not take it"
+                )
+            raise
+        self._drop_first()
+
+    def _drop_first(self) -> None:
+        self._outgoing.popleft()
+        self._tries = 0

@@ -18,6 +18,7 @@ import paho.mqtt.client as paho
 from echostep.team.broker import (
     CLIENT_ERRORS,
     LOOP_S,
+    MAX_PACKET,
     RefusedError,
     close_socket,
     connect,
@@ -85,9 +86,14 @@ class Listener:
     """A subscription: `run_once` runs the connection and passes each message to `put(topic, payload, retained)`."""
 
     def __init__(
-        self, endpoint: Endpoint, topics: Sequence[str], put: Callable[[str | None, bytes, bool], None]
+        self,
+        endpoint: Endpoint,
+        topics: Sequence[str],
+        put: Callable[[str | None, bytes, bool], None],
+        most_bytes: int = MAX_PACKET,
     ) -> None:
-        self._endpoint, self._topics, self._put = endpoint, topics, put
+        """`most_bytes`: of a packet; a broker of MQTT 5 sends no longer one."""
+        self._endpoint, self._topics, self._put, self._most_bytes = endpoint, topics, put, most_bytes
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
         self._use_mqtt5 = True
@@ -98,7 +104,7 @@ class Listener:
         client.on_message = self._message
         self._client = client
         try:
-            connect(client, self._endpoint)
+            connect(client, self._endpoint, self._most_bytes)
         except RefusedError:
             self._use_mqtt5 = not self._use_mqtt5
             raise

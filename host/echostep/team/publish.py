@@ -27,7 +27,16 @@ from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.georeference import GroundPlane
 from echostep.team.mqtt import MqttTransport
 from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
-from echostep.team.report import Motion, Position, Report, ReportedAlarm, StreamReport, moment, printable
+from echostep.team.report import (
+    WITHOUT_PLAN,
+    Motion,
+    Position,
+    Report,
+    ReportedAlarm,
+    StreamReport,
+    moment,
+    printable,
+)
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -185,8 +194,9 @@ def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> 
     """The report of a tracker without an estimate; number and times are set when it is sent."""
     return Report(
         echostep_report=1, team=team, name=name, run=run, sequence=0, time="", stale="", source=source, status="waiting",
-        position=None, motion=None, place=None, streams=None, plan=printable(plan.name, 64), plan_sha256=plan.digest,
-        version=importlib.metadata.version("echostep")[:32], battery_percent=battery_percent(), superseded=0,
+        position=None, motion=None, place=None, streams=None, plan=printable(plan.name, 64),
+        plan_sha256=plan.digest or WITHOUT_PLAN, version=importlib.metadata.version("echostep")[:32],
+        battery_percent=battery_percent(), superseded=0,
     )  # fmt: skip
 
 

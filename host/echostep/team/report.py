@@ -21,6 +21,7 @@ from msgspec import Meta
 from echostep.errors import EchostepError
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900
+WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without a plan, in a frame of its own
 LIMIT_M = 1e5
 
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M, description="m, on the plan (x east, y north)")]
@@ -163,7 +164,9 @@ class Report:
     place: Annotated[ReportedPlace | None, Meta(description="missing without a georeference")]
     streams: Annotated[StreamReport | None, Meta(description="missing until something is heard")]
     plan: Annotated[str, Meta(max_length=64, description="name of the plan that the wearer is tracked on")]
-    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$", description="SHA-256 of the plan's file")]
+    plan_sha256: Annotated[
+        str, Meta(pattern="^[0-9a-f]{64}$", description="SHA-256 of the plan's file; zeros without a plan")
+    ]
     version: Annotated[str, Meta(max_length=32, description="version of echostep on the tracker")]
     battery_percent: Annotated[int, Meta(ge=0, le=100, description="charge of the tracker's computer")] | None
     superseded: Annotated[

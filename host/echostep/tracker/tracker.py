@@ -23,7 +23,7 @@ from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
 from echostep.localization.last_place import LastPlace, last_place
 from echostep.localization.map_filter import FilterSettings, MapFilter
-from echostep.localization.meeting_model import carries_position, start_at
+from echostep.localization.meeting_model import carries_position, on_the_way, start_at
 from echostep.localization.meetings import MeetingEffect, MeetingQueue
 from echostep.localization.particle_kernels import systematic
 from echostep.localization.plausibility import STATED
@@ -240,8 +240,8 @@ class Tracker:
                 return []
             measured = measured.after(self._check_in_s)
         self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
-        for meeting in meetings:
-            self._meetings.note(meeting, self.filter.meet(meeting))
+        for t_s, meeting in meetings:
+            self._meetings.note(meeting, self.filter.meet(on_the_way(meeting, measured.segment, t_s)))
         self._estimate = self.filter.update(measured, readings)
         return [self._publish(measured, self._estimate)]
 
@@ -328,8 +328,8 @@ class Tracker:
                 waiting += readings
             else:
                 self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
-                for meeting in meetings:
-                    self.filter.meet(meeting)
+                for t_s, meeting in meetings:
+                    self.filter.meet(on_the_way(meeting, measured.segment, t_s))
                 self._estimate = self.filter.update(measured, readings)
         self._readings = (waiting + self._readings)[-MAX_READINGS:]
         if self._segment is None or self._estimate is None:

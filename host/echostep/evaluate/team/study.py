@@ -5,9 +5,10 @@ In: seeds. Out: rows `office/tap`, `tower/radio`, ... Owns the conditions. Simul
 
 All but the first wearer know their starts; the first is told a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
 apart; `beacons`: the same, each drops beacons, hears those of all and shares its own) or none (`unknown`, apart), or knows its own too and reports
-false places (`liar`: that wearer is left out of all columns). `ratio`: mean error of all wearers and runs together over that alone. `worst`: the
-greatest such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other random numbers, over
-those alone: how much of `worst` means nothing. An error on a wrong floor is at least a storey.
+false places (`liar`: that wearer is left out of all columns). `drawing`: the first one walks without a plan, from a known start, then the others
+from theirs: `alone` without a plan, `together` on its drawing; the first one is left out. `ratio`: mean error of all wearers and runs together over
+that alone. `worst`: the greatest such ratio of one wearer in one run, the first one left out; `by_chance`: the same of the trackers alone with other
+random numbers, over those alone: how much of `worst` means nothing. An error on a wrong floor is at least a storey.
 """
 
 from __future__ import annotations
@@ -28,11 +29,12 @@ from echostep.evaluate.anywhere.walks import T, X, Y, Z
 from echostep.evaluate.report import Row, Table, rows_by_name
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.evaluate.team.beacons import with_dropped_beacons
+from echostep.evaluate.team.drawings import drawing_by, track_on
 from echostep.evaluate.team.tracking import LIAR, How, track_team
 from echostep.evaluate.team.walks import WEARERS, TeamWalks, team_walks
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.start import Start
-from echostep.plan.model import Plan, Pose, load_plan
+from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
 from echostep.simulation.world.tower import tower
 
@@ -67,14 +69,15 @@ def _tower() -> Building:
 
 
 BUILDINGS: dict[str, Callable[[], Building]] = {"office": _office, "tower": _tower}
-ROWS = tuple(f"{building}/{how}" for building in BUILDINGS for how in HOWS)
+DRAWING = "office/drawing"  # of one storey: a drawing's storeys are not those of the plan
+ROWS = (*(f"{building}/{how}" for building in BUILDINGS for how in HOWS), DRAWING)
 
 
 def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[Row]:
     """The rows of these names for the teams of one seed."""
     rows: list[Row] = []
     for building, make in BUILDINGS.items():
-        hows = [name.split("/")[1] for name in names if name.startswith(f"{building}/")]
+        hows = [name.split("/")[1] for name in names if name.startswith(f"{building}/") and name != DRAWING]
         if not hows:
             continue
         plan, begin = make()
@@ -91,6 +94,17 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[Row]:
             together = track_team(walks, told, HOWS[how], seed)
             rows += [_row(f"{building}/{how}", walks, k, [alone[kind][0][k], together[k], alone[kind][1][k]]) | {"seed": seed}
                      for k in range(WEARERS) if not (how == "liar" and k == LIAR)]  # fmt: skip
+    return rows + (_drawing_rows(length_m, seed) if DRAWING in names else [])
+
+
+def _drawing_rows(length_m: float, seed: int) -> list[Row]:
+    """The row DRAWING of the team of one seed."""
+    walks = team_walks(*_office(), length_m, seed, at_door=True)
+    drawn, rows = drawing_by(walks, FIRST), []
+    for who in range(FIRST + 1, WEARERS):
+        alone, again = (track_on(NO_PLAN, walks, who, seed + more) for more in (0, OTHER_DRAWS))
+        runs = [alone, track_on(drawn, walks, who, seed), again]
+        rows.append(_row(DRAWING, walks, who, runs) | {"seed": seed, "meetings": 0})
     return rows
 
 
