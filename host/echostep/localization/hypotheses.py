@@ -53,7 +53,8 @@ def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weigh
     """At most MOST, from places (n,) in the map with weights that sum to 1. Each takes the particles near the heaviest square that is left."""
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
-    mass, found = np.bincount(particles.square, left), list[Hypothesis]()
+    mass = np.asarray(np.bincount(particles.square, left), np.float64)
+    found: list[Hypothesis] = []
     while len(found) < MOST:
         probability, *place = _take(int(mass.argmax()), particles, left, mass)
         if probability < LEAST:

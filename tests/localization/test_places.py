@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Places and moments of a cloud: the compiled passes against plain numpy."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from echostep.angles import mean_angle
+from echostep.localization import hypotheses as module
+from echostep.localization.hypotheses import hypotheses
+from echostep.localization.level_changes import SAME_LEVEL_M
+from echostep.localization.moments import moments, weight_about
+from naive.places import places
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 400), st.integers(1, 3))
+def test_places_are_those_of_the_plain_code(seed: int, count: int, levels: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = rng.normal(0.0, 1.0, count) + 9.0 * rng.integers(0, 4, count), rng.normal(-3.0, 2.0, count)
+    level, heading, weight = rng.integers(0, levels, count), rng.normal(0.0, 2.0, count), rng.random(count) + 1e-3
+    weight /= weight.sum()
+    found = [dataclasses.astuple(h) for h in hypotheses(x, y, level, heading, weight)]
+    expected = places(x, y, level, heading, weight)
+    assert len(found) == len(expected)
+    for one, other in zip(found, expected, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+
+
+def test_a_cloud_that_spans_a_country_needs_no_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_SQUARES", 100)
+    x, y = np.array([0.0, 0.5, 4e5]), np.array([0.0, 0.0, -4e5])
+    found = hypotheses(x, y, np.zeros(3, np.int64), np.zeros(3), np.array([0.3, 0.3, 0.4]))
+    assert [(h.probability, h.x_m) for h in found] == [pytest.approx((0.6, 0.25)), pytest.approx((0.4, 4e5))]
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 300))
+def test_moments_are_those_of_numpy(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y, heading, weight = rng.normal(50.0, 2.0, count), rng.normal(-9.0, 3.0, count), *rng.random((2, count))
+    weight /= weight.sum()
+    m = moments(x, y, heading, weight, 1.0, 5.0)
+    away = np.hypot(x - weight @ x, y - weight @ y)
+    covariance = np.cov(np.vstack([x, y]), aweights=weight, bias=True) if count > 1 else np.zeros((2, 2))
+    assert (m.x_m, m.y_m) == pytest.approx((weight @ x, weight @ y))
+    assert (m.xx_m2, m.xy_m2, m.yy_m2) == pytest.approx(
+        [covariance[0, 0], covariance[0, 1], covariance[1, 1]], abs=1e-9
+    )
+    assert np.arctan2(m.north, m.east) == pytest.approx(mean_angle(heading, weight))
+    assert (m.near, m.about) == pytest.approx((weight @ (away < 1.0), weight @ (away < 5.0)))
+
+
+def test_weight_about_a_place_is_of_its_level() -> None:
+    x, z, weight = (
+        np.array([0.0, 2.0, 0.0, 9.0]),
+        np.array([0.0, 0.0, SAME_LEVEL_M, 0.0]),
+        np.array([0.1, 0.2, 0.3, 0.4]),
+    )
+    assert weight_about(x, np.zeros(4), z, weight, (0.0, 0.0, 0.0), (1.0, 5.0)) == pytest.approx((0.1, 0.3))
