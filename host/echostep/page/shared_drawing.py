@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The plan of a drawing for others: put by the thread that draws, taken by the run that publishes it.
 
-In: the bytes of plan.json, each newer one in place of the one before. Out: the newest, once. Owns it; nobody waits.
+In: the bytes of plan.json, each newer one in place of the one before. Out: the newest, once. Owns it; neither side waits.
 """
 
 from __future__ import annotations
