@@ -11,9 +11,11 @@ import pytest
 
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.map_filter import DOUBTED, FOUND_WITHIN_M, FilterSettings, MapFilter
+from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.map_filter import DOUBTED, MapFilter
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import COARSE_INDEPENDENT_M, COARSE_REST, Cloud, CloudSettings
+from echostep.localization.plan_verdict import FOUND_WITHIN_M
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
+from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.last_place import MOVED_M, LastPlace, start_after
 from echostep.localization.level_changes import ClimbSettings
-from echostep.localization.map_filter import UNOBSERVED_DOUBT, FilterSettings, MapFilter
+from echostep.localization.map_filter import UNOBSERVED_DOUBT, MapFilter
 from echostep.localization.particles import CloudSettings
 from echostep.localization.plausibility import STATED
 from echostep.localization.start import Air, Start

@@ -11,8 +11,8 @@ import pytest
 from echostep.arrays import Floats
 from echostep.localization.background import BIN_M, Background, PlacedPings, RangeMemory, UnplannedDensities
 from echostep.localization.echo_likelihood import EchoSettings
+from echostep.localization.filter_settings import FilterSettings, with_plan_error
 from echostep.localization.last_wall import LastWall
-from echostep.localization.map_filter import FilterSettings, with_plan_error
 from echostep.localization.plausibility import beyond_errors_that_stay
 
 SD_M = 0.036

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.map_filter import MapFilter
 from echostep.localization.particles import CloudSettings
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment, PathSegment

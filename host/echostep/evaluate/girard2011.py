@@ -19,7 +19,8 @@ from echostep.evaluate.report import Row, Table, rows_by_name, summary
 from echostep.evaluate.study import Study, StudyRequest
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.map_filter import MapFilter
 from echostep.localization.start import Start
 from echostep.papers.girard2011 import Girard, GirardSettings
 from echostep.path import MeasuredSegment, PathSegment

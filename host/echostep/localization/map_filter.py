@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from statistics import median
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,17 +17,20 @@ from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
-from echostep.localization.beacon_model import BeaconSettings
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model
+from echostep.localization.echo_likelihood import EchoSettings
 from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate, likely_places
+from echostep.localization.filter_settings import FilterSettings, echo_models, with_plan_error
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.hypothetical import Hypothetical
-from echostep.localization.level_changes import SAME_LEVEL_M, ClimbSettings, HeightChange
+from echostep.localization.level_changes import HeightChange
 from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
 from echostep.localization.meetings import CONTRADICTIONS, PLACE_M, MeetingEffect, MeetingMemory, moved_probability
+from echostep.localization.moments import weight_about
+from echostep.localization.moves import HEIGHT_SD_M, height_change, move_of
 from echostep.localization.particle_kernels import Move, PingBatch
-from echostep.localization.particles import Cloud, CloudSettings, Evidence
+from echostep.localization.particles import Cloud, Evidence
+from echostep.localization.plan_verdict import FOUND_WITHIN_M, PlanVerdict
 from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
@@ -42,12 +44,8 @@ SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports 
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
 HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
-BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
 COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
 COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
-HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
-HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
-AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce, by reason: draughts
 # Probabilities that a cloud is right, by reason:
 DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
@@ -56,27 +54,9 @@ GATHERED = 0.7  # of one that has just gathered anywhere, if the plan fits: it h
 FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
 REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
 WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
-FOUND_WITHIN_M = 40.0  # path after which a search of one level that has found nothing begins anew
 LEVEL_M = 20.0  # the same for each level more: storeys are often alike but for their doors
-PLAN_FITS = 0.99  # prior and greatest probability that the plan is that of the building
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
-FAILS = 0.05  # probability that a search fails although the plan fits, over that if it does not: unknown starts are found within 40 m
-RESTORED_PER_M = -math.log(FAILS) / FOUND_WITHIN_M  # log-odds that the plan gains back on the path of a believed cloud
-# The same of a stated start that is rejected on the first EARLY_M of the path: taps and plans are wrong about as often.
-STATED_FAILS, EARLY_M = 0.05, 20.0
-CROSSED_M = 2.5  # from one way through a wall, within which another is through the same one, by reason
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
-
-
-@dataclass(frozen=True, slots=True)
-class FilterSettings:
-    """Settings of the filter's parts."""
-
-    cloud: CloudSettings = field(default_factory=CloudSettings)
-    echo: EchoSettings = field(default_factory=EchoSettings)
-    climb: ClimbSettings = field(default_factory=ClimbSettings)
-    beacons: BeaconSettings = field(default_factory=BeaconSettings)
-    plan_sd_m: float = 0.0  # of the walls' positions, per axis
 
 
 class MapFilter:
@@ -90,12 +70,12 @@ class MapFilter:
         self._settings = settings or FilterSettings()
         self._building = building
         self._rng = rng
-        self._model, self._blurred = _echo_models(self._settings)
+        self._model, self._blurred = echo_models(self._settings)
         echo = with_plan_error(self._settings)
         self._pings = UsablePings(building.background(self._model), echo)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
-        self._plan = Plausibility(PLAN_FITS)
+        self._plan = PlanVerdict()
         prior = (STATED if stated else self._gathered) if building.has_walls else BY_DEFINITION
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
@@ -106,7 +86,6 @@ class MapFilter:
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
-        self._crossed: list[tuple[float, float, int]] = []  # x, y (m), level where a believed cloud went through a wall
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
         self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
         if start.after_pause:
@@ -122,7 +101,7 @@ class MapFilter:
         """From now on the pings are those of rangers with these settings."""
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
-            self._model, self._blurred = _echo_models(self._settings)
+            self._model, self._blurred = echo_models(self._settings)
             self._pings.hear_by(self._building.background(self._model), with_plan_error(self._settings))
 
     @property
@@ -135,7 +114,7 @@ class MapFilter:
         segment = measured.segment
         gap = self._gaps.ended(measured)
         self._follow_barometer(measured)
-        change = _height_change(measured, self._riding.height_m)
+        change = height_change(measured, self._riding.height_m)
         if self._height is not None:
             self._height.update(change)
         if segment.unobserved:
@@ -258,7 +237,7 @@ class MapFilter:
     def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
         """Spread the cloud over an unobserved segment."""
         for each in self._clouds():
-            each.cloud.scatter(_move(segment), change)
+            each.cloud.scatter(move_of(segment), change)
             each.plausibility.doubt(UNOBSERVED_DOUBT)
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> None:
@@ -267,13 +246,12 @@ class MapFilter:
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         if segment.scale_sd > 0.0:
             self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
-        move = _move(segment)
+        move = move_of(segment)
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned)
             each.cloud.change_levels(move, change)
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
-            self._plan.add(RESTORED_PER_M * math.hypot(segment.dx_m, segment.dy_m))
-            self._plan.limit(PLAN_FITS)
+            self._plan.confirm(math.hypot(segment.dx_m, segment.dy_m))
 
     def _follow_with(self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities) -> None:
         """Propagate and reweight one cloud, and judge it by how well it foretold the pings."""
@@ -288,19 +266,10 @@ class MapFilter:
             model = self._blurred if cloud.is_scattered else self._model
             before = cloud.rescues
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
-            if cloud.rescues > before and each is self.tracked:
-                self._count_crossing()
+            if cloud.rescues > before and each is self.tracked and each.plausibility.probability >= BELIEVED:
+                self._plan.cross(self._believed(0.0))
             if self._building.has_walls:
                 self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
-
-    def _count_crossing(self) -> None:
-        """A believed cloud has gone through a wall: the plan is wrong there, which counts once a wall."""
-        if self.tracked.plausibility.probability < BELIEVED:
-            return
-        at = self._believed(0.0)
-        if all(math.hypot(at.x_m - x, at.y_m - y) > CROSSED_M or at.level != level for x, y, level in self._crossed):
-            self._crossed.append((at.x_m, at.y_m, at.level))
-            self._plan.add(math.log(FAILS))
 
     def _judge(
         self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float
@@ -325,10 +294,8 @@ class MapFilter:
         if self.search is None:
             return Right(here)
         cloud, mean = self.search.cloud, self._believed(0.0)
-        distance_m = np.hypot(cloud.map_x_m - mean.x_m, cloud.y_m - mean.y_m)
-        height_m = float(self.cloud.weight @ self.cloud.z_m)
-        weight = np.where(np.abs(cloud.z_m - height_m) < SAME_LEVEL_M, cloud.weight, 0.0)
-        near, about = (float(weight @ (distance_m < limit)) for limit in (TRACKING_M, LOST_M))
+        place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
+        near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
         return Right(min(here, near), about)
 
     def _choose(self, right: float, walk_heading_rad: float) -> bool:
@@ -338,7 +305,7 @@ class MapFilter:
         """
         tracked, search = self.tracked, self.search
         if self._is_astray(tracked.cloud):
-            self._plan.add(math.log(FAILS))
+            self._plan.fail_search()
             self.tracked = self._new_search(Start(), walk_heading_rad)
         elif search is None:
             return self._doubt(tracked, walk_heading_rad)
@@ -347,7 +314,7 @@ class MapFilter:
         elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
             self.tracked, self.search, self._is_elsewhere = search, None, False
         elif self._has_failed(search):
-            self._plan.add(math.log(FAILS))
+            self._plan.fail_search()
             near = None if self._is_elsewhere else self._believed(walk_heading_rad)
             self.search = self._new_search(Start(near=near), walk_heading_rad)
         else:
@@ -368,10 +335,10 @@ class MapFilter:
         least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else WIDE_DOUBTED
         if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
             return False
-        if tracked.is_stated and self._pings.path_m < EARLY_M:
-            self._plan.add(math.log(STATED_FAILS))
-        elif not tracked.is_stated and self._searched_m < self._found_within_m + EARLY_M:
-            self._plan.add(math.log(FAILS))  # the search had gathered in a wrong place
+        if tracked.is_stated:
+            self._plan.reject_start(self._pings.path_m)
+        else:
+            self._plan.reject_found(self._searched_m - self._found_within_m)
         self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
         return True
 
@@ -415,30 +382,3 @@ class MapFilter:
         """Weight of the tracked cloud outside of the building; 0 where walls enclose no floor."""
         indoors, cloud = self._building.indoors, self.cloud
         return 0.0 if indoors is None else float(cloud.weight @ ~indoors.holds(cloud.x_m, cloud.y_m))
-
-
-def _echo_models(s: FilterSettings) -> tuple[EchoModel, EchoModel]:
-    """The echo model with the plan's error, and the one for scattered clouds."""
-    echo = with_plan_error(s)
-    return echo_model(echo), echo_model(replace(echo, sd_m=math.hypot(echo.sd_m, s.cloud.rough_m)))
-
-
-def with_plan_error(s: FilterSettings) -> EchoSettings:
-    """The settings of the echoes, with the error of the plan's walls in that of the ranges."""
-    return replace(s.echo, sd_m=math.hypot(s.echo.sd_m, s.plan_sd_m))
-
-
-def _move(segment: PathSegment) -> Move:
-    """The segment's way; when the wearer turns, the trunk goes round the foot that was measured."""
-    sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(segment.turn_rad)) * BESIDE_M)
-    return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd, *segment.bend_m)
-
-
-def _height_change(measured: MeasuredSegment, riding_m: float) -> HeightChange:
-    """The foot's rise, and the median of the last heights by pressure: a slammed door moves a mean, but not a median."""
-    segment, last = measured.segment, measured.height_m[-HEIGHT_SAMPLES:].tolist()
-    span_s = segment.t1_s - segment.t0_s
-    if not last:
-        return HeightChange(segment.rise_m, segment.rise_sd_m, 0.0, math.inf, 0.0, span_s)
-    height_sd_m = math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(last)))
-    return HeightChange(segment.rise_m, segment.rise_sd_m, median(last), height_sd_m, riding_m, span_s)

@@ -21,8 +21,9 @@ from echostep.localization.beacon_map import BeaconPlace
 from echostep.localization.before_check_in import BeforeCheckIn
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
+from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.last_place import LastPlace, last_place
-from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.map_filter import MapFilter
 from echostep.localization.meeting_model import carries_position, on_the_way, start_at
 from echostep.localization.meetings import MeetingEffect, MeetingQueue
 from echostep.localization.particle_kernels import systematic

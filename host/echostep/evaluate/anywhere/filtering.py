@@ -14,7 +14,8 @@ import numpy as np
 
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.map_filter import FilterSettings, MapFilter
+from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.map_filter import MapFilter
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
