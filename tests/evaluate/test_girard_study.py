@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import multiprocessing
 import os
 import sys
 from functools import partial
@@ -19,10 +20,11 @@ from echostep.errors import EchostepError
 from echostep.evaluate import girard2011 as study
 from echostep.evaluate.echoes.study import echoes_study
 from echostep.evaluate.report import Row, summary, write_json
-from echostep.evaluate.runs import SeededRuns
+from echostep.evaluate.runs import Journal, SeededRuns
 from echostep.evaluate.study import StudyRequest, run_study
 from echostep.simulation.people.marker_walk import STEP_M, lay_markers, walk_markers
 from echostep.simulation.world import sites
+from waiting import until
 
 SITES = [sites.otb(), *(build(3) for build in study.SITES.values())]
 ECHOSTEP = Path(sys.executable).with_name("echostep")
@@ -138,6 +140,25 @@ def test_rows_of_other_arguments_are_not_taken(tmp_path: Path) -> None:
     for name in ("first", "second", "first"):
         assert SeededRuns("s", 1, 10, partial(named, name), tmp_path).rows() == [{"name": name}]
     assert len(list(tmp_path.glob("s.*.journal.jsonl"))) == 2  # neither was overwritten
+
+
+def held(folder: str, seed: int) -> list[Row]:
+    """The first run ends at once, another one only when it is patient no more."""
+    if seed > 1:
+        until((Path(folder) / "never").exists)
+        (Path(folder) / "finished").touch()
+    return [{"name": "held"}]
+
+
+def test_an_interrupted_study_waits_for_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(_journal: Journal, _seed: int, _rows: list[Row]) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Journal, "add", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        SeededRuns("s", 2, 1, partial(held, str(tmp_path)), tmp_path).rows()
+    assert not multiprocessing.active_children()
+    assert not (tmp_path / "finished").exists()
 
 
 def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:

@@ -119,6 +119,10 @@ def _on_cores(run: Run, seeds: Sequence[int]) -> Generator[tuple[int, list[Row]]
         seed_of = {pool.submit(run, seed): seed for seed in seeds}
         for done in as_completed(seed_of):
             yield seed_of[done], done.result()
+    except BaseException:  # a SIGTERM reaches this process alone: its workers would finish runs of minutes first
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
