@@ -29,9 +29,7 @@ class Moments(NamedTuple):
 
 
 @lean_kernel
-def moments(
-    x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_m: float, about_m: float
-) -> Moments:  # fmt: skip
+def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_m: float, about_m: float) -> Moments:
     """Of particles (n,) in the map."""
     x, y, east, north = 0.0, 0.0, 0.0, 0.0
     for i in range(len(weight)):

@@ -42,17 +42,17 @@ class PlanVerdict:
 
     def fail_search(self) -> None:
         """A search has found nothing, or a wrong place."""
-        self._fits.add(math.log(FAILS))
+        self._count_against()
 
     def reject_start(self, path_m: float) -> None:
         """A stated start is doubted after this length of path."""
         if path_m < EARLY_M:
-            self._fits.add(math.log(FAILS))
+            self._count_against()
 
     def reject_found(self, late_m: float) -> None:
         """The place that a search has found is doubted, `late_m` of path after a search should have found."""
         if late_m < EARLY_M:
-            self.fail_search()
+            self._count_against()
 
     def cross(self, at: Pose) -> None:
         """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall."""
@@ -62,4 +62,8 @@ class PlanVerdict:
         ):
             return
         self._crossed.append(at)
+        self._count_against()
+
+    def _count_against(self) -> None:
+        """One observation that is FAILS as probable if the plan fits."""
         self._fits.add(math.log(FAILS))
