@@ -43,9 +43,6 @@ from echostep.ports.meeting import Meeting
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, by reason
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
-HIDDEN_FACTOR = 3.0  # extra cloud-size factor when all views are hidden, by reason
-COARSE_FACTOR = 2.0  # extra cloud-size factor with the legs' odometry alone, by reason: its strides are known to 4 cm, its headings to a degree
-COARSE_PATH_M = 20.0  # path for which that factor stays after the last such segment, by reason
 # Probabilities that a cloud is right, by reason:
 DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
@@ -87,7 +84,6 @@ class MapFilter:
         self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
         self.beacon_map = BeaconMap(building.walls, self._settings.beacons, rng)
-        self._coarse_until_m = 0.0  # length of the path up to which COARSE_FACTOR holds
         if start.after_pause:
             self.tracked.plausibility.doubt(UNOBSERVED_DOUBT)
             self._search_beside(start.air, walk_heading_rad)
@@ -244,8 +240,6 @@ class MapFilter:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
-        if segment.scale_sd > 0.0:
-            self._coarse_until_m = self._pings.path_m + COARSE_PATH_M
         move = move_of(segment)
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned)
@@ -256,8 +250,6 @@ class MapFilter:
     def _follow_with(self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities) -> None:
         """Propagate and reweight one cloud, and judge it by how well it foretold the pings."""
         cloud = each.cloud
-        legs = COARSE_FACTOR if self._pings.path_m < self._coarse_until_m else 0.0
-        cloud.set_minimum_size(1.0 + legs + HIDDEN_FACTOR * cloud.hidden_share)
         if cloud.is_coarse:
             field = self._building.field(self._model)
             cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)

@@ -48,8 +48,7 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-# A cloud of more than so many times the usual size is roughened, by reason: only a scattered one is so large
-ROUGHENED = 10
+SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by reason: a gathered one is never so large
 SMALL = 2  # times the least size, by reason: a cloud has contracted
 COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
 COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
@@ -83,7 +82,7 @@ class CloudSettings:
     cloud that crossed a wall as a whole.
     """
 
-    size: int = 220
+    size: int = 660
     largest: int = 20_000
     searching: int = 300_000
     kld: float = 0.15
@@ -91,10 +90,10 @@ class CloudSettings:
     cell_deg: float = 5.0
     start_sd_m: float = 0.15
     start_turn_sd_deg: float = 5.0
-    start_scale_sd: float = 0.02
-    step_sd: float = 0.03
+    start_scale_sd: float = 0.01
+    step_sd: float = 0.02
     turn_sd_deg: float = 0.3
-    scale_sd: float = 0.002
+    scale_sd: float = 0.001
     resample_below: float = 0.5
     wall_cost: float = 40.0
     rescue_sd_m: float = 0.5
@@ -134,7 +133,6 @@ class Cloud:
         self._lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
         self._settings = settings
         self._rng = rng
-        self._minimum_size = settings.size
         self._last_used_m = np.full(2, -math.inf)  # path at the last ping of each ranger that a coarse cloud used
         self._path_m = 0.0
         self.rescues = 0
@@ -187,12 +185,12 @@ class Cloud:
     @property
     def is_scattered(self) -> bool:
         """Whether the cloud is so large that it has not gathered yet."""
-        return len(self.x_m) > ROUGHENED * self._settings.size
+        return len(self.x_m) > SCATTERED * self._settings.size
 
     @property
     def is_small(self) -> bool:
         """Whether the cloud has contracted to about its least size."""
-        return len(self.x_m) <= SMALL * self._minimum_size
+        return len(self.x_m) <= SMALL * self._settings.size
 
     @property
     def hidden_shares(self) -> Floats:
@@ -312,10 +310,6 @@ class Cloud:
         self.log_weight -= self.log_weight.max()
         self.resample_if_needed()
 
-    def set_minimum_size(self, factor: float) -> None:
-        """From the next resampling on, keep at least `factor` times the usual number of particles."""
-        self._minimum_size = int(factor * self._settings.size)
-
     def resample_if_needed(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.
 
@@ -414,7 +408,7 @@ class Cloud:
         cells.sort()
         k = np.count_nonzero(cells[1:] != cells[:-1])
         if k < 1:
-            return self._minimum_size
+            return s.size
         part = 2.0 / (9.0 * k)
         wanted = k / (2.0 * s.kld) * (1.0 - part + math.sqrt(part) * KLD_QUANTILE) ** 3
-        return int(max(wanted, self._minimum_size))
+        return int(max(wanted, s.size))
