@@ -20,6 +20,7 @@ from echostep.arrays import Floats, Ints
 from echostep.localization.beacon_beliefs import BeaconBeliefs, empty_beliefs
 from echostep.localization.coarse_field import CoarseField, CoarsePing, reweight_coarsely
 from echostep.localization.echo_likelihood import EchoModel
+from echostep.localization.hypotheses import hypotheses
 from echostep.localization.level_changes import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
@@ -52,7 +53,7 @@ SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by 
 SMALL = 2  # times the least size, by reason: a cloud has contracted
 COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
 COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
-COARSE_REST = 0.01  # weight of the scattered particles that a coarse cloud leaves behind when the others have gathered in few cells, by reason
+COARSE_REST = 0.1  # weight outside of few cells, or of one place, with which a coarse cloud has gathered there, by reason
 START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
 WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
 COARSE_WALL_COST = (
@@ -322,7 +323,7 @@ class Cloud:
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
-        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self._far_weight() > COARSE_REST
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest and not self._is_in_one_place()
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
@@ -350,6 +351,11 @@ class Cloud:
         cell = (east.astype(np.int64) * rows + north.astype(np.int64)) * sectors + sector
         mass = np.bincount(cell, self.weight)
         return np.log(np.maximum(mass, LEAST_MODE))[cell]
+
+    def _is_in_one_place(self) -> bool:
+        """Whether the likeliest place has all of the weight but COARSE_REST."""
+        places = hypotheses(self.x_m, self.y_m, self.level, self.turn_rad, self.weight)
+        return len(places) > 0 and places[0].probability > 1.0 - COARSE_REST
 
     def _far_weight(self) -> float:
         """Weight further than GATHERED_M from the mean."""
