@@ -141,7 +141,9 @@ def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: floa
             graph.closures.append(closure)
             graph.solve(ROUNDS if np.hypot(*moved[:2]) > FAR_M else 1)
             undone += _undo(graph)
-        begin = end
+            begin = end
+        else:
+            begin = min(max(int(np.searchsorted(way_m, way_m[begin] + 0.5 * STRETCH_M)), begin + 1), end)
     progress(1.0)
     return undone
 
