@@ -24,6 +24,7 @@ RIGHT_RAD = 0.5 * math.pi
 ALIGNED = 0.7  # share of fragments along the building's directions, at first; by reason
 DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction [by reason: 6 cm on 5 m]
 PEOPLE = 0.05  # share of the path on which somebody is beside a ranger, by reason
+MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too; by reason
 ALONG_SD_RAD = math.radians(5.0)  # of such people's direction from the path; by reason
 NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
 LEAST_COURSE_M = 0.3  # of path to either side, by which its direction is known
@@ -77,7 +78,7 @@ def companions(nodes: Nodes, fragments: Fragments) -> tuple[Floats, Floats]:
     heard_m = np.concatenate([[0.0], np.cumsum(size_m[order])])
     low, high = (np.searchsorted(way_m[order], way_m + side * NEAR_M) for side in (-1.0, 1.0))
     path_m = np.minimum(way_m + NEAR_M, nodes.way_m[-1]) - np.maximum(way_m - NEAR_M, 0.0)
-    person = np.minimum(PEOPLE * 2.0 * path_m / (heard_m[high] - heard_m[low]), 1.0)
+    person = np.minimum(PEOPLE * 2.0 * path_m / (heard_m[high] - heard_m[low]), MOST_PEOPLE)
     ends = [
         np.column_stack([np.interp(way_m + side * np.maximum(fragments.half_m, LEAST_COURSE_M), nodes.way_m, nodes.pose[:, k]) for k in (0, 1)])
         for side in (-1.0, 1.0)
