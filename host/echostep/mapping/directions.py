@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Whether the walls of a building have two directions at right angles, and the heading's error if so.
 
-In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any. The one state is the direction of the
-building against the heading by odometry, modulo a right angle: at first it may be any, then it diffuses as the heading drifts. Its distribution is
-kept on a circle of cells, forward and backward along the path [Rabiner 1989], so that a few walls askew, heard first, decide nothing. The evidence
-is the likelihood of all fragments against walls of any direction.
+In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or it is a person and has that of the
+path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be any, then it diffuses
+as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so that a few walls askew,
+heard first, decide nothing. The evidence is the likelihood of all fragments against walls of any direction.
 """
 
 from __future__ import annotations
@@ -17,17 +17,13 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import kernel
+from echostep.mapping.companions import density_along_path, people_share
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.nodes import Nodes
 
 RIGHT_RAD = 0.5 * math.pi
 ALIGNED = 0.7  # share of fragments along the building's directions, at first; by reason
 DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction [by reason: 6 cm on 5 m]
-PEOPLE = 0.05  # share of the path on which somebody is beside a ranger, by reason
-MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too; by reason
-ALONG_SD_RAD = math.radians(5.0)  # of such people's direction from the path; by reason
-NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
-LEAST_COURSE_M = 0.3  # of path to either side, by which its direction is known
 LEAST_EVIDENCE = math.log(1000.0)  # odds from which the building is thought to have such directions
 CELLS = 180  # of a right angle, half a degree each: less than DIRECTION_SD_RAD
 CELL_RAD = RIGHT_RAD / CELLS
@@ -52,13 +48,14 @@ def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
     node = fragments.node[order]
     angle = nodes.pose[node, 2] + fragments.normal_rad[order]
     variance = np.concatenate([[0.0], np.cumsum(nodes.turn_sd_rad**2)])
-    of_wall, beside = companions(nodes, fragments)
+    person = people_share(nodes, fragments)
+    along_path = density_along_path(nodes, fragments)
     seen = Seen(
         angle,
         fragments.sd_rad[order],
         np.diff(variance[node], prepend=variance[node[0]]),
-        of_wall[order],
-        beside[order],
+        person[order],
+        along_path[order],
     )
     smoothed = _smoothed(seen)
     direction = np.unwrap(smoothed.direction_rad, period=RIGHT_RAD)
@@ -67,39 +64,16 @@ def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
     return Directions(base, drift, smoothed.evidence)
 
 
-def companions(nodes: Nodes, fragments: Fragments) -> tuple[Floats, Floats]:
-    """Probability (f,) that each fragment stands still, and density of its direction (f,) as of somebody who goes along, times the rest.
-
-    People are beside a ranger for a share of the path, wherever that is: where little else is heard, as in a hall, most fragments are people, and
-    all of these are along the path.
-    """
-    way_m, size_m = nodes.way_m[fragments.node], 2.0 * fragments.half_m
-    order = np.argsort(way_m, kind="stable")
-    heard_m = np.concatenate([[0.0], np.cumsum(size_m[order])])
-    low, high = (np.searchsorted(way_m[order], way_m + side * NEAR_M) for side in (-1.0, 1.0))
-    path_m = np.minimum(way_m + NEAR_M, nodes.way_m[-1]) - np.maximum(way_m - NEAR_M, 0.0)
-    person = np.minimum(PEOPLE * 2.0 * path_m / (heard_m[high] - heard_m[low]), MOST_PEOPLE)
-    ends = [
-        np.column_stack([np.interp(way_m + side * np.maximum(fragments.half_m, LEAST_COURSE_M), nodes.way_m, nodes.pose[:, k]) for k in (0, 1)])
-        for side in (-1.0, 1.0)
-    ]
-    course = np.arctan2(*(ends[1] - ends[0]).T[::-1])
-    normal = nodes.pose[fragments.node, 2] + fragments.normal_rad
-    off = (normal - course) % math.pi - 0.5 * math.pi
-    sd = np.hypot(fragments.sd_rad, ALONG_SD_RAD)
-    return 1.0 - person, person * np.exp(-0.5 * (off / sd) ** 2) / (math.sqrt(2.0 * math.pi) * sd)
-
-
 class Seen(NamedTuple):
     """Fragments (f,) in order of their nodes: direction of the normal by odometry, its standard deviation, growth of the heading's variance since
-    the one before, and what `companions` says.
+    the one before; probability that each is a person who goes along, and the density of its direction if so.
     """
 
     angle_rad: Floats
     sd_rad: Floats
     variance: Floats
-    still: Floats
-    beside: Floats
+    person: Floats
+    along_path: Floats
 
 
 class Smoothed(NamedTuple):
@@ -117,13 +91,14 @@ def _smoothed(seen: Seen) -> Smoothed:
     belief, evidence = np.full(CELLS, 1.0 / CELLS), 0.0
     for f in range(count):
         _diffuse(belief, seen.variance[f])
+        person = seen.person[f]
         for cell in range(CELLS):
             still = _likelihood(seen.angle_rad[f] - cell * CELL_RAD, seen.sd_rad[f])
-            likely[f, cell] = seen.still[f] * still + seen.beside[f]
+            likely[f, cell] = person * seen.along_path[f] + (1.0 - person) * still
         belief *= likely[f]
         total = belief.sum()
         belief /= total
-        evidence += math.log(total / (seen.still[f] / RIGHT_RAD + seen.beside[f]))
+        evidence += math.log(total / (person * seen.along_path[f] + (1.0 - person) / RIGHT_RAD))
         forward[f] = belief
     direction, back = np.zeros(count), np.ones(CELLS)
     for f in range(count - 1, -1, -1):
