@@ -23,8 +23,8 @@ from echostep.plan.model import Door, Level, Plan, Pose
 
 LEAST_M = 0.1  # a shorter piece is no wall
 ROUND = 3  # digits of a metre
-# The first heading is the course of so much of path, or of as much of it, from LEAST_COURSE_M on, as is straight: chord by length of path, 4 degrees about
-# the course
+# The first heading is the course of so much of path, or of as much of it, from LEAST_COURSE_M on, as is straight: chord by length of the path, which
+# is 4 degrees about its course
 COURSE_M, LEAST_COURSE_M, STRAIGHT = 4.0, 0.5, 0.998
 SQUARE_RAD = math.radians(6.0)
 
