@@ -126,7 +126,8 @@ def _anchored(graph: Graph) -> Bools:
 
 
 def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:
-    """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched.
+    """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched, without one
+    the next begins in the middle of the last.
 
     `before_m`: only with what was passed before this length of path: by the walks before. Returns closures that are undone.
     """
