@@ -19,8 +19,15 @@ from echostep.mapping.directions import LEAST_EVIDENCE, find_directions
 from echostep.mapping.fragments import find_fragments
 from echostep.mapping.nodes import Nodes, Pings
 
-STEP_M = 10.0  # of path: the first step of the search turns it by half of the stated drift over it
-MOST_STEPS, HALVINGS = 12, 2
+STEP_M = 10.0  # of path: a step of the search turns it by half of the drift over it
+SCALES = (
+    4.0,
+    2.0,
+    1.0,
+    0.5,
+    0.25,
+)  # of the steps, and down to 1 of the drift: a bias is far from the walk's own drift, and only near it evidence
+MOST_STEPS = 12
 
 
 class _Tried(NamedTuple):
@@ -32,16 +39,22 @@ def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
     """The turn (rad/m) to be added so that the walls have two directions; the `known` one unless the odds of another are LEAST_EVIDENCE."""
     way_m = float(nodes.way_m[-1])
     step = 0.5 * math.sqrt(float(np.sum(nodes.turn_sd_rad**2)) / max(way_m * STEP_M, 1.0))
-    known = best = _Tried(known_rad_m, _evidence(nodes, pings, known_rad_m))
-    for k in range(HALVINGS + 1):
-        best = _climbed(nodes, pings, best, 0.5**k * step)
-        if best is known:
+    bias = known_rad_m
+    for scale in SCALES:
+        wider = replace(nodes, turn_sd_rad=max(scale, 1.0) * nodes.turn_sd_rad)
+        found = _climbed(wider, pings, bias, scale * step)
+        if found == known_rad_m:
             break  # as of a foot
-    return best.bias_rad_m if best.evidence > known.evidence + LEAST_EVIDENCE else known_rad_m
+        bias = found
+    if bias == known_rad_m:
+        return known_rad_m
+    gain = _evidence(nodes, pings, bias) - _evidence(nodes, pings, known_rad_m)
+    return bias if gain > LEAST_EVIDENCE else known_rad_m
 
 
-def _climbed(nodes: Nodes, pings: Pings, begin: _Tried, step: float) -> _Tried:
+def _climbed(nodes: Nodes, pings: Pings, begin_rad_m: float, step: float) -> float:
     """The bias from which another step gains no evidence, to the side where the first one does."""
+    begin = _Tried(begin_rad_m, _evidence(nodes, pings, begin_rad_m))
     for way in (-step, step):
         best = begin
         for _ in range(MOST_STEPS):
@@ -51,8 +64,8 @@ def _climbed(nodes: Nodes, pings: Pings, begin: _Tried, step: float) -> _Tried:
                 break
             best = tried
         if best is not begin:
-            return best
-    return begin
+            return best.bias_rad_m
+    return begin_rad_m
 
 
 def _evidence(nodes: Nodes, pings: Pings, bias_rad_m: float) -> float:

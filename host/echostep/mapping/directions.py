@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Whether the walls of a building have two directions at right angles, and the heading's error if so.
 
-In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any. The one state is the direction of the
-building against the heading by odometry, modulo a right angle: at first it may be any, then it diffuses as the heading drifts. Its distribution is
-kept on a circle of cells, forward and backward along the path [Rabiner 1989], so that a few walls askew, heard first, decide nothing. The evidence
-is the likelihood of all fragments against walls of any direction.
+In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or it is a person and has that of the
+path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be any, then it diffuses
+as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so that a few walls askew,
+heard first, decide nothing. The evidence is the likelihood of all fragments against walls of any direction.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import kernel
+from echostep.mapping.companions import density_along_path, people_share
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.nodes import Nodes
 
@@ -47,7 +48,15 @@ def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
     node = fragments.node[order]
     angle = nodes.pose[node, 2] + fragments.normal_rad[order]
     variance = np.concatenate([[0.0], np.cumsum(nodes.turn_sd_rad**2)])
-    seen = Seen(angle, fragments.sd_rad[order], np.diff(variance[node], prepend=variance[node[0]]))
+    person = people_share(nodes, fragments)
+    along_path = density_along_path(nodes, fragments)
+    seen = Seen(
+        angle,
+        fragments.sd_rad[order],
+        np.diff(variance[node], prepend=variance[node[0]]),
+        person[order],
+        along_path[order],
+    )
     smoothed = _smoothed(seen)
     direction = np.unwrap(smoothed.direction_rad, period=RIGHT_RAD)
     base = float(direction[0])
@@ -57,12 +66,14 @@ def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
 
 class Seen(NamedTuple):
     """Fragments (f,) in order of their nodes: direction of the normal by odometry, its standard deviation, growth of the heading's variance since
-    the one before.
+    the one before; probability that each is a person who goes along, and the density of its direction if so.
     """
 
     angle_rad: Floats
     sd_rad: Floats
     variance: Floats
+    person: Floats
+    along_path: Floats
 
 
 class Smoothed(NamedTuple):
@@ -80,12 +91,14 @@ def _smoothed(seen: Seen) -> Smoothed:
     belief, evidence = np.full(CELLS, 1.0 / CELLS), 0.0
     for f in range(count):
         _diffuse(belief, seen.variance[f])
+        person = seen.person[f]
         for cell in range(CELLS):
-            likely[f, cell] = _likelihood(seen.angle_rad[f] - cell * CELL_RAD, seen.sd_rad[f])
+            still = _likelihood(seen.angle_rad[f] - cell * CELL_RAD, seen.sd_rad[f])
+            likely[f, cell] = person * seen.along_path[f] + (1.0 - person) * still
         belief *= likely[f]
         total = belief.sum()
         belief /= total
-        evidence += math.log(total * RIGHT_RAD)
+        evidence += math.log(total / (person * seen.along_path[f] + (1.0 - person) / RIGHT_RAD))
         forward[f] = belief
     direction, back = np.zeros(count), np.ones(CELLS)
     for f in range(count - 1, -1, -1):

@@ -126,7 +126,8 @@ def _anchored(graph: Graph) -> Bools:
 
 
 def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:
-    """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched.
+    """Match stretch after stretch from node `first` on with what is older; a closure bends the path before the next stretch is matched, without one
+    the next begins in the middle of the last.
 
     `before_m`: only with what was passed before this length of path: by the walks before. Returns closures that are undone.
     """
@@ -141,7 +142,9 @@ def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: floa
             graph.closures.append(closure)
             graph.solve(ROUNDS if np.hypot(*moved[:2]) > FAR_M else 1)
             undone += _undo(graph)
-        begin = end
+            begin = end
+        else:
+            begin = min(max(int(np.searchsorted(way_m, way_m[begin] + 0.5 * STRETCH_M)), begin + 1), end)
     progress(1.0)
     return undone
 

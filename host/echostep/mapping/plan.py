@@ -23,7 +23,9 @@ from echostep.plan.model import Door, Level, Plan, Pose
 
 LEAST_M = 0.1  # a shorter piece is no wall
 ROUND = 3  # digits of a metre
-COURSE_M, STRAIGHT = 4.0, 0.97  # the first heading is the course of so much of path, if it is straight
+# The first heading is the course of so much of path, or of as much of it, from LEAST_COURSE_M on, as is straight: chord by length of the path, which
+# is 4 degrees about its course
+COURSE_M, LEAST_COURSE_M, STRAIGHT = 4.0, 0.5, 0.998
 SQUARE_RAD = math.radians(6.0)
 
 
@@ -70,17 +72,24 @@ def _turn(mapped: Mapped, heading_rad: float) -> float:
     The foot does not know yet at its first step where the toe points.
     """
     graph = mapped.graph
-    k = int(np.searchsorted(graph.nodes.way_m, COURSE_M))
-    course = float(graph.pose[0, 2])
-    if k < len(graph.nodes):
-        dx, dy = graph.pose[k, :2] - graph.pose[0, :2]
-        if math.hypot(dx, dy) > STRAIGHT * graph.nodes.way_m[k]:
-            course = math.atan2(dy, dx)
+    course = _first_course(graph.pose, graph.nodes.way_m)
     turn = heading_rad - course
     if graph.base_rad is not None:
         off = right_angles_off(graph.base_rad + turn)
         turn -= off if abs(off) < SQUARE_RAD else 0.0
     return turn
+
+
+def _first_course(pose: Floats, way_m: Floats) -> float:
+    """Direction of the straight beginning of a path (n, 3); the first heading where there is none.
+
+    The first stride leads to where the wearer looks, whatever the toe's heading is in it.
+    """
+    for k in range(min(int(np.searchsorted(way_m, COURSE_M)), len(pose) - 1), 0, -1):
+        dx, dy = pose[k, :2] - pose[0, :2]
+        if way_m[k] > LEAST_COURSE_M and math.hypot(dx, dy) > STRAIGHT * way_m[k]:
+            return math.atan2(dy, dx)
+    return float(pose[0, 2])
 
 
 def _doors(level: Level, paths: tuple[Floats, ...]) -> tuple[Door, ...]:

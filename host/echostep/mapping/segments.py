@@ -18,9 +18,6 @@ from echostep.mapping.spots import SPOT_HALF_M
 
 SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of one that passed it
-# Pings of a run, and its length: of a line that has a direction of the building, what reflects; of any line where the building has none; of one
-# askew to them, as corners and edges seem to be
-ACROSS, ANY, ASKEW = (8, 2.0 * SPOT_HALF_M), (8, 0.6), (12, 0.8)
 BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
 EXTEND_M = (
     2.6  # farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
@@ -28,6 +25,18 @@ EXTEND_M = (
 SURE_M = 0.5  # an end is extended by so much though pings passed: they may have passed the end itself
 MEETS_M, LONG_M = 0.5, 2.0  # a short piece so near to a wall of such a length meets it
 SNAP_M = 0.4  # an end that stands out beyond a crossing by less is cut there
+
+
+class Least(NamedTuple):
+    """Limits of a run: its pings, and its length; whether it is as wide, at least, as what reflects."""
+
+    pings: int
+    length_m: float
+    widened: bool = False
+
+
+# Of a line that has a direction of the building; of any line where the building has none; of one askew to them, as corners and edges seem to be
+ACROSS, ANY, ASKEW = Least(8, 2.0 * SPOT_HALF_M, widened=True), Least(8, 0.6), Least(12, 0.8)
 
 
 class Run(NamedTuple):
@@ -39,8 +48,8 @@ class Run(NamedTuple):
     pings: float
 
 
-def find_runs(cells: Cells, least: tuple[int, float]) -> list[Run]:
-    """Runs of all lines, of so many pings and so long at least; one on a line ACROSS a direction of the building is as wide as what reflects."""
+def find_runs(cells: Cells, least: Least) -> list[Run]:
+    """Runs of all lines within these limits."""
     runs = []
     kernel = np.ones(2 * SMOOTH + 1)
     for line, first in enumerate(cells.first_m.tolist()):
@@ -53,10 +62,10 @@ def find_runs(cells: Cells, least: tuple[int, float]) -> list[Run]:
                 continue
             low_m, high_m = first + at[0] * CELL_M, first + (at[-1] + 1) * CELL_M
             pings = float(h[low:high].sum())
-            if least is ACROSS:
+            if least.widened:
                 middle_m = 0.5 * (low_m + high_m)
                 low_m, high_m = min(low_m, middle_m - SPOT_HALF_M), max(high_m, middle_m + SPOT_HALF_M)
-            if pings >= least[0] and high_m - low_m >= least[1]:
+            if pings >= least.pings and high_m - low_m >= least.length_m:
                 runs.append(Run(line, low_m, high_m, pings))
     return runs
 

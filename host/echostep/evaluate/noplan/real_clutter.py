@@ -26,7 +26,10 @@ from echostep.simulation.world.acoustics import SRF02
 from echostep.simulation.world.echoes import ranger_bias_m
 
 FOLDER = "carmen"
-LAG_M = 10.0  # of path, over which the growth of the heading's error is stated: below, jitter of the corrected poses outweighs it
+LAGS_M = (
+    2.0,
+    20.0,
+)  # of path, from one to the other of which the growth of the heading's error is stated; scans are 0.5 to 1 m apart
 PING_S = 0.036  # from the ping of one ranger to that of the other, as the board triggers SRF02
 
 
@@ -48,25 +51,32 @@ def walked_log(path: Path, seed: int) -> SimulatedWalk:
 
 
 def with_stated_drift(segments: Sequence[MeasuredSegment], truth: Floats) -> list[MeasuredSegment]:
-    """The segments with standard deviations of the turn that grow as the heading's error does over LAG_M of path, about its mean.
+    """The segments with standard deviations of the turn that grow as the heading's error does from the one of LAGS_M to the other, about its mean.
 
-    `truth` (k, 5) as of a walk. From scan to scan the error is mostly jitter of the corrected poses, which does not add up: 3.7 degrees over a metre
-    of acapulco are 3.1 over ten.
+    `truth` (k, 5) as of a walk. Odometry sums up turns, so its error grows; what is there at once and does not grow is jitter of the corrected poses:
+    4 degrees over a metre of acapulco, and over forty.
     """
     pieces = [s.segment for s in segments]
     way_m = np.cumsum([math.hypot(s.dx_m, s.dy_m) for s in pieces])
-    variance = np.cumsum([s.turn_sd_rad**2 for s in pieces])
+    stated = np.cumsum([s.turn_sd_rad**2 for s in pieces])
     true = np.interp([s.t1_s for s in pieces], truth[:, 0], np.unwrap(truth[:, 3]))
     error = np.array([s.heading1_rad for s in pieces]) - true
-    later = np.searchsorted(way_m, way_m + LAG_M)
-    first = np.flatnonzero(later < len(way_m))
-    if not len(first):
+    if way_m[-1] <= LAGS_M[1]:
         return list(segments)
-    grown = wrap(error[later[first]] - error[first])
-    share = float(grown.std() / np.sqrt(np.mean(variance[later[first]] - variance[first])))
+    (near, stated_near), (far, stated_far) = (_grown(way_m, error, stated, lag_m) for lag_m in LAGS_M)
+    share = math.sqrt(max(far - near, 0.0) / (stated_far - stated_near))
     return [
         replace(s, segment=replace(p, turn_sd_rad=share * p.turn_sd_rad)) for s, p in zip(segments, pieces, strict=True)
     ]
+
+
+def _grown(way_m: Floats, error_rad: Floats, stated: Floats, lag_m: float) -> tuple[float, float]:
+    """Variance of the heading's error over so much path, about its mean, and that which is stated; `stated` (n,): sum of variances so far."""
+    later = np.searchsorted(way_m, way_m + lag_m)
+    first = np.flatnonzero(later < len(way_m))
+    return float(wrap(error_rad[later[first]] - error_rad[first]).var()), float(
+        np.mean(stated[later[first]] - stated[first])
+    )
 
 
 class _Hearing:

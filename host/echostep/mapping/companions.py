@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Which fragments may be people who go along with the wearer.
+
+In: nodes and fragments. Out: for each fragment a prior, and the density of its direction as of such a person. Owns the share of people. Somebody who
+walks beside a ranger is a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a hall, such pieces
+agree with each other like a wall.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.mapping.fragments import Fragments
+from echostep.mapping.nodes import Nodes
+
+PEOPLE = 0.05  # share of the path on which somebody is beside a ranger, by reason
+MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too; by reason
+ALONG_SD_RAD = math.radians(5.0)  # of such people's direction from that of the path; by reason
+NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
+LEAST_HALF_M = 0.3  # of path to either side of a fragment's middle, at least, over which its direction is taken
+
+
+def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
+    """Prior probability (f,) that a fragment is a person: people are everywhere for the same share of the path, walls are not."""
+    way_m = nodes.way_m[fragments.node]
+    order = np.argsort(way_m, kind="stable")
+    heard_m = np.concatenate([[0.0], np.cumsum(2.0 * fragments.half_m[order])])
+    low, high = (np.searchsorted(way_m[order], way_m + side * NEAR_M) for side in (-1.0, 1.0))
+    path_m = np.minimum(way_m + NEAR_M, nodes.way_m[-1]) - np.maximum(way_m - NEAR_M, 0.0)
+    share: Floats = np.minimum(PEOPLE * 2.0 * path_m / (heard_m[high] - heard_m[low]), MOST_PEOPLE)
+    return share
+
+
+def density_along_path(nodes: Nodes, fragments: Fragments) -> Floats:
+    """Density (f,) of each fragment's direction, per radian, if it is of somebody who goes along: that of the path beside it."""
+    off = (nodes.pose[fragments.node, 2] + fragments.normal_rad - _course(nodes, fragments)) % math.pi - 0.5 * math.pi
+    sd = np.hypot(fragments.sd_rad, ALONG_SD_RAD)
+    density: Floats = np.exp(-0.5 * (off / sd) ** 2) / (math.sqrt(2.0 * math.pi) * sd)
+    return density
+
+
+def _course(nodes: Nodes, fragments: Fragments) -> Floats:
+    """Direction (f,) of the path by odometry from the beginning of each fragment to its end."""
+    middle, half = nodes.way_m[fragments.node], np.maximum(fragments.half_m, LEAST_HALF_M)
+    dx, dy = (
+        np.interp(middle + half, nodes.way_m, nodes.pose[:, k])
+        - np.interp(middle - half, nodes.way_m, nodes.pose[:, k])
+        for k in (0, 1)
+    )
+    course: Floats = np.arctan2(dy, dx)
+    return course
