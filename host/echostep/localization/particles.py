@@ -53,7 +53,7 @@ SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by 
 SMALL = 2  # times the least size, by reason: a cloud has contracted
 COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
 COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
-COARSE_REST = 0.1  # weight outside of few cells, or of one place, with which a coarse cloud has gathered there, by reason
+COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered there, by reason
 START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
 WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
 COARSE_WALL_COST = (
@@ -75,12 +75,12 @@ KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 class CloudSettings:
     """Size of the cloud, spread of a start about whose errors nothing is said, and noise that the path's own covariance leaves out.
 
-    `step_sd`: of the length of a move, per square root of a metre; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation and of the lengths,
-    likewise. `resample_below`: effective share of the cloud at which it is resampled (systematic). The size follows the spread [Fox 2003,
-    KLD-sampling]: enough particles that the distribution over cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at
-    most `largest`. A cloud that would need more is coarse: it has `searching` particles, and echoes are looked up in a table. A scattered cloud is
-    roughened by `rough_m` and `rough_deg` until it has contracted. `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a
-    cloud that crossed a wall as a whole.
+    `step_sd`: of a move's length, per square root of a metre, twice that of a foot; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation
+    and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `resample_below`: effective share of the
+    cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
+    cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A cloud that would need more is coarse: it has
+    `searching` particles, and echoes are looked up in a table. A scattered cloud is roughened by `rough_m` and `rough_deg` until it has contracted.
+    `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
     """
 
     size: int = 660
