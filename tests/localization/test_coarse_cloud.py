@@ -26,10 +26,11 @@ ROOM = Building(Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0
 MODEL = echo_model(EchoSettings())
 SETTINGS = CloudSettings(searching=30_000)
 STEP_M = 0.5
+MORE_CELLS = 500  # largest exact cloud, less than what the cells of one place ask for
 
 
-def coarse_cloud(resample_below: float = 0.5) -> Cloud:
-    settings = replace(SETTINGS, resample_below=resample_below)
+def coarse_cloud(resample_below: float = 0.5, largest: int = SETTINGS.largest) -> Cloud:
+    settings = replace(SETTINGS, resample_below=resample_below, largest=largest)
     return Cloud(settings, Start(), 0.0, np.random.default_rng(1), floor=ROOM.floor)
 
 
@@ -58,10 +59,16 @@ def test_a_ping_tells_by_the_way_since_the_one_before() -> None:
     assert told(3.0 * COARSE_INDEPENDENT_M) == pytest.approx(whole, rel=0.05)
 
 
-@pytest.mark.parametrize(("share", "is_coarse"), [(0.8, True), (1.0 - 0.3 * COARSE_REST, False)])
-def test_a_cloud_is_fine_when_nearly_all_of_its_weight_is_in_one_place(share: float, is_coarse: bool) -> None:
-    cloud = coarse_cloud()
+@pytest.mark.parametrize(
+    ("share", "rest_away_m", "is_coarse"),
+    [(0.8, 0.0, True), (1.0 - 0.3 * COARSE_REST, 0.0, False), (1.0 - 0.9 * COARSE_REST, 200.0, False)],
+)
+def test_a_cloud_is_fine_when_nearly_all_of_its_weight_is_in_one_place(
+    share: float, rest_away_m: float, is_coarse: bool
+) -> None:
+    cloud = coarse_cloud(largest=MORE_CELLS)
     gather(cloud, share)
+    cloud.x_m = cloud.x_m + np.where(cloud.log_weight < 0.0, rest_away_m, 0.0)
     cloud.resample_if_needed()
     assert cloud.is_coarse == is_coarse
 
