@@ -19,7 +19,7 @@ from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate, likely_places
+from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate, likely_places
 from echostep.localization.filter_settings import FilterSettings, echo_models, with_plan_error
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.hypothetical import Hypothetical
@@ -363,7 +363,7 @@ class MapFilter:
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
         search = self.search.cloud if self.search else None
         elsewhere, plan_fits = self._building.elsewhere, self._plan.probability
-        if plan_fits < SURE:  # no place is surer than the plan that it is on
+        if plan_fits < UNFIT:  # then no place on it is probable
             right = Right(min(right.here, plan_fits), right.about)
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
         if self._height is not None:
