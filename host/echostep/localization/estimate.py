@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.hypotheses import Hypothesis, hypotheses
+from echostep.localization.hypotheses import Hypothesis
 from echostep.localization.moments import moments
 from echostep.localization.particles import Cloud
 
@@ -130,7 +130,7 @@ def estimate(
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     places: tuple[Hypothesis, ...] = ()
     if search is not None or xx + yy > SPREAD_M**2:
-        places = likely_places(search or cloud, walk_heading_rad)
+        places = (search or cloud).places(walk_heading_rad)
     status = _status(right.here * near, max(right.here * about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
     protection_m = _protection_m(xx, xy, yy, right.here)
@@ -140,11 +140,6 @@ def estimate(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
         protection_m, right.here, places,
     )  # fmt: skip
-
-
-def likely_places(cloud: Cloud, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
-    """The hypotheses of a cloud, the likeliest first."""
-    return hypotheses(cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, cloud.weight)
 
 
 def _status(near: float, about: float, level: float) -> TrackStatus:

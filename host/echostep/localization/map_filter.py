@@ -19,7 +19,7 @@ from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate, likely_places
+from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
 from echostep.localization.filter_settings import FilterSettings, echo_models, with_plan_error
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.hypothetical import Hypothetical
@@ -319,8 +319,7 @@ class MapFilter:
             return False
         if self._searched_m > 2.0 * self._found_within_m:
             return True
-        places = likely_places(cloud, 0.0)
-        return not places or places[0].probability < DOUBTED
+        return cloud.place_share < DOUBTED
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""

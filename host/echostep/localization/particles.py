@@ -20,7 +20,7 @@ from echostep.arrays import Floats, Ints
 from echostep.localization.beacon_beliefs import BeaconBeliefs, empty_beliefs
 from echostep.localization.coarse_field import CoarseField, CoarsePing, reweight_coarsely
 from echostep.localization.echo_likelihood import EchoModel
-from echostep.localization.hypotheses import hypotheses
+from echostep.localization.hypotheses import Hypothesis, hypotheses
 from echostep.localization.level_changes import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
@@ -204,6 +204,16 @@ class Cloud:
         """Their mean."""
         return float(self.hidden_shares.mean())
 
+    def places(self, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
+        """The few places where the trunk may be, the likeliest first."""
+        return hypotheses(self.map_x_m, self.y_m, self.level, self.turn_rad + walk_heading_rad, self.weight)
+
+    @property
+    def place_share(self) -> float:
+        """Weight of the likeliest place; 0 where none has enough to be listed."""
+        places = self.places(0.0)
+        return places[0].probability if places else 0.0
+
     def level_at(self, x_m: float) -> int:
         """Level of an x on the sheet."""
         return int(level_of(np.array([x_m]), self.sheet)[0]) if self.sheet else 0
@@ -323,7 +333,7 @@ class Cloud:
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
-        self.is_coarse = self.is_coarse and wanted > self._settings.largest and not self._is_in_one_place()
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - COARSE_REST
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
@@ -351,11 +361,6 @@ class Cloud:
         cell = (east.astype(np.int64) * rows + north.astype(np.int64)) * sectors + sector
         mass = np.bincount(cell, self.weight)
         return np.log(np.maximum(mass, LEAST_MODE))[cell]
-
-    def _is_in_one_place(self) -> bool:
-        """Whether the likeliest place has all of the weight but COARSE_REST."""
-        places = hypotheses(self.x_m, self.y_m, self.level, self.turn_rad, self.weight)
-        return len(places) > 0 and places[0].probability > 1.0 - COARSE_REST
 
     def _far_weight(self) -> float:
         """Weight further than GATHERED_M from the mean."""
