@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""People who go along with the wearer are no walls that have a direction."""
+"""Echoes of people beside the wearer are no walls that have a direction."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TURN_SD_RAD = math.radians(0.6)  # of each metre, as stated
 
 
 def across_a_hall(every_m: int) -> tuple[Nodes, Pings]:
-    """At 1 m/s through a hall, for a second in `every_m` metres with somebody 1 m to the left or the right, then along a corridor."""
+    """A way at 1 m/s through a hall, with echoes from 1 m to the left or the right in one second of `every_m`, then along a corridor."""
     found: list[MeasuredSegment] = []
     for k in range(HALL_M + CORRIDOR_M):
         hall = k < HALL_M
@@ -37,7 +37,7 @@ def across_a_hall(every_m: int) -> tuple[Nodes, Pings]:
 
 
 def test_people_in_a_hall_turn_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One second in twenty with somebody beside the wearer: the heading stays that of odometry, as walls it would be bent by more than 20 degrees."""
+    """Echoes of one ranger in one second of ten: the heading stays that of odometry; as walls they would bend it by more than 20 degrees."""
     nodes, pings = across_a_hall(10)
     fragments = find_fragments(nodes, pings)
     assert np.count_nonzero(nodes.way_m[fragments.node] < HALL_M) == HALL_M // 10

@@ -13,11 +13,8 @@ from echostep.mapping.plan import plan_of
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 
-TOE_DEG = (
-    -8.0,
-    -7.0,
-    -3.0,
-)  # of the heading at the beginnings of the first strides from their course, as simulated feet have it
+# Of the heading at the beginnings of the first strides from their course, as simulated feet have it
+TOE_DEG = (-8.0, -7.0, -3.0)
 
 
 def walk(straight_m: int) -> list[MeasuredSegment]:

@@ -20,13 +20,8 @@ from echostep.mapping.fragments import find_fragments
 from echostep.mapping.nodes import Nodes, Pings
 
 STEP_M = 10.0  # of path: a step of the search turns it by half of the drift over it
-SCALES = (
-    4.0,
-    2.0,
-    1.0,
-    0.5,
-    0.25,
-)  # of the steps, and down to 1 of the drift: a bias is far from the walk's own drift, and only near it evidence
+# Of the steps, and down to 1 of the drift: a bias is far from the walk's own drift, and only near it there is evidence
+SCALES = (4.0, 2.0, 1.0, 0.5, 0.25)
 MOST_STEPS = 12
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Which fragments may be people who go along with the wearer.
+"""Which fragments may be echoes of people beside the wearer, at the same pace.
 
-In: nodes and fragments. Out: for each fragment a prior, and the density of its direction as of such a person. Owns the share of people. Somebody who
-walks beside a ranger is a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a hall, such pieces
-agree with each other like a wall.
+In: nodes and fragments. Out: the prior probability of that for each fragment, and the density of its direction if so. Owns the share of people. Such
+echoes seem a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a hall, these pieces agree with
+each other like a wall.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from echostep.arrays import Floats
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.nodes import Nodes
 
-PEOPLE = 0.05  # share of the path on which somebody is beside a ranger, by reason
+PEOPLE = 0.05  # share of the path with echoes of a person beside a ranger, by reason
 MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too; by reason
-ALONG_SD_RAD = math.radians(5.0)  # of such people's direction from that of the path; by reason
+ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from that of the path; by reason
 NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
 LEAST_HALF_M = 0.3  # of path to either side of a fragment's middle, at least, over which its direction is taken
 
 
 def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
-    """Prior probability (f,) that a fragment is a person: people are everywhere for the same share of the path, walls are not."""
+    """Prior probability (f,) that a fragment's echoes are of a person: these come on the same share of any path, those of walls do not."""
     way_m = nodes.way_m[fragments.node]
     order = np.argsort(way_m, kind="stable")
     heard_m = np.concatenate([[0.0], np.cumsum(2.0 * fragments.half_m[order])])
@@ -35,7 +35,7 @@ def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
 
 
 def density_along_path(nodes: Nodes, fragments: Fragments) -> Floats:
-    """Density (f,) of each fragment's direction, per radian, if it is of somebody who goes along: that of the path beside it."""
+    """Density (f,) of each fragment's direction, per radian, if its echoes are of a person: about that of the path beside it."""
     off = (nodes.pose[fragments.node, 2] + fragments.normal_rad - _course(nodes, fragments)) % math.pi - 0.5 * math.pi
     sd = np.hypot(fragments.sd_rad, ALONG_SD_RAD)
     density: Floats = np.exp(-0.5 * (off / sd) ** 2) / (math.sqrt(2.0 * math.pi) * sd)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Whether the walls of a building have two directions at right angles, and the heading's error if so.
 
-In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or it is a person and has that of the
-path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be any, then it diffuses
-as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so that a few walls askew,
-heard first, decide nothing. The evidence is the likelihood of all fragments against walls of any direction.
+In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or its echoes are of a person, and
+it has that of the path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
+any, then it diffuses as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so
+that a few walls askew, heard first, decide nothing. The evidence is the likelihood of all fragments against walls of any direction.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
 
 class Seen(NamedTuple):
     """Fragments (f,) in order of their nodes: direction of the normal by odometry, its standard deviation, growth of the heading's variance since
-    the one before; probability that each is a person who goes along, and the density of its direction if so.
+    the one before; probability that its echoes are of a person, and the density of its direction if so.
     """
 
     angle_rad: Floats

@@ -26,10 +26,8 @@ from echostep.simulation.world.acoustics import SRF02
 from echostep.simulation.world.echoes import ranger_bias_m
 
 FOLDER = "carmen"
-LAGS_M = (
-    2.0,
-    20.0,
-)  # of path, from one to the other of which the growth of the heading's error is stated; scans are 0.5 to 1 m apart
+# Of path, from one to the other of which the growth of the heading's error is stated; scans are 0.5 to 1 m apart
+LAGS_M = (2.0, 20.0)
 PING_S = 0.036  # from the ping of one ranger to that of the other, as the board triggers SRF02
 
 
