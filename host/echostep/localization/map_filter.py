@@ -19,7 +19,7 @@ from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.estimate import LOST_M, TRACKING_M, UNFIT, Estimate, Right, estimate
+from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate
 from echostep.localization.filter_settings import FilterSettings, echo_models, with_plan_error
 from echostep.localization.gaps import Gap, Gaps
 from echostep.localization.hypothetical import Hypothetical
@@ -73,7 +73,7 @@ class MapFilter:
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
         self._plan = PlanVerdict()
-        prior = (STATED if stated else self._gathered) if building.has_walls else BY_DEFINITION
+        prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
@@ -189,11 +189,6 @@ class MapFilter:
         return FOUND_WITHIN_M + (0.0 if sheet is None else LEVEL_M * (len(sheet.height_m) - 1))
 
     @property
-    def _gathered(self) -> float:
-        """Probability that a cloud from anywhere is right when it has just gathered: on a wrong plan none is."""
-        return GATHERED * self._plan.probability
-
-    @property
     def plan_supports(self) -> bool:
         """Whether the last metres of echoes confirm the cloud by the plan."""
         return self._building.has_walls and self._right().here > BELIEVED and self._pings.silent_m < SUPPORTED_M
@@ -259,7 +254,8 @@ class MapFilter:
             before = cloud.rescues
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
             if cloud.rescues > before and each is self.tracked and each.plausibility.probability >= BELIEVED:
-                self._plan.cross(self._believed(0.0))
+                counts = self._plan.cross(self._believed(0.0))
+                evidence = evidence if counts else evidence._replace(log_path=0.0)
             if self._building.has_walls:
                 self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
 
@@ -275,7 +271,7 @@ class MapFilter:
         gain = beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
         each.plausibility.update(gain, evidence.log_path, path_m)
         if not judged:
-            each.plausibility.limit(min(most, self._gathered) if cloud.rescues else max(most, self._gathered))
+            each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))
 
     def _clouds(self) -> list[Hypothetical]:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
@@ -302,9 +298,9 @@ class MapFilter:
         elif search is None:
             return self._doubt(tracked, walk_heading_rad)
         elif right > AGREED:
-            self.search, self._is_elsewhere = None, False
+            self._find(tracked)
         elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
-            self.tracked, self.search, self._is_elsewhere = search, None, False
+            self._find(search)
         elif self._has_failed(search):
             self._plan.fail_search()
             near = None if self._is_elsewhere else self._believed(walk_heading_rad)
@@ -312,6 +308,14 @@ class MapFilter:
         else:
             return False
         return True
+
+    def _find(self, found: Hypothetical) -> None:
+        """Track from now on what a search has found, or the tracked cloud with which it agrees."""
+        was = self._believed(0.0)
+        self.tracked, self.search, self._is_elsewhere = found, None, False
+        now = self._believed(0.0)
+        away_m = math.hypot(now.x_m - was.x_m, now.y_m - was.y_m) if now.level == was.level else math.inf
+        self._plan.find(self._searched_m, away_m)
 
     def _is_astray(self, cloud: Cloud) -> bool:
         """Whether a coarse cloud holds no probable place on the path within which one is found, or is coarse on twice that."""
@@ -336,7 +340,7 @@ class MapFilter:
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m = self._pings.path_m
         self._met.forget_beacons()
-        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(self._gathered))
+        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
@@ -362,8 +366,8 @@ class MapFilter:
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
         search = self.search.cloud if self.search else None
         elsewhere, plan_fits = self._building.elsewhere, self._plan.probability
-        if plan_fits < UNFIT:  # then no place on it is probable
-            right = Right(min(right.here, plan_fits), right.about)
+        if plan_fits < SURE:  # otherwise what is said of a place holds if the plan does
+            right = Right(right.here * plan_fits, right.about)
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
         if self._height is not None:
             new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)

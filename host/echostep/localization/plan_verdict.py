@@ -3,8 +3,9 @@
 
 In: what becomes of searches and of believed clouds. Out: a probability. Owns its log-odds, and where a believed cloud went through a wall.
 
-On the plan of another building a search finds nothing, or a place that the next echoes reject; a stated start is rejected; a believed cloud goes
-through walls. Each is FAILS as probable if the plan fits as if it does not.
+On the plan of another building a search finds nothing, or a place that the next echoes reject; a stated start is rejected, and the search finds none
+near it; a believed cloud goes through walls. Each is FAILS as probable if the plan fits as if it does not. Echoes that a cloud foretells confirm the
+plan slowly: parts of two buildings are alike for tens of metres.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ from echostep.localization.plausibility import Plausibility
 from echostep.plan.model import Pose
 
 # All by reason.
-PLAN_FITS = 0.99  # prior and greatest probability
+PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
 FOUND_WITHIN_M = 40.0  # path on which an unknown start is found on one level
-RESTORED_PER_M = -math.log(FAILS) / FOUND_WITHIN_M  # log-odds that the plan gains back on the path of a believed cloud
+CONFIRMED_PER_M = -math.log(FAILS) / FOUND_WITHIN_M  # log-odds that the plan gains on the path of a believed cloud
+MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
+NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
 CROSSED_M = 2.5  # from one way through a wall, within which another is through the same one
 
 
@@ -29,6 +32,7 @@ class PlanVerdict:
     def __init__(self) -> None:
         self._fits = Plausibility(PLAN_FITS)
         self._crossed: list[Pose] = []
+        self._start_rejected = False
 
     @property
     def probability(self) -> float:
@@ -37,8 +41,7 @@ class PlanVerdict:
 
     def confirm(self, path_m: float) -> None:
         """A cloud was believed on this length of path."""
-        self._fits.add(RESTORED_PER_M * path_m)
-        self._fits.limit(PLAN_FITS)
+        self._gain(CONFIRMED_PER_M * path_m)
 
     def fail_search(self) -> None:
         """A search has found nothing, or a wrong place."""
@@ -47,22 +50,37 @@ class PlanVerdict:
     def reject_start(self, path_m: float) -> None:
         """A stated start is doubted after this length of path."""
         if path_m < EARLY_M:
+            self._start_rejected = True
             self._count_against()
+
+    def find(self, after_m: float, away_m: float) -> None:
+        """A search has found a place after this length of path, so far away from the cloud that was doubted.
+
+        Soon and near, it was the stated start that was a little wrong.
+        """
+        if self._start_rejected and after_m < EARLY_M and away_m < NEAR_M:
+            self._gain(-math.log(FAILS))
+        self._start_rejected = False
 
     def reject_found(self, late_m: float) -> None:
         """The place that a search has found is doubted, `late_m` of path after a search should have found."""
         if late_m < EARLY_M:
             self._count_against()
 
-    def cross(self, at: Pose) -> None:
-        """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall."""
+    def cross(self, at: Pose) -> bool:
+        """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall. Returns whether it counts."""
         if any(
             at.level == was.level and math.hypot(at.x_m - was.x_m, at.y_m - was.y_m) <= CROSSED_M
             for was in self._crossed
         ):
-            return
+            return False
         self._crossed.append(at)
         self._count_against()
+        return True
+
+    def _gain(self, log_odds: float) -> None:
+        self._fits.add(log_odds)
+        self._fits.limit(MOST_FITS)
 
     def _count_against(self) -> None:
         """One observation that is FAILS as probable if the plan fits."""

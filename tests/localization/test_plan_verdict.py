@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""Whether the plan fits, and what is said of a place on a plan that may not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from echostep.localization.building import Building
+from echostep.localization.estimate import SURE, Estimate, TrackStatus
+from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.map_filter import MapFilter
+from echostep.localization.particles import CloudSettings
+from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, NEAR_M, PLAN_FITS, PlanVerdict
+from echostep.localization.plausibility import UNPLANNED_DOOR
+from echostep.localization.start import Start
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.model import Pose
+from echostep.walls.echo_sources import Walls
+
+ROOM = Building(Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], float)), None)
+NONE, NO_RANGERS = np.zeros(0), np.zeros(0, np.int64)
+WALL = Pose(3.0, 4.0, 0.0)
+BEFORE = 6.0  # log-odds of a believed cloud
+
+
+def after_failed_searches(failed: int, confirmed_m: float = 0.0) -> Estimate:
+    """The estimate at the end of a step from a known place, after so many failed searches and so much path of a believed cloud."""
+    settings = FilterSettings(cloud=CloudSettings(searching=5_000))
+    start = Start(Pose(6.0, 4.0, 0.0), 0.05)
+    map_filter = MapFilter(ROOM, start, 0.0, np.random.default_rng(1), settings)
+    for _ in range(failed):
+        map_filter._plan.fail_search()
+    map_filter._plan.confirm(confirmed_m)
+    step = PathSegment(0.0, 1.0, 0.1, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=0, anchor_sd_m=0.0)
+    return map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
+
+
+@pytest.mark.parametrize("failed", [1, 2, 3])
+def test_a_place_is_as_sure_as_the_plan_that_it_is_on(failed: int) -> None:
+    estimate = after_failed_searches(failed)
+    assert estimate.plan_fits < SURE
+    assert estimate.right < estimate.plan_fits
+    assert estimate.status is not TrackStatus.TRACKING
+
+
+@pytest.mark.parametrize(("failed", "confirmed_m"), [(0, 0.0), (1, FOUND_WITHIN_M)])
+def test_a_plan_that_fits_takes_nothing(failed: int, confirmed_m: float) -> None:
+    estimate = after_failed_searches(failed, confirmed_m)
+    assert estimate.plan_fits == pytest.approx(PLAN_FITS)
+    assert estimate.status is TrackStatus.TRACKING
+
+
+@pytest.mark.parametrize(
+    ("after_m", "away_m", "fits"), [(10.0, 1.0, True), (10.0, 2 * NEAR_M, False), (30.0, 1.0, False)]
+)
+def test_a_start_that_was_a_little_wrong_says_nothing_of_the_plan(after_m: float, away_m: float, fits: bool) -> None:
+    verdict = PlanVerdict()
+    verdict.reject_start(0.5 * EARLY_M)
+    rejected = verdict.probability
+    verdict.find(after_m, away_m)
+    assert rejected < SURE
+    assert verdict.probability == pytest.approx(PLAN_FITS if fits else rejected)
+
+
+def test_a_rejection_is_taken_back_once() -> None:
+    verdict = PlanVerdict()
+    verdict.reject_start(0.5 * EARLY_M)
+    for _ in range(3):
+        verdict.find(1.0, 1.0)
+    assert verdict.probability == pytest.approx(PLAN_FITS)
+
+
+def test_one_wall_that_was_never_built_leaves_a_confirmed_plan_sure() -> None:
+    verdict = PlanVerdict()
+    verdict.confirm(1_000.0)
+    assert verdict.cross(WALL)
+    assert verdict.probability > SURE
+    assert not verdict.cross(WALL)
+    verdict.cross(Pose(20.0, 4.0, 0.0))
+    assert verdict.probability < SURE
+
+
+def test_a_wall_that_is_not_there_costs_its_price_once() -> None:
+    building = Building(Walls(np.array([[-9, -30, -9, 30], [29, -30, 29, 30], [10, -30, 10, 30]], float)), None)
+    map_filter = MapFilter(building, Start(Pose(0.0, 0.0, 0.0), 0.01), 0.0, np.random.default_rng(1))
+    costs = []
+    for k, dx_m in enumerate([20.0, -20.0, 20.0]):
+        map_filter.tracked.plausibility.log_odds = BEFORE
+        step = PathSegment(k, k + 1.0, dx_m, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0)
+        map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
+        costs.append(BEFORE - map_filter.tracked.plausibility.log_odds)
+    assert costs == pytest.approx([-UNPLANNED_DOOR, 0.0, 0.0], abs=0.3)
