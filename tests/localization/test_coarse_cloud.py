@@ -15,7 +15,7 @@ from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import DOUBTED, MapFilter
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import COARSE_INDEPENDENT_M, COARSE_REST, Cloud, CloudSettings
-from echostep.localization.plan_verdict import FOUND_WITHIN_M
+from echostep.localization.plan_verdict import FOUND_WITHIN_M, PLAN_FITS
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
@@ -74,22 +74,25 @@ def test_a_cloud_is_fine_when_nearly_all_of_its_weight_is_in_one_place(
 
 
 @pytest.mark.parametrize(
-    ("share", "path_m", "is_kept"),
+    ("share", "path_m", "is_kept", "doubts_plan"),
     [
-        (0.4 * DOUBTED, FOUND_WITHIN_M - 1.0, True),
-        (0.4 * DOUBTED, FOUND_WITHIN_M + 1.0, False),
-        (1.2 * DOUBTED, FOUND_WITHIN_M + 1.0, True),
-        (1.2 * DOUBTED, 2.0 * FOUND_WITHIN_M + 1.0, False),
+        (0.4 * DOUBTED, FOUND_WITHIN_M - 1.0, True, False),
+        (0.4 * DOUBTED, FOUND_WITHIN_M + 2.0, True, True),
+        (1.2 * DOUBTED, FOUND_WITHIN_M + 2.0, True, False),
+        (1.2 * DOUBTED, 2.0 * FOUND_WITHIN_M + 1.0, False, True),
     ],
 )
-def test_a_search_with_a_probable_place_goes_on(share: float, path_m: float, is_kept: bool) -> None:
-    """To and fro, without pings; the weights are set before the last step."""
+def test_a_search_goes_on_for_twice_the_path_within_which_one_finds(
+    share: float, path_m: float, is_kept: bool, doubts_plan: bool
+) -> None:
+    """To and fro, without pings; the weights are set before the last two steps."""
     map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1), FilterSettings(cloud=SETTINGS))
     begun = map_filter.cloud
     for k in range(round(path_m / STEP_M)):
-        gather(map_filter.cloud, DOUBTED * 1.2 if (k + 1) * STEP_M < path_m - STEP_M else share)
+        gather(map_filter.cloud, DOUBTED * 1.2 if (k + 1) * STEP_M < path_m - 3.0 * STEP_M else share)
         step = PathSegment(
             k, k + 1.0, STEP_M * (-1.0) ** k, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0
         )
-        map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
+        estimate = map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
     assert (map_filter.cloud is begun) == is_kept
+    assert (estimate.plan_fits < PLAN_FITS - 0.01) == doubts_plan

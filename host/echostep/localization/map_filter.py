@@ -30,7 +30,7 @@ from echostep.localization.moments import weight_about
 from echostep.localization.moves import HEIGHT_SD_M, height_change, move_of
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, Evidence
-from echostep.localization.plan_verdict import FOUND_WITHIN_M, PlanVerdict
+from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, PlanVerdict
 from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
@@ -77,6 +77,8 @@ class MapFilter:
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
+        self._coarse_m = 0.0  # length of the path on which it was coarse
+        self._is_overdue = False  # whether that is longer than the path within which one finds
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
@@ -292,6 +294,7 @@ class MapFilter:
         `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
         """
         tracked, search = self.tracked, self.search
+        self._note_coarse()
         if self._is_astray(tracked.cloud):
             self._plan.fail_search()
             self.tracked = self._new_search(Start(), walk_heading_rad)
@@ -317,13 +320,20 @@ class MapFilter:
         away_m = math.hypot(now.x_m - was.x_m, now.y_m - was.y_m) if now.level == was.level else math.inf
         self._plan.find(self._searched_m, away_m)
 
+    def _note_coarse(self) -> None:
+        """Count it against the plan, once a search, that no place is probable after the path within which one is found."""
+        cloud = self._clouds()[-1].cloud
+        if not cloud.is_coarse:
+            return
+        self._coarse_m = self._searched_m
+        if not self._is_overdue and self._coarse_m > self._found_within_m:
+            self._is_overdue = True
+            if cloud.place_share < DOUBTED:
+                self._plan.fail_search()
+
     def _is_astray(self, cloud: Cloud) -> bool:
-        """Whether a coarse cloud holds no probable place on the path within which one is found, or is coarse on twice that."""
-        if not cloud.is_coarse or self._searched_m <= self._found_within_m:
-            return False
-        if self._searched_m > 2.0 * self._found_within_m:
-            return True
-        return cloud.place_share < DOUBTED
+        """Whether a cloud is still coarse after twice the path within which a place is found."""
+        return cloud.is_coarse and self._searched_m > 2.0 * self._found_within_m
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
@@ -338,7 +348,7 @@ class MapFilter:
         return True
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
-        self._search_m = self._pings.path_m
+        self._search_m, self._coarse_m, self._is_overdue = self._pings.path_m, 0.0, False
         self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 
@@ -358,7 +368,7 @@ class MapFilter:
             return self._is_astray(search.cloud)
         # Storeys that are alike stay several places, and no new search would tell them apart.
         is_probable = search.has_contracted and search.plausibility.probability > FOUND
-        return not is_probable and self._searched_m > self._found_within_m
+        return not is_probable and self._searched_m > max(self._found_within_m, self._coarse_m + EARLY_M)
 
     def _estimate(self, segment: PathSegment, right: Right) -> Estimate:
         """The estimate at the end of a segment."""
