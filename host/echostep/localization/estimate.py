@@ -48,9 +48,8 @@ class Estimate:
     """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`.
 
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
-    `protection_m`: radius beyond which the error is with probability RISK, infinite where no radius within the building is that safe. `right`:
-    probability that the cloud is right; `plan_fits`: that the plan is the building's;
-    `outside`: that the trunk is outside of the building.
+    `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
+    the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
     `hypotheses`: the places of a cloud that has not gathered, the likeliest first.
     """
 
@@ -133,7 +132,7 @@ def estimate(
         places = (search or cloud).places(walk_heading_rad)
     status = _status(right.here * near, max(right.here * about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
-    protection_m = _protection_m(xx, xy, yy, right.here)
+    protection_m = _protection_m(xx, xy, yy, right.here * max(levels))
     if status is not TrackStatus.TRACKING and elsewhere is not None:
         xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), right.here)
     return Estimate(
@@ -150,7 +149,10 @@ def _status(near: float, about: float, level: float) -> TrackStatus:
 
 
 def _protection_m(xx_m2: float, xy_m2: float, yy_m2: float, right: float) -> float:
-    """Radius beyond which the error is with probability RISK: of a normal distribution along its longer axis; being wrong takes part of the risk."""
+    """Radius beyond which the error is with probability RISK: of a normal distribution along its longer axis.
+
+    `right`: probability of the place and its level; being wrong takes part of the risk.
+    """
     rest = RISK - (1.0 - right)
     if rest <= 0.0:
         return math.inf
