@@ -5,7 +5,7 @@ In: what becomes of searches and of believed clouds. Out: a probability. Owns it
 
 On the plan of another building a search finds nothing, or a place that the next echoes reject; a stated start is rejected, and the search finds none
 near it; a believed cloud goes through walls. Each is FAILS as probable if the plan fits as if it does not. Echoes that a cloud foretells confirm the
-plan slowly: parts of two buildings are alike for tens of metres.
+plan slowly: parts of two buildings are alike for ALIKE_M.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from echostep.plan.model import Pose
 # All by reason.
 PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
+FAR = 0.4  # the same for a rejected start that is found elsewhere: one in a hundred is so far off, half of the wrong plans have a place alike
 FOUND_WITHIN_M = 40.0  # path on which an unknown start is found on one level
-CONFIRMED_PER_M = -math.log(FAILS) / FOUND_WITHIN_M  # log-odds that the plan gains on the path of a believed cloud
+ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in the mean (20 to 50 m were seen): symmetric wings, storeys
 MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
 NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
@@ -41,7 +42,7 @@ class PlanVerdict:
 
     def confirm(self, path_m: float) -> None:
         """A cloud was believed on this length of path."""
-        self._gain(CONFIRMED_PER_M * path_m)
+        self._gain(path_m / ALIKE_M)
 
     def fail_search(self) -> None:
         """A search has found nothing, or a wrong place."""
@@ -60,6 +61,8 @@ class PlanVerdict:
         """
         if self._start_rejected and after_m < EARLY_M and away_m < NEAR_M:
             self._gain(-math.log(FAILS))
+        elif self._start_rejected:
+            self._gain(math.log(FAR))
         self._start_rejected = False
 
     def reject_found(self, late_m: float) -> None:
