@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Which fragments may be echoes of people beside the wearer, at the same pace.
 
-In: nodes and fragments. Out: the prior probability of that for each fragment, and the density of its direction if so. Owns the share of people. Such
-echoes seem a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a hall, these pieces agree with
-each other like a wall.
+In: nodes and fragments. Out: the prior probability of that for each fragment, and the density of its direction if so; the course of the path. Owns
+the share of people. Such echoes seem a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a hall,
+these pieces agree with each other like a wall.
 """
 
 from __future__ import annotations
@@ -44,10 +44,14 @@ def density_along_path(nodes: Nodes, fragments: Fragments) -> Floats:
 
 def _course(nodes: Nodes, fragments: Fragments) -> Floats:
     """Direction (f,) of the path by odometry from the beginning of each fragment to its end."""
-    middle, half = nodes.way_m[fragments.node], np.maximum(fragments.half_m, LEAST_HALF_M)
+    half_m = np.maximum(fragments.half_m, LEAST_HALF_M)
+    return course_of(nodes.pose, nodes.way_m, nodes.way_m[fragments.node], half_m)
+
+
+def course_of(pose: Floats, way_m: Floats, middle_m: Floats, half_m: Floats | float = LEAST_HALF_M) -> Floats:
+    """Direction (k,) of a path (n, 3), whose length so far is `way_m` (n,), over `half_m` to either side of each place `middle_m` (k,) along it."""
     dx, dy = (
-        np.interp(middle + half, nodes.way_m, nodes.pose[:, k])
-        - np.interp(middle - half, nodes.way_m, nodes.pose[:, k])
+        np.interp(middle_m + half_m, way_m, pose[:, k]) - np.interp(middle_m - half_m, way_m, pose[:, k])
         for k in (0, 1)
     )
     course: Floats = np.arctan2(dy, dx)

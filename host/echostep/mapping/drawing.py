@@ -6,20 +6,25 @@ In: a graph, its pings. Out: `Drawing`. Owns the order: first the lines that hav
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
+from echostep.mapping.companions import ALONG_SD_RAD, course_of
 from echostep.mapping.evidence import add_crossings, cell_counts, explained_by_ends, is_straight, ping_poses
 from echostep.mapping.graph import Graph
 from echostep.mapping.lines import Lines, find_lines, joined
 from echostep.mapping.nodes import Pings
 from echostep.mapping.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 
-# Of wall on one line, at least; shorter ones must be heard again. One passer-by in 15, in 70, goes along for longer, when one second is the mean
+# Of wall on one line, at least; shorter ones must be heard again, or be across the path. One passer-by in 15, in 70, goes along for longer, when one
+# second is the mean
 LONE_M, LONE_ASKEW_M = 2.5, 4.0
 PASSAGE_M = 5.0  # of path, between two passages
+ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within which a person may have gone along
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,34 +59,36 @@ def pieces_on(path: Floats, on: Bools) -> list[Floats]:
     return [path[a:b] for a, b in spans(on)]
 
 
+class _Heard(NamedTuple):
+    """Pings (k,): corrected place and axis (k, 3), length of the path so far, course of the path there."""
+
+    poses: Floats
+    way_m: Floats
+    course_rad: Floats
+
+
 def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     """The walls that these pings show, beside these paths."""
     poses = ping_poses(graph, pings)
     way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
+    heard = _Heard(poses, way_m, course_of(graph.pose, graph.nodes.way_m, way_m))
     lines = find_lines(graph)
     free = np.ones(len(poses), np.bool_)
     aligned = lines.aligned if lines.aligned.any() else np.ones(len(lines.rho_m), np.bool_)
     straight = _selected(lines, aligned)
     cells = cell_counts(straight, poses, pings.range_m, free, ahead)
     add_crossings(straight, paths, cells)
-    runs = _without_lone(
-        find_runs(cells, ACROSS if lines.aligned.any() else ANY),
-        straight,
-        straight.aligned | ~lines.aligned.any(),
-        poses,
-        way_m,
-        cells.of,
-    )
+    found = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
+    runs = _without_lone(found, straight, LONE_M, heard, cells.of)
     walls, _ = segments_of(straight, runs, cells)
     if not aligned.all():
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
         more = cell_counts(askew, poses, pings.range_m, free, ahead)
         add_crossings(askew, paths, more)
-        none = np.zeros(len(askew.rho_m), np.bool_)
-        found = _without_lone(find_runs(more, ASKEW), askew, none, poses, way_m, more.of)
+        found = _without_lone(find_runs(more, ASKEW), askew, LONE_ASKEW_M, heard, more.of)
         kept = sorted({run.line for run in found})
-        both = joined(straight, _selected(askew, np.isin(np.arange(len(none)), kept)))
+        both = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), kept)))
         runs += [run._replace(line=len(straight.rho_m) + kept.index(run.line)) for run in found]
         cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
         add_crossings(both, paths, cells)
@@ -90,21 +97,27 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     return Drawing(walls, sd, paths)
 
 
-def _without_lone(runs: list[Run], lines: Lines, aligned: Bools, poses: Floats, way_m: Floats, of: Ints) -> list[Run]:
-    """Without short pieces that were heard in one passage, meet no wall and have none on their line: people stood or walked there."""
+def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, of: Ints) -> list[Run]:
+    """Without pieces shorter than `least_m` in all on their line that meet no wall and that a person may have left; `of` (k,): line of each ping."""
     total = np.zeros(len(lines.rho_m))
     for run in runs:
         total[run.line] += run.high_m - run.low_m
-    kept = []
-    for i, run in enumerate(runs):
-        if not meets(lines, runs, i) and total[run.line] < (LONE_M if aligned[run.line] else LONE_ASKEW_M):
-            c, s = np.cos(lines.normal_rad[run.line]), np.sin(lines.normal_rad[run.line])
-            along = c * poses[:, 1] - s * poses[:, 0]
-            own = np.sort(way_m[(of == run.line) & (along >= run.low_m) & (along <= run.high_m)])
-            if not (np.diff(own) > PASSAGE_M).any():
-                continue
-        kept.append(run)
-    return kept
+    return [
+        run
+        for i, run in enumerate(runs)
+        if meets(lines, runs, i) or total[run.line] >= least_m or not _is_of_a_person(run, lines, heard, of)
+    ]
+
+
+def _is_of_a_person(run: Run, lines: Lines, heard: _Heard, of: Ints) -> bool:
+    """Whether a piece may be one: heard in one passage, and along the path or along no direction of the building."""
+    normal = lines.normal_rad[run.line]
+    along = math.cos(normal) * heard.poses[:, 1] - math.sin(normal) * heard.poses[:, 0]
+    own = np.flatnonzero((of == run.line) & (along >= run.low_m) & (along <= run.high_m))
+    if (np.diff(np.sort(heard.way_m[own])) > PASSAGE_M).any():
+        return False
+    off = np.abs((normal - heard.course_rad[own]) % math.pi - 0.5 * math.pi)
+    return not lines.aligned[run.line] or bool(np.median(off) < ALONG_RAD)
 
 
 def _selected(lines: Lines, which: Bools) -> Lines:

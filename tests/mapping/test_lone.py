@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""A short piece of wall in a hall, heard once: drawn where no person who goes along could have left it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.arrays import Ints
+from echostep.mapping.mapper import map_walk
+from echostep.path import MeasuredSegment, PathSegment
+
+CORRIDOR_M, HALL_M = 40, 30
+PIECE_M = 2  # of the way, along which a piece is heard in the middle of the hall
+TURN_SD_RAD = math.radians(0.3)  # of each metre, as stated
+
+
+def through_a_hall(course_rad: float) -> list[MeasuredSegment]:
+    """A way at 1 m/s along a corridor 2 m wide, then through a hall with this course; to the left a piece of wall parallel to the corridor."""
+    found: list[MeasuredSegment] = []
+    for k in range(CORRIDOR_M + HALL_M):
+        in_hall = k >= CORRIDOR_M
+        heading = course_rad if in_hall else 0.0
+        after = course_rad if k >= CORRIDOR_M - 1 else 0.0
+        t_s = k + np.arange(0.0, 1.0, 0.04)
+        ranger: Ints = np.arange(len(t_s)) % 2
+        way_m = t_s - CORRIDOR_M - HALL_M // 2
+        piece = (ranger == 0) & (way_m >= 0.0) & (way_m < PIECE_M)
+        range_m = np.where(piece, 1.5 - way_m * math.sin(course_rad), math.nan) if in_hall else np.ones(len(t_s))
+        segment = PathSegment(k, k + 1.0, math.cos(heading), math.sin(heading), heading, after, 0.02, TURN_SD_RAD, k)
+        found.append(MeasuredSegment(segment, t_s, ranger, range_m))
+    return found
+
+
+@pytest.mark.parametrize(("course_deg", "drawn_m"), [(25.0, PIECE_M * math.cos(math.radians(25.0))), (0.0, 0.0)])
+def test_a_piece_across_the_path_is_a_wall(course_deg: float, drawn_m: float) -> None:
+    """With a direction of the building and another one than the path's; along the path it may be a person."""
+    walls = map_walk(through_a_hall(math.radians(course_deg))).drawing.walls
+    in_hall = walls[walls[:, [0, 2]].min(1) > CORRIDOR_M + 5.0]
+    length_m = np.hypot(*(in_hall[:, 2:] - in_hall[:, :2]).T)
+    assert length_m.sum() == pytest.approx(drawn_m, abs=0.4)
