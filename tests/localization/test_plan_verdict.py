@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -75,11 +76,22 @@ def test_a_start_that_was_a_little_wrong_says_nothing_of_the_plan(after_m: float
         assert 0.5 < verdict.probability < rejected
 
 
-def test_a_rejection_is_taken_back_once() -> None:
+@pytest.mark.parametrize("reject", [PlanVerdict.reject_start, PlanVerdict.reject_found])
+def test_a_cloud_that_was_right_after_all_says_nothing_of_the_plan(
+    reject: Callable[[PlanVerdict, float], None],
+) -> None:
     verdict = PlanVerdict()
-    verdict.reject_start(0.5 * EARLY_M)
+    reject(verdict, 0.5 * EARLY_M)
+    assert verdict.probability < SURE
     for _ in range(3):
-        verdict.find(1.0, 1.0)
+        verdict.agree()
+    assert verdict.probability == pytest.approx(PLAN_FITS)
+
+
+def test_a_late_rejection_takes_nothing() -> None:
+    verdict = PlanVerdict()
+    verdict.reject_found(2.0 * EARLY_M)
+    verdict.agree()
     assert verdict.probability == pytest.approx(PLAN_FITS)
 
 
@@ -94,10 +106,10 @@ def test_one_wall_that_was_never_built_leaves_a_confirmed_plan_sure() -> None:
 
 
 def test_a_wall_that_is_not_there_costs_its_price_once() -> None:
-    building = Building(Walls(np.array([[-9, -30, -9, 30], [29, -30, 29, 30], [10, -30, 10, 30]], float)), None)
+    building = Building(Walls(np.array([[1, -5, 1, 5]], float)), None)
     map_filter = MapFilter(building, Start(Pose(0.0, 0.0, 0.0), 0.01), 0.0, np.random.default_rng(1))
     costs = []
-    for k, dx_m in enumerate([20.0, -20.0, 20.0]):
+    for k, dx_m in enumerate([2.0, -2.0, 2.0]):
         map_filter.tracked.plausibility.log_odds = BEFORE
         step = PathSegment(k, k + 1.0, dx_m, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0)
         map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))

@@ -301,9 +301,10 @@ class MapFilter:
         elif search is None:
             return self._doubt(tracked, walk_heading_rad)
         elif right > AGREED:
-            self._find(tracked)
+            self._plan.agree()
+            self.search, self._is_elsewhere = None, False
         elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
-            self._find(search)
+            self._follow_search(search)
         elif self._has_failed(search):
             self._plan.fail_search()
             near = None if self._is_elsewhere else self._believed(walk_heading_rad)
@@ -312,10 +313,10 @@ class MapFilter:
             return False
         return True
 
-    def _find(self, found: Hypothetical) -> None:
-        """Track from now on what a search has found, or the tracked cloud with which it agrees."""
+    def _follow_search(self, search: Hypothetical) -> None:
+        """Track from now on what a search has found."""
         was = self._believed(0.0)
-        self.tracked, self.search, self._is_elsewhere = found, None, False
+        self.tracked, self.search, self._is_elsewhere = search, None, False
         now = self._believed(0.0)
         away_m = math.hypot(now.x_m - was.x_m, now.y_m - was.y_m) if now.level == was.level else math.inf
         self._plan.find(self._searched_m, away_m)

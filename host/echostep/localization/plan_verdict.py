@@ -34,6 +34,7 @@ class PlanVerdict:
         self._fits = Plausibility(PLAN_FITS)
         self._crossed: list[Pose] = []
         self._start_rejected = False
+        self._taken = 0.0  # log-odds that the last rejection took
 
     @property
     def probability(self) -> float:
@@ -50,25 +51,26 @@ class PlanVerdict:
 
     def reject_start(self, path_m: float) -> None:
         """A stated start is doubted after this length of path."""
-        if path_m < EARLY_M:
-            self._start_rejected = True
-            self._count_against()
+        self._start_rejected = True
+        self._reject(path_m)
+
+    def reject_found(self, late_m: float) -> None:
+        """The place that a search has found is doubted, `late_m` of path after a search should have found."""
+        self._reject(late_m)
+
+    def agree(self) -> None:
+        """A search agrees with the cloud that was doubted, so that was right."""
+        self._gain(self._taken)
+        self._forget_rejection()
 
     def find(self, after_m: float, away_m: float) -> None:
         """A search has found a place after this length of path, so far away from the cloud that was doubted.
 
         Soon and near, it was the stated start that was a little wrong.
         """
-        if self._start_rejected and after_m < EARLY_M and away_m < NEAR_M:
-            self._gain(-math.log(FAILS))
-        elif self._start_rejected:
-            self._gain(math.log(FAR))
-        self._start_rejected = False
-
-    def reject_found(self, late_m: float) -> None:
-        """The place that a search has found is doubted, `late_m` of path after a search should have found."""
-        if late_m < EARLY_M:
-            self._count_against()
+        if self._start_rejected:
+            self._gain(self._taken if after_m < EARLY_M and away_m < NEAR_M else math.log(FAR))
+        self._forget_rejection()
 
     def cross(self, at: Pose) -> bool:
         """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall. Returns whether it counts."""
@@ -80,6 +82,14 @@ class PlanVerdict:
         self._crossed.append(at)
         self._count_against()
         return True
+
+    def _reject(self, path_m: float) -> None:
+        """Count against the plan that a cloud is doubted which was wrong from the first, if this path is short enough for that."""
+        self._taken = -math.log(FAILS) if path_m < EARLY_M else 0.0
+        self._gain(-self._taken)
+
+    def _forget_rejection(self) -> None:
+        self._start_rejected, self._taken = False, 0.0
 
     def _gain(self, log_odds: float) -> None:
         self._fits.add(log_odds)
