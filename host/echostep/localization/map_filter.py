@@ -255,11 +255,19 @@ class MapFilter:
             model = self._blurred if cloud.is_scattered else self._model
             before = cloud.rescues
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
-            if cloud.rescues > before and each is self.tracked and each.plausibility.probability >= BELIEVED:
-                counts = self._plan.cross(self._believed(0.0))
-                evidence = evidence if counts else evidence._replace(log_path=0.0)
+            if each is self.tracked and each.plausibility.probability >= BELIEVED and evidence.log_path < 0.0:
+                evidence = self._charged(evidence, is_through=cloud.rescues > before)
             if self._building.has_walls:
                 self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
+
+    def _charged(self, evidence: Evidence, *, is_through: bool) -> Evidence:
+        """The evidence of the believed cloud without what walls cost it where it has gone through before; `is_through`: it goes through one now."""
+        at = self._believed(0.0)
+        if self._plan.has_crossed(at):
+            return evidence._replace(log_path=0.0)
+        if is_through:
+            self._plan.cross(at)
+        return evidence
 
     def _judge(
         self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float

@@ -72,16 +72,18 @@ class PlanVerdict:
             self._gain(self._taken if after_m < EARLY_M and away_m < NEAR_M else math.log(FAR))
         self._forget_rejection()
 
-    def cross(self, at: Pose) -> bool:
-        """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall. Returns whether it counts."""
-        if any(
+    def has_crossed(self, at: Pose) -> bool:
+        """Whether a believed cloud has gone through a wall near here before."""
+        return any(
             at.level == was.level and math.hypot(at.x_m - was.x_m, at.y_m - was.y_m) <= CROSSED_M
             for was in self._crossed
-        ):
-            return False
-        self._crossed.append(at)
-        self._count_against()
-        return True
+        )
+
+    def cross(self, at: Pose) -> None:
+        """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall."""
+        if not self.has_crossed(at):
+            self._crossed.append(at)
+            self._count_against()
 
     def _reject(self, path_m: float) -> None:
         """Count against the plan that a cloud is doubted which was wrong from the first, if this path is short enough for that."""
