@@ -80,7 +80,7 @@ class CloudSettings:
     cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
     cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A cloud that would need more is coarse: it has
     `searching` particles, and echoes are looked up in a table. A scattered cloud is roughened by `rough_m` and `rough_deg` until it has contracted.
-    `wall_cost`: log-weight that crossing a wall costs, as `UNPLANNED_DOOR`. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
+    `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
     """
 
     size: int = 660
@@ -96,7 +96,7 @@ class CloudSettings:
     turn_sd_deg: float = 0.3
     scale_sd: float = 0.001
     resample_below: float = 0.5
-    wall_cost: float = 6.0
+    wall_cost: float = 40.0
     rescue_sd_m: float = 0.5
     rough_m: float = 0.1
     rough_deg: float = 2.0
