@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A short piece of wall in a hall, heard once: drawn where no person who goes along could have left it."""
+"""A short piece of wall in a hall, heard once: drawn where it is across the path, for echoes of people lie along it."""
 
 from __future__ import annotations
 
