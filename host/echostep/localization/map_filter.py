@@ -30,7 +30,7 @@ from echostep.localization.moments import weight_about
 from echostep.localization.moves import HEIGHT_SD_M, height_change, move_of
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, Evidence
-from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, PlanVerdict
+from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, PlanVerdict, away_m
 from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
@@ -78,7 +78,6 @@ class MapFilter:
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
         self._coarse_m = 0.0  # length of the path on which it was coarse
-        self._is_overdue = False  # whether that is longer than the path within which one finds
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
@@ -325,20 +324,16 @@ class MapFilter:
         """Track from now on what a search has found."""
         was = self._believed(0.0)
         self.tracked, self.search, self._is_elsewhere = search, None, False
-        now = self._believed(0.0)
-        away_m = math.hypot(now.x_m - was.x_m, now.y_m - was.y_m) if now.level == was.level else math.inf
-        self._plan.find(self._searched_m, away_m)
+        self._plan.find(self._searched_m, away_m(was, self._believed(0.0)))
 
     def _note_coarse(self) -> None:
-        """Count it against the plan, once a search, that no place is probable after the path within which one is found."""
+        """Measure the path of a coarse search; count against the plan that no place is probable at the end of that within which one is found."""
         cloud = self._clouds()[-1].cloud
         if not cloud.is_coarse:
             return
-        self._coarse_m = self._searched_m
-        if not self._is_overdue and self._coarse_m > self._found_within_m:
-            self._is_overdue = True
-            if cloud.place_share < DOUBTED:
-                self._plan.fail_search()
+        before_m, self._coarse_m = self._coarse_m, self._searched_m
+        if before_m <= self._found_within_m < self._coarse_m and cloud.place_share < DOUBTED:
+            self._plan.fail_search()
 
     def _is_astray(self, cloud: Cloud) -> bool:
         """Whether a cloud is still coarse after twice the path within which a place is found."""
@@ -357,7 +352,7 @@ class MapFilter:
         return True
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
-        self._search_m, self._coarse_m, self._is_overdue = self._pings.path_m, 0.0, False
+        self._search_m, self._coarse_m = self._pings.path_m, 0.0
         self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 

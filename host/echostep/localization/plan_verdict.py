@@ -27,6 +27,13 @@ NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an
 CROSSED_M = 2.5  # from one way through a wall, within which another is through the same one
 
 
+def away_m(one: Pose, other: Pose) -> float:
+    """Distance of two places on one level; infinite on different ones."""
+    if one.level != other.level:
+        return math.inf
+    return math.hypot(other.x_m - one.x_m, other.y_m - one.y_m)
+
+
 class PlanVerdict:
     """`probability` that the plan fits, after all that was told."""
 
@@ -63,21 +70,18 @@ class PlanVerdict:
         self._gain(self._taken)
         self._forget_rejection()
 
-    def find(self, after_m: float, away_m: float) -> None:
-        """A search has found a place after this length of path, so far away from the cloud that was doubted.
+    def find(self, after_m: float, off_m: float) -> None:
+        """A search has found a place after this length of path, so far off the cloud that was doubted.
 
         Soon and near, it was the stated start that was a little wrong.
         """
         if self._start_rejected:
-            self._gain(self._taken if after_m < EARLY_M and away_m < NEAR_M else math.log(FAR))
+            self._gain(self._taken if after_m < EARLY_M and off_m < NEAR_M else math.log(FAR))
         self._forget_rejection()
 
     def has_crossed(self, at: Pose) -> bool:
         """Whether a believed cloud has gone through a wall near here before."""
-        return any(
-            at.level == was.level and math.hypot(at.x_m - was.x_m, at.y_m - was.y_m) <= CROSSED_M
-            for was in self._crossed
-        )
+        return any(away_m(was, at) <= CROSSED_M for was in self._crossed)
 
     def cross(self, at: Pose) -> None:
         """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall."""
