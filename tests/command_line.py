@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import os
 import signal
 import subprocess
@@ -17,9 +18,9 @@ from unittest import mock
 import pytest
 
 from echostep.cli import main
-from echostep.output.foxglove import POSE
 from echostep.ports.chunks import Chunk
-from echostep.recording.recorder import DerivedMessage, Recorder
+from echostep.recording.recorder import Recorder
+from echostep.session.last_place import PlaceKeeper
 
 PROGRAM = [sys.executable, "-m", "echostep"]  # for tests that need a process: signals, kills, pipes
 
@@ -70,14 +71,9 @@ def interrupt_when(suffices: Callable[[Chunk], object], monkeypatch: pytest.Monk
 
 
 def interrupt_after(estimates: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A live run of this process gets SIGINT, as by Ctrl-C, once so many estimates are recorded."""
-    written = list[DerivedMessage]()
-
-    def are_enough(_: Recorder, messages: list[DerivedMessage]) -> bool:
-        written.extend(message for message in messages if message.topic.name == POSE.name)
-        return len(written) >= estimates
-
-    interrupt_once_called(Recorder, "write_derived", monkeypatch, are_enough)
+    """A live run of this process gets SIGINT, as by Ctrl-C, while it tracks the portion that gives this estimate."""
+    noted = itertools.count(1)
+    interrupt_once_called(PlaceKeeper, "note", monkeypatch, lambda *_: next(noted) >= estimates)
 
 
 def _text(stream: io.TextIOWrapper) -> str:

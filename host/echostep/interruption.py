@@ -4,8 +4,9 @@
 In: signals. Out: one KeyboardInterrupt, after which the run writes its files; an output that a closed terminal does not break.
 Owns the handlers, and whether a signal has come. A second Ctrl-C ends at once.
 
-A KeyboardInterrupt is lost where Python drops every exception: in finalizers, and in the callbacks of LLVM while a kernel is compiled or loaded. So
-the loop of a run calls `raise_lost`.
+An exception between two bytecodes would tear a portion: recorded but not tracked, or tracked but not written. So the loop of a run holds the signal
+back and asks for it between two portions. That also finds one that came earlier and was lost, where Python drops every exception: in finalizers, and
+in the callbacks of LLVM while a kernel is compiled or loaded.
 """
 
 from __future__ import annotations
@@ -17,12 +18,15 @@ import signal
 import stat
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TextIO
 
+SIGNAL_POLL_S = 0.1  # by reason: a run that ends this late ends at once
 _asked = threading.Event()  # a signal has come since `end_by_signals`
+_holding = threading.Event()  # the first one is held back
 HANGUP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # missing on Windows
 
 
@@ -35,22 +39,41 @@ def end_by_signals() -> None:
         signal.signal(HANGUP, _end)
 
 
-def raise_lost() -> None:
-    """Raise KeyboardInterrupt again, once, when a signal has come; a run whose loop still calls this has not got it."""
+@contextmanager
+def holding_signals() -> Iterator[None]:
+    """Hold the first signal back until `raise_held`."""
+    _holding.set()
+    try:
+        yield
+    finally:
+        _holding.clear()
+
+
+def raise_held() -> None:
+    """Raise KeyboardInterrupt when a signal has come."""
     if _asked.is_set():
-        _asked.clear()
         raise KeyboardInterrupt
 
 
+def sleep(span_s: float) -> None:
+    """Sleep; a signal that is held back ends it with KeyboardInterrupt."""
+    ends_s = time.monotonic() + span_s
+    while (left_s := ends_s - time.monotonic()) > 0.0:
+        raise_held()
+        time.sleep(min(left_s, SIGNAL_POLL_S))
+
+
 def _end(number: int, _frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt; afterwards only Ctrl-C still interrupts."""
+    """Raise KeyboardInterrupt, unless it is held back; afterwards only Ctrl-C still interrupts."""
+    held = _holding.is_set() and not _asked.is_set()
     _asked.set()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     if HANGUP is not None:
         signal.signal(HANGUP, lambda *_: leave_terminal())
     if number == HANGUP:
         leave_terminal()
-    raise KeyboardInterrupt
+    if not held:
+        raise KeyboardInterrupt
 
 
 def leave_terminal() -> None:

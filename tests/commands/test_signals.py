@@ -17,6 +17,7 @@ import pytest
 
 from board_runs import ROOT
 from command_line import PROGRAM, echostep
+from echostep.interruption import end_by_signals, holding_signals, raise_held, sleep
 from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
@@ -127,6 +128,24 @@ def test_an_interrupt_that_is_dropped_ends_the_run_all_the_same(
     recording = open_recording(tmp_path / "walk.mcap")
     assert list(recording.chunks()) == written
     assert not recording.truncated
+
+
+def test_a_held_signal_ends_a_wait_and_a_second_ends_at_once() -> None:
+    """As in a replay at the speed of the walk, over an hour in which the computer slept."""
+    handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    end_by_signals()
+    try:
+        with holding_signals():
+            raise_held()
+            signal.raise_signal(signal.SIGINT)
+            with pytest.raises(KeyboardInterrupt):
+                sleep(PATIENCE_S)
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+    finally:
+        end_by_signals()  # forgets the two
+        for number, handler in handlers:
+            signal.signal(number, handler)
 
 
 def check_files(out: Path, live: subprocess.Popen[bytes]) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from typing import TYPE_CHECKING
 
+from echostep.interruption import sleep
 from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep.ports.meeting import MEETING
@@ -35,7 +36,7 @@ def paced(chunks: Iterable[Chunk], speed: float) -> Iterator[Chunk]:
         first_ns = chunk.t_arrival_ns if first_ns is None else first_ns
         early_s = (chunk.t_arrival_ns - first_ns) * 1e-9 / speed - (time.monotonic() - start_s)
         if early_s > LEAST_SLEEP_S:
-            time.sleep(early_s)
+            sleep(early_s)
         yield chunk
 
 

@@ -18,7 +18,7 @@ from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.errors import EchostepError
-from echostep.interruption import raise_lost
+from echostep.interruption import holding_signals, raise_held
 from echostep.localization.start import Start
 from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
@@ -84,12 +84,16 @@ def record(ports: PortOptions, out: Path) -> None:
     with closing(_open_ports(ports)) as opened:
         _identify(opened)
         metadata = version_metadata() | clock_metadata() | {"note": "recorded without tracking"}
-        with start_recording(out, metadata, ports.keep) as recorder, suppress(KeyboardInterrupt):
+        with (
+            start_recording(out, metadata, ports.keep) as recorder,
+            suppress(KeyboardInterrupt),
+            holding_signals(),
+        ):
             chunks = _recorded_chunks(opened, recorder, MtxTiming().rate_hz, ports.seconds)
             for chunk in with_bar(chunks, "recording; Ctrl-C ends it", _passed(ports.seconds)):
-                raise_lost()
                 if chunk is not None:
                     byte_count[chunk.port] += len(chunk.data)
+                raise_held()
         print_notices(recorder.notices)
     from_gateway = f", {byte_count[GATEWAY]} from the gateway" if ports.beacons else ""
     foot = f"{byte_count[FOOT]} from the foot board" if ports.foot else f"{byte_count[MTX]} from the MTx"

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Self
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
-from echostep.interruption import raise_lost
+from echostep.interruption import holding_signals, raise_held
 from echostep.localization.estimate import Estimate
 from echostep.localization.metrics import Truth
 from echostep.output.derived import Derived
@@ -212,16 +212,16 @@ class Session:
         derived = Derived(self.tracker) if sinks else None
         shown = self.output.terminal and console.is_terminal
         view = TerminalView(self.tracker, self.title, progress, console) if shown else None
-        with view or nullcontext():
+        with view or nullcontext(), holding_signals():
             try:
                 for portion in portions:
-                    raise_lost()
                     estimates = self._take(portion)
                     self._show(estimates, view)
                     if derived:
                         messages = derived.take(portion, estimates)
                         for write in sinks:
                             write(messages)
+                    raise_held()
             except KeyboardInterrupt:
                 self._interrupted = True
 
