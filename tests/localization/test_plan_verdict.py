@@ -98,11 +98,25 @@ def test_a_late_rejection_takes_nothing() -> None:
 def test_one_wall_that_was_never_built_leaves_a_confirmed_plan_sure() -> None:
     verdict = PlanVerdict()
     verdict.confirm(1_000.0)
-    for _ in range(3):
-        verdict.cross(WALL)
+    told = [verdict.pass_walls(WALL, 1.0, UNPLANNED_DOOR) for _ in range(3)]
+    assert told == [UNPLANNED_DOOR, 0.0, 0.0]
     assert verdict.probability > SURE
-    verdict.cross(Pose(20.0, 4.0, 0.0))
+    verdict.pass_walls(Pose(20.0, 4.0, 0.0), 1.0, UNPLANNED_DOOR)
     assert verdict.probability < SURE
+
+
+def test_a_way_through_a_wall_counts_however_many_strides_it_takes() -> None:
+    verdict = PlanVerdict()
+    for k in range(4):
+        verdict.pass_walls(Pose(0.3 * k, 4.0, 0.0), 0.3, 0.3 * UNPLANNED_DOOR)
+    assert verdict.probability < PLAN_FITS
+
+
+def test_the_edges_of_doors_are_no_walls_gone_through() -> None:
+    verdict = PlanVerdict()
+    for k in range(20):
+        verdict.pass_walls(Pose(5.0 * k, 4.0, 0.0), 5.0, math.log(0.1))
+    assert verdict.probability == pytest.approx(PLAN_FITS)
 
 
 def test_a_wall_that_is_not_there_costs_its_price_once() -> None:

@@ -252,21 +252,13 @@ class MapFilter:
         else:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model
-            before = cloud.rescues
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
-            if each is self.tracked and each.plausibility.probability >= BELIEVED and evidence.log_path < 0.0:
-                evidence = self._charged(evidence, is_through=cloud.rescues > before)
+            path_m = math.hypot(move.dx_m, move.dy_m)
+            if each is self.tracked and each.plausibility.probability >= BELIEVED:
+                log_path = self._plan.pass_walls(self._believed(0.0), path_m, evidence.log_path)
+                evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:
-                self._judge(each, evidence, pings, unplanned, math.hypot(move.dx_m, move.dy_m))
-
-    def _charged(self, evidence: Evidence, *, is_through: bool) -> Evidence:
-        """The evidence of the believed cloud without what walls cost it where it has gone through before; `is_through`: it goes through one now."""
-        at = self._believed(0.0)
-        if self._plan.has_crossed(at):
-            return evidence._replace(log_path=0.0)
-        if is_through:
-            self._plan.cross(at)
-        return evidence
+                self._judge(each, evidence, pings, unplanned, path_m)
 
     def _judge(
         self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float

@@ -44,6 +44,7 @@ from echostep.localization.particle_kernels import (
     propagate_and_reweight,
     systematic,
 )
+from echostep.localization.plausibility import UNPLANNED_DOOR
 from echostep.localization.start import Air, Start, draw_poses
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
@@ -96,7 +97,7 @@ class CloudSettings:
     turn_sd_deg: float = 0.3
     scale_sd: float = 0.001
     resample_below: float = 0.5
-    wall_cost: float = 40.0
+    wall_cost: float = -UNPLANNED_DOOR
     rescue_sd_m: float = 0.5
     rough_m: float = 0.1
     rough_deg: float = 2.0

@@ -24,7 +24,8 @@ ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in
 MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
 NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
-CROSSED_M = 2.5  # from one way through a wall, within which another is through the same one
+CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
+THROUGH = math.log(1 / 100)  # share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
 
 
 def away_m(one: Pose, other: Pose) -> float:
@@ -40,6 +41,7 @@ class PlanVerdict:
     def __init__(self) -> None:
         self._fits = Plausibility(PLAN_FITS)
         self._crossed: list[Pose] = []
+        self._log_passed = 0.0  # of a believed cloud on the last CROSSED_M, log of the share that went through no wall
         self._start_rejected = False
         self._taken = 0.0  # log-odds that the last rejection took
 
@@ -79,15 +81,22 @@ class PlanVerdict:
             self._gain(self._taken if after_m < EARLY_M and off_m < NEAR_M else math.log(FAR))
         self._forget_rejection()
 
-    def has_crossed(self, at: Pose) -> bool:
-        """Whether a believed cloud has gone through a wall near here before."""
-        return any(away_m(was, at) <= CROSSED_M for was in self._crossed)
+    def pass_walls(self, at: Pose, path_m: float, log_passed: float) -> float:
+        """A believed cloud has gone so far to this place; `log_passed`: log of the share of it that crossed no wall. Returns what that tells of it.
 
-    def cross(self, at: Pose) -> None:
-        """A believed cloud has gone through a wall here: the plan is wrong there, which counts once a wall."""
-        if not self.has_crossed(at):
+        If hardly any of it found another way, the plan is wrong there. That counts once a wall, and tells nothing more of the cloud afterwards.
+        """
+        if self._has_crossed(at):
+            self._log_passed = 0.0
+            return 0.0
+        self._log_passed = self._log_passed * math.exp(-path_m / CROSSED_M) + log_passed
+        if self._log_passed < THROUGH:
             self._crossed.append(at)
             self._count_against()
+        return log_passed
+
+    def _has_crossed(self, at: Pose) -> bool:
+        return any(away_m(was, at) <= CROSSED_M for was in self._crossed)
 
     def _reject(self, path_m: float) -> None:
         """Count against the plan that a cloud is doubted which was wrong from the first, if this path is short enough for that."""

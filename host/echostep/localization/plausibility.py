@@ -19,7 +19,7 @@ from echostep.arrays import Floats
 
 # All by reason.
 WRONG_PER_M = 2e-5  # probability that a right cloud becomes wrong on a metre of the path: once in 50 km
-UNPLANNED_DOOR = math.log(1 / 400)  # log-probability that a way leads through a wall of the plan all the same
+UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a wall of the plan all the same
 STATED = 0.99  # prior probability of a stated start
 # Of a ping's log-ratio, up to which it tells nothing: an error of one standard deviation that stays along a wall (plan, sway, speed of sound) is the
 # cloud's alone, for a rival that follows the wall learns it
