@@ -24,8 +24,12 @@ ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in
 MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
 NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
-CROSSED_M = 4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
-THROUGH = math.log(1 / 100)  # share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
+CROSSED_M = (
+    4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
+)
+THROUGH = math.log(
+    1 / 100
+)  # share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
 
 
 def away_m(one: Pose, other: Pose) -> float:
