@@ -232,9 +232,12 @@ def test_changed_plans() -> None:
 def test_walks_are_long_and_keep_clear_of_walls(site: sites.Site) -> None:
     xy = np.array([w[:2] for w in site.waypoints])
     assert np.hypot(*np.diff(xy, axis=0).T).sum() > 60.0
-    if len(site.built.levels) == 1:
-        walls = shapely.MultiLineString([(w[:2], w[2:]) for w in box(site.built).tolist()])
-        assert walls.distance(shapely.LineString(xy)) > 0.2
+    z = np.array([w[3] if len(w) > 3 else 0.0 for w in site.waypoints])
+    heights = np.array([level.height_m for level in site.built.levels])
+    for k in range(len(xy) - 1):
+        for level in {int(np.abs(heights - at).argmin()) for at in z[k : k + 2]}:
+            walls = shapely.MultiLineString(list(site.built.levels[level].walls.reshape(-1, 2, 2)))
+            assert walls.distance(shapely.LineString(xy[k : k + 2])) > 0.2
 
 
 # ---- the peer ----

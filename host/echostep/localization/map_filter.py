@@ -254,7 +254,7 @@ class MapFilter:
             model = self._blurred if cloud.is_scattered else self._model
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
             path_m = math.hypot(move.dx_m, move.dy_m)
-            if each is self.tracked and each.plausibility.probability >= BELIEVED:
+            if each is self.tracked and each.plausibility.probability > BELIEVED and not self._is_elsewhere:
                 log_path = self._plan.pass_walls(self._believed(0.0), path_m, evidence.log_path)
                 evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:

@@ -83,6 +83,7 @@ class PlanVerdict:
         """
         if self._start_rejected:
             self._gain(self._taken if after_m < EARLY_M and off_m < NEAR_M else math.log(FAR))
+        self._log_passed = 0.0
         self._forget_rejection()
 
     def pass_walls(self, at: Pose, path_m: float, log_passed: float) -> float:

@@ -19,6 +19,7 @@ STAIRWELL = np.array([(-5.0, 0.0), (0.0, 0.0), (0.0, 3.0), (-5.0, 3.0)])
 LIFT = np.array([(LENGTH_M, 0.4), (LENGTH_M + 2.0, 0.4), (LENGTH_M + 2.0, 2.6), (LENGTH_M, 2.6)])
 LIFT_AT = (LENGTH_M + 1.0, 1.5)
 CORRIDOR_Y = 1.5
+SPINE = (-3.6, CORRIDOR_Y, -1.4, CORRIDOR_Y)  # the wall between the flights, which leaves room to turn at both ends
 
 
 def tower(storeys: int) -> Plan:
@@ -76,7 +77,7 @@ def _walls(level: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
             x = door + 0.9
         walls += [(x, y, LENGTH_M, y), (0.0, away, LENGTH_M, away), (0.0, y, 0.0, away), (LENGTH_M, y, LENGTH_M, away)]
         walls += [(7.0 * k, y, 7.0 * k, away) for k in range(1, 4)]
-    walls += [(-5.0, 0.0, 0.0, 0.0), (-5.0, 0.0, -5.0, 3.0), (-5.0, 3.0, 0.0, 3.0), (-3.6, 1.5, -0.3, 1.5)]
+    walls += [(-5.0, 0.0, 0.0, 0.0), (-5.0, 0.0, -5.0, 3.0), (-5.0, 3.0, 0.0, 3.0), SPINE]
     walls += [
         (0.0, 0.0, 0.0, 0.3),
         (0.0, 2.7, 0.0, 3.0),
