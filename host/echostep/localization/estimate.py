@@ -31,7 +31,7 @@ TAIL = 1.5
 SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, by reason
 UNFIT = 0.5  # probability of the plan below which it is said not to fit, by reason
 OUTSIDE = 0.5  # probability of being outside of the building above which it is said, by reason
-SURE_OF_LEVEL = 0.9  # least probability of the likeliest level while tracking, by reason
+SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, by reason
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
+from echostep.localization.alike_levels import RecentWay
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.building import Building
@@ -81,6 +82,7 @@ class MapFilter:
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
+        self._way = RecentWay()  # since the search began
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
@@ -237,6 +239,7 @@ class MapFilter:
         segment = measured.segment
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         move = move_of(segment)
+        self._way.add(move, pings, change.felt_m)
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned)
             each.cloud.change_levels(move, change)
@@ -249,6 +252,8 @@ class MapFilter:
         if cloud.is_coarse:
             field = self._building.field(self._model)
             cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)
+            if not cloud.is_coarse and cloud.is_on_any_level:
+                cloud.copy_to_levels(self._way.log_odds(cloud, self._blurred, self._building.walls))
         else:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model
@@ -345,13 +350,14 @@ class MapFilter:
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m, self._coarse_m = self._pings.path_m, 0.0
+        self._way = RecentWay()
         self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
         cloud, weight = self.cloud, self.cloud.weight
-        level = int(np.bincount(cloud.level, weight).argmax())
+        level = cloud.likeliest_level
         on = cloud.level == level
         x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
         return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)

@@ -45,7 +45,7 @@ from echostep.localization.particle_kernels import (
     systematic,
 )
 from echostep.localization.plausibility import UNPLANNED_DOOR
-from echostep.localization.start import Air, Start, draw_poses
+from echostep.localization.start import ANY_LEVEL, Air, Start, draw_poses
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -60,8 +60,10 @@ WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is c
 COARSE_WALL_COST = (
     5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
 )
+LEVELS_REST = 0.1  # the same where there are several levels, by reason: only exact likelihoods tell storeys apart that are alike
 COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
 # Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
+LOG_LEAST_LEVEL = math.log(0.01)  # of the odds of a level on which a place is tried, too, by reason
 MODE_M, MODE_RAD = 2.0, math.radians(45.0)
 LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, by reason
 MOST_MODES = 1_000_000  # cells beyond which no modes are told apart: memory
@@ -139,6 +141,7 @@ class Cloud:
         self._path_m = 0.0
         self.rescues = 0
         self.is_gathered = False
+        self.is_on_any_level = self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         self.is_coarse = start.pose is None or start.sd_m > WIDE_M
         self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
         wanted = max(self._size_by_spread(), START_SIZE)
@@ -211,9 +214,14 @@ class Cloud:
 
     @property
     def place_share(self) -> float:
-        """Weight of the likeliest place; 0 where none has enough to be listed."""
-        places = self.places(0.0)
+        """Weight of the likeliest place, on whatever level; 0 where none has enough to be listed."""
+        places = hypotheses(self.map_x_m, self.y_m, np.zeros(len(self.x_m), np.int64), self.turn_rad, self.weight)
         return places[0].probability if places else 0.0
+
+    @property
+    def likeliest_level(self) -> int:
+        """The level with the most weight."""
+        return int(np.bincount(self.level, self.weight).argmax())
 
     def level_at(self, x_m: float) -> int:
         """Level of an x on the sheet."""
@@ -286,6 +294,20 @@ class Cloud:
         )
         self.resample_if_needed()
 
+    def copy_to_levels(self, log_odds: Floats) -> None:
+        """Lay the particles of the likeliest level on each level, with these log-odds (k,) against it; those of other levels give way to them."""
+        assert self.sheet is not None
+        own, height_m = self.likeliest_level, self.sheet.height_m
+        log_weight, on = self.log_weight, np.flatnonzero(self.level == own)
+        levels = np.flatnonzero(log_odds > LOG_LEAST_LEVEL)
+        level = np.repeat(levels, len(on))
+        self._keep(np.tile(on, len(levels)))
+        self.log_weight = np.tile(log_weight[on], len(levels)) + log_odds[level]
+        self.log_weight -= self.log_weight.max()
+        self.x_m += (level - own) * self.sheet.pitch_m
+        self.z_m += height_m[level] - height_m[own]
+        self.lag_m -= height_m[level] - height_m[own]
+
     def forget_lag(self) -> None:
         """The height by pressure may have begun anew: nothing is known of its lag."""
         self._lag_variance = UNKNOWN_LAG_M2
@@ -334,7 +356,7 @@ class Cloud:
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
-        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - COARSE_REST
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - (COARSE_REST if self.sheet is None else LEVELS_REST)
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
