@@ -23,7 +23,9 @@ from echostep.legs.walking_bout import climbs
 Signs = tuple[float, float]
 # Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one; by reason.
 CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
-TURN_SD = 12.0 / 90.0  # of the same, per rad of the trunk's turn: strides of a turn on the spot, legs_qmt of the public recordings
+TURN_SD = (
+    12.0 / 90.0
+)  # of the same, per rad of the trunk's turn: strides of a turn on the spot, legs_qmt of the public recordings
 # Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)
 UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`

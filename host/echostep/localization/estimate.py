@@ -50,7 +50,7 @@ class Estimate:
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
     `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
     the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
-    `hypotheses`: the places of a cloud that has not gathered, the likeliest first.
+    `hypotheses`: the places of a cloud that has not gathered, or not on one level, the likeliest first.
     """
 
     t_s: float
@@ -128,7 +128,7 @@ def estimate(
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     places: tuple[Hypothesis, ...] = ()
-    if search is not None or xx + yy > SPREAD_M**2:
+    if search is not None or xx + yy > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
         places = (search or cloud).places(walk_heading_rad)
     status = _status(right.here * near, max(right.here * about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2

@@ -15,7 +15,6 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
-from echostep.localization.alike_levels import RecentWay
 from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.building import Building
@@ -33,6 +32,7 @@ from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, Evidence
 from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, PlanVerdict, away_m
 from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
+from echostep.localization.recent_way import RecentWay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
 from echostep.localization.start import ANY_LEVEL, Air, Start
@@ -82,7 +82,7 @@ class MapFilter:
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
-        self._way = RecentWay()  # since the search began
+        self._way = RecentWay()  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._board_restarts = 0  # before the last height by pressure
         self._met = MeetingMemory()
@@ -209,7 +209,7 @@ class MapFilter:
         """
         if self.cloud.is_coarse or not len(self._building.floor.x_m):
             return
-        self._is_elsewhere = True
+        self._is_elsewhere, self._way = True, RecentWay()
         on_levels = self.cloud.sheet is not None and air is None
         near = replace(self._believed(walk_heading_rad), level=ANY_LEVEL) if on_levels else None
         self.search = self._new_search(Start(near=near, air=air), walk_heading_rad)
@@ -239,7 +239,7 @@ class MapFilter:
         segment = measured.segment
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
         move = move_of(segment)
-        self._way.add(move, pings, change.felt_m)
+        self._way.add(move, pings, change)
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned)
             each.cloud.change_levels(move, change)
@@ -253,7 +253,7 @@ class MapFilter:
             field = self._building.field(self._model)
             cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)
             if not cloud.is_coarse and cloud.is_on_any_level:
-                cloud.copy_to_levels(self._way.log_odds(cloud, self._blurred, self._building.walls))
+                self._way.pass_again(cloud, self._blurred, self._building.walls)
         else:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model
@@ -350,7 +350,6 @@ class MapFilter:
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m, self._coarse_m = self._pings.path_m, 0.0
-        self._way = RecentWay()
         self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 

@@ -11,7 +11,9 @@ it also has a height `z` and an offset `lag` of the height by pressure. Weights 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -60,10 +62,16 @@ WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is c
 COARSE_WALL_COST = (
     5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
 )
-LEVELS_REST = 0.1  # the same where there are several levels, by reason: only exact likelihoods tell storeys apart that are alike
+LEVELS_REST = (
+    0.1  # the same where there are several levels, by reason: only exact likelihoods tell storeys apart that are alike
+)
 COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
 # Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
-LOG_LEAST_LEVEL = math.log(0.01)  # of the odds of a level on which a place is tried, too, by reason
+PASSING = 3_000  # particles of a second pass, by reason: a tenth of a second for each 10 m
+PASSING_ROUGH = (
+    0.5,
+    math.radians(2.0),
+)  # roughening (m, rad) of the places that are tried again, by reason: a coarse place is off by so much
 MODE_M, MODE_RAD = 2.0, math.radians(45.0)
 LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, by reason
 MOST_MODES = 1_000_000  # cells beyond which no modes are told apart: memory
@@ -141,7 +149,9 @@ class Cloud:
         self._path_m = 0.0
         self.rescues = 0
         self.is_gathered = False
-        self.is_on_any_level = self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
+        self.is_on_any_level = (
+            self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
+        )
         self.is_coarse = start.pose is None or start.sd_m > WIDE_M
         self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
         wanted = max(self._size_by_spread(), START_SIZE)
@@ -294,19 +304,22 @@ class Cloud:
         )
         self.resample_if_needed()
 
-    def copy_to_levels(self, log_odds: Floats) -> None:
-        """Lay the particles of the likeliest level on each level, with these log-odds (k,) against it; those of other levels give way to them."""
+    @contextmanager
+    def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:
+        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level, for a second pass with few particles."""
         assert self.sheet is not None
-        own, height_m = self.likeliest_level, self.sheet.height_m
-        log_weight, on = self.log_weight, np.flatnonzero(self.level == own)
-        levels = np.flatnonzero(log_odds > LOG_LEAST_LEVEL)
-        level = np.repeat(levels, len(on))
-        self._keep(np.tile(on, len(levels)))
-        self.log_weight = np.tile(log_weight[on], len(levels)) + log_odds[level]
-        self.log_weight -= self.log_weight.max()
-        self.x_m += (level - own) * self.sheet.pitch_m
-        self.z_m += height_m[level] - height_m[own]
-        self.lag_m -= height_m[level] - height_m[own]
+        settings, levels = self._settings, len(self.sheet.height_m)
+        self._settings = replace(settings, largest=min(PASSING, settings.largest))
+        self._keep(np.repeat(systematic(np.exp(self.log_weight), float(self._rng.random()), PASSING // levels), levels))
+        self._roughen(*PASSING_ROUGH)
+        level = np.tile(np.arange(levels), PASSING // levels)
+        c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
+        self.x_m = self.map_x_m - (c * dx_m - s * dy_m) + level * self.sheet.pitch_m
+        self.y_m = self.y_m - (s * dx_m + c * dy_m)
+        self.z_m, self.hidden = self.sheet.height_m[level], np.zeros((2, len(level)))
+        self.forget_lag()
+        yield
+        self._settings = settings
 
     def forget_lag(self) -> None:
         """The height by pressure may have begun anew: nothing is known of its lag."""
@@ -356,7 +369,11 @@ class Cloud:
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
-        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - (COARSE_REST if self.sheet is None else LEVELS_REST)
+        self.is_coarse = (
+            self.is_coarse
+            and wanted > self._settings.largest
+            and self.place_share <= 1.0 - (COARSE_REST if self.sheet is None else LEVELS_REST)
+        )
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
