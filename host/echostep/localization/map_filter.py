@@ -252,7 +252,7 @@ class MapFilter:
         if cloud.is_coarse:
             field = self._building.field(self._model)
             cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)
-            if not cloud.is_coarse and cloud.is_on_any_level:
+            if not cloud.is_coarse:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
         else:
             # A scattered cloud's particles stand for the places between them.

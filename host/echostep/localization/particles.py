@@ -149,7 +149,7 @@ class Cloud:
         self._path_m = 0.0
         self.rescues = 0
         self.is_gathered = False
-        self.is_on_any_level = (
+        self._is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
         self.is_coarse = start.pose is None or start.sd_m > WIDE_M
@@ -306,18 +306,21 @@ class Cloud:
 
     @contextmanager
     def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:
-        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level, for a second pass with few particles."""
-        assert self.sheet is not None
-        settings, levels = self._settings, len(self.sheet.height_m)
+        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level unless it is known, for a second pass with few particles."""
+        settings = self._settings
         self._settings = replace(settings, largest=min(PASSING, settings.largest))
+        levels = len(self.sheet.height_m) if self.sheet and self._is_on_any_level else 1
         self._keep(np.repeat(systematic(np.exp(self.log_weight), float(self._rng.random()), PASSING // levels), levels))
         self._roughen(*PASSING_ROUGH)
-        level = np.tile(np.arange(levels), PASSING // levels)
         c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
-        self.x_m = self.map_x_m - (c * dx_m - s * dy_m) + level * self.sheet.pitch_m
+        self.x_m = self.x_m - (c * dx_m - s * dy_m)
         self.y_m = self.y_m - (s * dx_m + c * dy_m)
-        self.z_m, self.hidden = self.sheet.height_m[level], np.zeros((2, len(level)))
-        self.forget_lag()
+        self.hidden = np.zeros((2, len(self.x_m)))
+        if self.sheet and levels > 1:
+            level = np.tile(np.arange(levels), PASSING // levels)
+            self.x_m += (level - self.level) * self.sheet.pitch_m
+            self.z_m = self.sheet.height_m[level]
+            self.forget_lag()
         yield
         self._settings = settings
 
@@ -372,7 +375,7 @@ class Cloud:
         self.is_coarse = (
             self.is_coarse
             and wanted > self._settings.largest
-            and self.place_share <= 1.0 - (COARSE_REST if self.sheet is None else LEVELS_REST)
+            and self.place_share <= 1.0 - LEVELS_REST
         )
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
