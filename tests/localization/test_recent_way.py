@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An unknown start in a building whose storeys are alike: each is as probable as the others, until the way tells them apart."""
+"""A search in a building whose storeys are alike, and its second pass along the way: levels are as probable as the echoes make them."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from functools import cache
 import numpy as np
 import pytest
 
-from echostep.arrays import Floats
 from echostep.evaluate.anywhere import sites
 from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
-from echostep.localization.recent_way import PAST_M, RecentWay
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.estimate import SURE_OF_LEVEL, Estimate, TrackStatus
 from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.moves import move_of
-from echostep.localization.particles import Cloud, CloudSettings
+from echostep.localization.moves import height_change, move_of
+from echostep.localization.particles import PASSING, Cloud, CloudSettings
+from echostep.localization.recent_way import PAST_M, RecentWay
 from echostep.localization.start import Air, Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment
-from echostep.plan.model import Plan
+from echostep.plan.model import Plan, Pose
 from echostep.simulation.world.tower import STOREY_M, tower
 from echostep.walls.level_sheet import lay_out_levels
 
-STOREYS, TRUE = 3, 1
+STOREYS, TRUE, WRONG = 3, 1, 2
 SEED = 5
 WALKED_M = 30.0
-ECHO = EchoSettings()
+ECHO, SETTINGS = EchoSettings(), CloudSettings()
 MODEL = echo_model(ECHO)
+ANYWHERE = Start()
 
 
 @cache
@@ -64,72 +64,66 @@ def alike() -> Building:
     return building(replace(tower(STOREYS), levels=levels))
 
 
-def log_odds(where: Building, walked_m: float = WALKED_M, rise_m: float = 0.0) -> Floats:
-    """Of the levels, after a way that ends with a step of this rise, against that of a cloud about its true end on TRUE."""
+def way_in(where: Building, walked_m: float = WALKED_M) -> RecentWay:
     way, usable = RecentWay(), UsablePings(where.background(MODEL), ECHO)
-    followed = segments(walked_m)
-    for measured in followed:
-        is_last = measured is followed[-1]
-        way.add(move_of(measured.segment), usable.take(measured)[0], rise_m if is_last else 0.0)
-    end = followed[-1].segment
-    start = Start(replace(walk().pose_at(end.t1_s), level=TRUE), 0.1)
-    cloud = Cloud(CloudSettings(), start, end.heading1_rad, np.random.default_rng(1), where.sheet, None, where.floor)
-    return way.log_odds(cloud, MODEL, where.walls)
+    for measured in segments(walked_m):
+        way.add(move_of(measured.segment), usable.take(measured)[0], height_change(measured, 0.0))
+    return way
 
 
-def tracked(where: Building, start: Start, walked_m: float) -> list[Estimate]:
+def true_end(level: int) -> tuple[Pose, float]:
+    """True pose at the end of the way, on this level, and the trunk's heading in the walk frame."""
+    last = segments(WALKED_M)[-1].segment
+    return replace(walk().pose_at(last.t1_s), level=level), last.heading1_rad
+
+
+def level_shares(where: Building, start: Start = ANYWHERE) -> list[float]:
+    """Probability of each level after the second pass of a cloud that has gathered at the true place, but on level WRONG; `start`: of the search."""
+    pose, walk_heading_rad = true_end(WRONG)
+    rng = np.random.default_rng(1)
+    cloud = Cloud(SETTINGS, Start(pose, 0.2), walk_heading_rad, rng, where.sheet, None, where.floor)
+    cloud.is_on_any_level = Cloud(SETTINGS, start, 0.0, rng, where.sheet, None, where.floor).is_on_any_level
+    way_in(where).pass_again(cloud, MODEL, where.walls)
+    assert len(cloud.x_m) <= PASSING
+    true, _ = true_end(TRUE)
+    assert np.hypot(cloud.weight @ cloud.map_x_m - true.x_m, cloud.weight @ cloud.y_m - true.y_m) < 0.3
+    return np.bincount(cloud.level, cloud.weight, STOREYS).tolist()
+
+
+def tracked(where: Building) -> list[Estimate]:
+    """Estimates from an unknown start, by a small search."""
     settings = FilterSettings(cloud=CloudSettings(searching=60_000))
-    filtered = MapFilter(where, start, walk().segments[0].segment.heading0_rad, np.random.default_rng(1), settings)
-    return [filtered.update(measured) for measured in segments(walked_m)]
+    filtered = MapFilter(where, Start(), walk().segments[0].segment.heading0_rad, np.random.default_rng(1), settings)
+    return [filtered.update(measured) for measured in segments(WALKED_M)]
 
 
-def test_levels_that_are_alike_are_equally_probable() -> None:
-    assert log_odds(alike()) == pytest.approx([0.0] * STOREYS, abs=1e-9)
+def test_levels_that_are_alike_are_about_as_probable_after_the_second_pass() -> None:
+    assert level_shares(alike()) == pytest.approx([1.0 / STOREYS] * STOREYS, abs=0.25)
 
 
-def test_doors_tell_levels_apart() -> None:
-    found = log_odds(different())
-    assert found[TRUE] == 0.0
-    assert (np.delete(found, TRUE) < -10.0).all()
+def test_doors_tell_the_true_level_by_the_second_pass() -> None:
+    assert level_shares(different())[TRUE] > SURE_OF_LEVEL
 
 
-def test_on_stairs_a_new_way_begins() -> None:
-    assert log_odds(different(), rise_m=0.3) == pytest.approx([0.0] * STOREYS)
+@pytest.mark.parametrize("start", [Start(level=WRONG), Start(air=Air(0.0, 1.0))])
+def test_a_level_that_is_known_stays(start: Start) -> None:
+    assert level_shares(alike(), start)[WRONG] == pytest.approx(1.0)
 
 
-def test_a_way_is_no_longer_than_it_says() -> None:
-    way, usable = RecentWay(), UsablePings(different().background(MODEL), ECHO)
-    for measured in walk().segments:
-        way.add(move_of(measured.segment), usable.take(measured)[0], 0.0)
-    assert PAST_M - 2.0 < way.length_m <= PAST_M
+def test_the_way_has_a_bound() -> None:
+    assert PAST_M - 2.0 < way_in(different(), 1000.0).length_m <= PAST_M
 
 
 def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
     """A coarse cloud's few particles made one of them sure by chance."""
-    last = tracked(alike(), Start(), WALKED_M)[-10:]
+    last = tracked(alike())[-10:]
     assert all(e.status is not TrackStatus.TRACKING for e in last)
-    assert all(min(e.levels) > 0.2 for e in last)
+    assert all(min(e.levels) > 0.1 for e in last)
     assert all({h.level for h in e.hypotheses} == {0, 1, 2} for e in last)
-    true = walk().pose_at(last[-1].t_s)
+    true, _ = true_end(TRUE)
     assert np.hypot(last[-1].x_m - true.x_m, last[-1].y_m - true.y_m) < 0.5
 
 
 def test_on_levels_that_differ_the_right_one_is_tracked() -> None:
-    last = tracked(different(), Start(), WALKED_M)[-1]
-    assert last.level == TRUE
-    assert last.levels[TRUE] > 0.99
-
-
-@pytest.mark.parametrize(
-    ("start", "is_open"),
-    [
-        (Start(), True),
-        (Start(level=TRUE), False),
-        (Start(air=Air(0.0, 1.0)), False),
-        (Start(walk().pose_at(1.0)), False),
-    ],
-)
-def test_a_level_that_is_known_is_not_tried_on_others(start: Start, *, is_open: bool) -> None:
-    where = alike()
-    cloud = Cloud(CloudSettings(), start, 0.0, np.random.default_rng(1), where.sheet, None, where.floor)
-    assert cloud.is_on_any_level == is_open
+    last = tracked(different())[-1]
+    assert (last.level, last.status) == (TRUE, TrackStatus.TRACKING)

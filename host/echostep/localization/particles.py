@@ -67,7 +67,8 @@ LEVELS_REST = (
 )
 COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
 # Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
-PASSING = 3_000  # particles of a second pass, by reason: a tenth of a second for each 10 m
+PASSING = 5_000  # particles of a second pass, by reason: about a second for 40 m
+LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, by reason
 PASSING_ROUGH = (
     0.5,
     math.radians(2.0),
@@ -149,7 +150,7 @@ class Cloud:
         self._path_m = 0.0
         self.rescues = 0
         self.is_gathered = False
-        self._is_on_any_level = (
+        self.is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
         self.is_coarse = start.pose is None or start.sd_m > WIDE_M
@@ -200,12 +201,20 @@ class Cloud:
     @property
     def is_scattered(self) -> bool:
         """Whether the cloud is so large that it has not gathered yet."""
-        return len(self.x_m) > SCATTERED * self._settings.size
+        return len(self.x_m) > SCATTERED * self._least_size
 
     @property
     def is_small(self) -> bool:
         """Whether the cloud has contracted to about its least size."""
-        return len(self.x_m) <= SMALL * self._settings.size
+        return len(self.x_m) <= SMALL * self._least_size
+
+    @property
+    def _least_size(self) -> int:
+        """Least number of particles: on each level that may be the true one, for few particles make one of them likelier by chance."""
+        if self.sheet is None:
+            return self._settings.size
+        held = np.count_nonzero(np.bincount(self.level, self.weight) > LEAST_LEVEL)
+        return self._settings.size * int(held)
 
     @property
     def hidden_shares(self) -> Floats:
@@ -306,23 +315,30 @@ class Cloud:
 
     @contextmanager
     def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:
-        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level unless it is known, for a second pass with few particles."""
+        """Go back to the beginning of the way of (dx, dy) in the walk frame, for a second pass with few particles.
+
+        Each begins on every level, unless the level is known.
+        """
         settings = self._settings
         self._settings = replace(settings, largest=min(PASSING, settings.largest))
-        levels = len(self.sheet.height_m) if self.sheet and self._is_on_any_level else 1
-        self._keep(np.repeat(systematic(np.exp(self.log_weight), float(self._rng.random()), PASSING // levels), levels))
+        levels = len(self.sheet.height_m) if self.sheet and self.is_on_any_level else 1
+        self._keep(systematic(np.exp(self.log_weight), float(self._rng.random()), PASSING // levels))
         self._roughen(*PASSING_ROUGH)
         c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
-        self.x_m = self.x_m - (c * dx_m - s * dy_m)
-        self.y_m = self.y_m - (s * dx_m + c * dy_m)
+        self.x_m, self.y_m = self.x_m - (c * dx_m - s * dy_m), self.y_m - (s * dx_m + c * dy_m)
         self.hidden = np.zeros((2, len(self.x_m)))
         if self.sheet and levels > 1:
-            level = np.tile(np.arange(levels), PASSING // levels)
-            self.x_m += (level - self.level) * self.sheet.pitch_m
-            self.z_m = self.sheet.height_m[level]
-            self.forget_lag()
+            self._lay_on_each_level(self.sheet)
         yield
         self._settings = settings
+
+    def _lay_on_each_level(self, sheet: LevelSheet) -> None:
+        """Copy every particle to each level; nothing is known of the lag then."""
+        level = np.tile(np.arange(len(sheet.height_m)), len(self.x_m))
+        self._keep(np.repeat(np.arange(len(self.x_m)), len(sheet.height_m)))
+        self.x_m = self.map_x_m + level * sheet.pitch_m
+        self.z_m = sheet.height_m[level]
+        self.forget_lag()
 
     def forget_lag(self) -> None:
         """The height by pressure may have begun anew: nothing is known of its lag."""
@@ -375,7 +391,7 @@ class Cloud:
         self.is_coarse = (
             self.is_coarse
             and wanted > self._settings.largest
-            and self.place_share <= 1.0 - LEVELS_REST
+            and self.place_share <= 1.0 - (COARSE_REST if self.sheet is None else LEVELS_REST)
         )
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
@@ -454,7 +470,7 @@ class Cloud:
 
         The lightest of a coarse cloud, COARSE_REST of its weight, do not count.
         """
-        s = self._settings
+        s, least = self._settings, self._least_size
         kept = self._heaviest(1.0 - COARSE_REST) if self.is_coarse else slice(None)
         cells = np.floor(self.x_m[kept] / s.cell_m)
         cells += 1e6 * np.floor(self.y_m[kept] / s.cell_m)
@@ -462,7 +478,7 @@ class Cloud:
         cells.sort()
         k = np.count_nonzero(cells[1:] != cells[:-1])
         if k < 1:
-            return s.size
+            return least
         part = 2.0 / (9.0 * k)
         wanted = k / (2.0 * s.kld) * (1.0 - part + math.sqrt(part) * KLD_QUANTILE) ** 3
-        return int(max(wanted, s.size))
+        return int(max(wanted, least))
