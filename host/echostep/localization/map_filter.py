@@ -307,7 +307,7 @@ class MapFilter:
         elif right > AGREED:
             self._plan.agree()
             self.search, self._is_elsewhere = None, False
-        elif search.plausibility.probability > FOUND and search.cloud.is_gathered and right < DOUBTED:
+        elif search.plausibility.probability > FOUND and search.cloud.is_in_one_place and right < DOUBTED:
             self._follow_search(search)
         elif self._has_failed(search):
             self._plan.fail_search()

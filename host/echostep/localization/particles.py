@@ -62,9 +62,8 @@ WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is c
 COARSE_WALL_COST = (
     5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
 )
-LEVELS_REST = (
-    0.1  # the same where there are several levels, by reason: only exact likelihoods tell storeys apart that are alike
-)
+# The same where there are several levels, after so many metres, by reason: only exact likelihoods tell storeys apart that are alike
+LEVELS_REST, LEVELS_M = 0.1, 10.0
 COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
 # Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
 PASSING = 5_000  # particles of a second pass, by reason: about a second for 40 m
@@ -322,7 +321,9 @@ class Cloud:
         settings = self._settings
         self._settings = replace(settings, largest=min(PASSING, settings.largest))
         levels = len(self.sheet.height_m) if self.sheet and self.is_on_any_level else 1
-        self._keep(systematic(np.exp(self.log_weight), float(self._rng.random()), PASSING // levels))
+        log_weight, chosen = self.log_weight, _spread(len(self.x_m), PASSING // levels)
+        self._keep(chosen)
+        self.log_weight = log_weight[chosen]
         self._roughen(*PASSING_ROUGH)
         c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
         self.x_m, self.y_m = self.x_m - (c * dx_m - s * dy_m), self.y_m - (s * dx_m + c * dy_m)
@@ -334,8 +335,10 @@ class Cloud:
 
     def _lay_on_each_level(self, sheet: LevelSheet) -> None:
         """Copy every particle to each level; nothing is known of the lag then."""
-        level = np.tile(np.arange(len(sheet.height_m)), len(self.x_m))
-        self._keep(np.repeat(np.arange(len(self.x_m)), len(sheet.height_m)))
+        levels, log_weight = len(sheet.height_m), self.log_weight
+        level = np.tile(np.arange(levels), len(self.x_m))
+        self._keep(np.repeat(np.arange(len(self.x_m)), levels))
+        self.log_weight = np.repeat(log_weight, levels)
         self.x_m = self.map_x_m + level * sheet.pitch_m
         self.z_m = sheet.height_m[level]
         self.forget_lag()
@@ -388,19 +391,20 @@ class Cloud:
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
-        self.is_coarse = (
-            self.is_coarse
-            and wanted > self._settings.largest
-            and self.place_share <= 1.0 - (COARSE_REST if self.sheet is None else LEVELS_REST)
-        )
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - self._rest
         count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
-        self.is_gathered = self.is_gathered or self._far_weight() < GATHERED_REST
+        self.is_gathered = self.is_gathered or self._far_weight(self.x_m) < GATHERED_REST
         if self.is_coarse:
             self._roughen(*COARSE_ROUGH)
         elif self.is_scattered:
             self._roughen(self._settings.rough_m, math.radians(self._settings.rough_deg))
+
+    @property
+    def _rest(self) -> float:
+        """Weight outside of one place with which a coarse cloud has gathered."""
+        return COARSE_REST if self.sheet is None or self._path_m < LEVELS_M else LEVELS_REST
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
@@ -421,10 +425,15 @@ class Cloud:
         mass = np.bincount(cell, self.weight)
         return np.log(np.maximum(mass, LEAST_MODE))[cell]
 
-    def _far_weight(self) -> float:
-        """Weight further than GATHERED_M from the mean."""
+    @property
+    def is_in_one_place(self) -> bool:
+        """Whether the cloud has gathered, on whatever level."""
+        return self.is_gathered or self._far_weight(self.map_x_m) < GATHERED_REST
+
+    def _far_weight(self, x_m: Floats) -> float:
+        """Weight further than GATHERED_M from the mean, by x (n,) on the sheet or in the map."""
         weight = self.weight
-        far = np.hypot(self.x_m - weight @ self.x_m, self.y_m - weight @ self.y_m) > GATHERED_M
+        far = np.hypot(x_m - weight @ x_m, self.y_m - weight @ self.y_m) > GATHERED_M
         return float(weight @ far)
 
     def _noise(self, move: Move, share: float) -> Floats:
@@ -482,3 +491,8 @@ class Cloud:
         part = 2.0 / (9.0 * k)
         wanted = k / (2.0 * s.kld) * (1.0 - part + math.sqrt(part) * KLD_QUANTILE) ** 3
         return int(max(wanted, least))
+
+
+def _spread(size: int, count: int) -> Ints:
+    """At most `count` of so many indices, evenly: in a cloud that has not gathered, light places have more particles than by their weight."""
+    return np.unique(np.linspace(0, size - 1, count).astype(np.int64))
