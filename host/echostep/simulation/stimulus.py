@@ -59,7 +59,9 @@ class BoardSensors:
         self._air_pa = air_pa
         self._barometer = barometer or Scp1000Model(rest[3])
         self._compass = CompassModel(magnetism, rest[4])
-        self._belt_rad_s = walk.belt_rad_s if worn is None else worn.rates(walk.belt_rad_s, RATE_HZ, rest[2].spawn(1)[0])
+        self._belt_rad_s = (
+            walk.belt_rad_s if worn is None else worn.rates(walk.belt_rad_s, RATE_HZ, rest[2].spawn(1)[0])
+        )
 
     def rows(self, start: int, stop: int, ranging: NDArray[np.bool_] | None = None) -> NDArray[np.void]:
         """Rows of the milliseconds start..stop-1 of the walk; past its end the last posture goes on.

@@ -43,10 +43,14 @@ class WornGyro:
     adds to the bias, by the rotations about the other axes. `jitter_rad`: of the trunk against the feet, correlated over `jitter_s`.
     """
 
-    scale: float = 0.02  # two belts of real walks: 0.7 % between them, 2.3 % against motion capture [legs_qmt, legs_gaittoolbox]
+    scale: float = (
+        0.02  # two belts of real walks: 0.7 % between them, 2.3 % against motion capture [legs_qmt, legs_gaittoolbox]
+    )
     wander_rad_s: float = math.radians(0.03)  # of a gyro of its class, 0.02 to 0.1
     wander_s: float = 100.0
-    walking_rad_s: float = math.radians(0.06)  # two belts on one pelvis differ by 0.08 deg/s in walking, by 0.01 at rest [legs_qmt]
+    walking_rad_s: float = math.radians(
+        0.06
+    )  # two belts on one pelvis differ by 0.08 deg/s in walking, by 0.01 at rest [legs_qmt]
     jitter_rad: float = math.radians(1.0)  # 0.9 to 1.2 degrees from stride to stride [legs_qmt]
     jitter_s: float = 1.0
 
