@@ -138,9 +138,10 @@ def test_the_drift_over_a_minute_is_much_less_and_no_more_than_particles_allow()
         fused += growth(errors(walker, steps)[LEARNT:], 55)
         variance = np.array([step.heading_sd_rad**2 for step in steps])[LEARNT:]
         stated += 55.0 * float(variance.mean())
-    # The bias, known to 0.57 degrees per root second of walking over the root of 165 to 500 s, makes 2.1 degrees of drift in a minute; the foot 4.7.
-    assert math.sqrt(fused / foot) < 0.65
-    assert stated < fused < stated + WALKS * 55.0 * STRIDE_M * OF_USERS_RAD**2
+    # The bias, known to 0.57 degrees per root second of walking over the root of 165 to 500 s, makes 2.1 degrees of drift in a minute, the fading as
+    # much again; the foot 4.7.
+    assert math.sqrt(fused / foot) < 0.75
+    assert stated < fused < stated + 1.5 * WALKS * 55.0 * STRIDE_M * OF_USERS_RAD**2
 
 
 def test_moves_turn_with_the_headings_and_keep_their_lengths() -> None:
@@ -243,6 +244,13 @@ def test_what_was_left_unstated_is_stated_when_the_belt_fails() -> None:
     _, steps = walked(walker, lambda *_: failed)
     of_failure = [step.heading_sd_rad for step in steps if 300.0 < step.t_end_s < 300.0 + 3.0 * STRIDE_S]
     assert max(of_failure) > 1.2 * DRIFT_RAD
+
+
+def test_the_foots_own_heading_returns_in_the_long_run() -> None:
+    """With a known bias alone the fused heading would drift by the root of two of the foot's."""
+    end = [(walker.drift[-1], errors(walker, walked(walker)[1])[-1]) for walker in map(Walker, range(WALKS))]
+    foot, fused = np.sqrt(np.mean(np.square(end), axis=0))
+    assert fused < 1.25 * foot
 
 
 def test_a_belt_that_comes_back_is_trusted_again_after_turns() -> None:

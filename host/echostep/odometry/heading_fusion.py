@@ -8,7 +8,7 @@ In the middle of each stance, and at both ends of standing, foot less belt headi
 as its navigation states; the belt's error is its noise, its bias times time, its scale error times the turn. Trunk and foot differ by a constant
 angle, from stance to stance by JITTER_RAD, and more where the wearer turns. What the filter finds of the foot's error is shared out by the variances
 of both turns. Bias and scale are those known before the stride: a bias found later must not bend the path that is behind, or all corrections would
-sum up to the foot's own drift.
+sum up to the foot's own drift. In the long run the foot knows more, since its error grows by the root of time: the correction fades.
 
 Without evidence that the belt gyro turns with the foot (scale known to SURE_SCALE, within LARGEST_SCALE; innovations as expected) the correction is
 kept as it is: a dead, loose or reversed gyro never corrects. A gap, or REFUSALS stances in a row beyond the gate, begin the evidence anew.
@@ -123,9 +123,16 @@ class HeadingFusion:
             dt = t_s - self._last[0]
             turn = wrap(yaw_rad - self._last[1])
             share = self._belt_share(dt, turn)
+            self._fade(dt)
             self._propagate(dt, turn, (bias_sd_rad_s * dt) ** 2)
             self._update(yaw_rad - angle, turn, share)
         self._last, self._growth = (t_s, yaw_rad), 0.0
+
+    def _fade(self, dt: float) -> None:
+        """Return to the foot over the time (s) in which the error of the belt's bias makes as much drift as the foot has."""
+        if self.trusted and self._growth > 0.0:
+            over_s = max(self._growth / (dt * float(self._P[BIAS, BIAS])), CORRELATED_S)
+            self.correction_rad *= math.exp(-dt / over_s)
 
     def _belt_share(self, dt: float, turn: float) -> float:
         """Share of the foot's turn error that the belt takes out: by the variances of both turns over `dt`, the belt's as of a random walk."""
