@@ -28,17 +28,14 @@ from echostep.legs.heading import HeadingSettings
 from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry.belt_angle import BeltAngle
 
-OFFSET, BIAS, SCALE = (
-    0,
-    1,
-    2,
-)  # indices of the state: foot less belt heading (rad), bias of the belt (rad/s), error of its scale
-SIZE = 3
+# Indices of the state: recent error of the foot (rad), not yet corrected; the rest of foot less belt heading (rad); bias of the belt (rad/s); error
+# of its scale.
+FOOT, OFFSET, BIAS, SCALE = 0, 1, 2, 3
+SIZE = 4
+MEASURED = np.array([1.0, 1.0, 0.0, 0.0])  # foot less belt heading, by the state
 
-REST_S, EDGE_S = (
-    1.0,
-    0.25,
-)  # a longer stance is standing [foot.trunk_path], which is measured so far from its ends: half a stance
+REST_S = 1.0  # a longer stance is standing [foot.trunk_path], which is measured near both ends:
+EDGE_S = 0.25  # half a stance from them
 # Trunk against foot in the middle of the stance: 0.9 to 1.2 degrees in straight strides (two feet, two belt sensors of legs_qmt), 10 to 40 degrees in
 # turns of 60 to 170 degrees a stride (motion capture, legs_gaittoolbox).
 JITTER_RAD, TWIST_SHARE = math.radians(1.2), 0.3
@@ -47,14 +44,13 @@ WALKING_RAD_S = math.radians(0.06)
 GATE_SD = 3.0  # a normal innovation exceeds it in 0.3 % of stances
 # All by reason.
 FIRST_SCALE_SD = 1.0  # a dead gyro (-1) is possible, and a reversed one (-2) not excluded
-SURE_SCALE, LARGEST_SCALE = (
-    0.03,
-    0.1,
-)  # sensitivity, and 20 degrees of tilt of the axis, which cost 6 %; real belts: 1 to 2 %
+SURE_SCALE = 0.03  # sd, two right angles; real belts err by 1 to 2 %
+LARGEST_SCALE = 0.1  # sensitivity, and 20 degrees of tilt of the axis, which cost 6 %
 SCALE_WALK = 0.001  # from stance to stance: a belt that shifts, 1 % in a hundred strides
 REFUSALS = 3
 MEMORY = 20  # stances in the mean of the squared normalized innovations; 1 is expected
 LARGEST_MEAN_SQUARE = 2.5  # of a belt that is worn; about 20 normal ones exceed it once in 10,000
+RECENT_S = 10.0  # time in which jitter lets the filter find an error of the foot: some strides; what is older is no longer sought
 CORRELATED_S = 30.0  # the error of the bias acts in one direction until walls tell the heading: as a random walk of this much growth
 
 
@@ -141,28 +137,33 @@ class HeadingFusion:
 
     def _propagate(self, dt: float, turn: float, variance: float) -> None:
         """The state over `dt` with a turn of the foot: foot less belt changes by the belt's bias and scale error; `variance`: added to noise."""
+        kept = math.exp(-dt / RECENT_S)
         f = np.eye(SIZE)
+        f[FOOT, FOOT], f[OFFSET, FOOT] = kept, 1.0 - kept
         f[OFFSET, BIAS], f[OFFSET, SCALE] = -dt, -turn
         self._state = f @ self._state
         self._P = f @ self._P @ f.T
-        self._P[OFFSET, OFFSET] += self._growth + self._gyro.walk_rad**2 * dt + variance
+        self._P[FOOT, FOOT] += self._growth
+        self._P[OFFSET, OFFSET] += self._gyro.walk_rad**2 * dt + variance
         self._P[BIAS, BIAS] += self._gyro.drift_rad_s2**2 * dt
         self._P[SCALE, SCALE] += SCALE_WALK**2
 
     def _update(self, measured: float, turn: float, share: float) -> None:
         """Update by the measured difference after a turn of the foot; correct the foot by the belt's share of what is found of its error."""
-        innovation = wrap(measured - float(self._state[OFFSET]))
-        variance = self._P[OFFSET, OFFSET] + JITTER_RAD**2 + (TWIST_SHARE * turn) ** 2
+        innovation = wrap(measured - float(MEASURED @ self._state))
+        towards = self._P @ MEASURED
+        variance = float(MEASURED @ towards) + JITTER_RAD**2 + (TWIST_SHARE * turn) ** 2
         square = innovation**2 / variance
         self._mean_square += (min(square, GATE_SD**2) - self._mean_square) / MEMORY
         if square > GATE_SD**2:
             self._refuse(measured)
             return
-        gain = self._P[:, OFFSET] / variance
-        self._state = self._state + gain * innovation
-        self._P = self._P - np.outer(gain, gain) * variance
+        self._state = self._state + towards / variance * innovation
+        self._P = self._P - np.outer(towards, towards) / variance
+        found = float(self._state[FOOT])
+        self._state[FOOT], self._state[OFFSET] = 0.0, self._state[OFFSET] + found
         self._share = share if self.trusted else 0.0
-        self.correction_rad = wrap(self.correction_rad + self._share * float(gain[OFFSET]) * innovation)
+        self.correction_rad = wrap(self.correction_rad + self._share * found)
         self._refused, self._promised = 0, 0.0
 
     def _refuse(self, measured: float) -> None:
@@ -178,6 +179,6 @@ class HeadingFusion:
 
     def _restart(self, measured: float) -> None:
         """Nothing is known but the difference of the headings."""
-        self._state = np.array([measured, 0.0, 0.0])
-        self._P = np.diag([JITTER_RAD**2, self._gyro.bias_sd_rad_s**2, FIRST_SCALE_SD**2])
+        self._state = np.array([0.0, measured, 0.0, 0.0])
+        self._P = np.diag([0.0, JITTER_RAD**2, self._gyro.bias_sd_rad_s**2, FIRST_SCALE_SD**2])
         self._mean_square, self._refused = 1.0, 0

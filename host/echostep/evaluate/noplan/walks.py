@@ -19,9 +19,8 @@ from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
 from echostep.simulation.devices.board_sensors import WornGyro
 from echostep.simulation.devices.mtx import MtxModel
 
-DRIFT_RAD = math.radians(
-    0.5
-)  # random walk of the heading, per square root of a metre: the worst of the hallways, with the simulated foot's own
+# Random walk of the heading per square root of a metre: the worst of the hallways, with the simulated foot's own.
+DRIFT_RAD = math.radians(0.5)
 SCALE_SD = 0.007  # of all lengths of a walk: the worst of the hallways
 PEOPLE = 0.05  # share of the time for which a person is beside a ranger
 
