@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -246,11 +246,15 @@ class FrontEnd:
             self._add_belt(blocks, int(message_index[sample_index]))
             for aligned in self.alignment.feed([event], float(t_s[sample_index])):
                 fused = self.heading_fusion.corrected(aligned)
-                segments = self.path.add_step(fused) if isinstance(fused, Step) else self.path.add_stance(fused)
+                segments = self._step_segments(fused) if isinstance(fused, Step) else self.path.add_stance(fused)
                 completed.append((int(message_index[sample_index]), segments))
             begin = sample_index
         self._add_belt(blocks)
         return completed + self._standing_segments(foot, t_s, message_index, begin, len(t_s))
+
+    def _step_segments(self, step: Step) -> list[PathSegment]:
+        """The segment of a step, with what the belt says of it."""
+        return [replace(segment, belt=self.heading_fusion.evidence) for segment in self.path.add_step(step)]
 
     def _add_belt(self, blocks: deque[tuple[int, GyroBlock]], before: float = math.inf) -> None:
         """Hand the blocks of gyro samples that are filled before a message to the fusion of the headings."""
