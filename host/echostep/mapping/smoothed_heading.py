@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The foot's headings corrected by the belt's in hindsight: with the bias of the belt's gyro as the whole walk shows it.
 
-In: `MeasuredSegment`s in order of time. Out: the same, turned. Owns nothing. Live the belt corrects the foot by the bias known by then [heading_fusion];
-afterwards a smoother [Rauch, Tung and Striebel 1965] over the same filter gives the error of the foot at each stance. Where the belt is not trusted the
-live headings stay.
+In: `MeasuredSegment`s in order of time. Out: the same, turned. Owns nothing. Live the belt corrects the foot by the bias known by then
+[odometry.heading_fusion]; afterwards a smoother [Rauch, Tung and Striebel 1965] over the same filter gives the error of the foot at each stance. Where
+the belt is not trusted the live headings stay.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _growth(found: _Smoothed, segment: PathSegment) -> float:
 
 
 def _turned(segment: PathSegment, live: float, begin: float, middle: float, end: float) -> PathSegment:
-    """A segment whose live correction was `live`: its way turned to an error of `middle`, its first heading by `begin`, its last to an error of `end`."""
+    """A segment corrected by `live`: now its way is by `middle`, its last heading by `end`, and its first heading turns by `begin`."""
     turned = rotated_segment(segment, live - middle)
     return replace(turned, heading0_rad=segment.heading0_rad + begin, heading1_rad=segment.heading1_rad + live - end)
 
