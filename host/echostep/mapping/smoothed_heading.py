@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The foot's headings corrected by the belt's in hindsight: with the bias of the belt's gyro as the whole walk shows it.
 
-In: `MeasuredSegment`s in order of time. Out: the same, turned. Owns nothing. Live the belt corrects the foot by the bias known by then
-[odometry.heading_fusion]; afterwards a smoother [Rauch, Tung and Striebel 1965] over the same filter gives the error of the foot at each stance. Where
+In: `MeasuredSegment`s in order of time. Out: the same, turned. Owns nothing. Live the belt corrects the foot by the bias known then
+[odometry.heading_fusion]; afterwards a smoother [Rauch, Tung, Striebel 1965] over the same filter gives the error of the foot at each stance. Where
 the belt is not trusted the live headings stay.
 """
 
