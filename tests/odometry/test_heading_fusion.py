@@ -278,6 +278,28 @@ def test_a_turn_of_the_trunk_that_lasts_begins_anew() -> None:
     assert abs(error[310] - error[298]) < 8.0 * DRIFT_RAD
 
 
+def test_a_foot_that_lost_its_heading_is_not_turned_back() -> None:
+    """Its walk frame is another one then, which the legs or the plan join to the first."""
+    walker, fusion = Walker(8), HeadingFusion()
+    coming, corrections = blocks(*walker.belt()), []
+    for k, event in enumerate(walker.events()):
+        for block in coming:
+            fusion.add_belt(block)
+            if block.t_s[-1] > event.t_end_s:
+                break
+        lost = 2.0 if k >= 600 else 0.0
+        sd = 1.0 if k == 600 else DRIFT_RAD
+        fusion.corrected(
+            replace(event, heading_rad=wrap(event.heading_rad + lost))
+            if isinstance(event, Stance)
+            else replace(event, heading_rad=wrap(event.heading_rad + lost), heading_sd_rad=sd)
+        )
+        corrections.append(fusion.correction_rad)
+    assert abs(corrections[590]) > 0.0
+    assert np.ptp(corrections[601:606]) == 0.0
+    assert np.ptp(corrections[596:700]) < 20.0 * DRIFT_RAD
+
+
 @given(
     st.integers(0, 2**32 - 1),
     st.lists(st.integers(0, 30_000), max_size=6),

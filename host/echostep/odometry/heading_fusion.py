@@ -9,8 +9,8 @@ out by the variances of both turns. Only a recent error is sought: a bias found 
 sum up to the foot's own drift. In the long run the foot knows more, since its error grows by the root of time: the correction fades. A drawing, which
 needs no heading at once, finds more in hindsight [mapping.smoothed_heading].
 
-Without evidence that the belt gyro turns with the foot the correction is kept as it is: a dead, loose or reversed gyro never corrects. A gap, or
-REFUSALS stances in a row beyond the gate, begin the evidence anew.
+Without evidence that the belt gyro turns with the foot the correction is kept as it is: a dead, loose or reversed gyro never corrects. A gap of foot
+or belt, or REFUSALS stances in a row beyond the gate, begin the evidence anew.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ EDGE_S = 0.25  # half a stance from them
 WALKING_RAD_S = math.radians(0.06)
 RECENT_S = 10.0  # by reason: some strides, in which jitter lets the filter find an error of the foot; what is older is no longer sought
 REFUSALS = 3  # by reason
+LOST_RAD = math.radians(
+    10.0
+)  # by reason: a stride's turn is known to a degree; beyond it the foot's samples were missing, and its frame is a new one
 
 
 class HeadingFusion:
@@ -97,7 +100,8 @@ class HeadingFusion:
         if angle is None:
             self._keep_foot()
             return
-        joins = self._last is not None and self._belt.since_s <= self._last.t_s < t_s
+        known = self._growth < LOST_RAD**2
+        joins = known and self._last is not None and self._belt.since_s <= self._last.t_s < t_s
         headings = StanceHeadings(t_s, yaw_rad, angle, self._growth, bias_sd_rad_s, begins=not joins)
         if (
             self._filter is None
