@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -24,13 +24,38 @@ STANDING_PIECE_S = 0.5  # duration of the segments into which standing is cut: t
 UNOBSERVED_SD_M = 0.75  # a segment with a larger standard deviation was not observed: half a stride of an adult
 
 
+class StanceHeadings(NamedTuple):
+    """Yaw of the foot and angle of the belt (rad, each from a zero of its own) at a time in a stance.
+
+    `growth_rad2`: of the variance of the foot's yaw since the stance before. `bias_sd_rad_s`: how far the belt gyro's bias differed in between.
+    `begins`: nothing joins the belt's angle to the one before.
+    """
+
+    t_s: float
+    foot_rad: float
+    belt_rad: float
+    growth_rad2: float
+    bias_sd_rad_s: float
+    begins: bool
+
+
+class BeltEvidence(NamedTuple):
+    """What the belt's gyro says of a step: stances since the step before; the error of the foot's heading that was taken out of the step, and the
+    standard deviation of its turn without that.
+    """
+
+    stances: tuple[StanceHeadings, ...]
+    correction_rad: float
+    foot_turn_sd_rad: float
+
+
 @dataclass(frozen=True, slots=True)
 class PathSegment:
     """The trunk moves evenly by (dx, dy) in the walk frame, from `t0_s` to `t1_s`, turning from `heading0_rad` to `heading1_rad`, on a curve.
 
     `sd_m`: standard deviation of the move per axis. `turn_sd_rad`: growth of the yaw's standard deviation. `step`: steps so far.
     `anchor_sd_m`: standard deviation of each end per axis, the same at both. `rise_m`: height gained by the foot, with its standard deviation,
-    infinite where no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share.
+    infinite where no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share. `belt`: of a foot's step.
     """
 
     t0_s: float
@@ -46,6 +71,7 @@ class PathSegment:
     rise_m: float = 0.0
     rise_sd_m: float = math.inf
     scale_sd: float = 0.0
+    belt: BeltEvidence | None = None
 
     @property
     def unobserved(self) -> bool:

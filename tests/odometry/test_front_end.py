@@ -6,6 +6,7 @@ from __future__ import annotations
 import heapq
 import math
 import random
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 
@@ -15,7 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board_runs import ROOT
-from echostep.board.calibration import RangerSettings, ranges
+from echostep.arrays import Floats
+from echostep.board.calibration import GyroSettings, RangerSettings, ranges
 from echostep.board.frames import encode
 from echostep.board.messages import ROWS, Outcome, Ping
 from echostep.foot.steps import FootSettings
@@ -26,7 +28,8 @@ from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.simulation.devices.board import PythonBoard
-from echostep.simulation.scenario import Scenario
+from echostep.simulation.devices.mtx import MtxModel
+from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario
 from echostep.timing.timeline import MtxTiming
 
 Told = list[tuple[object, ...]]
@@ -245,3 +248,43 @@ def test_the_rangers_delay_moves_their_pings() -> None:
     ]
     both = min(map(len, times)) - 10
     assert np.allclose(times[1][:both] - times[0][:both], 0.01)
+
+
+@cache
+def drifting(drift_deg: float) -> tuple[Chunk, ...]:
+    """Four minutes through the demo's building with a foot whose yaw walks by so much per root metre, and a belt's gyro."""
+    model = MtxModel(yaw_walk_rad=math.radians(drift_deg))
+    return tuple(Scenario(PLAN, 3 * DEMO_WAYPOINTS, 4, PythonBoard(4), None, model).chunks())
+
+
+def headings(chunks: Iterable[Chunk], portion: int, ours: FrontEnd | None = None) -> list[tuple[float, float]]:
+    """Time and heading at the end of each segment."""
+    ours, given = ours or front_end(), list(chunks)
+    portions = (portion_of(given[k : k + portion]) for k in range(0, len(given), portion))
+    pieces = [piece for p in portions for piece in ours.process(p)]
+    return [(p.segment.t1_s, p.segment.heading1_rad) for p in pieces if isinstance(p, MeasuredSegment)]
+
+
+def test_the_belts_gyro_takes_drift_out_of_the_foot() -> None:
+    """By the headings of a foot without drift. With a belt gyro upside down the foot is alone."""
+    foot_alone = FrontEnd(
+        MtxTiming(), RangerSettings(), FootSettings(), GaitSettings(), gyro=GyroSettings(belt_reversed=True)
+    )
+    true, fused = (np.array(headings(drifting(deg), 1000)) for deg in (0.0, 1.0))
+    alone = np.array(headings(drifting(1.0), 1000, foot_alone))
+    assert foot_alone.heading_fusion.correction_rad == 0.0
+    t_s = np.arange(90.0, true[-1, 0] - 1.0)
+    grown = []
+    for track in (fused, alone):
+        error = np.interp(t_s, *_unwrapped(track)) - np.interp(t_s, *_unwrapped(true))
+        grown.append(float(np.mean((error[40:] - error[:-40]) ** 2)))
+    assert math.sqrt(grown[0] / grown[1]) < 0.9
+
+
+def _unwrapped(track: Floats) -> Floats:
+    return np.array([track[:, 0], np.unwrap(track[:, 1])])
+
+
+@pytest.mark.parametrize("portion", [1, 37, 20_000])
+def test_corrected_headings_do_not_depend_on_portions(portion: int) -> None:
+    assert headings(drifting(1.0)[:60_000], portion) == headings(drifting(1.0)[:60_000], 1000)

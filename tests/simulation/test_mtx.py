@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.simulation.devices.mtx import GRAVITY_M_S2, MtxModel, MtxStream, stream
+from echostep.arrays import Floats
+from echostep.simulation.devices.mtx import GRAVITY_M_S2, MtxModel, MtxStream, measure, stream
 from echostep.simulation.devices.serial_delivery import deliver
+from echostep.simulation.people.attitude import rotations
 from echostep.simulation.people.walker import RATE_HZ, Person, Walk
 from echostep.simulation.world.magnetic_field import EARTH, MagneticField
 from echostep.xsens import MtxReader
@@ -113,3 +116,34 @@ def test_delivery_keeps_every_byte_in_order(lengths: list[int], timer_s: float) 
     assert all(portions)
     assert np.diff(arrival_s).min(initial=0.0) >= 0.0
     assert (complete_s - begin_s >= np.array(lengths) * 10 / 115_200 - 1e-12).all()
+
+
+def test_the_yaw_walks_with_the_root_of_the_way_and_the_field_with_it(l_walk: Walk) -> None:
+    """By the differences to an MTx without it, whose errors are the same to the last bit."""
+    drift_rad, turns, walked_m = math.radians(2.0), [], 0.0
+    for seed in range(20):
+        steady, walking = (
+            measure(l_walk, replace(MtxModel(), yaw_walk_rad=drift), np.random.default_rng(seed))
+            for drift in (0.0, drift_rad)
+        )
+        assert np.array_equal(steady.accel, walking.accel)
+        up = vertical(l_walk, walking.t_s)
+        rate = walking.gyro - steady.gyro
+        assert np.allclose(np.cross(rate, up), 0.0, atol=1e-9)
+        turns.append(np.einsum("ni,ni->n", rate, up) * np.median(np.diff(walking.t_s)))
+        at = np.minimum((walking.t_s * RATE_HZ).astype(int), len(l_walk.t_s) - 1)
+        walked_m += float(np.hypot(*np.diff(l_walk.foot_m[at, :2], axis=0).T).sum())
+        level = [m - np.einsum("ni,ni->n", m, up)[:, None] * up for m in (steady.mag, walking.mag)]
+        sine = np.einsum("ni,ni->n", np.cross(level[1], level[0]), up) / (np.linalg.norm(level[0], axis=1) ** 2)
+        late = np.abs(np.cumsum(turns[-1])) > math.radians(3.0)
+        assert np.allclose(sine[late], np.sin(np.cumsum(turns[-1]))[late], atol=0.1)
+    assert math.sqrt(sum(float(np.sum(t**2)) for t in turns) / walked_m) == pytest.approx(drift_rad, rel=0.05)
+    still = np.concatenate([t[:200] for t in turns])
+    assert np.abs(still).max() < 1e-9
+
+
+def vertical(walk: Walk, t_s: Floats) -> Floats:
+    """The vertical (n, 3) in the axes of a foot sensor."""
+    at = np.minimum((t_s * RATE_HZ).astype(int), len(walk.t_s) - 1)
+    found: Floats = rotations(walk.foot_rpy_rad[at])[:, 2]
+    return found

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from echostep.arrays import Floats
 from echostep.plan.model import Level
-from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model
+from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model, WornGyro
 from echostep.simulation.people.walker import Walk
 from echostep.simulation.stimulus import NO_SYNC, ROW, BoardSensors
 from simulation.simulated import SPEED_M_S
@@ -91,3 +92,26 @@ def test_bearings_are_clockwise_from_north() -> None:
     seen = CompassModel(None, np.random.default_rng(1)).bearings(np.zeros((4, 2)), heading)
     off = (seen - np.array([0, 900, 1800, 2700]) + 1800) % 3600 - 1800
     assert np.abs(off).max() < 150
+
+
+def test_a_worn_gyro_has_the_errors_it_states() -> None:
+    """Each alone, over many wearers: scale and jitter in walking, the bias's wander at all times."""
+    n, rate_hz = 60_000, 1000.0
+    turning = np.full(n, 0.2)
+    none = WornGyro(0.0, 0.0, 100.0, 0.0, 0.0, 1.0)
+    assert np.array_equal(none.rates(turning, rate_hz, np.random.default_rng(0)), turning)
+
+    def errors(worn: WornGyro, rate: Floats) -> Floats:
+        return np.array([worn.rates(rate, rate_hz, np.random.default_rng(k)) - rate for k in range(60)])
+
+    scale = errors(replace(none, scale=0.02), turning) / turning
+    assert scale[:, 0].std() == pytest.approx(0.02, rel=0.3)
+    assert np.ptp(scale, axis=1).max() < 1e-12
+    walking = errors(replace(none, walking_rad_s=0.001), turning)
+    assert walking[:, n // 2].std() == pytest.approx(0.001, rel=0.3)
+    wander = errors(replace(none, wander_rad_s=0.001), np.zeros(n))
+    assert wander[:, -1].std() == pytest.approx(0.001, rel=0.3)
+    angle = np.cumsum(errors(replace(none, jitter_rad=0.02), turning), axis=1) / rate_hz
+    assert angle[:, 1000:-1000:1000].std() == pytest.approx(0.02, rel=0.3)
+    still = errors(replace(none, jitter_rad=0.02, walking_rad_s=0.001), np.zeros(n))
+    assert np.abs(still).max() == 0.0

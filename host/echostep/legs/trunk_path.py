@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -154,10 +154,9 @@ def segment_after(segment: PathSegment, from_s: float) -> PathSegment:
     if from_s <= segment.t0_s:
         return segment
     share = (segment.t1_s - from_s) / (segment.t1_s - segment.t0_s)
-    return PathSegment(
-        from_s, segment.t1_s, share * segment.dx_m, share * segment.dy_m, segment.heading_rad(from_s), segment.heading1_rad,
-        math.sqrt(share) * segment.sd_m, math.sqrt(share) * segment.turn_sd_rad, segment.step, segment.anchor_sd_m,
-        share * segment.rise_m, segment.rise_sd_m, segment.scale_sd,
+    return replace(
+        segment, t0_s=from_s, dx_m=share * segment.dx_m, dy_m=share * segment.dy_m, heading0_rad=segment.heading_rad(from_s),
+        sd_m=math.sqrt(share) * segment.sd_m, turn_sd_rad=math.sqrt(share) * segment.turn_sd_rad, rise_m=share * segment.rise_m,
     )  # fmt: skip
 
 
@@ -166,8 +165,7 @@ def rotated_segment(segment: PathSegment, angle_rad: float, scale: float = 1.0) 
     if angle_rad == 0.0 and scale == 1.0:
         return segment
     c, s = scale * math.cos(angle_rad), scale * math.sin(angle_rad)
-    return PathSegment(
-        segment.t0_s, segment.t1_s, c * segment.dx_m - s * segment.dy_m, s * segment.dx_m + c * segment.dy_m,
-        segment.heading0_rad + angle_rad, segment.heading1_rad + angle_rad, segment.sd_m, segment.turn_sd_rad, segment.step,
-        segment.anchor_sd_m, segment.rise_m, segment.rise_sd_m, segment.scale_sd,
+    return replace(
+        segment, dx_m=c * segment.dx_m - s * segment.dy_m, dy_m=s * segment.dx_m + c * segment.dy_m,
+        heading0_rad=segment.heading0_rad + angle_rad, heading1_rad=segment.heading1_rad + angle_rad,
     )  # fmt: skip

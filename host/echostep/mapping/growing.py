@@ -18,7 +18,8 @@ from echostep.mapping.directions import right_angles_off
 from echostep.mapping.drawing import draw
 from echostep.mapping.graph import Graph
 from echostep.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
-from echostep.mapping.nodes import nodes_of
+from echostep.mapping.nodes import Nodes, nodes_of
+from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.mapping.storeys import find_storeys
 from echostep.path import MeasuredSegment
 
@@ -39,7 +40,7 @@ class GrowingMap:
         Once it shows that the building has two directions, or other ones, or that odometry has a bias, all is solved anew.
         """
         self._segments += segments
-        nodes, pings = nodes_of(self._segments)
+        nodes, pings = nodes_of(with_smoothed_headings(self._segments))
         bias = find_bias(nodes, pings, self._bias_rad_m)
         if bias != self._bias_rad_m:
             self._bias_rad_m, self._solved = bias, None
@@ -47,7 +48,7 @@ class GrowingMap:
         fragments, directions = find_pieces(nodes, pings)
         graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
         graph.storeys = find_storeys(self._segments, nodes)
-        if solved is not None and _same(solved.base_rad, graph.base_rad):
+        if solved is not None and _begins_alike(solved.nodes, nodes) and _same(solved.base_rad, graph.base_rad):
             first, graph.base_rad = len(solved.nodes) - 1, solved.base_rad
             graph.pose = _continued(solved.pose, graph.pose)
             graph.closures = solved.closures
@@ -58,6 +59,11 @@ class GrowingMap:
             find_walls(graph)
         self._solved = graph
         return Mapped(graph, pings, draw(graph, pings), directions, tuple(undone))
+
+
+def _begins_alike(solved: Nodes, nodes: Nodes) -> bool:
+    """Whether the solved nodes are the first ones: headings in hindsight may make a turn on the spot large enough for a node, or too small."""
+    return np.array_equal(solved.t_s, nodes.t_s[: len(solved)])
 
 
 def _same(a: float | None, b: float | None) -> bool:

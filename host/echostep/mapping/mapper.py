@@ -22,6 +22,7 @@ from echostep.mapping.fragments import Fragments, find_fragments
 from echostep.mapping.graph import ROUNDS, Closure, Graph, Walls, contradicted
 from echostep.mapping.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.relief import find_relief
+from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.mapping.spots import with_spots
 from echostep.mapping.storeys import STAIRS, find_storeys
 from echostep.path import MeasuredSegment
@@ -65,6 +66,7 @@ def drawn(solved: Mapped) -> Mapped:
 
 def solve_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
     """The corrected path of one walk; nothing is drawn yet."""
+    segments = with_smoothed_headings(segments)
     nodes, pings = nodes_of(segments)
     nodes, pings = without_bias(nodes, pings, find_bias(nodes, pings))
     fragments, directions = find_pieces(nodes, pings)

@@ -13,7 +13,8 @@ Indices: `frame_row` counts the board's frames of a portion, `sample_index` the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +44,7 @@ from echostep.legs.trunk_path import GyroBlock, WearerSettings
 from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
+from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.odometry.synchronizer import HEIGHT, PART, Synchronizer
 from echostep.odometry.wearer_signs import WearerSigns
 from echostep.path import Dropout, MeasuredSegment, PathSegment
@@ -85,6 +87,7 @@ class FrontEnd:
         self.foot = Foot(foot)
         self._foot_settings = foot
         self.alignment = Alignment()
+        self.heading_fusion = HeadingFusion()
         self.path = TrunkPath(gait)
         self.handover = FootLegsHandover(wearer or WearerSettings(), iron)
         self.status: Status | None = None
@@ -140,7 +143,7 @@ class FrontEnd:
             self.signs.add_legs(message_index, block)
         self._watch_belt(frames, times)
         # Foot: its samples -> segments of the trunk's path.
-        foot_segments = self._track_foot(samples, times)
+        foot_segments = self._track_foot(samples, leg_blocks, times)
         # Handover: segments of foot and legs -> segments of one path.
         observed_s = self._merge_paths(foot_segments, leg_blocks, times)
         self.signs.settle()
@@ -224,11 +227,15 @@ class FrontEnd:
         found: Ints = known[np.searchsorted(report_row, ping_row), ranger]
         return found
 
-    def _track_foot(self, samples: FootSamples, times: Times) -> list[tuple[int, list[PathSegment]]]:
-        """Segments from the foot odometry, each group with the index of the message that completed it."""
+    def _track_foot(
+        self, samples: FootSamples, leg_blocks: list[tuple[int, GyroBlock]], times: Times
+    ) -> list[tuple[int, list[PathSegment]]]:
+        """Segments from the foot odometry, each group with the index of the message that completed it; the belt's gyro corrects their headings."""
         completed: list[tuple[int, list[PathSegment]]] = []
+        blocks = deque(leg_blocks)
         timed = np.flatnonzero(~np.isnan(times.mtx_s))
         if not len(timed):
+            self._add_belt(blocks)
             return completed
         t_s, message_index = times.mtx_s[timed], times.mtx_message_index[timed]
         self.signs.add_foot(t_s, samples.gyro[timed], samples.accel[timed], message_index)
@@ -236,11 +243,23 @@ class FrontEnd:
         begin = 0
         for event, sample_index in zip(foot.events, foot.sample_index.tolist(), strict=True):
             completed += self._standing_segments(foot, t_s, message_index, begin, sample_index)
+            self._add_belt(blocks, int(message_index[sample_index]))
             for aligned in self.alignment.feed([event], float(t_s[sample_index])):
-                segments = self.path.add_step(aligned) if isinstance(aligned, Step) else self.path.add_stance(aligned)
+                fused = self.heading_fusion.corrected(aligned)
+                segments = self._step_segments(fused) if isinstance(fused, Step) else self.path.add_stance(fused)
                 completed.append((int(message_index[sample_index]), segments))
             begin = sample_index
+        self._add_belt(blocks)
         return completed + self._standing_segments(foot, t_s, message_index, begin, len(t_s))
+
+    def _step_segments(self, step: Step) -> list[PathSegment]:
+        """The segment of a step, with what the belt says of it."""
+        return [replace(segment, belt=self.heading_fusion.evidence) for segment in self.path.add_step(step)]
+
+    def _add_belt(self, blocks: deque[tuple[int, GyroBlock]], before: float = math.inf) -> None:
+        """Hand the blocks of gyro samples that are filled before a message to the fusion of the headings."""
+        while blocks and blocks[0][0] < before:
+            self.heading_fusion.add_belt(blocks.popleft()[1])
 
     def _standing_segments(
         self, foot: FootEvents, t_s: Floats, message_index: Ints, begin: int, end: int

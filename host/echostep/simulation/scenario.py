@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from operator import attrgetter
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from echostep.board.subscription import SUBSCRIBE
 from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.simulation.devices.board import Board, PythonBoard
+from echostep.simulation.devices.board_sensors import WornGyro
 from echostep.simulation.devices.foot_board import FootBoardPort, foot_rng
 from echostep.simulation.devices.kit_2026 import Kit2026Sensors
 from echostep.simulation.devices.mtx import MtxModel, stream
@@ -44,14 +46,17 @@ class Scenario:
     def __init__(
         self, plan: Plan, waypoints: Sequence[Waypoint], seed: int, board: Board,
         person: Person | None = None, model: MtxModel | None = None, configure: Configure | None = None,
-        kit: Kit = Kit.PAPERS, foot_board: Board | None = None,
+        kit: Kit = Kit.PAPERS, foot_board: Board | None = None, worn: WornGyro | None = None,
     ) -> None:  # fmt: skip
-        """`configure` is sent to the board before it starts; `foot_board` plays the one on the foot, in the place of an MTx."""
+        """`configure` is sent to the board before it starts; `foot_board` plays the one on the foot, in the place of an MTx.
+
+        `worn`: how the belt's gyro is worn, perfectly by default; of the papers' kit.
+        """
         streams = [np.random.default_rng([seed, k]) for k in range(3, 7)]
         magnetism = MagneticField(streams[3])
         self.walk = walk(waypoints, person or Person(), streams[0])
         self.mtx = stream(self.walk, model or MtxModel(), streams[1], magnetism)
-        kind = Kit2026Sensors if kit is Kit.OF_2026 else BoardSensors
+        kind = Kit2026Sensors if kit is Kit.OF_2026 else partial(BoardSensors, worn=worn)
         self.sensors: BoardSensors | Kit2026Sensors = kind(self.walk, plan.levels, self.mtx.t_s, streams[2], magnetism)
         self._board = board
         self.foot = None if foot_board is None else FootBoardPort(self.walk, foot_rng(seed), foot_board)

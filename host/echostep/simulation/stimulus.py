@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.plan.model import Level
-from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model
-from echostep.simulation.people.walker import Walk
+from echostep.simulation.devices.board_sensors import Adis16100Model, CompassModel, Scp1000Model, WornGyro
+from echostep.simulation.people.walker import RATE_HZ, Walk
 from echostep.simulation.world.acoustics import SRF02, Acoustics, speed_of_sound_m_s
 from echostep.simulation.world.echoes import echoes, ranger_bias_m
 from echostep.simulation.world.magnetic_field import MagneticField
@@ -38,13 +38,13 @@ class BoardSensors:
     def __init__(
         self, walk: Walk, levels: Sequence[Level], sync_t_s: Floats, rng: np.random.Generator,
         magnetism: MagneticField | None = None, air_pa: Floats | None = None, acoustics: Acoustics = SRF02,
-        barometer: Scp1000Model | None = None,
+        barometer: Scp1000Model | None = None, worn: WornGyro | None = None,
     ) -> None:  # fmt: skip
         """`sync_t_s`: times of the MTx SyncOut edges, ascending; without `magnetism` the earth field alone.
 
         Echoes come from the walls of the nearest level.
 
-        `acoustics`: of the rangers; `barometer`: another one than an SCP1000.
+        `acoustics`: of the rangers; `barometer`: another one than an SCP1000; `worn`: how the belt's gyro is worn, perfectly by default.
 
         `air_pa`: the true pressure at each millisecond of the walk (`weather.pressures`), in the place of its heights.
         """
@@ -59,6 +59,9 @@ class BoardSensors:
         self._air_pa = air_pa
         self._barometer = barometer or Scp1000Model(rest[3])
         self._compass = CompassModel(magnetism, rest[4])
+        self._belt_rad_s = (
+            walk.belt_rad_s if worn is None else worn.rates(walk.belt_rad_s, RATE_HZ, rest[2].spawn(1)[0])
+        )
 
     def rows(self, start: int, stop: int, ranging: NDArray[np.bool_] | None = None) -> NDArray[np.void]:
         """Rows of the milliseconds start..stop-1 of the walk; past its end the last posture goes on.
@@ -70,7 +73,7 @@ class BoardSensors:
         rows = np.zeros(len(at), ROW)
         rows["thigh"] = self._thigh.counts(w.thigh_rad_s[at])
         rows["calf"] = self._calf.counts(w.calf_rad_s[at])
-        rows["belt"] = self._belt.counts(w.belt_rad_s[at])
+        rows["belt"] = self._belt.counts(self._belt_rad_s[at])
         trunk, heading = w.trunk_m[at], w.heading_rad[at]
         begin = 0
         for end in [*(np.flatnonzero(np.diff(self._level[at])) + 1).tolist(), len(at)]:

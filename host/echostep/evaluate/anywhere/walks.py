@@ -19,6 +19,8 @@ from echostep.plan.model import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import Settings
 from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.devices.board_sensors import WornGyro
+from echostep.simulation.devices.mtx import MtxModel
 from echostep.simulation.people.walker import Person
 from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
@@ -58,9 +60,9 @@ def way_m(truth: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(truth[:, X]), np.diff(truth[:, Y])))])
 
 
-def simulate(site: Site, seed: int) -> SimulatedWalk:
-    """The walk of a site."""
-    return walk_of(site.built, *_chunks(site, seed))
+def simulate(site: Site, seed: int, model: MtxModel | None = None, worn: WornGyro | None = None) -> SimulatedWalk:
+    """The walk of a site, with another MTx and belt gyro than usual."""
+    return walk_of(site.built, *_chunks(site, seed, model, worn))
 
 
 def simulate_with_gap(site: Site, seed: int, from_m: float, gap_s: float) -> tuple[SimulatedWalk, float]:
@@ -72,8 +74,11 @@ def simulate_with_gap(site: Site, seed: int, from_m: float, gap_s: float) -> tup
     return walk_of(site.built, heard, truth), begin_s + gap_s
 
 
-def _chunks(site: Site, seed: int) -> tuple[list[Chunk], Floats]:
-    scenario = Scenario(site.built, site.waypoints, seed, PythonBoard(seed), Person(corner_m=CORNER_M))
+def _chunks(
+    site: Site, seed: int, model: MtxModel | None = None, worn: WornGyro | None = None
+) -> tuple[list[Chunk], Floats]:
+    person = Person(corner_m=CORNER_M)
+    scenario = Scenario(site.built, site.waypoints, seed, PythonBoard(seed), person, model, worn=worn)
     return list(scenario.chunks()), scenario.truth
 
 

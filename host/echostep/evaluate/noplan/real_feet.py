@@ -105,8 +105,8 @@ def true_walk(walk: Hallway) -> Walk:
     heading = np.interp(t - START_S, middle, np.unwrap(np.arctan2(strides[:, 1], strides[:, 0])))
     still = np.zeros((len(t), 3))
     rate = np.zeros(len(t))
-    belt = np.gradient(heading) * RATE_HZ
-    return Walk(t, trunk, heading, still, still, rate, rate, belt, np.ones(len(t), bool), rate)
+    # No belt was recorded: its gyro is still, as those of the legs, so the foot is alone.
+    return Walk(t, trunk, heading, still, still, rate, rate, rate, np.ones(len(t), bool), rate)
 
 
 def chunks(walk: Hallway, plan: Plan, seed: int) -> list[Chunk]:

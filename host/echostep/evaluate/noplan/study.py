@@ -148,7 +148,7 @@ def drawn_row(
     row |= closure_columns(mapped.graph.closures, pose, truth, frame)
     row["shape_m"] = rmse(pose[:, :2], truth)
     at_s = nodes.t_s if at_s is None else at_s
-    foot, _ = nodes_of(walk.segments)  # as it was measured: the mapper takes a bias out of it
+    foot, _ = nodes_of(walk.segments)  # by foot and belt live: the mapper smooths, and takes a bias out of it
     paths = {"": pose, "foot_": foot.pose, "footslam_": footslam(foot, np.random.default_rng([seed, 85]))}
     for of, path in paths.items():
         placed = known_start(path[:, :2], truth).to_map(path[:, :2])

@@ -34,6 +34,8 @@ class MtxModel:
     """Errors after the MTx manual (noise densities; biases as left by its calibration), its crystal, its mounting and its cable.
 
     `drift_ppm`: its period against the board's clock. `mounting_rpy_rad`: sensor -> foot. `timer_s`: latency timer of the USB adapter.
+    `yaw_walk_rad`: random walk of its yaw per square root of a metre of the foot's path, as feet have it and a data sheet does not; the field turns
+    with it, so that no compass takes it out.
     `filter`: its on-board filter, fed with what it measures; None: a well-behaved one, that only follows the field and leans a little.
     """
 
@@ -49,6 +51,7 @@ class MtxModel:
     jitter_s: float = 0.0003
     timer_s: float = 0.001
     first_counter: int = 65_000  # so that it wraps within a short walk
+    yaw_walk_rad: float = 0.0
     filter: OnBoardFilter | None = None
 
     @property
@@ -127,6 +130,11 @@ def measure(
     at = np.minimum((t * RATE_HZ).astype(int), len(walk.t_s) - 1)
     r = rotations(walk.foot_rpy_rad[at]) @ mounting
     field = magnetism.field(walk.foot_m[at, :2]) if magnetism else np.tile(EARTH, (len(t), 1))
+    if model.yaw_walk_rad > 0.0:
+        walked_m = np.hypot(*np.diff(walk.foot_m[at, :2], axis=0, prepend=walk.foot_m[at[:1], :2]).T)
+        turn = model.yaw_walk_rad * np.sqrt(walked_m) * rng.spawn(1)[0].standard_normal(len(t))
+        gyro += r[:, 2] * turn[:, None] / period
+        field = np.einsum("nji,nj->ni", rotations(np.cumsum(turn)[:, None] * [0.0, 0.0, 1.0]), field)
     mag = np.einsum("nji,nj->ni", r, field) + model.mag_noise * rng.standard_normal(r.shape[:2])
     if model.filter is None:
         world = _mt_world(_believed(r, field, model, period, rng))

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""The angle that the belt has turned: the integral of its gyro's rate, as far as it is unbroken.
+
+In: blocks of samples in order of time. Out: the angle at a time of the last KEPT_S. Owns these angles. Positive: counter-clockwise from above.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from echostep.arrays import Floats
+
+GAP_S = 0.05  # ten samples; a longer gap may hide a turn, by reason
+KEPT_S = 30.0  # longest standing that tells a bias
+
+
+class BeltAngle:
+    """Call `add` with blocks in order of time."""
+
+    def __init__(self) -> None:
+        self.since_s = math.inf  # when the unbroken record begins
+        self._rate = self._t_s = math.nan  # of the last sample
+        self._angle = 0.0
+        self._kept: deque[tuple[Floats, Floats]] = deque()  # times and angles of each block, with the sample before it
+
+    def add(self, t_s: Floats, rate_rad_s: Floats) -> None:
+        """A block of samples (n,). One with a missing sample, or whose samples are all alike as of a dead gyro, is left out."""
+        if not (np.isfinite(t_s).all() and np.isfinite(rate_rad_s).all()) or np.ptp(rate_rad_s) == 0.0:
+            return
+        times, rates = np.append(self._t_s, t_s), np.append(self._rate, rate_rad_s)
+        if not _unbroken(times):
+            self._begin(float(t_s[0]))
+            times, rates = t_s, rate_rad_s
+        if not _unbroken(times):
+            return
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(times) * (rates[1:] + rates[:-1]))])
+        self._kept.append((times, self._angle + turned))
+        self._t_s, self._rate, self._angle = float(times[-1]), float(rates[-1]), self._angle + float(turned[-1])
+        while self._kept[0][0][-1] < self._t_s - KEPT_S:
+            self._kept.popleft()
+
+    @property
+    def oldest_s(self) -> float:
+        """Time of the oldest angle; infinite without any."""
+        return float(self._kept[0][0][0]) if self._kept else math.inf
+
+    def angle_rad(self, t_s: float) -> float | None:
+        """The angle (not wrapped) at a time; None where it is not known (yet)."""
+        for times, angles in reversed(self._kept):
+            if times[0] <= t_s <= times[-1]:
+                return float(np.interp(t_s, times, angles))
+        return None
+
+    def _begin(self, t_s: float) -> None:
+        """Begin an unbroken record at a time."""
+        self._kept.clear()
+        self.since_s, self._t_s = t_s, math.nan
+
+
+def _unbroken(times: Floats) -> bool:
+    """Whether times (n,) go on without a gap."""
+    steps = np.diff(times)
+    return bool(((steps > 0.0) & (steps <= GAP_S)).all())
