@@ -17,8 +17,9 @@ from echostep.localization.estimate import SURE_OF_LEVEL, Estimate, TrackStatus
 from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.moves import height_change, move_of
+from echostep.localization.particle_kernels import Move
 from echostep.localization.particles import PASSING, Cloud, CloudSettings
-from echostep.localization.recent_way import PAST_M, RecentWay
+from echostep.localization.recent_way import MOST_PIECES, PAST_M, RecentWay
 from echostep.localization.start import Air, Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment
@@ -84,7 +85,7 @@ def level_shares(where: Building, start: Start = ANYWHERE) -> list[float]:
     cloud = Cloud(SETTINGS, Start(pose, 0.2), walk_heading_rad, rng, where.sheet, None, where.floor)
     cloud.is_on_any_level = Cloud(SETTINGS, start, 0.0, rng, where.sheet, None, where.floor).is_on_any_level
     way_in(where).pass_again(cloud, MODEL, where.walls)
-    assert len(cloud.x_m) <= PASSING
+    assert (len(cloud.x_m) <= PASSING) == cloud.is_on_any_level
     true, _ = true_end(TRUE)
     assert np.hypot(cloud.weight @ cloud.map_x_m - true.x_m, cloud.weight @ cloud.y_m - true.y_m) < 0.3
     return np.bincount(cloud.level, cloud.weight, STOREYS).tolist()
@@ -112,6 +113,14 @@ def test_a_level_that_is_known_stays(start: Start) -> None:
 
 def test_the_way_has_a_bound() -> None:
     assert PAST_M - 2.0 < way_in(different(), 1000.0).length_m <= PAST_M
+
+
+def test_standing_does_not_lengthen_the_way_for_ever() -> None:
+    way, standing = way_in(different(), 3.0), walk().segments[0]
+    pings = UsablePings(different().background(MODEL), ECHO).take(standing)[0]
+    for _ in range(MOST_PIECES + 10):
+        way.add(Move(0.0, 0.0, 0.0, 0.0), pings, height_change(standing, 0.0))
+    assert len(way) == MOST_PIECES
 
 
 def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:

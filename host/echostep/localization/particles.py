@@ -66,15 +66,12 @@ COARSE_WALL_COST = (
 LEVELS_REST, LEVELS_M = 0.1, 10.0
 COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
 # Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
-PASSING = 5_000  # particles of a second pass, by reason: about a second for 40 m
-LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, by reason
-PASSING_ROUGH = (
-    0.5,
-    math.radians(2.0),
-)  # roughening (m, rad) of the places that are tried again, by reason: a coarse place is off by so much
 MODE_M, MODE_RAD = 2.0, math.radians(45.0)
 LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, by reason
 MOST_MODES = 1_000_000  # cells beyond which no modes are told apart: memory
+LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, by reason
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much; by reason
+PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
 GATHERED_M, GATHERED_REST = (
     2.5,
     1e-4,
@@ -314,24 +311,23 @@ class Cloud:
 
     @contextmanager
     def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:
-        """Go back to the beginning of the way of (dx, dy) in the walk frame, for a second pass with few particles.
-
-        Each begins on every level, unless the level is known.
-        """
+        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level, for a second pass with few particles."""
         settings = self._settings
         self._settings = replace(settings, largest=min(PASSING, settings.largest))
-        levels = len(self.sheet.height_m) if self.sheet and self.is_on_any_level else 1
-        log_weight, chosen = self.log_weight, _spread(len(self.x_m), PASSING // levels)
+        levels = len(self.sheet.height_m) if self.sheet else 1
+        log_weight, chosen = self.log_weight, _spread(len(self.x_m), max(PASSING // levels, 1))
         self._keep(chosen)
         self.log_weight = log_weight[chosen]
         self._roughen(*PASSING_ROUGH)
         c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
         self.x_m, self.y_m = self.x_m - (c * dx_m - s * dy_m), self.y_m - (s * dx_m + c * dy_m)
         self.hidden = np.zeros((2, len(self.x_m)))
-        if self.sheet and levels > 1:
+        if self.sheet:
             self._lay_on_each_level(self.sheet)
-        yield
-        self._settings = settings
+        try:
+            yield
+        finally:
+            self._settings = settings
 
     def _lay_on_each_level(self, sheet: LevelSheet) -> None:
         """Copy every particle to each level; nothing is known of the lag then."""

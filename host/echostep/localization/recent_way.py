@@ -19,6 +19,7 @@ from echostep.localization.particles import Cloud
 from echostep.walls.echo_sources import Walls
 
 PAST_M = 40.0  # path that is passed again, by reason: that on which a place is found
+MOST_PIECES = 1_000  # of it, by reason: eight minutes of standing
 
 
 class RecentWay:
@@ -28,16 +29,21 @@ class RecentWay:
         self._pieces: deque[tuple[Move, PingBatch, HeightChange]] = deque()
         self.length_m = 0.0
 
+    def __len__(self) -> int:
+        return len(self._pieces)
+
     def add(self, move: Move, pings: PingBatch, change: HeightChange) -> None:
         """One more move."""
         self._pieces.append((move, pings, change))
         self.length_m += math.hypot(move.dx_m, move.dy_m)
-        while self.length_m > PAST_M:
+        while self._pieces and (self.length_m > PAST_M or len(self._pieces) > MOST_PIECES):
             first, _, _ = self._pieces.popleft()
             self.length_m -= math.hypot(first.dx_m, first.dy_m)
 
     def pass_again(self, cloud: Cloud, model: EchoModel, walls: Walls) -> None:
-        """Let a cloud walk the way once more, from its beginning on each level."""
+        """Let a cloud walk the way once more, from its beginning on each level; not where the level is known: stairs may have led there."""
+        if cloud.sheet is not None and not cloud.is_on_any_level:
+            return
         dx_m = sum(move.dx_m for move, _, _ in self._pieces)
         dy_m = sum(move.dy_m for move, _, _ in self._pieces)
         with cloud.passing_again(dx_m, dy_m):
