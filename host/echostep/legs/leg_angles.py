@@ -23,19 +23,16 @@ from echostep.legs.walking_bout import climbs
 Signs = tuple[float, float]
 # Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one; by reason.
 CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
-TURN_SD = (
-    12.0 / 90.0
-)  # of the same, per rad of the trunk's turn: strides of a turn on the spot, legs_qmt of the public recordings
 # Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)
 UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`
 
 
 class StrideMean:
-    """Mean angles (thigh, shank, yaw) of a stride between two grid indices; `first`: of a walk; `stairs`: whether the knee shows that it climbs."""
+    """Mean angles (thigh, shank, yaw) of a stride between two grid indices; `first`: of a walk."""
 
-    def __init__(self, begin: int, end: int, grid: AngleGrid, *, first: bool, stairs: bool) -> None:
-        self.begin, self.end, self.first, self.stairs = begin, end, first, stairs
+    def __init__(self, begin: int, end: int, grid: AngleGrid, *, first: bool) -> None:
+        self.begin, self.end, self.first = begin, end, first
         self.angles = tuple(math.fsum(column[begin:end]) / (end - begin) for column in grid.columns)
 
 
@@ -90,40 +87,33 @@ class LegAngles:
         """Update the gyros' errors by a stride: its mean angles are those of the stride before, but for bias and leak.
 
         Mid swing is the moment of the fastest turn, so that angles there scatter with its time; means do not. The first stride of a walk (`first`),
-        and one after a gap, has none before it: its angles at both ends are compared. Onto stairs and off them the means change: nothing is learnt.
+        and one after a gap, has none before it: its angles at both ends are compared.
         """
-        stairs = self._climbs(signs, begin, end)
-        before, self._mean = self._mean, StrideMean(begin, end, self._grid, first=first, stairs=stairs)
+        before, self._mean = self._mean, StrideMean(begin, end, self._grid, first=first)
         if before is None or before.end != begin:
             span_s, sd = (end - begin) / GRID_HZ, FIRST_CLOSURE_SD_RAD
-            thigh, shank, yaw = (c[end] - c[begin] for c in self._grid.columns)
-        elif before.stairs != stairs:
-            return
+            thigh, shank, yaw = ((c[end] - c[begin]) / span_s for c in self._grid.columns)
         else:
             span_s = 0.5 * (end - before.begin) / GRID_HZ
             sd = FIRST_CLOSURE_SD_RAD if before.first else CLOSURE_SD_RAD
-            thigh, shank, yaw = (new - old for new, old in zip(self._mean.angles, before.angles, strict=True))
-        sd = math.hypot(sd, TURN_SD * yaw)
-        for bias, sign, change in zip(self.bias, signs, (thigh, shank), strict=True):
-            bias.learn(sign * change / span_s, sd / span_s, yaw / span_s)
+            thigh, shank, yaw = (
+                (new - old) / span_s for new, old in zip(self._mean.angles, before.angles, strict=True)
+            )
+        for bias, sign, rate in zip(self.bias, signs, (thigh, shank), strict=True):
+            bias.learn(sign * rate, sd / span_s, yaw)
 
     def correct_level(self, signs: Signs, begin: int, end: int) -> None:
         """Correct the level by the mean angles of a stride; a shorter one is nearer to standing, and on stairs they are others."""
         thigh, shank = self.between(signs, begin, end)
+        strike = heel_strike_index(shank)
+        phase = (np.arange(strike, len(shank)) - strike) / (len(shank) - 1)
         self.move_level(signs, begin)
-        if self._climbs(signs, begin, end):
+        if climbs(*knees(phase, thigh[strike:], shank[strike:])):
             return
         share = min(float(np.ptp(shank)) / UPRIGHT_RANGE_RAD, 1.0)
         usual = (s + share * (m - s) for s, m in zip(STANDING_RAD, MEAN_RAD, strict=True))
         off = tuple(u - float(angle.mean()) for u, angle in zip(usual, (thigh, shank), strict=True))
         self.level = self.level.corrected((off[0], off[1]), MEAN_SD_RAD)
-
-    def _climbs(self, signs: Signs, begin: int, end: int) -> bool:
-        """Whether the knee shows that a stride is on stairs."""
-        thigh, shank = self.between(signs, begin, end)
-        strike = heel_strike_index(shank)
-        phase = (np.arange(strike, len(shank)) - strike) / (len(shank) - 1)
-        return climbs(*knees(phase, thigh[strike:], shank[strike:]))
 
     def forget_level(self, k: int = 0) -> None:
         """Nothing is known of the level from grid index k on."""
