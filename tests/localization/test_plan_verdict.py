@@ -132,3 +132,11 @@ def test_a_wall_that_is_not_there_costs_its_price_once() -> None:
         map_filter.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
         costs.append(BEFORE - map_filter.tracked.plausibility.log_odds)
     assert costs == pytest.approx([-UNPLANNED_DOOR, 0.0], abs=0.3)
+
+
+def test_a_plan_that_states_an_error_is_charged_less_for_a_wall() -> None:
+    exact, inexact = PlanVerdict(), PlanVerdict(plan_sd_m=0.1)
+    for verdict in (exact, inexact):
+        verdict.pass_walls(WALL, 1.0, UNPLANNED_DOOR)
+    assert exact.probability < inexact.probability < PLAN_FITS
+    assert inexact.probability > SURE

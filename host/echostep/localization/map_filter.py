@@ -73,7 +73,7 @@ class MapFilter:
         self._pings = UsablePings(building.background(self._model), echo)
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
-        self._plan = PlanVerdict()
+        self._plan = PlanVerdict(self._settings.plan_sd_m)
         prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None

@@ -18,6 +18,7 @@ from echostep.plan.model import Pose
 # All by reason.
 PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
+GRAZED = 0.2  # of a wall on a plan that states an error: its end is in the way of a right cloud by as much, on 100 m once or so
 FAR = 0.4  # the same for a rejected start that is found elsewhere: one in a hundred is so far off, half of the wrong plans have a place alike
 FOUND_WITHIN_M = 40.0  # path on which an unknown start is found on one level
 ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in the mean (20 to 50 m were seen): symmetric wings, storeys
@@ -42,7 +43,9 @@ def away_m(one: Pose, other: Pose) -> float:
 class PlanVerdict:
     """`probability` that the plan fits, after all that was told."""
 
-    def __init__(self) -> None:
+    def __init__(self, plan_sd_m: float = 0.0) -> None:
+        """`plan_sd_m`: error of the walls' positions that the plan states."""
+        self._log_through = math.log(FAILS if plan_sd_m == 0.0 else GRAZED)
         self._fits = Plausibility(PLAN_FITS)
         self._crossed: list[Pose] = []
         self._log_passed = 0.0  # of a believed cloud on the last CROSSED_M, log of the share that went through no wall
@@ -97,7 +100,7 @@ class PlanVerdict:
         self._log_passed = self._log_passed * math.exp(-path_m / CROSSED_M) + log_passed
         if self._log_passed < THROUGH:
             self._crossed.append(at)
-            self._count_against()
+            self._fits.add(self._log_through)
         return log_passed
 
     def _has_crossed(self, at: Pose) -> bool:
