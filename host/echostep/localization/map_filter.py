@@ -258,11 +258,10 @@ class MapFilter:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
+            # Where there was more than one place, a light one may have lost a level by chance.
             if cloud.is_on_any_level and cloud.is_in_one_place:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
-                cloud.is_on_any_level = (
-                    False  # where there was more than one place, a light one may have lost a level by chance
-                )
+                cloud.is_on_any_level = False
             path_m = math.hypot(move.dx_m, move.dy_m)
             if each is self.tracked and each.plausibility.probability > BELIEVED and not self._is_elsewhere:
                 log_path = self._plan.pass_walls(self._believed(0.0), path_m, evidence.log_path)

@@ -209,8 +209,7 @@ class Cloud:
         """Least number of particles: on each level that may be the true one, for few particles make one of them likelier by chance."""
         if self.sheet is None:
             return self._settings.size
-        held = np.count_nonzero(np.bincount(self.level, self.weight) > LEAST_LEVEL)
-        return self._settings.size * int(held)
+        return self._settings.size * int(np.count_nonzero(self._level_shares > LEAST_LEVEL))
 
     @property
     def hidden_shares(self) -> Floats:
@@ -236,7 +235,12 @@ class Cloud:
     @property
     def likeliest_level(self) -> int:
         """The level with the most weight."""
-        return int(np.bincount(self.level, self.weight).argmax())
+        return int(self._level_shares.argmax())
+
+    @property
+    def _level_shares(self) -> Floats:
+        """Weight on each level up to the highest that has any (k,)."""
+        return np.asarray(np.bincount(self.level, self.weight), np.float64)
 
     def level_at(self, x_m: float) -> int:
         """Level of an x on the sheet."""

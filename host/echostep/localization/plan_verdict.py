@@ -63,7 +63,7 @@ class PlanVerdict:
 
     def fail_search(self) -> None:
         """A search has found nothing, or a wrong place."""
-        self._count_against()
+        self._fits.add(math.log(FAILS))
 
     def reject_start(self, path_m: float) -> None:
         """A stated start is doubted after this length of path."""
@@ -117,7 +117,3 @@ class PlanVerdict:
     def _gain(self, log_odds: float) -> None:
         self._fits.add(log_odds)
         self._fits.limit(MOST_FITS)
-
-    def _count_against(self) -> None:
-        """One observation that is FAILS as probable if the plan fits."""
-        self._fits.add(math.log(FAILS))

@@ -42,6 +42,7 @@ class HeadingFusion:
 
     def __init__(self) -> None:
         self.correction_rad = 0.0  # error of the foot's heading so far, as far as it is known
+        self.evidence: BeltEvidence | None = None  # what the belt says of the last step; None before there is a belt
         self._belt = BeltAngle()
         self._filter: HeadingFilter | None = None
         self._last: StanceHeadings | None = None  # measured last
@@ -51,7 +52,6 @@ class HeadingFusion:
         self._owed = 0.0  # of that what was not taken out
         self._refused = 0  # stances in a row
         self._stances: list[StanceHeadings] = []  # since the last step
-        self._evidence: BeltEvidence | None = None  # of the last step
 
     def add_belt(self, block: GyroBlock) -> None:
         """A block of samples, of which the belt's rate is used."""
@@ -61,11 +61,6 @@ class HeadingFusion:
     def trusted(self) -> bool:
         """Whether foot and belt have been seen to turn alike."""
         return self._filter is not None and self._filter.trusted
-
-    @property
-    def evidence(self) -> BeltEvidence | None:
-        """What the belt says of the last step; None before there is a belt."""
-        return self._evidence
 
     def corrected(self, event: Step | Stance) -> Step | Stance:
         """A step turned by the correction; a stance as it is, after it was measured."""
@@ -78,7 +73,7 @@ class HeadingFusion:
         self._promised, self._owed = self._promised + self._share * variance, 0.0
         if self._filter is None:
             return event
-        self._evidence = BeltEvidence(tuple(self._stances), self.correction_rad, event.heading_sd_rad)
+        self.evidence = BeltEvidence(tuple(self._stances), self.correction_rad, event.heading_sd_rad)
         self._stances.clear()
         turned = rotated_event(event, self.correction_rad)
         assert isinstance(turned, Step)

@@ -16,6 +16,7 @@ import numpy as np
 from echostep.evaluate.anywhere.echo_changes import with_people
 from echostep.evaluate.anywhere.sites import Site
 from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
+from echostep.legs.trunk_path import rotated_segment
 from echostep.simulation.devices.board_sensors import WornGyro
 from echostep.simulation.devices.mtx import MtxModel
 
@@ -34,9 +35,6 @@ def walked(site: Site, seed: int) -> SimulatedWalk:
 
 def _scaled(walk: SimulatedWalk, scale: float) -> SimulatedWalk:
     """The same path as a foot that measures all lengths too long by a factor."""
-    moved = [
-        replace(measured, segment=replace(s, dx_m=scale * s.dx_m, dy_m=scale * s.dy_m))
-        for measured in walk.segments
-        for s in [measured.segment]
-    ]
-    return replace(walk, segments=tuple(moved))
+    return replace(
+        walk, segments=tuple(replace(m, segment=rotated_segment(m.segment, 0.0, scale)) for m in walk.segments)
+    )
