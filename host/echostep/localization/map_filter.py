@@ -315,8 +315,8 @@ class MapFilter:
             self._follow_search(search)
         elif self._has_failed(search):
             self._plan.fail_search()
-            near = None if self._is_elsewhere else self._believed(walk_heading_rad)
-            self.search = self._new_search(Start(near=near), walk_heading_rad)
+            start = Start() if self._is_elsewhere else self._nearby(walk_heading_rad)
+            self.search = self._new_search(start, walk_heading_rad)
         else:
             return False
         return True
@@ -349,8 +349,12 @@ class MapFilter:
             self._plan.reject_start(self._pings.path_m)
         else:
             self._plan.reject_found(self._searched_m - self._found_within_m)
-        self.search = self._new_search(Start(near=self._believed(walk_heading_rad)), walk_heading_rad)
+        self.search = self._new_search(self._nearby(walk_heading_rad), walk_heading_rad)
         return True
+
+    def _nearby(self, walk_heading_rad: float) -> Start:
+        """Anywhere, a share near the tracked cloud, at its height."""
+        return Start(near=self._believed(walk_heading_rad), near_z_m=float(self.cloud.weight @ self.cloud.z_m))
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m, self._coarse_m = self._pings.path_m, 0.0

@@ -47,7 +47,7 @@ from echostep.localization.particle_kernels import (
     systematic,
 )
 from echostep.localization.plausibility import UNPLANNED_DOOR
-from echostep.localization.start import ANY_LEVEL, Air, Start, draw_poses
+from echostep.localization.start import ANY_LEVEL, Air, Start, draw_poses, near_count
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -166,6 +166,8 @@ class Cloud:
         self.hidden: Floats = np.zeros((2, count))
         self.beliefs = empty_beliefs(count, 0)
         self.z_m: Floats = self.sheet.height_m[self.level] if self.sheet else np.zeros(count)
+        if start.near_z_m is not None:
+            self.z_m[: near_count(count)] = start.near_z_m
 
     @property
     def level(self) -> Ints:

@@ -39,7 +39,8 @@ class Start:
 
     `pose`: its mean, with a standard deviation `sd_m` per axis and `heading_sd_rad`; a pose with level ANY_LEVEL may be on any. Without a pose:
     evenly over the walkable floor, on any level and with any heading, within the outline `room_m` (k, 2) on `level` if there is one; a share of them
-    `near` a pose, if there is one: with level ANY_LEVEL, above and below it too, with any heading. `air`: what is known of the heights by pressure.
+    `near` a pose, if there is one, at the height `near_z_m` (on stairs it is between two levels): with level ANY_LEVEL, above and below it too, with
+    any heading. `air`: what is known of the heights by pressure.
     `after_pause`: at the pose an earlier run ended, and the wearer may have gone on since, so the whole building is searched beside it.
     """
 
@@ -49,6 +50,7 @@ class Start:
     room_m: Floats | None = None
     level: int = ANY_LEVEL
     near: Pose | None = None
+    near_z_m: float | None = None
     air: Air | None = None
     after_pause: bool = False
 
@@ -73,11 +75,16 @@ def draw_poses(
     return x, y, heading
 
 
+def near_count(count: int) -> int:
+    """How many of so many particles, the first ones, are drawn near a pose."""
+    return round(NEAR_SHARE * count)
+
+
 def _drawn_near(
     near: Pose, x: Floats, y: Floats, heading: Floats, sheet: LevelSheet | None, rng: np.random.Generator
 ) -> tuple[Floats, Floats, Floats]:
     """The same poses, the first NEAR_SHARE of them about a pose instead; on any level, with any heading, if its level is not known."""
-    count = round(NEAR_SHARE * len(x))
+    count = near_count(len(x))
     noise = rng.standard_normal((3, count))
     east = near.x_m if sheet is None else near.x_m + _levels(near.level, count, sheet) * sheet.pitch_m
     x[:count], y[:count] = east + NEAR_M * noise[0], near.y_m + NEAR_M * noise[1]
