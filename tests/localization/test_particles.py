@@ -12,8 +12,16 @@ from hypothesis import strategies as st
 
 from echostep.localization.echo_likelihood import EchoSettings, echo_model, log_echo
 from echostep.localization.estimate import TrackStatus, ellipse95, estimate, trust
-from echostep.localization.particle_kernels import Move, PingBatch, effective_size, systematic
-from echostep.localization.particles import Cloud, CloudSettings
+from echostep.localization.particle_kernels import (
+    NOISE_BEND,
+    Move,
+    PingBatch,
+    effective_size,
+    piece_of,
+    propagate,
+    systematic,
+)
+from echostep.localization.particles import BENDS, Cloud, CloudSettings
 from echostep.localization.start import Start
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
@@ -103,6 +111,20 @@ def test_a_turn_leads_round_the_end_of_a_wall(bend_m: float, passes: bool) -> No
     pings = heard(math.pi / 2, 0.0, 3)._replace(share=np.array([0.25, 0.5, 0.75]))
     move = Move(-0.8, 0.8, 0.01, 0.0, 0.0, bend_m * 0.8, bend_m * 0.8)
     assert (found.propagate_and_reweight(move, pings, MODEL, jamb).log_path > -0.1) == passes
+
+
+def test_ways_of_particles_differ_in_the_middle_of_a_turn_and_end_alike() -> None:
+    found = cloud()
+    move = Move(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.4)
+    noise = np.zeros((5, len(found.x_m)))
+    noise[NOISE_BEND] = np.linspace(*BENDS, len(found.x_m))
+    found.turn_rad[:], found.scale[:] = 0.0, 1.0
+    begin = found.y_m.copy()
+    propagate(found.arrays, piece_of(move, 0.0, 0.5), 0.5, noise, 6.0, BOX.index)
+    middle = found.y_m - begin
+    assert [middle.max(), middle.min()] == pytest.approx([0.0, -0.4])
+    propagate(found.arrays, piece_of(move, 0.5, 1.0), 0.5, noise, 6.0, BOX.index)
+    assert found.y_m == pytest.approx(begin)
 
 
 def test_a_move_through_a_wall_is_survived_wider() -> None:

@@ -12,6 +12,11 @@ from page.frames import PLAN
 
 
 @pytest.fixture(scope="module")
-def chunks() -> list[Chunk]:
+def scenario() -> Scenario:
     """A simulated walk of 11 m on the demo's plan."""
-    return list(Scenario(PLAN, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8)), 5, PythonBoard(seed=5)).chunks())
+    return Scenario(PLAN, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8)), 5, PythonBoard(seed=5))
+
+
+@pytest.fixture(scope="module")
+def chunks(scenario: Scenario) -> list[Chunk]:
+    return list(scenario.chunks())

@@ -9,6 +9,7 @@ import math
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +21,7 @@ from echostep.page.live import LivePage
 from echostep.plan.model import Pose
 from echostep.ports.check_in import PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import Chunk, portion_of
+from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
 from page.frames import LOCAL, PLAN, next_frame, opened_url
 from waiting import PATIENCE_S
@@ -210,12 +212,14 @@ def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
 
 @pytest.mark.parametrize(("at", "fits"), [((0.0, 0.0), True), ((14.0, 4.0), False)])
 def test_echoes_speak_for_a_right_tap_and_against_a_wrong_one(
-    chunks: list[Chunk], at: tuple[float, float], fits: bool
+    scenario: Scenario, chunks: list[Chunk], at: tuple[float, float], fits: bool
 ) -> None:
     """The wearer walks in the corridor, where echoes tell nothing until the next door; the wrong tap is in Office 4."""
     tracker, begin = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1), len(chunks) * 2 // 5
-    here = tracker.take(portion_of(chunks[:begin]))[-1]
-    tracker.feed(Chunk(PERSON, 0, CheckIn(here.x_m + at[0], here.y_m + at[1], None, 0.2).encode()))
+    tracker.take(portion_of(chunks[:begin]))
+    tap_s = 1e-9 * (chunks[begin].t_arrival_ns - START_NS)
+    _, x_m, y_m, *_ = scenario.truth[np.searchsorted(scenario.truth[:, 0], tap_s)]
+    tracker.feed(Chunk(PERSON, 0, CheckIn(x_m + at[0], y_m + at[1], None, 0.2).encode()))
     for k in range(begin, len(chunks), 100):
         tracker.take(portion_of(chunks[k : k + 100]))
         if not DOUBTED <= tracker.state.right <= BELIEVED:

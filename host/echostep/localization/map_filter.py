@@ -36,7 +36,7 @@ from echostep.localization.recent_way import RecentWay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
 from echostep.localization.start import ANY_LEVEL, Air, Start
-from echostep.localization.usable_pings import UsablePings
+from echostep.localization.usable_pings import UsablePings, judged_share
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.ports.meeting import Meeting
@@ -241,13 +241,15 @@ class MapFilter:
         move = move_of(segment)
         self._way.add(move, pings, change)
         for each in self._clouds():
-            self._follow_with(each, move, pings, unplanned)
+            self._follow_with(each, move, pings, unplanned, judged_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
             self._plan.confirm(math.hypot(segment.dx_m, segment.dy_m))
 
-    def _follow_with(self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities) -> None:
-        """Propagate and reweight one cloud, and judge it by how well it foretold the pings."""
+    def _follow_with(
+        self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
+    ) -> None:
+        """Propagate and reweight one cloud, and judge it by this share of how well it foretold the pings."""
         cloud = each.cloud
         if cloud.is_coarse:
             field = self._building.field(self._model)
@@ -267,18 +269,19 @@ class MapFilter:
                 log_path = self._plan.pass_walls(self._believed(0.0), path_m, evidence.log_path)
                 evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:
-                self._judge(each, evidence, pings, unplanned, path_m)
+                self._judge(each, evidence, pings, unplanned, path_m, share)
 
     def _judge(
-        self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float
-    ) -> None:
+        self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
+        share: float,
+    ) -> None:  # fmt: skip
         """Update the probability that a cloud is right; one that has not contracted gains nothing, and a search's is judged against chance alone."""
         cloud, most = each.cloud, each.plausibility.probability
         judged = each.has_contracted and not cloud.is_scattered
         each.has_contracted = each.has_contracted or cloud.is_small  # what contracts it, it has not foretold
         rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
         seen = 1.0 - cloud.hidden_shares[pings.ranger]
-        gain = beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
+        gain = share * beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
         each.plausibility.update(gain, evidence.log_path, path_m)
         if not judged:
             each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))

@@ -19,7 +19,7 @@ from echostep.walls.index import WallIndex, crosses_wall
 
 NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed, by reason: the next resampling drops such particles
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
-NOISE_TURN, NOISE_SCALE = 2, 3  # rows of the noise (4, n); rows 0 and 1 are x and y
+NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 0 and 1 are x and y
 
 
 class ParticleArrays(NamedTuple):
@@ -42,6 +42,15 @@ class Move(NamedTuple):
     scale_sd: float = 0.0
     bend_x_m: float = 0.0
     bend_y_m: float = 0.0
+
+
+class Piece(NamedTuple):
+    """Chord of a piece of a move, and what of it its bend is (m, walk frame)."""
+
+    dx_m: float
+    dy_m: float
+    bend_x_m: float
+    bend_y_m: float
 
 
 class PingBatch(NamedTuple):
@@ -102,7 +111,7 @@ def propagate_and_reweight(
     particles: ParticleArrays, move: Move, noise: Floats, progress: MoveProgress, pings: PingBatch,
     model: CloudModel, walls: WallIndex, memory: EchoMemory,
 ) -> tuple[MoveProgress, float, float]:  # fmt: skip
-    """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (4, n) is for the rest of the move.
+    """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (5, n) is for the rest of the move.
 
     Writes to `memory.log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, the lowest
     best log-weight before renormalising, and the log of the weight that the walls left.
@@ -112,8 +121,8 @@ def propagate_and_reweight(
     while done < 1.0 or k < len(pings.share):
         until = max(pings.share[k], done) if k < len(pings.share) else 1.0
         if until > done:
-            dx, dy = piece_of(move, done, until)
-            best, left = propagate(particles, dx, dy, (until - done) / rest, noise, model.wall_cost, walls)
+            piece = piece_of(move, done, until)
+            best, left = propagate(particles, piece, (until - done) / rest, noise, model.wall_cost, walls)
             lowest = min(lowest, best)
             passed += left
             done = until
@@ -139,17 +148,18 @@ def propagate_and_reweight(
 
 
 @kernel
-def piece_of(move: Move, begin: float, end: float) -> tuple[float, float]:
-    """The chord (m, walk frame) of a move between two shares of it: of a parabola [`PathSegment.way_m`]."""
+def piece_of(move: Move, begin: float, end: float) -> Piece:
+    """The piece of a move between two shares of it: of a parabola [`PathSegment.way_m`]."""
     part, bend = end - begin, (end - begin) * (1.0 - begin - end)
-    return part * move.dx_m + bend * move.bend_x_m, part * move.dy_m + bend * move.bend_y_m
+    bend_x, bend_y = bend * move.bend_x_m, bend * move.bend_y_m
+    return Piece(part * move.dx_m + bend_x, part * move.dy_m + bend_y, bend_x, bend_y)
 
 
 @lean_kernel
 def propagate(
-    particles: ParticleArrays, dx: float, dy: float, share: float, noise: Floats, wall_cost: float, walls: WallIndex
+    particles: ParticleArrays, piece: Piece, share: float, noise: Floats, wall_cost: float, walls: WallIndex
 ) -> tuple[float, float]:
-    """Move every particle by (dx, dy) in the walk frame, with this share of its noise, and make the greatest log-weight 0 again.
+    """Move every particle by a piece, with this share of its noise but all of that of its bend, and make the greatest log-weight 0 again.
 
     Returns what that was, and the log of the share of the weight that crossed no wall.
     """
@@ -158,6 +168,7 @@ def propagate(
     for i in range(len(x)):
         turn[i] += share * noise[NOISE_TURN, i]
         scale[i] += share * noise[NOISE_SCALE, i]
+        dx, dy = piece.dx_m + noise[NOISE_BEND, i] * piece.bend_x_m, piece.dy_m + noise[NOISE_BEND, i] * piece.bend_y_m
         c, s = math.cos(turn[i]), math.sin(turn[i])
         to_x = x[i] + scale[i] * (c * dx - s * dy) + share * noise[0, i]
         to_y = y[i] + scale[i] * (s * dx + c * dy) + share * noise[1, i]

@@ -34,6 +34,7 @@ from echostep.localization.level_changes import (
     set_levels_by_pressure,
 )
 from echostep.localization.particle_kernels import (
+    NOISE_BEND,
     CloudModel,
     EchoMemory,
     Move,
@@ -48,6 +49,7 @@ from echostep.localization.particle_kernels import (
 )
 from echostep.localization.plausibility import UNPLANNED_DOOR
 from echostep.localization.start import ANY_LEVEL, Air, Start, draw_poses, near_count
+from echostep.path import BENT
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -56,6 +58,8 @@ SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by 
 SMALL = 2  # times the least size, by reason: a cloud has contracted
 COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
 COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
+# Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
+COARSE_BEND = BENT * 2.0 * math.tan(math.radians(45.0) / 4.0)
 COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
 START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
 WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
@@ -76,6 +80,9 @@ GATHERED_M, GATHERED_REST = (
     2.5,
     1e-4,
 )  # a cloud has gathered when no more than this weight is further from its mean, by reason
+# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle; by reason: people turn on the spot, and walk
+# round the end of a wall more sharply than an arc
+BENDS = (-1.0, 3.0)
 KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 
 
@@ -164,6 +171,7 @@ class Cloud:
         self.lag_m: Floats = np.full(count, 0.0 if start.air is None else start.air.zero_m)
         self.log_weight: Floats = np.zeros(count)
         self.hidden: Floats = np.zeros((2, count))
+        self.bend: Floats = np.zeros(count)
         self.beliefs = empty_beliefs(count, 0)
         self.z_m: Floats = self.sheet.height_m[self.level] if self.sheet else np.zeros(count)
         if start.near_z_m is not None:
@@ -255,6 +263,7 @@ class Cloud:
         how well the cloud foretold the pings and the path.
         """
         log_evidence, log_passed = np.zeros(len(pings.share)), 0.0
+        self._draw_bends(move)
         progress, settings = MoveProgress(0.0, 0), self._settings
         cloud_model = CloudModel(settings.wall_cost, settings.resample_below, model)
         while progress.share < 1.0 or progress.ping < len(log_evidence):
@@ -275,10 +284,13 @@ class Cloud:
     def propagate_and_reweight_coarsely(
         self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
     ) -> None:
-        """The same for a coarse cloud: one ping of each ranger on COARSE_M of the path, looked up in the table."""
+        """The same for a coarse cloud: one ping of each ranger on COARSE_M of the path, looked up in the table, and none in a turn."""
         length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(257), 0.0
+        is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
         for k, share in enumerate([*pings.share.tolist(), 1.0]):
             is_ping = k < len(pings.share)
+            if is_ping and is_turning:
+                continue
             if is_ping and self._path_m + share * length < self._last_used_m[pings.ranger[k]] + COARSE_M:
                 continue
             if share > done:
@@ -300,7 +312,7 @@ class Cloud:
     def _propagate_coarsely(self, move: Move, begin: float, end: float, walls: Walls) -> None:
         """Between two shares of a move."""
         noise = self._noise(move, end - begin)
-        propagate(self.arrays, *piece_of(move, begin, end), 1.0, noise, COARSE_WALL_COST, walls.index)
+        propagate(self.arrays, piece_of(move, begin, end), 1.0, noise, COARSE_WALL_COST, walls.index)
 
     def change_levels(self, move: Move, change: HeightChange) -> None:
         """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
@@ -439,14 +451,21 @@ class Cloud:
         return float(weight @ far)
 
     def _noise(self, move: Move, share: float) -> Floats:
-        """Noise of this share of a move in x, y, turn and scale of each particle, (4, n)."""
+        """Noise of this share of a move in x, y, turn and scale of each particle, and of its bend, (5, n)."""
         s, length = self._settings, math.hypot(move.dx_m, move.dy_m)
         sd = math.hypot(move.sd_m, s.step_sd * math.sqrt(length))
         turn_sd = math.hypot(move.turn_sd_rad, math.radians(s.turn_sd_deg) * math.sqrt(length))
-        noise = self._rng.standard_normal((4, len(self.x_m)))
+        noise = np.empty((5, len(self.x_m)))
+        noise[:NOISE_BEND] = self._rng.standard_normal((NOISE_BEND, len(self.x_m)))
         scale_sd = math.hypot(move.scale_sd, s.scale_sd * math.sqrt(length))
-        noise *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
+        noise[:NOISE_BEND] *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
+        noise[NOISE_BEND] = self.bend
         return noise
+
+    def _draw_bends(self, move: Move) -> None:
+        """How much more than BENT of an arc each particle's way is on a move."""
+        turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
+        self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
 
     def _widen(self) -> None:
         """Widen the places after every particle has crossed a wall."""
@@ -465,7 +484,7 @@ class Cloud:
         """Replace the particles by the chosen ones (m,), with equal weights."""
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
         self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
-        self.z_m, self.lag_m = self.z_m[chosen], self.lag_m[chosen]
+        self.z_m, self.lag_m, self.bend = self.z_m[chosen], self.lag_m[chosen], self.bend[chosen]
         self.beliefs = BeaconBeliefs(*(part[chosen] for part in self.beliefs))
         self.hidden = np.ascontiguousarray(self.hidden[:, chosen])
         self.log_weight = np.zeros(len(chosen))

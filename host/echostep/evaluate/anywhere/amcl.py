@@ -27,7 +27,15 @@ from echostep.localization.level_changes import (
     change_levels,
     level_change_model,
 )
-from echostep.localization.particle_kernels import Move, ParticleArrays, effective_size, propagate, systematic
+from echostep.localization.particle_kernels import (
+    NOISE_BEND,
+    Move,
+    ParticleArrays,
+    Piece,
+    effective_size,
+    propagate,
+    systematic,
+)
 from echostep.localization.particles import CloudSettings
 from echostep.localization.start import Start, draw_poses
 from echostep.path import MeasuredSegment, PathSegment
@@ -111,10 +119,11 @@ class AugmentedMcl:
         sd = math.hypot(segment.sd_m, s.step_sd * math.sqrt(length))
         turn_sd = math.hypot(segment.turn_sd_rad, math.radians(s.turn_sd_deg) * math.sqrt(length))
         sds = np.array([[sd], [sd], [turn_sd], [s.scale_sd * math.sqrt(length)]])
-        noise = math.sqrt(share) * sds * self._rng.standard_normal((4, SIZE))
+        noise = np.zeros((5, SIZE))
+        noise[:NOISE_BEND] = math.sqrt(share) * sds * self._rng.standard_normal((NOISE_BEND, SIZE))
         p, dx, dy = self._particles, share * segment.dx_m, share * segment.dy_m
         walls = self._walls.near(p.x_m, p.y_m, math.hypot(dx, dy))
-        propagate(p, dx, dy, 1.0, noise, s.wall_cost, walls)
+        propagate(p, Piece(dx, dy, 0.0, 0.0), 1.0, noise, s.wall_cost, walls)
 
     def _weight(self, axis: float, range_m: float, walk_heading_rad: float) -> None:
         """Weights and their mean (lines 5 to 10 of the table), then resampling (lines 11 to 16)."""
