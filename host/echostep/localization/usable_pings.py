@@ -19,11 +19,9 @@ from echostep.path import MeasuredSegment
 
 RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
-# Turn on a segment at which its pings count half, by reason: headings between its ends are interpolated
-TURNING_RAD = math.radians(45.0)
-JUDGING_RAD = math.radians(
-    15.0
-)  # the same where they tell whether the cloud is right, by reason: they choose a way round, and are foretold badly
+# Turns on a segment at which its pings count half, by reason: headings between its ends are interpolated
+TURNING_RAD = math.radians(45.0)  # as weights of particles
+JUDGING_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
 
 
 def judged_share(turn_rad: float) -> float:
