@@ -4,7 +4,8 @@
 In: walls, their floor. Out: `CoarseField`, and `reweight_coarsely`, which looks a ping up instead of tracing it. Owns nothing.
 
 A cell of the floor has one row, a sector of the ranger's axis one column. A ranger's cone is wide, so its range changes little within a sector of 15
-degrees; within a cell of 25 cm it changes by as much as the cell is wide, and COARSE_SD_M says so. A look-up takes a tenth of a trace's time.
+degrees; within a cell of 25 cm it changes by as much as the cell is wide, and COARSE_SD_M says so. An entry is an expected range and the probability
+that an echo is heard at all, for walls at a grazing angle or far away seldom are. A look-up takes a tenth of a trace's time.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ FAR_SHARE, FAR_FACTOR = (
     0.3,
     3.0,
 )  # of the expected ranges are off by so many times as much: edges, corners, the next wall
-LIKELY = 0.05  # probability of detection that the sources up to the expected range have together: a weak echo foretold in vain costs little
+LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
+CHANCES = 8  # steps of the probability that an echo is heard
+RANGES = 256  # steps of the expected range
+OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
 MISSED, HIDDEN, EXTRA = (
     0.1,
     0.25,
@@ -43,13 +47,13 @@ UNKNOWN = -1  # no row: outside the building
 class CoarseField(NamedTuple):
     """`row` (rows, columns): row of `expected` by cell of the grid from (x0_m, y0_m) on, or UNKNOWN.
 
-    `expected` (cells, SECTORS): ranges in UNIT_M, 0: none.
+    `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability that an echo is heard, of CHANCES.
     """
 
     x0_m: float
     y0_m: float
     row: Int32s
-    expected: np.ndarray[tuple[int, int], np.dtype[np.uint8]]
+    expected: np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 
 
 class CoarsePing(NamedTuple):
@@ -64,7 +68,7 @@ class CoarsePing(NamedTuple):
 def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
     """The table of a floor; seconds for a building of thousands of square metres."""
     if not len(floor.x_m):
-        return CoarseField(0.0, 0.0, np.full((1, 1), UNKNOWN, np.int32), np.zeros((1, SECTORS), np.uint8))
+        return CoarseField(0.0, 0.0, np.full((1, 1), UNKNOWN, np.int32), np.zeros((1, SECTORS), np.uint16))
     x0, y0 = float(floor.x_m.min()) - (AROUND + 0.5) * CELL_M, float(floor.y_m.min()) - (AROUND + 0.5) * CELL_M
     column, line = ((floor.x_m - x0) / CELL_M).astype(np.int64), ((floor.y_m - y0) / CELL_M).astype(np.int64)
     row = np.full((int(line.max()) + AROUND + 1, int(column.max()) + AROUND + 1), UNKNOWN, np.int32)
@@ -81,7 +85,7 @@ def reweight_coarsely(
 ) -> None:
     """Add each particle's log-likelihood of a ping, by the table, to the ping's power, and make the greatest log-weight 0.
 
-    `table` (257,): room for the log-density by expected range, its last entry outside.
+    `table` (OUTSIDE + 1,): room for the log-density by entry.
     """
     x, y, turn, _, log_weight = particles
     _log_densities(ping, model, table)
@@ -95,58 +99,61 @@ def reweight_coarsely(
 
 @inline_kernel
 def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
-    """The expected range (UNIT_M) at a place and in a direction; 256 outside."""
+    """The entry of the table at a place and in a direction; OUTSIDE outside."""
     rows, columns = field.row.shape
     c, r = (x - field.x0_m) / CELL_M, (y - field.y0_m) / CELL_M
     if not (0.0 <= c < columns and 0.0 <= r < rows):
-        return 256
+        return OUTSIDE
     cell = field.row[int(r), int(c)]
     if cell < 0:
-        return 256
+        return OUTSIDE
     turns = axis_rad * (0.5 / math.pi)
     return int(field.expected[cell, min(int((turns - math.floor(turns)) * SECTORS), SECTORS - 1)])
 
 
 @lean_kernel
 def _log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
-    """Log-density per metre of a range by the expected one, to the ping's power; range 0: of no echo.
+    """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
 
-    The last entry: outside, where walls are rare.
+    With the entry's probability the view is that of the expected range, else as where none is expected. The last entry: outside, where walls are rare.
     """
     range_m = ping.range_m
     even = 1.0 / (model.maximum_m - model.minimum_m)
-    for k in range(256):
+    for k in range(RANGES):
         if range_m <= 0.0:
-            planned, hidden = EXTRA if k == 0 else MISSED, MISSED
+            likely, unlikely, hidden = MISSED, EXTRA, MISSED
         else:
-            planned, hidden = (1.0 - EXTRA) * even, (1.0 - MISSED) * even
-            if k > 0:
-                z = (range_m - k * UNIT_M) / COARSE_SD_M
-                near = math.exp(-0.5 * z * z)
-                far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
-                planned = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
-                planned *= (1.0 - MISSED) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
-        table[k] = ping.power * math.log((1.0 - HIDDEN) * planned + HIDDEN * hidden + ping.missed)
-    table[256] = ping.power * math.log((0.9 if range_m <= 0.0 else 0.1 * even) + ping.missed)
+            z = (range_m - k * UNIT_M) / COARSE_SD_M
+            near = math.exp(-0.5 * z * z)
+            far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
+            likely = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
+            likely *= (1.0 - MISSED) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
+            unlikely, hidden = (1.0 - EXTRA) * even, (1.0 - MISSED) * even
+        for c in range(CHANCES):
+            chance = (c + 0.5) / CHANCES if k > 0 else 0.0
+            planned = chance * likely + (1.0 - chance) * unlikely
+            table[c * RANGES + k] = ping.power * math.log((1.0 - HIDDEN) * planned + HIDDEN * hidden + ping.missed)
+    table[OUTSIDE] = ping.power * math.log((0.9 if range_m <= 0.0 else 0.1 * even) + ping.missed)
 
 
 @kernel
 def _expected(
     x: Floats, y: Floats, walls: WallIndex, model: EchoModel
-) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
-    """The range (UNIT_M) up to which sources are detected with probability LIKELY, by cell and sector; 0: none is likely."""
+) -> np.ndarray[tuple[int, int], np.dtype[np.uint16]]:
+    """The entries by cell and sector: the range up to which sources are detected with probability LIKELY, and the probability that any is."""
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    expected = np.zeros((len(x), SECTORS), np.uint8)
+    expected = np.zeros((len(x), SECTORS), np.uint16)
     for i in range(len(x)):
         for s in range(SECTORS):
             axis = 2.0 * math.pi * (s + 0.5) / SECTORS
             count = echo_sources(x[i], y[i], axis, walls, distance_m, off_axis_rad, kind)
-            missed = 1.0
+            missed, entry = 1.0, 0
             for k in range(count):
                 missed *= 1.0 - detection(distance_m[k], off_axis_rad[k], kind[k], model)
-                if missed < 1.0 - LIKELY:
-                    expected[i, s] = max(min(int(distance_m[k] / UNIT_M + 0.5), 255), 1)
-                    break
+                if entry == 0 and missed < 1.0 - LIKELY:
+                    entry = max(min(int(distance_m[k] / UNIT_M + 0.5), RANGES - 1), 1)
+            if entry > 0:
+                expected[i, s] = entry + RANGES * min(int((1.0 - missed) * CHANCES), CHANCES - 1)
     return expected
 
 

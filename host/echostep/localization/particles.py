@@ -20,7 +20,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.beacon_beliefs import BeaconBeliefs, empty_beliefs
-from echostep.localization.coarse_field import CoarseField, CoarsePing, reweight_coarsely
+from echostep.localization.coarse_field import OUTSIDE, CoarseField, CoarsePing, reweight_coarsely
 from echostep.localization.echo_likelihood import EchoModel
 from echostep.localization.hypotheses import Hypothesis, hypotheses
 from echostep.localization.level_changes import (
@@ -285,7 +285,7 @@ class Cloud:
         self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
     ) -> None:
         """The same for a coarse cloud: one ping of each ranger on COARSE_M of the path, looked up in the table, and none in a turn."""
-        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(257), 0.0
+        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE + 1), 0.0
         is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
         for k, share in enumerate([*pings.share.tolist(), 1.0]):
             is_ping = k < len(pings.share)
