@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""The table of expected ranges against a trace of each entry, and what silence costs before a wall that is seldom heard."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.localization.building import Building
+from echostep.localization.coarse_field import (
+    CHANCES,
+    LIKELY,
+    RANGES,
+    SECTORS,
+    UNIT_M,
+    CoarsePing,
+    reweight_coarsely,
+)
+from echostep.localization.echo_likelihood import EchoSettings, detection, echo_model
+from echostep.localization.particle_kernels import ParticleArrays
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+
+ROOM = Building(
+    Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0], [3, 0, 3, 5]], float)), None
+)
+MODEL = echo_model(EchoSettings())
+FIELD = ROOM.field(MODEL)
+EAST, NORTH_EAST = 0.0, math.radians(37.5)
+ROOM_FOR_TABLE = np.empty(CHANCES * RANGES + 1)
+
+
+def traced(x_m: float, y_m: float, axis_rad: float) -> tuple[float, float]:
+    """The range up to which sources are detected with probability LIKELY (nan: none), and the probability that any is."""
+    distance_m, off_axis_rad, kind = (np.empty(MOST_SOURCES) for _ in range(3))
+    count = echo_sources(x_m, y_m, axis_rad, ROOM.walls.index, distance_m, off_axis_rad, kind)
+    missed = np.cumprod([1.0 - detection(distance_m[k], off_axis_rad[k], kind[k], MODEL) for k in range(count)])
+    likely = np.flatnonzero(missed < 1.0 - LIKELY)
+    return (float(distance_m[likely[0]]), 1.0 - float(missed[-1])) if len(likely) else (math.nan, 0.0)
+
+
+def log_density(x_m: float, y_m: float, axis_rad: float, range_m: float) -> float:
+    """Of one ping (range 0: none) at a place, less that in the middle of the hall, where nothing is in reach."""
+    pair = np.array([x_m, 4.6]), np.array([y_m, 4.1]), np.array([axis_rad, EAST]), np.ones(2), np.zeros(2)
+    particles = ParticleArrays(*pair)
+    reweight_coarsely(particles, CoarsePing(0.0, range_m, 1.0, 0.0), FIELD, MODEL, ROOM_FOR_TABLE)
+    return float(particles.log_weight[0] - particles.log_weight[1])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_entry_is_a_trace_from_the_middle_of_its_cell_and_sector(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for k in rng.integers(len(ROOM.floor.x_m), size=40):
+        s = int(rng.integers(SECTORS))
+        range_m, chance = traced(ROOM.floor.x_m[k], ROOM.floor.y_m[k], 2.0 * math.pi * (s + 0.5) / SECTORS)
+        entry = int(FIELD.expected[k, s])
+        if math.isnan(range_m):
+            assert entry == 0
+        else:
+            assert (entry % RANGES) * UNIT_M == pytest.approx(range_m, abs=UNIT_M)
+            assert (entry // RANGES + 0.5) / CHANCES == pytest.approx(chance, abs=0.51 / CHANCES)
+
+
+def test_silence_costs_little_where_a_wall_is_seldom_heard() -> None:
+    """A wall 1 m ahead is nearly always heard, one that is seen at 37 degrees, 4.9 m away, seldom."""
+    assert traced(11.1, 4.1, EAST)[1] > 0.9
+    assert LIKELY < traced(9.1, 4.1, NORTH_EAST)[1] < 0.4
+    assert log_density(11.1, 4.1, EAST, 0.0) < -1.2
+    assert -0.6 < log_density(9.1, 4.1, NORTH_EAST, 0.0) < 0.0
+
+
+@pytest.mark.parametrize(("at", "axis_rad"), [((11.1, 4.1), EAST), ((9.1, 4.1), NORTH_EAST)])
+def test_an_echo_from_where_one_is_expected_speaks_for_the_place(at: tuple[float, float], axis_rad: float) -> None:
+    range_m, _ = traced(*at, axis_rad)
+    assert log_density(*at, axis_rad, range_m) > 0.5
+    assert log_density(*at, axis_rad, range_m + 1.5) < log_density(*at, axis_rad, range_m) - 1.0
