@@ -115,7 +115,8 @@ def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
 def _log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
     """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
 
-    With the entry's probability the view is that of the expected range, else as where none is expected. The last entry: outside, where walls are rare.
+    With the entry's probability the echo is that of the expected range, else as where none is expected. The last entry: outside, where walls
+    are rare.
     """
     range_m = ping.range_m
     even = 1.0 / (model.maximum_m - model.minimum_m)
