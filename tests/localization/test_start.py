@@ -34,6 +34,6 @@ def test_a_search_beside_a_cloud_on_stairs_begins_between_two_levels() -> None:
     start = Start(near=Pose(*LIFT_AT, 0.0, 1), near_z_m=4.2)
     rng = np.random.default_rng(1)
     cloud = Cloud(CloudSettings(searching=COUNT), start, 0.0, rng, laid_out.sheet, None, building.floor)
-    near = near_count(len(cloud.x_m))
+    near = near_count(COUNT)
     assert (cloud.z_m[:near] == start.near_z_m).all()
     assert (cloud.z_m[near:] == laid_out.sheet.height_m[cloud.level[near:]]).all()

@@ -61,7 +61,6 @@ COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the inform
 # Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
 COARSE_BEND = BENT * 2.0 * math.tan(math.radians(45.0) / 4.0)
 COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
-SEARCHING_PER_M2 = 60  # of floor, particles of a coarse cloud: five within 60 cm and 15 degrees of each pose, by reason
 START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
 WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
 COARSE_WALL_COST = (
@@ -95,9 +94,8 @@ class CloudSettings:
     and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `resample_below`: effective share of the
     cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
     cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A cloud that would need more is coarse: it has
-    `searching` particles, on a large floor twice as many, and echoes are looked up in a table. A scattered cloud is roughened by `rough_m` and
-    `rough_deg` until it has contracted. `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as
-    a whole.
+    `searching` particles, and echoes are looked up in a table. A scattered cloud is roughened by `rough_m` and `rough_deg` until it has contracted.
+    `wall_cost`: log-weight that crossing a wall costs. `rescue_sd_m`: widening of a cloud that crossed a wall as a whole.
     """
 
     size: int = 660
@@ -159,8 +157,7 @@ class Cloud:
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
         self.is_coarse = start.pose is None or start.sd_m > WIDE_M
-        self._searching = min(max(settings.searching, round(SEARCHING_PER_M2 * floor.area_m2)), 2 * settings.searching)
-        self._draw(start, self._searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
+        self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
         wanted = max(self._size_by_spread(), START_SIZE)
         if wanted < settings.largest:
             self.is_coarse = False
@@ -407,7 +404,7 @@ class Cloud:
         self._resample(wanted_weight, weight_after, len(self.x_m))
         wanted = self._size_by_spread()
         self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - self._rest
-        count = self._searching if self.is_coarse else min(wanted, self._settings.largest)
+        count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
         if count != len(self.x_m):
             self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
         self.is_gathered = self.is_gathered or self._far_weight(self.x_m) < GATHERED_REST
