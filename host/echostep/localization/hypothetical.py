@@ -23,13 +23,14 @@ class Hypothetical:
     """A cloud, the probability that it is right, and whether it has contracted once: before that, echoes tell little of it.
 
     `is_stated`: it began where it was said to begin, so it should explain the echoes from the first on. `doubts`: log-odds that ranges to beacons of
-    each teammate have taken from it.
+    each teammate have taken from it. `judged_m`: length of the path on which it was judged by the echoes that it foretold.
     """
 
     cloud: Cloud
     plausibility: Plausibility
     is_stated: bool = False
     has_contracted: bool = False
+    judged_m: float = 0.0
     doubts: dict[str, float] = field(default_factory=dict)
 
     def weigh_range(self, meeting: Meeting, area_m2: float) -> float:

@@ -31,7 +31,7 @@ from echostep.localization.moves import HEIGHT_SD_M, height_change, move_of
 from echostep.localization.particle_kernels import Move, PingBatch
 from echostep.localization.particles import Cloud, Evidence
 from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, PlanVerdict, away_m
-from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay
+from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay, probability_of
 from echostep.localization.recent_way import RecentWay
 from echostep.localization.relative_height import RelativeHeight
 from echostep.localization.riding_height import RidingHeight
@@ -49,9 +49,13 @@ DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
 BELIEVED = 0.99  # of the tracked one, above which the plan supports it
 GATHERED = 0.7  # of one that has just gathered anywhere, if the plan fits: it has yet to foretell echoes
+UNDECIDED = 0.8  # at most of the tracked one, while a search that has not gathered is of another mind: the true place dies in one of five by chance
 FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
 REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
 WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
+ALIKE_NATS = 8.0  # of evidence that a wrong place gains by being alike, before a search has found another
+JUDGED_M = 20.0  # path on which a search's place is judged before it counts against the tracked one
+ELSEWHERE = 0.05  # weight of a search about the tracked cloud, below which it is of another mind
 LEVEL_M = 20.0  # the same for each level more: storeys are often alike but for their doors
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
@@ -283,21 +287,33 @@ class MapFilter:
         seen = 1.0 - cloud.hidden_shares[pings.ranger]
         gain = share * beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
         each.plausibility.update(gain, evidence.log_path, path_m)
-        if not judged:
+        if judged:
+            each.judged_m += path_m
+        else:
             each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))
 
     def _clouds(self) -> list[Hypothetical]:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
     def _right(self) -> Right:
-        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height."""
+        """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height.
+
+        Where the search has none there, it is what the tracked cloud has foretold against what the search has.
+        """
         here = self.tracked.plausibility.probability
         if self.search is None:
             return Right(here)
         cloud, mean = self.search.cloud, self._believed(0.0)
         place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
         near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
-        return Right(min(here, near), about)
+        return Right(min(here, near if near > ELSEWHERE else self._against(self.search)), about)
+
+    def _against(self, search: Hypothetical) -> float:
+        """Probability that the tracked cloud is right where a search is of another mind."""
+        log_odds = self.tracked.plausibility.log_odds
+        if search.judged_m > JUDGED_M:
+            return probability_of(log_odds - search.plausibility.log_odds)
+        return min(probability_of(log_odds - ALIKE_NATS), UNDECIDED)
 
     def _choose(self, right: float, walk_heading_rad: float) -> bool:
         """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found.

@@ -35,6 +35,11 @@ def log_odds(probability: float) -> float:
     return math.log(probability / (1.0 - probability))
 
 
+def probability_of(log_odds: float) -> float:
+    """The inverse."""
+    return 1.0 / (1.0 + math.exp(-log_odds))
+
+
 def beyond_errors_that_stay(log_ratio: Floats, power: Floats) -> Floats:
     """What the log-ratios of pings (k,) tell of a cloud: nothing up to what errors that stay explain, less by that beyond.
 
@@ -52,7 +57,7 @@ class Plausibility:
     @property
     def probability(self) -> float:
         """That the cloud is right."""
-        return 1.0 / (1.0 + math.exp(-self.log_odds))
+        return probability_of(self.log_odds)
 
     def add(self, log_ratio: float) -> None:
         """One observation: the log of its density if right over that if wrong."""
