@@ -30,8 +30,8 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of each across its line; `paths_m`: the corrected path (k, 2) of each
-    walk, or each piece of it on this storey.
+    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
+    corrected path (k, 2) of each walk, or each piece of it on this storey.
     """
 
     walls: Floats

@@ -19,7 +19,9 @@ from echostep.mapping.lines import Lines
 from echostep.mapping.nodes import Pings
 from echostep.mapping.segments import Run
 
-PLACES = 8  # of the path beside a wall, at most, evenly along it: each costs a solution with the graph's factor
+# Of the path beside a wall, at most, each in the middle of its share of it: each costs a solution with the graph's factor. With 64 of them the whole
+# differs by 3 % (18 simulated walks)
+PLACES = 4
 
 
 def wall_sds(graph: Graph, pings: Pings, poses: Floats, lines: Lines, runs: list[Run], of: Ints) -> Floats:
@@ -40,7 +42,7 @@ def _path_sd_m(graph: Graph, pings: Pings, poses: Floats, lines: Lines, run: Run
     if not len(own):
         return 0.0
     places = np.unique(pings.node[beside])
-    chosen = places[np.unique(np.linspace(0, len(places) - 1, PLACES).round().astype(np.int64))]
+    chosen = places[np.unique(((np.arange(PLACES) + 0.5) / PLACES * len(places)).astype(np.int64))]
     return math.sqrt(float(distance_variances(graph, normal_rad, own, chosen).mean()))
 
 
