@@ -16,13 +16,14 @@ from echostep.evaluate.anywhere.sites import Site
 from echostep.evaluate.anywhere.tours import clearance_m
 from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
 from echostep.evaluate.noplan.judgement import known_start, path_columns
+from echostep.mapping.drawing import Drawing, draw
 from echostep.mapping.graph import Closure, contradicted
 from echostep.mapping.growing import GrowingMap
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.plan import plan_of
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
-from echostep.plan.model import NO_PLAN, load_plan
+from echostep.plan.model import NO_PLAN, Pose, load_plan
 from echostep.session.metadata import run_metadata
 from echostep.session.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
@@ -59,6 +60,25 @@ def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     assert check_plan(plan) == []
     assert plan.uncertainty_m is not None
     assert 0.01 < plan.uncertainty_m < 0.2
+
+
+def test_walls_are_known_as_well_as_the_path_that_drew_them(mapped: Mapped) -> None:
+    """The same walk by a foot that errs ten times as much, without its returns: more than twice as uncertain; the walls stay where they are."""
+    graph, nodes = mapped.graph, mapped.graph.nodes
+    loose = replace(graph, nodes=replace(nodes, sd_m=10.0 * nodes.sd_m), closures=[])
+    loose.solve(1)
+    loose.pose, loose.walls = graph.pose, graph.walls
+    (drawing,) = draw(loose, mapped.pings)
+    assert np.array_equal(drawing.walls, mapped.drawing.walls)
+    assert np.sqrt(np.mean(drawing.sd_m**2)) > 2.0 * np.sqrt(np.mean(mapped.drawing.sd_m**2))
+
+
+def test_the_plans_uncertainty_is_that_of_its_length(mapped: Mapped) -> None:
+    """Eight metres known to 10 cm, one metre to 50 cm, and a piece too short to be drawn."""
+    walls = np.array([[0.0, 2.0, 8.0, 2.0], [9.0, 2.0, 9.0, 3.0], [0.0, 0.0, 0.05, 0.0]])
+    drawing = Drawing(walls, np.array([0.1, 0.5, 9.0]), mapped.drawing.paths_m)
+    plan, _ = plan_of(replace(mapped, drawings=(drawing,)), Pose(0.0, 0.0, 0.0), "two walls")
+    assert plan.uncertainty_m == pytest.approx(math.sqrt((8.0 * 0.01 + 0.25) / 9.0), abs=0.001)
 
 
 def test_the_solution_pivots_on_its_diagonal(mapped: Mapped) -> None:

@@ -26,7 +26,7 @@ def _segments(lines: list[tuple[float, float]], runs: list[Run]) -> list[list[fl
         np.full(count, CELLS),
         np.zeros(0, np.intp),
     )
-    found, _ = segments_of(Lines(normal, rho, none, none, none, none == 0.0), runs, cells)
+    found = segments_of(Lines(normal, rho, none, none, none, none == 0.0), runs, cells)
     ends: list[list[float]] = found.tolist()
     return ends
 

@@ -19,6 +19,7 @@ from echostep.mapping.graph import Graph
 from echostep.mapping.lines import Lines, find_lines, joined
 from echostep.mapping.nodes import Pings
 from echostep.mapping.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
+from echostep.mapping.wall_sd import wall_sds
 
 # Of wall on one line, at least; shorter ones must be heard again, or be across the path. One passer-by in 15, in 70, goes along for longer, when one
 # second is the mean
@@ -29,8 +30,8 @@ ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of each across its line; `paths_m`: the corrected path (k, 2) of each
-    walk, or each piece of it on this storey.
+    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
+    corrected path (k, 2) of each walk, or each piece of it on this storey.
     """
 
     walls: Floats
@@ -80,7 +81,7 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     add_crossings(straight, paths, cells)
     found = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
     runs = _without_lone(found, straight, LONE_M, heard, cells.of)
-    walls, _ = segments_of(straight, runs, cells)
+    walls = segments_of(straight, runs, cells)
     if not aligned.all():
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
@@ -93,8 +94,8 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
         cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
         add_crossings(both, paths, cells)
         straight = both
-    walls, sd = segments_of(straight, runs, cells)
-    return Drawing(walls, sd, paths)
+    walls = segments_of(straight, runs, cells)
+    return Drawing(walls, wall_sds(graph, pings, poses, straight, runs, cells.of), paths)
 
 
 def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, of: Ints) -> list[Run]:

@@ -53,14 +53,16 @@ def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str) -> tuple[Plan,
     heights = np.zeros(1) if storeys is None else storeys.height_m - storeys.height_m[first_storey]
     wells = [] if storeys is None else wells_of(storeys, moved(mapped.graph.pose[:, :2]))
     walked = tuple(tuple(moved(path) for path in drawing.paths_m) for drawing in mapped.drawings)
-    levels, variances = [], []
+    levels, lengths_m, variances = [], [], []
     for k, drawing in enumerate(mapped.drawings):
         walls = np.round(moved(drawing.walls.reshape(-1, 2)).reshape(-1, 4), ROUND)
-        long = np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > LEAST_M
+        length_m = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
+        long = length_m > LEAST_M
         level = Level(str(k - first_storey), round(float(heights[k]), 1), walls[long])
         levels.append(with_wells(replace(level, doors=_doors(level, walked[k])), k, wells))
+        lengths_m += length_m[long].tolist()
         variances += (drawing.sd_m[long] ** 2).tolist()
-    sd = round(math.sqrt(float(np.mean(variances))), ROUND) if variances else None
+    sd = round(math.sqrt(float(np.average(variances, weights=lengths_m))), ROUND) if variances else None
     connectors = tuple(connector(well, number) for number, well in enumerate(wells, 1))
     plan = Plan(name, tuple(levels), replace(start, level=first_storey), "", connectors, uncertainty_m=sd)
     return plan, walked

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Walls as segments: runs of cells that answered, joined over what was not heard, extended to the walls that they meet.
 
-In: lines and counts by cell. Out: segments with their standard deviations. Owns the limits.
+In: lines and counts by cell. Out: segments. Owns the limits.
 """
 
 from __future__ import annotations
@@ -84,8 +84,8 @@ def _bridged(pieces: list[tuple[int, int]], passed: Floats) -> list[tuple[int, i
     return joined
 
 
-def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> tuple[Floats, Floats]:
-    """Segments (n, 4) with their ends where they meet other walls, and standard deviations (n,)."""
+def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> Floats:
+    """Segments (n, 4) with their ends where they meet other walls."""
     ends = np.array([(run.low_m, run.high_m) for run in runs]).reshape(-1, 2)
     met = ends.copy()
     for i, run in enumerate(runs):
@@ -95,7 +95,7 @@ def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> tuple[Floats, Fl
                 ends[i, side], 1.0 if side else -1.0, crossings, cells.passed[run.line], cells.first_m[run.line]
             )
     rows = [_segment(lines, run.line, *met[i]) for i, run in enumerate(runs)]
-    return np.array(rows).reshape(-1, 4), np.array([lines.sd_m[run.line] for run in runs])
+    return np.array(rows).reshape(-1, 4)
 
 
 def meets(lines: Lines, runs: list[Run], i: int) -> bool:

@@ -36,9 +36,9 @@ export function drawnText(drawing) {
   let length = 0, square = 0;
   const { walls } = drawing;
   for (let k = 0; k < walls.length; k += 5) {
-    length += Math.hypot(walls[k + 2] - walls[k], walls[k + 3] - walls[k + 1]);
-    square += walls[k + 4] ** 2;
+    const piece = Math.hypot(walls[k + 2] - walls[k], walls[k + 3] - walls[k + 1]);
+    length += piece;
+    square += piece * walls[k + 4] ** 2;
   }
-  const sd = Math.sqrt(square / Math.max(walls.length / 5, 1));
-  return `drawn: ${length.toFixed(0)} m of wall${length ? `, to ${(100 * sd).toFixed(0)} cm` : ''}`;
+  return `drawn: ${length.toFixed(0)} m of wall${length ? `, to ${(100 * Math.sqrt(square / length)).toFixed(0)} cm` : ''}`;
 }
