@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""A search of another mind than the tracked cloud: what each has foretold decides, and not before the search has been judged."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.localization.building import Building
+from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.hypothetical import Hypothetical
+from echostep.localization.map_filter import AGREED, DOUBTED, JUDGED_M, UNDECIDED, MapFilter
+from echostep.localization.particles import Cloud, CloudSettings
+from echostep.localization.plausibility import Plausibility, probability_of
+from echostep.localization.start import Start
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.model import Pose
+from echostep.walls.echo_sources import Walls
+
+ROOM = Building(Walls(np.array([[0, 0, 30, 0], [30, 0, 30, 8], [30, 8, 0, 8], [0, 8, 0, 0]], float)), None)
+HERE, THERE = Pose(3.0, 4.0, 0.0), Pose(25.0, 4.0, 0.0)
+NONE = np.zeros(0)
+
+
+def hypothetical(at: Pose, log_odds: float) -> Hypothetical:
+    """A cloud of a few decimetres at a place that has contracted."""
+    cloud = Cloud(CloudSettings(size=100, largest=1000), Start(at, 0.1, 0.05), 0.0, np.random.default_rng(1))
+    cloud.is_gathered = True
+    each = Hypothetical(cloud, Plausibility(0.5), has_contracted=True)
+    each.plausibility.log_odds = log_odds
+    return each
+
+
+def of_two_minds(log_odds: float, search_log_odds: float, judged_m: float, at: Pose = THERE) -> MapFilter:
+    """A filter that tracks HERE with these log-odds, and whose search says `at` with others."""
+    settings = FilterSettings(cloud=CloudSettings(size=100, largest=1000, searching=2_000))
+    two = MapFilter(ROOM, Start(HERE), 0.0, np.random.default_rng(1), settings)
+    two.tracked = hypothetical(HERE, log_odds)
+    two.search = hypothetical(at, search_log_odds)
+    two.search.judged_m = judged_m
+    return two
+
+
+def after_a_step(two: MapFilter) -> float:
+    """East of the tracked cloud after a step without pings."""
+    step = PathSegment(0.0, 1.0, 0.1, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=1, anchor_sd_m=0.0)
+    return two.update(MeasuredSegment(step, NONE, np.zeros(0, np.int64), NONE)).x_m
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "right"), [(11.0, UNDECIDED), (7.0, probability_of(-1.0)), (0.0, probability_of(-8.0))]
+)
+def test_before_the_search_is_judged_a_place_that_may_be_alike_is_not_sure(log_odds: float, right: float) -> None:
+    two = of_two_minds(log_odds, 9.0, 0.5 * JUDGED_M)
+    assert two._right().here == pytest.approx(right)
+
+
+@pytest.mark.parametrize(("log_odds", "search_log_odds", "stays"), [(10.0, 3.0, True), (4.0, 9.0, False)])
+def test_a_judged_search_is_followed_if_it_has_foretold_more(
+    log_odds: float, search_log_odds: float, stays: bool
+) -> None:
+    two = of_two_minds(log_odds, search_log_odds, 1.5 * JUDGED_M)
+    assert (two._right().here > AGREED) == stays
+    assert (two._right().here < DOUBTED) == (not stays)
+    assert math.dist((after_a_step(two),), ((HERE if stays else THERE).x_m,)) < 0.5
+    assert two.search is None
+
+
+def test_a_search_that_agrees_is_asked_for_its_weight_there() -> None:
+    """Whatever it has foretold: it is the same place."""
+    two = of_two_minds(11.0, 11.0, 1.5 * JUDGED_M, at=HERE)
+    assert two._right().here > AGREED
