@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 
 # All by reason.
-PRIOR_MISSED, PRIOR_HEARD = 0.1, 20.0  # pings: a ranger in order misses one echo in two hundred; one that is not is known after two seconds
+# Pings: a ranger in order misses one echo in two hundred; one that is not is known after two seconds
+PRIOR_MISSED, PRIOR_HEARD = 0.1, 20.0
 LIKE_M = 0.15  # difference of two echoes from one wall: three errors of their difference
 SURE_M = 3.0  # range within which a wall is detected surely: half of the ranger's
 MOST_SILENT = 8  # pings between two such echoes: more are a door
