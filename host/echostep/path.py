@@ -24,6 +24,11 @@ STANDING_PIECE_S = 0.5  # duration of the segments into which standing is cut: t
 UNOBSERVED_SD_M = 0.75  # a segment with a larger standard deviation was not observed: half a stride of an adult
 
 
+def bend_of(turn_rad: float) -> float:
+    """Bend of a way with this turn, as a share of its chord: BENT of an arc, whose height over the chord is chord / 2 * tan(turn / 4)."""
+    return BENT * 2.0 * math.tan(0.25 * turn_rad)
+
+
 class StanceHeadings(NamedTuple):
     """Yaw of the foot and angle of the belt (rad, each from a zero of its own) at a time in a stance.
 
@@ -87,10 +92,9 @@ class PathSegment:
     def bend_m(self) -> tuple[float, float]:
         """Vector in the walk frame: the middle of the way lies a quarter of it off the chord.
 
-        BENT of the arc of a circle that turns with the trunk, whatever way the trunk faces: its height over the middle of the chord is
-        chord / 2 * tan(turn / 4). A left turn bends the way to the right of the chord.
+        BENT of the arc of a circle that turns with the trunk, whatever way the trunk faces. A left turn bends the way to the right of the chord.
         """
-        bend = BENT * 2.0 * math.tan(0.25 * self.turn_rad)
+        bend = bend_of(self.turn_rad)
         return bend * self.dy_m, -bend * self.dx_m
 
     def way_m(self, share: Share) -> tuple[Share, Share]:

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -64,7 +62,7 @@ def test_a_judged_search_is_followed_if_it_has_foretold_more(
     two = of_two_minds(log_odds, search_log_odds, 1.5 * JUDGED_M)
     assert (two._right().here > AGREED) == stays
     assert (two._right().here < DOUBTED) == (not stays)
-    assert math.dist((after_a_step(two),), ((HERE if stays else THERE).x_m,)) < 0.5
+    assert abs(after_a_step(two) - (HERE if stays else THERE).x_m) < 0.5
     assert two.search is None
 
 

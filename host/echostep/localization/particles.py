@@ -49,7 +49,7 @@ from echostep.localization.particle_kernels import (
 )
 from echostep.localization.plausibility import UNPLANNED_DOOR
 from echostep.localization.start import ANY_LEVEL, Air, Start, draw_poses, near_count
-from echostep.path import BENT
+from echostep.path import bend_of
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -59,7 +59,7 @@ SMALL = 2  # times the least size, by reason: a cloud has contracted
 COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
 COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
 # Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
-COARSE_BEND = BENT * 2.0 * math.tan(math.radians(45.0) / 4.0)
+COARSE_BEND = bend_of(math.radians(45.0))
 COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
 START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
 WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room

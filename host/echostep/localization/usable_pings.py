@@ -26,7 +26,12 @@ JUDGING_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way
 
 def judged_share(turn_rad: float) -> float:
     """Share of the information of a turning segment's pings that tells whether the cloud is right."""
-    return (1.0 + (turn_rad / TURNING_RAD) ** 2) / (1.0 + (turn_rad / JUDGING_RAD) ** 2)
+    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, JUDGING_RAD)
+
+
+def _loss(turn_rad: float, half_rad: float) -> float:
+    """By what the information of a ping is divided on a segment that turns; 2 where it turns by `half_rad`."""
+    return 1.0 + (turn_rad / half_rad) ** 2
 
 
 class UsablePings:
@@ -58,7 +63,7 @@ class UsablePings:
         axis = segment.heading0_rad + share * segment.turn_rad + RANGER_AXES_RAD[measured.ranger]
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
         travel_m = self._travels(measured.ranger, self.path_m + share * length)
-        power = np.minimum(travel_m / self._correlation_m, 1.0) / (1.0 + (segment.turn_rad / TURNING_RAD) ** 2)
+        power = np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
         self.path_m += length
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)

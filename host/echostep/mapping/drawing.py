@@ -81,8 +81,8 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     add_crossings(straight, paths, cells)
     found = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
     runs = _without_lone(found, straight, LONE_M, heard, cells.of)
-    walls = segments_of(straight, runs, cells)
     if not aligned.all():
+        walls = segments_of(straight, runs, cells)
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
         more = cell_counts(askew, poses, pings.range_m, free, ahead)
