@@ -12,10 +12,12 @@ from echostep.localization.building import Building
 from echostep.localization.coarse_field import (
     CHANCES,
     LIKELY,
+    OUTSIDE,
     RANGES,
     SECTORS,
     UNIT_M,
     CoarsePing,
+    log_densities,
     reweight_coarsely,
 )
 from echostep.localization.echo_likelihood import EchoSettings, detection, echo_model
@@ -75,3 +77,15 @@ def test_an_echo_from_where_one_is_expected_speaks_for_the_place(at: tuple[float
     range_m, _ = traced(*at, axis_rad)
     assert log_density(*at, axis_rad, range_m) > 0.5
     assert log_density(*at, axis_rad, range_m + 1.5) < log_density(*at, axis_rad, range_m) - 1.0
+
+
+@pytest.mark.parametrize("k", [0, 20, 90, 200])
+def test_the_density_of_each_entry_adds_up_to_one(k: int) -> None:
+    """Over silence and all ranges; some of the wide part of near and far ranges is out of the ranger's reach."""
+    step_m, total, table = 0.01, 0.0, np.empty(OUTSIDE + 1)
+    entry = 7 * RANGES + k
+    for range_m in np.arange(MODEL.minimum_m, MODEL.maximum_m, step_m):
+        log_densities(CoarsePing(0.0, float(range_m), 1.0, 0.0), MODEL, table)
+        total += step_m * math.exp(table[entry])
+    log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0), MODEL, table)
+    assert total + math.exp(table[entry]) == pytest.approx(1.0, abs=0.08)

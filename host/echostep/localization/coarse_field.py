@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
-from echostep.localization.echo_likelihood import EchoModel, detection
+from echostep.localization.echo_likelihood import SILENT, EchoModel, detection, hidden_density
 from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
@@ -28,18 +28,16 @@ SECTORS = 24  # of 15 degrees
 UNIT_M = 0.025  # of a range in the table, one byte
 COARSE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
 FAR_SHARE, FAR_FACTOR = (
-    0.3,
+    0.2,
     3.0,
 )  # of the expected ranges are off by so many times as much: edges, corners, the next wall
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
 CHANCES = 8  # steps of the probability that an echo is heard
 RANGES = 256  # steps of the expected range
 OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
-MISSED, HIDDEN, EXTRA = (
-    0.1,
-    0.25,
-    0.6,
-)  # shares: no echo where one is expected; views that are hidden; no echo where none is expected
+MISSED = 0.05  # share of the echoes heard by the entry that are none all the same
+QUIET = 0.6  # share of "no echo" where none is heard: the others are second reflections and things that no plan shows
+HIDDEN = 0.2  # share of views that are hidden: more than for an exact cloud, for a hidden view has no memory here
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
 
@@ -88,7 +86,7 @@ def reweight_coarsely(
     `table` (OUTSIDE + 1,): room for the log-density by entry.
     """
     x, y, turn, _, log_weight = particles
-    _log_densities(ping, model, table)
+    log_densities(ping, model, table)
     top = -np.inf
     for i in range(len(x)):
         log_weight[i] += table[_entry(x[i], y[i], ping.axis_rad + turn[i], field)]
@@ -112,7 +110,7 @@ def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
 
 
 @lean_kernel
-def _log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
+def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
     """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
 
     With the entry's probability the echo is that of the expected range, else as where none is expected. The last entry: outside, where walls
@@ -122,14 +120,15 @@ def _log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
     even = 1.0 / (model.maximum_m - model.minimum_m)
     for k in range(RANGES):
         if range_m <= 0.0:
-            likely, unlikely, hidden = MISSED, EXTRA, MISSED
+            likely, unlikely, hidden = MISSED, QUIET, SILENT
         else:
             z = (range_m - k * UNIT_M) / COARSE_SD_M
             near = math.exp(-0.5 * z * z)
             far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
             likely = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
             likely *= (1.0 - MISSED) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
-            unlikely, hidden = (1.0 - EXTRA) * even, (1.0 - MISSED) * even
+            unlikely = (1.0 - QUIET) * even
+            hidden = hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
         for c in range(CHANCES):
             chance = (c + 0.5) / CHANCES if k > 0 else 0.0
             planned = chance * likely + (1.0 - chance) * unlikely

@@ -127,6 +127,16 @@ def outlier_density(range_m: float, m: EchoModel) -> float:
     return SILENT if range_m <= 0.0 else (1.0 - SILENT) / (m.maximum_m - m.minimum_m)
 
 
+@inline_kernel
+def hidden_density(range_m: float, first_m: float, m: EchoModel) -> float:
+    """Density per metre of a range if the view is hidden, and the plan's first source is at `first_m`; range 0: the probability of no echo."""
+    if range_m <= 0.0:
+        return SILENT
+    before = min(max(first_m, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
+    nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
+    return (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
+
+
 @lean_kernel
 def echo_density(
     range_m: float, count: int, distance_m: Floats, off_axis_rad: Floats, kind: Floats, m: EchoModel
@@ -135,12 +145,7 @@ def echo_density(
     outlier = outlier_density(range_m, m)
     stray = 1.0 / (m.maximum_m - m.minimum_m)
     planned = planned_density(range_m, count, distance_m, off_axis_rad, kind, stray, m)
-    hidden = SILENT
-    if range_m > 0.0:
-        first = distance_m[0] if count else m.maximum_m
-        before = min(max(first, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
-        nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
-        hidden = (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) * stray)
+    hidden = hidden_density(range_m, distance_m[0] if count else m.maximum_m, m)
     return (1.0 - m.outlier) * ((1.0 - m.hidden) * planned + m.hidden * hidden) + m.outlier * outlier
 
 

@@ -18,12 +18,14 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.hypotheses import Hypothesis
-from echostep.localization.moments import moments
+from echostep.localization.moments import Moments, moments
 from echostep.localization.particles import Cloud
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
 TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter, by reason: a door, a room
 SURE = 0.95  # probability of an error below TRACKING_M while tracking, by reason
+# Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, by reason
+MUCH_LIKELIER = 2.0
 UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, by reason
 RISK = 1e-3  # probability of an error beyond the protection radius
 # Of the protection radius of a normal distribution, by reason: errors of echoes and steps have heavier tails.
@@ -119,18 +121,24 @@ def estimate(
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
-    `sd_m`: standard deviation per axis to be added; `right`: probability that the cloud is right, otherwise the trunk is `elsewhere`. While tracking,
-    the covariance is the cloud's; otherwise that of the mixture of both about its mean. The hypotheses are those of `search`, if there is one.
+    Of a cloud of several places the mean is in none of them: the position is then that of the place which has more than half of the weight, if there
+    is one. `sd_m`: standard deviation per axis to be added; `right`: probability that the cloud is right, otherwise the trunk is `elsewhere`. While
+    tracking, the covariance is the cloud's; otherwise that of the mixture of both about the position. The hypotheses are those of `search`, if there
+    is one.
     """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
+    places: tuple[Hypothesis, ...] = ()
+    if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
+        places = (search or cloud).places(walk_heading_rad)
+    if search is None and places and places[0].probability > UNSURE:
+        m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    places: tuple[Hypothesis, ...] = ()
-    if search is not None or xx + yy > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
-        places = (search or cloud).places(walk_heading_rad)
-    status = _status(right.here * near, max(right.here * about, right.about), max(levels))
+    # A coarse cloud began anywhere: the weight of its likeliest place is the probability of that (measured: host/docs/anywhere.md).
+    about *= 1.0 if cloud.is_coarse else right.here
+    status = _status(right.here * near, max(about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
     protection_m = _protection_m(xx, xy, yy, right.here * max(levels))
     if status is not TrackStatus.TRACKING and elsewhere is not None:
@@ -139,6 +147,19 @@ def estimate(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
         protection_m, right.here, places,
     )  # fmt: skip
+
+
+def _moments_at(place: Hypothesis, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
+    """The moments about a place, with its heading; those about the mean, if they have half as much weight near them."""
+    dx, dy = cloud.map_x_m - place.x_m, cloud.y_m - place.y_m
+    square_m2 = dx * dx + dy * dy
+    near, about = (float(weight[square_m2 < limit**2].sum()) for limit in (TRACKING_M, LOST_M))
+    if near < MUCH_LIKELIER * mean.near:
+        return mean
+    xx, xy, yy = (float(weight @ (a * b)) for a, b in ((dx, dx), (dx, dy), (dy, dy)))
+    length = math.hypot(mean.east, mean.north)
+    east, north = length * math.cos(place.heading_rad), length * math.sin(place.heading_rad)
+    return Moments(place.x_m, place.y_m, xx, xy, yy, east, north, near, about)
 
 
 def _status(near: float, about: float, level: float) -> TrackStatus:

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""The position of a cloud that may be in several places."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate
+from echostep.localization.particles import Cloud, CloudSettings
+from echostep.localization.start import Start
+from echostep.plan.model import Pose
+
+APART_M = 30.0
+
+
+def _in_two_places(second: float, sd_m: float = 0.1, here: float = 0.7, *, is_coarse: bool = True) -> Estimate:
+    """Of a cloud at the origin looking along x, with this share of its weight APART_M further east, looking along y."""
+    cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), sd_m), 0.0, np.random.default_rng(1))
+    there = np.arange(len(cloud.x_m)) % 2 == 1
+    cloud.x_m = cloud.x_m + APART_M * there
+    cloud.turn_rad = cloud.turn_rad + 0.5 * math.pi * there
+    cloud.log_weight = np.log(np.where(there, max(second, 1e-9), 1.0 - second))
+    cloud.is_coarse = is_coarse
+    return estimate(cloud, 0.0, 0.0, 0, right=Right(here))
+
+
+@pytest.mark.parametrize(("second", "x_m", "heading_rad"), [(0.4, 0.0, 0.0), (0.6, APART_M, 0.5 * math.pi)])
+def test_the_position_is_that_of_the_likelier_place(second: float, x_m: float, heading_rad: float) -> None:
+    """And the covariance, about it, has the other place in it."""
+    found = _in_two_places(second)
+    assert math.hypot(found.x_m - x_m, found.y_m) < 0.3
+    assert found.heading_rad == pytest.approx(heading_rad, abs=0.1)
+    assert math.sqrt(found.xx_m2) == pytest.approx(math.sqrt(0.4) * APART_M, rel=0.05)
+    assert found.status == TrackStatus.UNCERTAIN
+
+
+def test_no_place_that_has_half_of_the_weight_is_the_position() -> None:
+    """Three places alike: the mean is as good as any of them."""
+    cloud = Cloud(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
+    cloud.x_m = cloud.x_m + APART_M * (np.arange(len(cloud.x_m)) % 3)
+    found = estimate(cloud, 0.0, 0.0, 0)
+    assert found.x_m == pytest.approx(APART_M, abs=1.0)
+    assert found.status == TrackStatus.LOST
+    assert len(found.hypotheses) == 3
+
+
+def test_a_wide_cloud_of_one_place_has_its_mean() -> None:
+    """Its densest square is where it is by chance."""
+    found = _in_two_places(0.0, sd_m=1.2)
+    assert math.hypot(found.x_m, found.y_m) < 0.1
+
+
+@pytest.mark.parametrize(("is_coarse", "status"), [(True, TrackStatus.UNCERTAIN), (False, TrackStatus.LOST)])
+def test_a_doubted_cloud_is_lost_and_one_that_gathers_is_not(is_coarse: bool, status: TrackStatus) -> None:
+    """The share of a coarse cloud in a place is the probability of that already."""
+    assert _in_two_places(0.4, here=0.7, is_coarse=is_coarse).status == status
