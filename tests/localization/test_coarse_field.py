@@ -12,7 +12,6 @@ from echostep.localization.building import Building
 from echostep.localization.coarse_field import (
     CHANCES,
     LIKELY,
-    OUTSIDE,
     RANGES,
     SECTORS,
     UNIT_M,
@@ -82,8 +81,8 @@ def test_an_echo_from_where_one_is_expected_speaks_for_the_place(at: tuple[float
 @pytest.mark.parametrize("k", [0, 20, 90, 200])
 def test_the_density_of_each_entry_adds_up_to_one(k: int) -> None:
     """Over silence and all ranges; some of the wide part of near and far ranges is out of the ranger's reach."""
-    step_m, total, table = 0.01, 0.0, np.empty(OUTSIDE + 1)
-    entry = 7 * RANGES + k
+    step_m, total, table = 0.01, 0.0, ROOM_FOR_TABLE
+    entry = (CHANCES - 1) * RANGES + k
     for range_m in np.arange(MODEL.minimum_m, MODEL.maximum_m, step_m):
         log_densities(CoarsePing(0.0, float(range_m), 1.0, 0.0), MODEL, table)
         total += step_m * math.exp(table[entry])

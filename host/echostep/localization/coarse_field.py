@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
-from echostep.localization.echo_likelihood import SILENT, EchoModel, detection, hidden_density
+from echostep.localization.echo_likelihood import EchoModel, detection, hidden_density
 from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
@@ -119,8 +119,9 @@ def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
     range_m = ping.range_m
     even = 1.0 / (model.maximum_m - model.minimum_m)
     for k in range(RANGES):
+        hidden = hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
         if range_m <= 0.0:
-            likely, unlikely, hidden = MISSED, QUIET, SILENT
+            likely, unlikely = MISSED, QUIET
         else:
             z = (range_m - k * UNIT_M) / COARSE_SD_M
             near = math.exp(-0.5 * z * z)
@@ -128,7 +129,6 @@ def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
             likely = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
             likely *= (1.0 - MISSED) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
             unlikely = (1.0 - QUIET) * even
-            hidden = hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
         for c in range(CHANCES):
             chance = (c + 0.5) / CHANCES if k > 0 else 0.0
             planned = chance * likely + (1.0 - chance) * unlikely

@@ -136,7 +136,7 @@ def estimate(
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    # A coarse cloud began anywhere: the weight of its likeliest place is the probability of that (measured: host/docs/anywhere.md).
+    # A coarse cloud began anywhere: the weight of its likeliest place is the probability of that (measured: host/DESIGN.md).
     about *= 1.0 if cloud.is_coarse else right.here
     status = _status(right.here * near, max(about, right.about), max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
@@ -151,12 +151,12 @@ def estimate(
 
 def _moments_at(place: Hypothesis, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
     """The moments about a place, with its heading; those about the mean, if they have half as much weight near them."""
-    dx, dy = cloud.map_x_m - place.x_m, cloud.y_m - place.y_m
-    square_m2 = dx * dx + dy * dy
-    near, about = (float(weight[square_m2 < limit**2].sum()) for limit in (TRACKING_M, LOST_M))
+    distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
+    near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))
     if near < MUCH_LIKELIER * mean.near:
         return mean
-    xx, xy, yy = (float(weight @ (a * b)) for a, b in ((dx, dx), (dx, dy), (dy, dy)))
+    dx, dy = mean.x_m - place.x_m, mean.y_m - place.y_m
+    xx, xy, yy = mean.xx_m2 + dx * dx, mean.xy_m2 + dx * dy, mean.yy_m2 + dy * dy
     length = math.hypot(mean.east, mean.north)
     east, north = length * math.cos(place.heading_rad), length * math.sin(place.heading_rad)
     return Moments(place.x_m, place.y_m, xx, xy, yy, east, north, near, about)
