@@ -115,6 +115,7 @@ class MeasuredSegment:
     `t_s`, `ranger` (0 looks left, 1 right) and `range_m` (NaN: no echo) are (n,). `height_m` (k,): heights by pressure in the same time.
     `ranger_part`: kind of ranger of the last ping, as the board has named it [protocol/messages.toml, part]; 0: not named, or no ping.
     `board_restarts`: of the board before the last height, which may then be another barometer's.
+    `ahead_rad`: how far both rangers look ahead of abeam.
     """
 
     segment: PathSegment
@@ -124,6 +125,12 @@ class MeasuredSegment:
     height_m: Floats = field(default_factory=lambda: np.zeros(0))
     ranger_part: int = 0
     board_restarts: int = 0
+    ahead_rad: float = 0.0
+
+    @property
+    def off_heading_rad(self) -> Floats:
+        """Axis of each ping's ranger (n,) from the trunk's heading."""
+        return np.asarray(np.where(self.ranger == 0, 1.0, -1.0) * (0.5 * math.pi - self.ahead_rad))
 
     @property
     def without_pings(self) -> MeasuredSegment:
@@ -136,8 +143,7 @@ class MeasuredSegment:
         x_m, y_m = s.way_m((t_s - s.t0_s) / (s.t1_s - s.t0_s))
         rest = replace(s, t0_s=t_s, dx_m=s.dx_m - x_m, dy_m=s.dy_m - y_m, heading0_rad=s.heading_rad(t_s))
         kept = self.t_s >= t_s
-        pings = (self.t_s[kept], self.ranger[kept], self.range_m[kept])
-        return MeasuredSegment(rest, *pings, self.height_m, self.ranger_part, self.board_restarts)
+        return replace(self, segment=rest, t_s=self.t_s[kept], ranger=self.ranger[kept], range_m=self.range_m[kept])
 
 
 @dataclass(frozen=True, slots=True)

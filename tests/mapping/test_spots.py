@@ -12,7 +12,7 @@ from echostep.arrays import Ints
 from echostep.mapping.directions import Directions
 from echostep.mapping.fragments import find_fragments
 from echostep.mapping.mapper import find_pieces, map_walk
-from echostep.mapping.nodes import RANGER_AXES_RAD, Nodes, Pings, nodes_of
+from echostep.mapping.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.spots import is_spot, with_spots
 from echostep.path import MeasuredSegment, PathSegment
 
@@ -37,7 +37,9 @@ def there_and_back() -> list[MeasuredSegment]:
         t_s = k + np.arange(0.0, 1.0, 0.5 * PING_S)
         ranger: Ints = np.arange(len(t_s)) % 2
         pairs = zip((t_s - k).tolist(), ranger.tolist(), strict=True)
-        ranges = [heard_m(x + share * dx, heading + share * turn + RANGER_AXES_RAD[r]) for share, r in pairs]
+        ranges = [
+            heard_m(x + share * dx, heading + share * turn + (-0.5 if r else 0.5) * math.pi) for share, r in pairs
+        ]
         segment = PathSegment(k, k + 1.0, dx, 0.0, heading, heading + turn, 0.02, math.radians(0.3), k)
         found.append(MeasuredSegment(segment, t_s, ranger, np.array(ranges)))
         x, heading = x + dx, heading + turn
@@ -62,7 +64,7 @@ def swept(middle_rad: float, sweep_rad: float) -> tuple[Nodes, Pings]:
     axis = middle_rad + np.linspace(-0.5, 0.5, count) * sweep_rad
     nodes = Nodes(np.arange(2.0), np.zeros((2, 3)), np.array([0.03]), np.array([0.01]), np.zeros(2))
     whole: Ints = np.zeros(count, np.int64)
-    return nodes, Pings(np.zeros((count, 2)), axis, np.full(count, 2.0), whole, whole, nothing)
+    return nodes, Pings(np.zeros((count, 2)), axis, np.full(count, 2.0), whole, nothing, whole, nothing)
 
 
 @pytest.mark.parametrize(

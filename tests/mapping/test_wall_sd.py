@@ -41,7 +41,8 @@ def pings_of(graph: Graph, node: Ints) -> tuple[Pings, Floats]:
     """A ping of the left ranger at each of these nodes, and their places."""
     count = len(node)
     places = graph.pose[node]
-    pings = Pings(places[:, :2], places[:, 2], np.full(count, 2.0), np.zeros(count, np.int64), node, np.zeros(count))
+    none, left = np.zeros(count), np.zeros(count, np.int64)
+    pings = Pings(places[:, :2], places[:, 2], np.full(count, 2.0), left, none, node, none)
     return pings, places
 
 

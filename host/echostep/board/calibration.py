@@ -32,6 +32,7 @@ OFFSET_MAX_M_S2 = 1.5  # of an accelerometer: 65 mg when new, and soldering [ICM
 SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; by reason
 BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; by reason
 AXES = ("x", "y", "z")
+MOST_AHEAD_DEG = 60.0  # that rangers look off abeam, by reason: then they look along the way
 
 
 class Echo(NamedTuple):
@@ -44,10 +45,18 @@ class Echo(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RangerSettings:
-    """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst."""
+    """`speed_of_sound_m_s`; `delay_s` from the time stamp of the trigger to the ultrasonic burst; `ahead_deg`: how far both rangers look ahead of
+    abeam, as the belt carries them.
+    """
 
     speed_of_sound_m_s: float = SPEED_OF_SOUND_M_S
     delay_s: float = 0.0
+    ahead_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for rangers that do not look aside."""
+        if abs(self.ahead_deg) > MOST_AHEAD_DEG:
+            raise ValueError(f"[ranger] ahead_deg: rangers look aside, at most {MOST_AHEAD_DEG:.0f} degrees off it")
 
 
 @dataclass(frozen=True, slots=True)

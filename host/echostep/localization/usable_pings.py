@@ -17,7 +17,6 @@ from echostep.localization.echo_likelihood import EchoSettings
 from echostep.localization.particle_kernels import PingBatch
 from echostep.path import MeasuredSegment
 
-RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
 # Turns on a segment at which its pings count half, by reason: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
@@ -60,7 +59,7 @@ class UsablePings:
         share = np.ones(len(measured.t_s))
         if span_s > 0.0:
             share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
-        axis = segment.heading0_rad + share * segment.turn_rad + RANGER_AXES_RAD[measured.ranger]
+        axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
         travel_m = self._travels(measured.ranger, self.path_m + share * length)
         power = np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)

@@ -18,7 +18,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
 from echostep.mapping.graph import Graph
 from echostep.mapping.lines import Lines
-from echostep.mapping.nodes import RANGER_AXES_RAD, Pings
+from echostep.mapping.nodes import Pings
 
 CELL_M = 0.05
 MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
@@ -51,7 +51,7 @@ def ping_poses(graph: Graph, pings: Pings) -> Floats:
     b = graph.pose[np.minimum(pings.node + 1, len(graph.pose) - 1)]
     at = a[:, :2] + pings.share[:, None] * (b[:, :2] - a[:, :2])
     turn = wrap(b[:, 2] - a[:, 2])
-    return np.column_stack([at, a[:, 2] + pings.share * turn + RANGER_AXES_RAD[pings.ranger]])
+    return np.column_stack([at, a[:, 2] + pings.share * turn + pings.off_heading_rad])
 
 
 def is_straight(graph: Graph, pings: Pings) -> Bools:

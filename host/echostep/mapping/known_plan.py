@@ -44,7 +44,7 @@ def plan_as_walk(level: Level, sd_m: float) -> Mapped:
     none = Walls(np.zeros(0), np.zeros(0), np.full(n, -1))
     graph = Graph(nodes, fragments, pose.copy(), none, base_rad=_base(normal, length))
     nothing, integers = np.zeros(0), np.zeros(0, np.int64)
-    pings = Pings(np.zeros((0, 2)), nothing, nothing, integers, integers, nothing)
+    pings = Pings(np.zeros((0, 2)), nothing, nothing, integers, nothing, integers, nothing)
     directions = Directions(graph.base_rad or 0.0, np.zeros(n), 0.0)
     return Mapped(graph, pings, (), directions, ())
 

@@ -82,6 +82,7 @@ def merged_pings(old: Pings, new: Pings, first: int) -> Pings:
         np.concatenate([old.axis_rad, new.axis_rad]),
         np.concatenate([old.range_m, new.range_m]),
         np.concatenate([old.ranger, new.ranger]),
+        np.concatenate([old.off_heading_rad, new.off_heading_rad]),
         np.concatenate([old.node, new.node + first]),
         np.concatenate([old.share, new.share]),
     )

@@ -19,7 +19,6 @@ STILL_M, STILL_RAD = 0.01, math.radians(0.5)  # a segment that moves and turns l
 # Growth of the path's error per square root of a metre beside the step's own covariance, as the particle filter has it [particles.py]
 MOVE_SD, TURN_SD_RAD = 0.03, math.radians(0.3)
 LEAST_SD_M = 0.005  # of a turn on the spot: the trunk moves over the foot
-RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])  # from the trunk's heading: ranger 0 looks left, 1 right
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +41,15 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Pings:
-    """Pings (k,): place `at_m` (k, 2) and `axis_rad` by odometry, `range_m` (NaN: no echo), ranger, and the node before each with the share of the
-    way to the next.
+    """Pings (k,): place `at_m` (k, 2) and `axis_rad` by odometry, `range_m` (NaN: no echo), ranger with its axis from the trunk's heading, and the
+    node before each with the share of the way to the next.
     """
 
     at_m: Floats
     axis_rad: Floats
     range_m: Floats
     ranger: Ints
+    off_heading_rad: Floats
     node: Ints
     share: Floats
 
@@ -68,13 +68,11 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
         span_s = s.t1_s - s.t0_s
         share = np.clip((measured.t_s - s.t0_s) / span_s, 0.0, 1.0) if span_s > 0.0 and moves else 0.0 * measured.t_s
         along = share if moves else 0.0 * share
-        axis = heading + along * turn + RANGER_AXES_RAD[measured.ranger]
+        off = measured.off_heading_rad
+        axis = heading + along * turn + off
+        at_x, at_y = x + along * s.dx_m, y + along * s.dy_m
         node = np.full(len(share), len(rows) - 1)
-        pings.append(
-            np.column_stack(
-                [x + along * s.dx_m, y + along * s.dy_m, axis, measured.range_m, measured.ranger, node, along]
-            )
-        )
+        pings.append(np.column_stack([at_x, at_y, axis, measured.range_m, measured.ranger, off, node, along]))
         if moves:
             rows.append((s.t1_s, x + s.dx_m, y + s.dy_m, heading + turn, way + length))
             sds.append(
@@ -90,6 +88,7 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
         ping[:, 2].copy(),
         ping[:, 3].copy(),
         ping[:, 4].astype(np.int64),
-        ping[:, 5].astype(np.int64),
-        ping[:, 6].copy(),
+        ping[:, 5].copy(),
+        ping[:, 6].astype(np.int64),
+        ping[:, 7].copy(),
     )

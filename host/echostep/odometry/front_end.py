@@ -99,7 +99,7 @@ class FrontEnd:
         self._ranger = ranger
         self._ranger_parts = np.zeros((1, 2), np.int64)  # left, right, by the newest report
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings(), errors.belt)
-        self._synchronizer = Synchronizer()
+        self._synchronizer = Synchronizer(math.radians(ranger.ahead_deg))
         self._unknown_ports = 0
         self._bad_times = 0
 

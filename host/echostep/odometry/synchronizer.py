@@ -71,7 +71,9 @@ class _Popped(NamedTuple):
 class Synchronizer:
     """For each portion call `add_pings` and `add_segments`, then `pop_ready`. Messages are counted from the start of the portion."""
 
-    def __init__(self) -> None:
+    def __init__(self, ahead_rad: float = 0.0) -> None:
+        """`ahead_rad`: how far both rangers look ahead of abeam."""
+        self._ahead_rad = ahead_rad
         self._state = np.zeros(1, _STATE)
         self._state["dropout_s"] = -math.inf
         self._waiting = np.empty((MAX_WAITING + 1, 3))  # pings: t_s, ranger, range_m; oldest first
@@ -128,10 +130,12 @@ class Synchronizer:
         done = int(np.sum(popped.segment[:count] != DROPOUT))
         self._segments, self._completed_by = segments[done:], [-1] * (len(segments) - done)
         self._new = _NewPings(np.empty(0, np.int64), np.empty((0, 3)))
-        return _pieces(segments, popped, count)
+        return _pieces(segments, popped, count, self._ahead_rad)
 
 
-def _pieces(segments: list[PathSegment], popped: _Popped, count: int) -> list[MeasuredSegment | Dropout]:
+def _pieces(
+    segments: list[PathSegment], popped: _Popped, count: int, ahead_rad: float
+) -> list[MeasuredSegment | Dropout]:
     """The first `count` rows of the output columns as objects."""
     pings = int(popped.ping_end[count - 1]) if count else 0
     t_s, ranger, value_m = popped.ping[0], popped.ping[1, :pings].astype(np.int64), popped.ping[2]
@@ -142,17 +146,20 @@ def _pieces(segments: list[PathSegment], popped: _Popped, count: int) -> list[Me
         if segment == DROPOUT:
             pieces.append(Dropout(dropout_s))
         else:
-            pieces.append(_measured(segments[segment], t_s[begin:end], ranger[begin:end], value_m[begin:end]))
+            measured = _measured(segments[segment], t_s[begin:end], ranger[begin:end], value_m[begin:end], ahead_rad)
+            pieces.append(measured)
             begin = end
     return pieces
 
 
-def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats) -> MeasuredSegment:
+def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats, ahead_rad: float) -> MeasuredSegment:
     """A segment with its pings, and apart from them the heights."""
     heard = ranger % PART != HEIGHT
     which, high = ranger[heard], ranger[~heard]
     part, restarts = (int(kind[-1]) // PART if len(kind) else 0 for kind in (which, high))
-    return MeasuredSegment(segment, t_s[heard], which % PART, value_m[heard], value_m[~heard], part, restarts)
+    return MeasuredSegment(
+        segment, t_s[heard], which % PART, value_m[heard], value_m[~heard], part, restarts, ahead_rad
+    )
 
 
 @kernel

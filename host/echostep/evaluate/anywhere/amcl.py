@@ -49,7 +49,6 @@ ALPHA_SLOW, ALPHA_FAST = (
     0.001,
     0.1,
 )  # decay rates of the long-term and the short-term mean likelihood, a ping; those of the ROS node amcl
-RANGER_AXES_RAD = np.array([0.5 * math.pi, -0.5 * math.pi])
 SCALE_SD = 0.02  # of the lengths, at the start
 CELL_M, NEAR_M = 1.0, 1.5  # the estimate is the mean of the particles within NEAR_M of the heaviest cell's mean
 HEIGHT_SD_M, HEIGHT_SAMPLES = 0.15, 9  # of a median of heights by pressure
@@ -93,15 +92,14 @@ class AugmentedMcl:
         """Sample the motion, weight by each ping, resample with random poses."""
         segment = measured.segment
         length, done = math.hypot(segment.dx_m, segment.dy_m), 0.0
-        for share, ranger, range_m in _pings(measured):
+        for share, ranger, off_heading_rad, range_m in _pings(measured):
             self._move(segment, share - done)
             self._travel_m += length * (share - done)
             done = share
             if self._travel_m[ranger] >= EchoSettings().correlation_m:
                 self._travel_m[ranger] = 0.0
-                turn = segment.turn_rad
-                axis = segment.heading0_rad + share * turn + RANGER_AXES_RAD[ranger]
-                self._weight(axis, range_m, segment.heading0_rad + share * turn)
+                heading = segment.heading0_rad + share * segment.turn_rad
+                self._weight(heading + off_heading_rad, range_m, heading)
         self._move(segment, 1.0 - done)
         self._travel_m += length * (1.0 - done)
         self._change_levels(measured)
@@ -183,12 +181,13 @@ class AugmentedMcl:
         return Claim(segment.t1_s, map_x, float(at[1]), level, z, status, _radius(away, weight))
 
 
-def _pings(measured: MeasuredSegment) -> list[tuple[float, int, float]]:
-    """Share of the segment, ranger and range (0: none) of each ping."""
+def _pings(measured: MeasuredSegment) -> list[tuple[float, int, float, float]]:
+    """Share of the segment, ranger, its axis from the heading, and range (0: none) of each ping."""
     s = measured.segment
     span_s = s.t1_s - s.t0_s
     share = np.clip((measured.t_s - s.t0_s) / span_s, 0.0, 1.0) if span_s > 0.0 else np.ones(len(measured.t_s))
-    return list(zip(share.tolist(), measured.ranger.tolist(), np.nan_to_num(measured.range_m).tolist(), strict=True))
+    columns = share, measured.ranger, measured.off_heading_rad, np.nan_to_num(measured.range_m)
+    return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def _radius(away_m: Floats, weight: Floats) -> float:

@@ -18,7 +18,7 @@ from echostep.evaluate.anywhere.sites import plan_of
 from echostep.evaluate.clutter.carmen_log import CarmenLog, read_log
 from echostep.evaluate.clutter.occupancy import standing_places
 from echostep.evaluate.clutter.odometry import Odometry, odometry_of
-from echostep.evaluate.clutter.scan_pings import hear
+from echostep.evaluate.clutter.scan_pings import AHEAD_RAD, hear
 from echostep.evaluate.clutter.wall_lines import straight_pieces, wall_segments
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan, Pose
@@ -116,5 +116,5 @@ class _SegmentBuilder:
             self._t_s, self._t_s + span_s, c * ahead - s * left, s * ahead + c * left, self._heading, self._heading + turn,
             sd_m, turn_sd_rad, len(self.segments),
         )  # fmt: skip
-        self.segments.append(MeasuredSegment(segment, *pings))
+        self.segments.append(MeasuredSegment(segment, *pings, ahead_rad=AHEAD_RAD))
         self._t_s, self._heading = segment.t1_s, segment.heading1_rad

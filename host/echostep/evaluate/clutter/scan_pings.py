@@ -2,7 +2,7 @@
 """What two rangers would hear where a scan was taken: the nearest return within half a cone at either side that is loud enough.
 
 In: scans. Out: ranges of the left and the right ranger at each scan. Owns nothing. The losses are those of the simulated SRF02 (`acoustics`); scans
-end at 90 degrees, so the rear half of each cone is missing.
+end at 90 degrees, so the rear half of each cone is missing: the rangers look AHEAD_RAD ahead of abeam, which the filter is told.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from echostep.simulation.world.acoustics import SRF02, Acoustics, wall_db
 from echostep.simulation.world.echoes import ranger_bias_m
 
 HALF_CONE_RAD = math.radians(27.5)  # half of the 55 degree cone [Robot Electronics, sonar FAQ]
+AHEAD_RAD = 0.5 * HALF_CONE_RAD  # middle of the half before abeam
 
 
 def hear(log: CarmenLog, scans: Ints, rng: np.random.Generator, acoustics: Acoustics = SRF02) -> Floats:

@@ -20,7 +20,6 @@ from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.evaluate.clutter.building import building_of, walk_from
 from echostep.evaluate.clutter.carmen_log import CarmenLog, logs_in, name_of
 from echostep.evaluate.clutter.scan_pings import HALF_CONE_RAD, nearest_return
-from echostep.mapping.nodes import RANGER_AXES_RAD
 from echostep.path import MeasuredSegment
 from echostep.simulation.world.acoustics import SRF02
 from echostep.simulation.world.echoes import ranger_bias_m
@@ -101,7 +100,7 @@ class _Hearing:
     def _range_m(self, t_s: float, ranger: int) -> float:
         scan = int(np.clip(np.searchsorted(self._truth[:, 0], t_s) - 1, 0, len(self._truth) - 2))
         x, y = (np.interp(t_s, self._truth[:, 0], self._truth[:, k]) for k in (1, 2))
-        axis = np.interp(t_s, self._truth[:, 0], self._heading) + RANGER_AXES_RAD[ranger]
+        axis = np.interp(t_s, self._truth[:, 0], self._heading) + (-0.5 if ranger else 0.5) * math.pi
         ahead = np.concatenate(self._returns[scan : scan + 2]) - [x, y]
         away_m = np.hypot(*ahead.T)
         off_axis = np.abs(wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - axis))

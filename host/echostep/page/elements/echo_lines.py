@@ -15,7 +15,6 @@ import numpy as np
 from echostep.jit import kernel
 from echostep.localization.echo_likelihood import EchoModel, detection
 from echostep.localization.estimate import Estimate
-from echostep.localization.usable_pings import RANGER_AXES_RAD
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex
@@ -51,7 +50,7 @@ def last_echo_lines(
             continue
         ping_s, range_m = float(measured.t_s[rows[-1]]), float(measured.range_m[rows[-1]])
         x, y, heading_rad = _trunk_pose(measured, estimate, ping_s)
-        axis = heading_rad + float(RANGER_AXES_RAD[ranger])
+        axis = heading_rad + float(measured.off_heading_rad[rows[-1]])
         expected = expected_range(x + east_m, y, axis, index, model)
         ranges = (None if math.isnan(v) else float(v) for v in (range_m, expected))
         lines.append(EchoLine(ping_s, ranger, x, y, axis, *ranges))
