@@ -41,7 +41,8 @@ class EchoSettings:
     `hidden`: share of views in which the plan is not what stands there, `hidden_m`: length of the path over which a view stays hidden (a cupboard).
     `stray`: a second reflection when no source was detected; `outlier`: anything else, from ping to ping.
     `correlation_m`: length of the path over which errors of successive echoes become independent: those of the plan, of a ranger's bias, and of the
-    trunk's sway, which lasts half a stride.
+    trunk's sway, which lasts half a stride. `own`: share of an echo's information that none before it has brought, however far back: a plan that is
+    not what stands there errs alike for metres (by the filter's errors among real clutter: host/DESIGN.md).
     """
 
     sd_m: float = 0.036
@@ -57,6 +58,7 @@ class EchoSettings:
     stray: float = 0.3
     outlier: float = 0.05
     correlation_m: float = 0.25
+    own: float = 0.7
 
     def __post_init__(self) -> None:
         """Raise ValueError for lengths of zero and for numbers that are not probabilities."""
@@ -66,6 +68,8 @@ class EchoSettings:
         for name in ("hidden", "stray", "outlier"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(f"[echo] {name}: must be a probability below 1")
+        if not 0.0 < self.own <= 1.0:
+            raise ValueError("[echo] own: must be a share above 0, at most 1")
         if not 0.0 < self.minimum_m < 0.5 * self.maximum_m:
             raise ValueError("[echo] minimum_m: must be well below maximum_m")
 

@@ -34,7 +34,7 @@ def _loss(turn_rad: float, half_rad: float) -> float:
 
 
 class UsablePings:
-    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `correlation_m`."""
+    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`."""
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self.path_m = 0.0  # length of the path so far
@@ -44,7 +44,7 @@ class UsablePings:
 
     def hear_by(self, background: Background, echo: EchoSettings) -> None:
         """From now on the pings are those of rangers with these settings."""
-        self._correlation_m = echo.correlation_m
+        self._correlation_m, self._own = echo.correlation_m, echo.own
         self._ranges = RangeMemory(background, echo)
 
     @property
@@ -62,7 +62,7 @@ class UsablePings:
         axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
         range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
         travel_m = self._travels(measured.ranger, self.path_m + share * length)
-        power = np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
+        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
         self.path_m += length
         used = power > LEAST_POWER
         way_x_m, way_y_m = segment.way_m(share)
