@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.mapping.closures import KNOWN_SD_M, gained
+from echostep.mapping.closures import KNOWN_SD_M, find_closure, gained
 from echostep.mapping.fragments import Fragments
 from echostep.mapping.graph import Graph, Walls
 from echostep.mapping.matching import match
@@ -85,3 +85,37 @@ def test_what_the_graph_knew_is_no_news() -> None:
     assert same is not None
     assert not same[1].any()  # the place is recognised, nothing else
     assert gained(np.zeros(3), 9.0 * before, 9.0 * before) is None  # known on no axis
+
+
+AWAY_M, AWAY_SD_M = 60.0, 0.4  # of path between two passages, and its standard deviation
+BENT_M = 0.25  # from the second passage to the third across the corridor, by which the graph is wrong
+
+
+def three_passages() -> Graph:
+    """Along y = 0, 0.5 and 0.1 m: the first hears a wall on its right, the others one on their left, 1 m away, the third as if by BENT_M farther."""
+    x = np.arange(0.5, 8.0)
+    count, walls_m = len(x), (-1.5, 1.5, 1.5 + BENT_M)
+    y = np.repeat([0.0, 0.5, 0.1], count)
+    side = np.repeat([-0.5 * math.pi, 0.5 * math.pi, 0.5 * math.pi], count)
+    pose = np.column_stack([np.tile(x, 3), y, np.zeros(3 * count)])
+    to_wall = np.column_stack([np.zeros(3 * count), np.repeat(walls_m, count) - y])
+    way = np.concatenate([k * (count + AWAY_M) + x for k in range(3)])
+    sd_m = np.where(np.diff(way) > 1.5, AWAY_SD_M, 0.005)
+    nodes = Nodes(way, pose, sd_m, np.full(len(sd_m), 1e-4), way)
+    n, flat = len(way), np.ones(3 * count)
+    found = Fragments(
+        np.arange(n), to_wall, side, 0.5 * flat, 0.04 * flat, 0.03 * flat, np.full(n, 20), np.zeros(0, np.int64)
+    )
+    graph = Graph(nodes, found, pose, Walls(np.zeros(0), np.zeros(0), np.full(n, -1)))
+    graph.solve()
+    return graph
+
+
+def test_a_return_is_to_the_passage_whose_walls_are_matched() -> None:
+    """Not to one that is nearer and heard something else: nothing ties the two."""
+    graph = three_passages()
+    count = len(graph.nodes) // 3
+    closure = find_closure(graph, 2 * count, 3 * count, float(graph.nodes.way_m[2 * count]) - 20.0)
+    assert closure is not None
+    assert count <= closure.old < 2 * count
+    assert closure.between[1] == pytest.approx(0.1 - BENT_M - 0.5, abs=0.05)

@@ -12,6 +12,7 @@ import pytest
 from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.foot.steps import Step
+from echostep.mapping.nodes import HELD_TURN_SD_RAD, TURN_SD_RAD, nodes_of
 from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.path import MeasuredSegment, PathSegment
@@ -81,6 +82,17 @@ def test_without_a_belt_or_with_one_that_does_not_turn_nothing_changes() -> None
     without = [replace(m, segment=replace(m.segment, belt=None)) for m in numbed]
     assert with_smoothed_headings(without) == without
     assert with_smoothed_headings([]) == []
+
+
+def test_a_heading_that_the_belt_holds_drifts_less_in_the_graph() -> None:
+    """By the length of each step but the first, beside what it states; a belt that does not turn with the wearer holds nothing."""
+    assert HELD_TURN_SD_RAD < TURN_SD_RAD
+    for change, growth_rad in ((lambda _, rate: rate, HELD_TURN_SD_RAD), (numb, TURN_SD_RAD)):
+        segments = with_smoothed_headings(segments_of(Walker(1, 100), change))
+        stated = np.array([m.segment.turn_sd_rad for m in segments])
+        length_m = np.array([math.hypot(m.segment.dx_m, m.segment.dy_m) for m in segments])
+        expected = np.hypot(stated, growth_rad * np.sqrt(length_m))
+        np.testing.assert_allclose(nodes_of(segments)[0].turn_sd_rad[1:], expected[1:])
 
 
 def test_a_belt_that_fails_leaves_the_rest_as_it_was_live() -> None:

@@ -99,6 +99,20 @@ def test_no_return_joins_two_storeys(mapped: Mapped) -> None:
     assert all(old == new for old, new in pairs)
 
 
+def test_walls_of_the_stairwell_hold_the_path_over_the_stairs(mapped: Mapped) -> None:
+    """Each way over the stairs hears walls, which are of no storey and of no other way."""
+    graph, storeys = mapped.graph, mapped.graph.storeys
+    assert storeys is not None
+    place = storeys.with_flights
+    assert (place[storeys.of != STAIRS] == storeys.of[storeys.of != STAIRS]).all()
+    assert np.unique(place).tolist() == [0, 1, 2, 3]
+    node, wall = graph.fragments.node, graph.walls.of
+    for flight in (2, 3):
+        heard = wall[(place[node] == flight) & (wall >= 0)]
+        assert len(heard) > 5
+        assert not np.isin(heard, wall[place[node] != flight]).any()
+
+
 def test_a_walk_over_stairs_is_not_joined_with_others(mapped: Mapped) -> None:
     with pytest.raises(EchostepError, match="first: leads over 2 storeys"):
         join_walks([("first", mapped), ("second", mapped)])

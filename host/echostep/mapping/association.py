@@ -18,7 +18,6 @@ from echostep.mapping.fragments import Fragments
 from echostep.mapping.graph import Walls
 from echostep.mapping.nodes import Nodes
 from echostep.mapping.spots import is_spot
-from echostep.mapping.storeys import STAIRS
 
 APART_M = 0.15  # of a fragment's middle from the line of its wall: three standard deviations of either
 TURNED_RAD = math.radians(6.0)
@@ -32,7 +31,7 @@ def associate(
 ) -> Walls:
     """The walls of all fragments, each at the mean of its pieces; those of one piece too. `anchored` (f,): the place is known by a closure.
 
-    `storey` (f,): a wall is on one; fragments on stairs are of none.
+    `storey` (f,): a wall is on one.
     """
     order = np.lexsort((-fragments.half_m, fragments.node))
     size_m, spot = fragments.half_m[order] * 2.0, is_spot(fragments.half_m[order])
@@ -41,7 +40,7 @@ def associate(
     way_m = nodes.way_m[fragments.node]
     placed = _Placed(centre_m, normal_rad, fragments.half_m, fragments.sd_rad, way_m, anchored)
     of, normals, rhos, count = np.full(len(order), -1, np.int64), [], [], 0
-    for k in range(int(storey.max(initial=STAIRS)) + 1):
+    for k in range(int(storey.max(initial=-1)) + 1):
         longs = long[storey[long] == k]
         found, normal, rho = _associate(np.concatenate([longs, short[storey[short] == k]]), len(longs), placed)
         of = np.where(found < 0, of, found + count)

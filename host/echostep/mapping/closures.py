@@ -3,12 +3,13 @@
 
 In: a graph solved so far. Out: `Closure`s with their odds. Owns the limits. The posterior of a shift is the graph's own uncertainty times the match
 of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure says what this posterior knows better than
-the graph, along the directions in which it does: of a corridor, its width only.
+the graph, along the directions in which it does: of a corridor, its width only. It is one with the passage that heard the matched walls.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,17 @@ MOST_SD_M = 4.0  # of the graph's uncertainty, beyond which no closure is tried:
 KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
 NEW_SHARE = 0.5  # of the graph's variance on an axis: what is left of it, up to which the match counts
 LEAST_OLD = 4
+LEAST_COVARIANCE = np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
+PASSAGES = 4  # that are tried for one stretch, by reason: two of them mostly
+
+
+class _Matched(NamedTuple):
+    """The posterior of a shift (3,): `mean`, covariance `after` the match and `before` (3, 3), log-odds against a new place."""
+
+    mean: Floats
+    after: Floats
+    before: Floats
+    log_odds: float
 
 
 def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure | None:
@@ -45,42 +57,85 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
         return None
     away = np.hypot(*(centre[older] - at).T)
     nearest = int(f.node[older[np.argmin(away)]])
-    covariance = graph.covariance(node, nearest)
-    sd = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+    sd = _greatest_sd_m(graph.covariance(node, nearest))
     if sd > MOST_SD_M:
         return None
     older = older[away < NEAR_M + 3.0 * sd]
     if len(older) < LEAST_OLD:
         return None
-    old_node = int(f.node[older[np.argmin(np.hypot(*(graph.pose[f.node[older], :2] - at).T))]])
-    covariance = graph.covariance(node, old_node)
-    return _posterior(graph, new, older, node, old_node, covariance)
+    return _closure(graph, new, older, node)
 
 
-def _posterior(graph: Graph, new: Ints, older: Ints, node: int, old_node: int, covariance: Floats) -> Closure | None:
-    """The closure that the posterior of the shift says, None if it is not sure or known on no axis."""
-    covariance = covariance + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
-    sd = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
+    """The closure with the passage that heard the walls which are matched; None if it is not sure, or known on no axis.
+
+    Another passage of the same place may be elsewhere in the graph, until a return ties the two: what its neighbour heard says nothing of it.
+    """
+    at = graph.pose[node, :2]
+    old_node = _nearest(graph, older, at)
+    for _ in range(PASSAGES):
+        covariance = graph.covariance(node, old_node)
+        if _greatest_sd_m(covariance) > MOST_SD_M:
+            return None
+        matched = _matched(graph, new, older, node, covariance)
+        if matched.log_odds < LEAST_LOG_ODDS:
+            return None
+        passage = _explaining(graph, new, older, node, matched.mean)
+        if old_node in graph.fragments.node[passage]:
+            return _said(graph, node, old_node, matched)
+        old_node = _nearest(graph, passage, at + matched.mean[:2])
+    return None
+
+
+def _said(graph: Graph, node: int, old_node: int, matched: _Matched) -> Closure | None:
+    """What the posterior of the shift says beyond the graph; None if it is known on no axis."""
+    if (news := gained(matched.mean, matched.after, matched.before)) is None:
+        return None
+    shift, information = news
+    return Closure(old_node, node, graph.pose[node] - graph.pose[old_node] + shift, information, matched.log_odds)
+
+
+def _greatest_sd_m(covariance: Floats) -> float:
+    """Standard deviation of a place along the axis on which it is known worst."""
+    return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+
+
+def _matched(graph: Graph, new: Ints, older: Ints, node: int, covariance: Floats) -> _Matched:
+    """The posterior of the shift of `node` with fragments `new` onto fragments `older`, of this `covariance` (3, 3) before."""
+    before = covariance + LEAST_COVARIANCE
+    sd = _greatest_sd_m(before)
     shifts = np.linspace(-3.0 * sd, 3.0 * sd, SHIFTS if sd < 0.6 else 2 * SHIFTS + 1)
-    turns = np.linspace(-2.0, 2.0, TURNS) * math.sqrt(covariance[2, 2])
+    turns = np.linspace(-2.0, 2.0, TURNS) * math.sqrt(before[2, 2])
     score = match(pieces(graph, new), stretches(graph, older), graph.pose[node, :2], shifts, turns)
     t, x, y = np.meshgrid(turns, shifts, shifts, indexing="ij")
     grid = np.stack([x.ravel(), y.ravel(), t.ravel()], axis=1)
-    prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(covariance), grid))
+    prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(before), grid))
     prior /= prior.sum()
     top = max(float(score.max()), 0.0)
     found = prior * np.exp(score.ravel() - top)
     log_odds = math.log(max(float(found.sum()), 1e-300)) + top + math.log((1.0 - NEW) / NEW)
-    if log_odds < LEAST_LOG_ODDS:
-        return None
-    found /= found.sum()
+    found /= max(float(found.sum()), 1e-300)
     mean = found @ grid
     spread = (grid - mean) * np.sqrt(found)[:, None]
-    after = spread.T @ spread + np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
-    if (news := gained(mean, after, covariance)) is None:
-        return None
-    shift, information = news
-    return Closure(old_node, node, graph.pose[node] - graph.pose[old_node] + shift, information, log_odds)
+    return _Matched(mean, spread.T @ spread + LEAST_COVARIANCE, before, log_odds)
+
+
+def _explaining(graph: Graph, new: Ints, older: Ints, node: int, shift: Floats) -> Ints:
+    """Of fragments `older` those of the one passage that explains `new` best when `node` is moved by `shift` (3,)."""
+    way_m = graph.nodes.way_m[graph.fragments.node[older]]
+    order = np.argsort(way_m, kind="stable")
+    passages = np.split(older[order], np.flatnonzero(np.diff(way_m[order]) > STRETCH_M) + 1)
+    at, single = graph.pose[node, :2], pieces(graph, new)
+    moved = single._replace(x_m=single.x_m + shift[0], y_m=single.y_m + shift[1])
+    here, turned = np.zeros(1), shift[2:]
+    found = [float(match(moved, stretches(graph, p), at + shift[:2], here, turned)[0, 0, 0]) for p in passages]
+    return passages[int(np.argmax(found))]
+
+
+def _nearest(graph: Graph, which: Ints, at: Floats) -> int:
+    """The node nearest to a place (2,), of those of fragments `which` (k,)."""
+    node = graph.fragments.node[which]
+    return int(node[np.argmin(np.hypot(*(graph.pose[node, :2] - at).T))])
 
 
 def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:

@@ -23,7 +23,7 @@ from echostep.mapping.wall_sd import wall_sds
 
 # Of wall on one line, at least; shorter ones must be heard again, or be across the path. One passer-by in 15, in 70, goes along for longer, when one
 # second is the mean
-LONE_M, LONE_ASKEW_M = 2.5, 4.0
+LONE_M, LONE_ASKEW_M = 2.5, 6.0
 PASSAGE_M = 5.0  # of path, between two passages
 ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within which a person may have gone along
 

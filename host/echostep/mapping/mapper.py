@@ -106,8 +106,9 @@ def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gra
 
 
 def find_walls(graph: Graph) -> None:
-    """Find which fragments are of one wall, and solve."""
-    storey = graph.storey_of(graph.fragments.node)
+    """Find which fragments are of one wall, and solve; those heard on stairs are of walls there, which hold the heading."""
+    node = graph.fragments.node
+    storey = np.zeros(len(node), np.int64) if graph.storeys is None else graph.storeys.with_flights[node]
     graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), storey)
     graph.solve()
 

@@ -42,6 +42,14 @@ class Storeys:
         changed = np.flatnonzero(np.diff(self.of[level]))
         return [(int(level[k]), int(level[k + 1])) for k in changed]
 
+    @property
+    def with_flights(self) -> Ints:
+        """The storey of each node (n,); each way over stairs is one of its own, numbered after the storeys."""
+        found = self.of.copy()
+        for k, (first, end) in enumerate(spans(self.of == STAIRS).tolist(), len(self.height_m)):
+            found[first:end] = k
+        return found
+
 
 def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys | None:
     """The storeys of a walk; None where it has only one."""
