@@ -45,7 +45,9 @@ def test_a_piece_across_the_path_is_a_wall(course_deg: float, drawn_m: float) ->
 
 
 @pytest.mark.parametrize(("piece_m", "drawn_m"), [(5.0, 0.0), (8.0, 8.0)])
-def test_a_piece_along_an_askew_path_is_a_wall_if_it_is_longer_than_people_go_along(piece_m: float, drawn_m: float) -> None:
+def test_a_piece_along_an_askew_path_is_a_wall_if_it_is_longer_than_people_go_along(
+    piece_m: float, drawn_m: float
+) -> None:
     """At 30 degrees to the building; people who go along do so for 6 m at most."""
     assert drawn_in_hall_m(through_a_hall(math.radians(30.0), piece_m, beside=True)) == pytest.approx(drawn_m, abs=0.5)
 
