@@ -17,12 +17,12 @@ from echostep.arrays import Floats
 from echostep.evaluate.anywhere import amcl, echo_changes, kidnaps, plan_changes, sites, walks
 from echostep.evaluate.anywhere.columns import run_row, summaries
 from echostep.evaluate.anywhere.filtering import Claim, FilterRun
-from echostep.evaluate.anywhere.judgement import JudgedRun, Truth, judge
+from echostep.evaluate.anywhere.judgement import JudgedRun, Truth, judge, true_levels
 from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.localization.estimate import TrackStatus
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan.model import Plan, Pose
+from echostep.plan.model import Connector, ConnectorKind, Level, Plan, Pose
 
 TRACKING, UNCERTAIN, LOST = TrackStatus.TRACKING, TrackStatus.UNCERTAIN, TrackStatus.LOST
 CODE = {TRACKING: 0.0, UNCERTAIN: 1.0, LOST: 2.0}
@@ -87,6 +87,28 @@ def test_a_wrong_floor_is_a_storey_off() -> None:
     right = np.array([[True, False], [False, True], [False, True]])
     run = judge(claims, Truth(np.zeros((3, 2)), right), np.zeros(3))
     assert run.error_m.tolist() == [0.0, 3.5, 6.0]
+
+
+SQUARE_M = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], float)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "kind", "height_m", "right"),
+    [
+        (1.0, "lift", 2.5, [True, True, False, False]),  # it passes floor 1 on its way from 0 to 2
+        (1.0, "lift", 4.0, [True, True, True, False]),  # and is about halfway
+        (1.0, "lift", 7.0, [False, False, True, False]),
+        (5.0, "lift", 4.0, [False, True, False, False]),  # beside the lift
+        (1.0, "stairs", 4.0, [False, True, False, False]),
+        (5.0, "lift", 1.9, [True, True, False, False]),  # a tie
+    ],
+)
+def test_in_a_lift_the_nearest_stop_is_right_too(
+    x_m: float, kind: ConnectorKind, height_m: float, right: list[bool]
+) -> None:
+    levels = tuple(Level(str(k), 3.5 * k, ROOM) for k in range(4))
+    plan = Plan("tower", levels, None, "", (Connector(kind, "shaft", (0, 2), SQUARE_M),))
+    assert true_levels(np.array([[x_m, 1.0]]), np.array([height_m]), plan).tolist() == [right]
 
 
 def test_a_summary_by_hand() -> None:

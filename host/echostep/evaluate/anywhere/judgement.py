@@ -13,10 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.evaluate.anywhere.filtering import Claim
 from echostep.localization.estimate import TrackStatus
+from echostep.plan.model import Plan
 
 FOUND_M = 1.0  # a wearer is found within this error
 SEARCH_M = 40.0  # of the way, after which a wearer must be found
@@ -116,11 +118,23 @@ class JudgedRun:
         return float(self.t_s[-1] - self.t_s[0]) if len(self.t_s) else 0.0
 
 
-def true_levels(z_m: Floats, heights_m: Sequence[float]) -> Bools:
-    """Which of levels at `heights_m` are right (n, levels) at true heights of the floor (n,)."""
-    away = np.abs(z_m[:, None] - heights_m)
-    right: Bools = away <= away.min(1, keepdims=True) + 2.0 * TIE_M
+def true_levels(xy_m: Floats, z_m: Floats, plan: Plan) -> Bools:
+    """Which levels of a plan are right (n, levels) at true places (n, 2) and heights of the floor (n,).
+
+    The nearest one; in a lift also the nearest of those at which it stops, for it passes the others.
+    """
+    away_m = np.abs(z_m[:, None] - [level.height_m for level in plan.levels])
+    right = _nearest(away_m)
+    for lift in (c for c in plan.connectors if c.kind == "lift"):
+        inside = shapely.contains_xy(shapely.Polygon(lift.outline_m), xy_m[:, 0], xy_m[:, 1])
+        stops = np.ix_(inside, np.isin(np.arange(len(plan.levels)), lift.levels))
+        right[stops] |= _nearest(away_m[stops])
     return right
+
+
+def _nearest(away_m: Floats) -> Bools:
+    """The levels that are nearest, of distances (n, levels), and those that are as near but for a tie."""
+    return np.asarray(away_m <= away_m.min(1, keepdims=True) + 2.0 * TIE_M)
 
 
 def errors_m(place_m: Floats, level: Ints, true: Truth) -> Floats:

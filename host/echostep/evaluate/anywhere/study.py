@@ -42,9 +42,9 @@ def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
     walk, claims = trial.walk, [c for c in run.claims if c.t_s >= trial.from_s]
     t_s = np.array([c.t_s for c in claims])
     x, y, z = (np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y, Z))
-    right = true_levels(z, [level.height_m for level in trial.plan.levels])
+    place = np.column_stack([x, y])
     walked_m = walk.walked_m(t_s) - walk.walked_m(np.array([trial.from_s]))
-    return judge(claims, Truth(np.column_stack([x, y]), right), walked_m)
+    return judge(claims, Truth(place, true_levels(place, z, trial.plan)), walked_m)
 
 
 def anywhere_study(data: Path | None, rows: str = "*") -> Study:

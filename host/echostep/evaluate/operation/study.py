@@ -53,7 +53,7 @@ def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Part
     assert at.true_level is not None
     assert at.height_m is not None
     assert at.true_height_m is not None
-    right = true_levels(at.true_height_m, [level.height_m for level in walk.plan.levels])
+    right = true_levels(at.true_xy_m, at.true_height_m, walk.plan)
     points = {
         "error_m": at.error_m,
         "above_m": at.height_m - at.true_height_m,

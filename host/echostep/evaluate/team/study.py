@@ -137,7 +137,8 @@ def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Float
     truth = walks.truth[who]
     t_s = np.array([e.t_s for e in estimates])
     x, y, z = (np.interp(t_s, truth[:, T], truth[:, k]) for k in (X, Y, Z))
-    true = Truth(np.column_stack([x, y]), true_levels(z, [level.height_m for level in walks.plan.levels]))
+    place = np.column_stack([x, y])
+    true = Truth(place, true_levels(place, z, walks.plan))
     places = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
     return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 
