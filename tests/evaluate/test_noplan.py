@@ -18,7 +18,7 @@ from echostep.evaluate.anywhere.sites import Site, plan_of
 from echostep.evaluate.anywhere.walks import SimulatedWalk
 from echostep.evaluate.noplan.footslam import RADIUS_M, footslam, hexagon
 from echostep.evaluate.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
-from echostep.evaluate.noplan.real_clutter import with_stated_drift
+from echostep.evaluate.noplan.real_clutter import walked_log, with_stated_drift
 from echostep.evaluate.noplan.sites import furnished, loop_walls
 from echostep.evaluate.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from echostep.evaluate.study import StudyRequest
@@ -175,3 +175,11 @@ def test_a_log_is_drawn(tmp_path: Path) -> None:
     (row,) = one_run(("clutter/made",), tmp_path, tmp_path, 1, 1)
     assert row["rmse_m"] < 0.5
     assert row["storeys"] == 1
+
+
+def test_rangers_with_whole_cones_look_abeam(tmp_path: Path) -> None:
+    """Unlike those of the study `clutter`, which has the cones' front halves only."""
+    path = tmp_path / "made.log"
+    write_log(path, WALLS_OF_LOG)
+    axes = np.concatenate([m.off_heading_rad for m in walked_log(path, 1).segments])
+    assert set(axes.tolist()) == {0.5 * math.pi, -0.5 * math.pi}

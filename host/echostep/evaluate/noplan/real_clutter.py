@@ -89,13 +89,13 @@ class _Hearing:
         self._returns = [scan[seen] for scan, seen in zip(ends, near, strict=True)]
 
     def heard(self, measured: MeasuredSegment) -> MeasuredSegment:
-        """The segment with its pings."""
+        """The segment with its pings, whose cones are whole: the rangers look abeam."""
         s = measured.segment
         first, last = (int(np.ceil(t / PING_S)) for t in (s.t0_s, s.t1_s))
         number = np.arange(first, last)
         t_s, ranger = np.asarray(number * PING_S, np.float64), number % 2
         ranges = np.array([self._range_m(t, r) for t, r in zip(t_s.tolist(), ranger.tolist(), strict=True)])
-        return replace(measured, t_s=t_s, ranger=ranger, range_m=ranges.reshape(-1))
+        return replace(measured, t_s=t_s, ranger=ranger, range_m=ranges.reshape(-1), ahead_rad=0.0)
 
     def _range_m(self, t_s: float, ranger: int) -> float:
         scan = int(np.clip(np.searchsorted(self._truth[:, 0], t_s) - 1, 0, len(self._truth) - 2))
