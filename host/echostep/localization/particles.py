@@ -4,7 +4,8 @@
 In: moves of the trunk in the walk frame, with the pings on them. Out: a `Cloud` whose moments are the estimate. Owns the particles; draws from the
 generator that it is given. Only the filter's kernels go from the walk frame to the map.
 
-A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length. In a building of several levels
+A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length, `veer` = turn of the path on a
+metre that the wearer has not made. In a building of several levels
 it also has a height `z` and an offset `lag` of the height by pressure. Weights are logarithms.
 """
 
@@ -35,6 +36,7 @@ from echostep.localization.level_changes import (
 )
 from echostep.localization.particle_kernels import (
     NOISE_BEND,
+    NOISE_TURN,
     CloudModel,
     EchoMemory,
     Move,
@@ -91,7 +93,8 @@ class CloudSettings:
     """Size of the cloud, spread of a start about whose errors nothing is said, and noise that the path's own covariance leaves out.
 
     `step_sd`: of a move's length, per square root of a metre, twice that of a foot; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation
-    and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `resample_below`: effective share of the
+    and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `start_veer_sd_deg`: of a bias
+    of the path, degrees that it turns on each metre of a straight way, as by unequal wheels; feet have none. `resample_below`: effective share of the
     cloud at which it is resampled (systematic). The size follows the spread [Fox 2003, KLD-sampling]: enough particles that the distribution over
     cells of `cell_m`, `cell_m`, `cell_deg` is met within `kld`, at least `size`, at most `largest`. A cloud that would need more is coarse: it has
     `searching` particles, and echoes are looked up in a table. A scattered cloud is roughened by `rough_m` and `rough_deg` until it has contracted.
@@ -107,6 +110,7 @@ class CloudSettings:
     start_sd_m: float = 0.15
     start_turn_sd_deg: float = 5.0
     start_scale_sd: float = 0.01
+    start_veer_sd_deg: float = 0.0
     step_sd: float = 0.02
     turn_sd_deg: float = 0.3
     scale_sd: float = 0.001
@@ -168,6 +172,11 @@ class Cloud:
         self.x_m, self.y_m, heading = draw_poses(start, count, floor, self.sheet, self._rng)
         self.turn_rad: Floats = heading - walk_heading_rad
         self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
+        self.veer_rad_m: Floats = np.zeros(count)
+        if (
+            self._settings.start_veer_sd_deg > 0.0
+        ):  # otherwise nothing is drawn: a walk on foot stays the same to the bit
+            self.veer_rad_m = math.radians(self._settings.start_veer_sd_deg) * self._rng.standard_normal(count)
         self.lag_m: Floats = np.full(count, 0.0 if start.air is None else start.air.zero_m)
         self.log_weight: Floats = np.zeros(count)
         self.hidden: Floats = np.zeros((2, count))
@@ -457,6 +466,7 @@ class Cloud:
         noise[:NOISE_BEND] = self._rng.standard_normal((NOISE_BEND, len(self.x_m)))
         scale_sd = math.hypot(move.scale_sd, s.scale_sd * math.sqrt(length))
         noise[:NOISE_BEND] *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
+        noise[NOISE_TURN] += share * length * self.veer_rad_m
         noise[NOISE_BEND] = self.bend
         return noise
 
@@ -481,7 +491,7 @@ class Cloud:
     def _keep(self, chosen: Ints) -> None:
         """Replace the particles by the chosen ones (m,), with equal weights."""
         self.x_m, self.y_m = self.x_m[chosen], self.y_m[chosen]
-        self.turn_rad, self.scale = self.turn_rad[chosen], self.scale[chosen]
+        self.turn_rad, self.scale, self.veer_rad_m = self.turn_rad[chosen], self.scale[chosen], self.veer_rad_m[chosen]
         self.z_m, self.lag_m, self.bend = self.z_m[chosen], self.lag_m[chosen], self.bend[chosen]
         self.beliefs = BeaconBeliefs(*(part[chosen] for part in self.beliefs))
         self.hidden = np.ascontiguousarray(self.hidden[:, chosen])

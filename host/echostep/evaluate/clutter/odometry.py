@@ -20,6 +20,7 @@ FITS_RAD = math.radians(10.0)  # error of a turn between two scans above which t
 FITTING = 0.95  # least share of turns that fit
 LENGTH_NOISE, TURN_NOISE_RAD = 0.03, math.radians(2.0)  # of the corrected increments, where the odometry does not fit
 SAME_M = 0.01  # the odometry counts on from a scan's pose when it begins so near to it
+VEER_SD_DEG = 2.0  # bias of wheels' odometry, on a metre: wheels 0.4 m apart that differ by 1.4 %, by reason
 PIECE_M, PIECE_RAD = 0.3, math.radians(10.0)  # a piece ends when it is so long or turns so much
 
 
@@ -27,13 +28,14 @@ PIECE_M, PIECE_RAD = 0.3, math.radians(10.0)  # a piece ends when it is so long 
 class Odometry:
     """`steps[i]` (m, 3): pieces from scan i to the next, in the frame of the piece before: forward, left (m), turn (rad).
 
-    `sd_m` per axis and `turn_sd_rad`: standard deviations over one scan. `source`: for the table.
+    `sd_m` per axis and `turn_sd_rad`: standard deviations over one scan; `veer_sd_deg`: of its bias, a turn on each metre. `source`: for the table.
     """
 
     steps: tuple[Floats, ...]
     sd_m: float
     turn_sd_rad: float
     source: str
+    veer_sd_deg: float = 0.0
 
 
 def odometry_of(log: CarmenLog, rng: np.random.Generator) -> Odometry:
@@ -44,7 +46,7 @@ def odometry_of(log: CarmenLog, rng: np.random.Generator) -> Odometry:
     error[:, 2] = wrap(error[:, 2])
     if np.mean(np.abs(error[:, 2]) <= FITS_RAD) >= FITTING:
         sd_m = math.sqrt(0.5 * float(np.mean(error[:, 0] ** 2 + error[:, 1] ** 2)))
-        return Odometry(steps, sd_m, math.sqrt(float(np.mean(error[:, 2] ** 2))), "raw odometry")
+        return Odometry(steps, sd_m, math.sqrt(float(np.mean(error[:, 2] ** 2))), "raw odometry", VEER_SD_DEG)
     noise = rng.standard_normal((2, len(true)))
     noisy = true * (1.0 + LENGTH_NOISE * noise[:1].T)
     noisy[:, 2] = true[:, 2] + TURN_NOISE_RAD * noise[1]

@@ -21,6 +21,7 @@ from echostep.evaluate.clutter.carmen_log import logs_in, read_log
 from echostep.evaluate.clutter.pictures import draw_plans
 from echostep.evaluate.report import Row, Table
 from echostep.evaluate.study import Study, StudyRequest
+from echostep.localization.particles import CloudSettings
 from echostep.localization.start import Start
 
 UNKNOWN_M = 60.0  # length of the walks from unknown starts
@@ -48,7 +49,8 @@ def _unknown_scan(building: Building, number: int) -> int:
 
 
 def _row(building: Building, plan: str, what: str, walk: LogWalk, start: Start, seed: int) -> Row:
-    run = track(walk.segments, building.plans[plan], start, seed)
+    cloud = CloudSettings(start_veer_sd_deg=building.odometry.veer_sd_deg)
+    run = track(walk.segments, building.plans[plan], start, seed, cloud)
     at_scans = FilterRun(tuple(run.claims[k] for k in walk.at_scan), run.most_particles, run.cpu_s)
     row = run_row(f"{building.log.name}/{plan}/{what}", seed, _judged(walk, at_scans), at_scans)
     return row | {"source": building.odometry.source}
