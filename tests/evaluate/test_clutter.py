@@ -25,6 +25,7 @@ from echostep.evaluate.clutter.odometry import odometry_of
 from echostep.evaluate.clutter.scan_pings import hear
 from echostep.evaluate.clutter.wall_lines import straight_pieces, wall_segments
 from echostep.localization.estimate import TrackStatus
+from echostep.localization.particles import CloudSettings
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
@@ -229,7 +230,9 @@ def test_the_command_tracks_every_log_of_a_folder(log_file: Path, tmp_path: Path
 
 
 def test_unknown_starts_lie_where_the_log_goes_on(log_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def at_the_origin(segments: Sequence[MeasuredSegment], _plan: Plan, start: Start, _seed: int) -> FilterRun:
+    def at_the_origin(
+        segments: Sequence[MeasuredSegment], _plan: Plan, start: Start, _seed: int, _cloud: CloudSettings
+    ) -> FilterRun:
         assert start.pose is None
         assert start.room_m is None
         claims = [Claim(s.segment.t1_s, 0.0, 0.0, 0, 0.0, TrackStatus.LOST, math.inf) for s in segments]
