@@ -20,7 +20,7 @@ TURN_SD_RAD = math.radians(0.3)  # of each metre, as stated
 def through_a_hall(course_rad: float, piece_m: float = PIECE_M, *, beside: bool = False) -> list[MeasuredSegment]:
     """A way at 1 m/s along a corridor 2 m wide, then through a hall with this course; to the left a piece of wall parallel to the corridor.
 
-    `beside`: parallel to the way instead, as a person leaves it who goes along.
+    `beside`: parallel to the way instead, as the echoes of a passer-by lie.
     """
     slope = 0.0 if beside else math.sin(course_rad)
     found: list[MeasuredSegment] = []
