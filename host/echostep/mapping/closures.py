@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.mapping.graph import Closure, Graph
-from echostep.mapping.matching import match
+from echostep.mapping.matching import Pieces, match
 from echostep.mapping.stretches import pieces, stretches
 
 STRETCH_M = 8.0  # of path that is matched as one
@@ -72,15 +72,16 @@ def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
     Another passage of the same place may be elsewhere in the graph, until a return ties the two: what its neighbour heard says nothing of it.
     """
     at = graph.pose[node, :2]
+    single, ways = pieces(graph, new), stretches(graph, older)
     old_node = _nearest(graph, older, at)
     for _ in range(PASSAGES):
         covariance = graph.covariance(node, old_node)
         if _greatest_sd_m(covariance) > MOST_SD_M:
             return None
-        matched = _matched(graph, new, older, node, covariance)
+        matched = _matched(single, ways, at, covariance)
         if matched.log_odds < LEAST_LOG_ODDS:
             return None
-        passage = _explaining(graph, new, older, node, matched.mean)
+        passage = _explaining(graph, single, older, at, matched.mean)
         if old_node in graph.fragments.node[passage]:
             return _said(graph, node, old_node, matched)
         old_node = _nearest(graph, passage, at + matched.mean[:2])
@@ -100,13 +101,13 @@ def _greatest_sd_m(covariance: Floats) -> float:
     return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
 
 
-def _matched(graph: Graph, new: Ints, older: Ints, node: int, covariance: Floats) -> _Matched:
-    """The posterior of the shift of `node` with fragments `new` onto fragments `older`, of this `covariance` (3, 3) before."""
+def _matched(single: Pieces, ways: Pieces, at: Floats, covariance: Floats) -> _Matched:
+    """The posterior of the shift of a node at `at` (2,) with pieces `single` onto older ones `ways`, of this `covariance` (3, 3) before."""
     before = covariance + LEAST_COVARIANCE
     sd = _greatest_sd_m(before)
     shifts = np.linspace(-3.0 * sd, 3.0 * sd, SHIFTS if sd < 0.6 else 2 * SHIFTS + 1)
     turns = np.linspace(-2.0, 2.0, TURNS) * math.sqrt(before[2, 2])
-    score = match(pieces(graph, new), stretches(graph, older), graph.pose[node, :2], shifts, turns)
+    score = match(single, ways, at, shifts, turns)
     t, x, y = np.meshgrid(turns, shifts, shifts, indexing="ij")
     grid = np.stack([x.ravel(), y.ravel(), t.ravel()], axis=1)
     prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(before), grid))
@@ -120,12 +121,11 @@ def _matched(graph: Graph, new: Ints, older: Ints, node: int, covariance: Floats
     return _Matched(mean, spread.T @ spread + LEAST_COVARIANCE, before, log_odds)
 
 
-def _explaining(graph: Graph, new: Ints, older: Ints, node: int, shift: Floats) -> Ints:
-    """Of fragments `older` those of the one passage that explains `new` best when `node` is moved by `shift` (3,)."""
+def _explaining(graph: Graph, single: Pieces, older: Ints, at: Floats, shift: Floats) -> Ints:
+    """Of fragments `older` those of the one passage that explains pieces `single` best when their node at `at` (2,) is moved by `shift` (3,)."""
     way_m = graph.nodes.way_m[graph.fragments.node[older]]
     order = np.argsort(way_m, kind="stable")
     passages = np.split(older[order], np.flatnonzero(np.diff(way_m[order]) > STRETCH_M) + 1)
-    at, single = graph.pose[node, :2], pieces(graph, new)
     moved = single._replace(x_m=single.x_m + shift[0], y_m=single.y_m + shift[1])
     here, turned = np.zeros(1), shift[2:]
     found = [float(match(moved, stretches(graph, p), at + shift[:2], here, turned)[0, 0, 0]) for p in passages]
