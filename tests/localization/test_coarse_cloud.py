@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
+from echostep.localization.coarse_field import AFTER_ECHO, AFTER_SILENCE
+from echostep.localization.coarse_pings import INDEPENDENT_M, USED_M, CoarsePings
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import DOUBTED, MapFilter
 from echostep.localization.particle_kernels import Move, PingBatch
-from echostep.localization.particles import COARSE_INDEPENDENT_M, COARSE_REST, Cloud, CloudSettings
+from echostep.localization.particles import COARSE_REST, Cloud, CloudSettings
 from echostep.localization.plan_verdict import FOUND_WITHIN_M, PLAN_FITS
 from echostep.localization.start import Start
 from echostep.path import MeasuredSegment, PathSegment
@@ -41,22 +43,43 @@ def gather(cloud: Cloud, share: float) -> None:
     cloud.log_weight -= cloud.log_weight.max()
 
 
+def pings(range_m: float, count: int) -> PingBatch:
+    """So many of ranger 0 at the beginning, all with this range (0: silent)."""
+    one = np.ones(count)
+    return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), one, 0.0 * one, one, one)
+
+
 def told(way_m: float) -> float:
     """The range of the log-weights after one ping, this way after one of the same ranger."""
-    one = np.ones(1)
-    ping = PingBatch(one, 0.0 * one, 1.2 * one, one, np.zeros(1, np.int64), one, 0.0 * one, one, one)
-    cloud = coarse_cloud(resample_below=0.0)
-    for move, pings in ((Move(0.0, 0.0, 0.0, 0.0), ping), (Move(way_m, 0.0, 0.0, 0.0), SILENCE)):
-        cloud.propagate_and_reweight_coarsely(move, pings, MODEL, ROOM.walls, ROOM.field(MODEL))
+    ping, cloud = pings(1.2, 1), coarse_cloud(resample_below=0.0)
+    for move, batch in ((Move(0.0, 0.0, 0.0, 0.0), ping), (Move(way_m, 0.0, 0.0, 0.0), SILENCE)):
+        cloud.propagate_and_reweight_coarsely(move, batch, MODEL, ROOM.walls, ROOM.field(MODEL))
     cloud.log_weight[:] = 0.0
     cloud.propagate_and_reweight_coarsely(Move(0.0, 0.0, 0.0, 0.0), ping, MODEL, ROOM.walls, ROOM.field(MODEL))
     return float(np.ptp(cloud.log_weight))
 
 
 def test_a_ping_tells_by_the_way_since_the_one_before() -> None:
-    whole = told(COARSE_INDEPENDENT_M)
-    assert told(0.5 * COARSE_INDEPENDENT_M) == pytest.approx(0.5 * whole, rel=0.05)
-    assert told(3.0 * COARSE_INDEPENDENT_M) == pytest.approx(whole, rel=0.05)
+    whole = told(INDEPENDENT_M)
+    assert told(0.5 * INDEPENDENT_M) == pytest.approx(0.5 * whole, rel=0.05)
+    assert told(3.0 * INDEPENDENT_M) == pytest.approx(whole, rel=0.05)
+
+
+def test_pings_from_nearly_one_place_are_used_once() -> None:
+    used, both = CoarsePings(), pings(1.2, 2)
+    assert used.take(both, 0, 0.0) is not None
+    assert used.take(both, 1, 0.9 * USED_M) is None
+    assert used.take(both, 1, 1.1 * USED_M) is not None
+
+
+def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
+    used, after = CoarsePings(), []
+    for range_m in (0.0, 1.2, 0.0, 0.0):
+        ping = used.take(pings(range_m, 1), 0, 0.0)
+        assert ping is not None
+        after.append(ping.after)
+        used.path_m += 1.0
+    assert after == [AFTER_SILENCE, AFTER_SILENCE, AFTER_ECHO, AFTER_SILENCE]
 
 
 @pytest.mark.parametrize(

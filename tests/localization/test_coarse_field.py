@@ -10,8 +10,11 @@ import pytest
 
 from echostep.localization.building import Building
 from echostep.localization.coarse_field import (
+    AFTER_ECHO,
+    AFTER_SILENCE,
     CHANCES,
     LIKELY,
+    OUTSIDE,
     RANGES,
     SECTORS,
     UNIT_M,
@@ -41,11 +44,11 @@ def traced(x_m: float, y_m: float, axis_rad: float) -> tuple[float, float]:
     return (float(distance_m[likely[0]]), 1.0 - float(missed[-1])) if len(likely) else (math.nan, 0.0)
 
 
-def log_density(x_m: float, y_m: float, axis_rad: float, range_m: float) -> float:
+def log_density(x_m: float, y_m: float, axis_rad: float, range_m: float, after: int = AFTER_ECHO) -> float:
     """Of one ping (range 0: none) at a place, less that in the middle of the hall, where nothing is in reach."""
     pair = np.array([x_m, 4.6]), np.array([y_m, 4.1]), np.array([axis_rad, EAST]), np.ones(2), np.zeros(2)
     particles = ParticleArrays(*pair)
-    reweight_coarsely(particles, CoarsePing(0.0, range_m, 1.0, 0.0), FIELD, MODEL, ROOM_FOR_TABLE)
+    reweight_coarsely(particles, CoarsePing(0.0, range_m, 1.0, 0.0, after), FIELD, MODEL, ROOM_FOR_TABLE)
     return float(particles.log_weight[0] - particles.log_weight[1])
 
 
@@ -78,13 +81,27 @@ def test_an_echo_from_where_one_is_expected_speaks_for_the_place(at: tuple[float
     assert log_density(*at, axis_rad, range_m + 1.5) < log_density(*at, axis_rad, range_m) - 1.0
 
 
+def test_silence_that_goes_on_costs_less_before_a_wall_than_silence_after_an_echo() -> None:
+    """A view that was hidden, or an entry that is wrong, stays so."""
+    after_echo, after_silence = (log_density(11.1, 4.1, EAST, 0.0, after) for after in (AFTER_ECHO, AFTER_SILENCE))
+    assert after_echo + 0.3 < after_silence < 0.0
+
+
+def test_silence_in_a_hall_is_no_evidence_for_outside() -> None:
+    """Otherwise the particles of a hall died within metres, for each silent ping counted."""
+    for after in (AFTER_ECHO, AFTER_SILENCE):
+        log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
+        assert ROOM_FOR_TABLE[OUTSIDE] == ROOM_FOR_TABLE[0]
+
+
+@pytest.mark.parametrize("after", [AFTER_ECHO, AFTER_SILENCE])
 @pytest.mark.parametrize("k", [0, 20, 90, 200])
-def test_the_density_of_each_entry_adds_up_to_one(k: int) -> None:
+def test_the_density_of_each_entry_adds_up_to_one(k: int, after: int) -> None:
     """Over silence and all ranges; some of the wide part of near and far ranges is out of the ranger's reach."""
     step_m, total, table = 0.01, 0.0, ROOM_FOR_TABLE
     entry = (CHANCES - 1) * RANGES + k
     for range_m in np.arange(MODEL.minimum_m, MODEL.maximum_m, step_m):
-        log_densities(CoarsePing(0.0, float(range_m), 1.0, 0.0), MODEL, table)
+        log_densities(CoarsePing(0.0, float(range_m), 1.0, 0.0, after), MODEL, table)
         total += step_m * math.exp(table[entry])
-    log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0), MODEL, table)
+    log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0, after), MODEL, table)
     assert total + math.exp(table[entry]) == pytest.approx(1.0, abs=0.08)

@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
-from echostep.localization.echo_likelihood import EchoModel, detection, hidden_density
+from echostep.localization.echo_likelihood import SILENT, EchoModel, detection, hidden_density
 from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
@@ -35,9 +35,18 @@ LIKELY = 0.05  # probability of detection that the sources up to the expected ra
 CHANCES = 8  # steps of the probability that an echo is heard
 RANGES = 256  # steps of the expected range
 OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
-MISSED = 0.05  # share of the echoes heard by the entry that are none all the same
-QUIET = 0.6  # share of "no echo" where none is heard: the others are second reflections and things that no plan shows
-HIDDEN = 0.2  # share of views that are hidden: more than for an exact cloud, for a hidden view has no memory here
+AFTER_ECHO, AFTER_SILENCE = (
+    0,
+    1,
+)  # the ping before, of the same ranger; silence goes on where nothing answers, and where an entry is wrong
+# Each after an echo, and after silence:
+MISSED = 0.02, 0.1  # share of the echoes heard by the entry that are none all the same
+QUIET = (
+    0.3,
+    0.8,
+)  # share of "no echo" where none is heard: the others are second reflections and things that no plan shows
+HIDDEN = 0.1, 0.2  # share of views that are hidden
+HIDDEN_QUIET = 0.1, 0.6  # share of "no echo" in these
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
 
@@ -55,12 +64,13 @@ class CoarseField(NamedTuple):
 
 
 class CoarsePing(NamedTuple):
-    """One ping: axis in the walk frame, range (0: none), power, odds that a silent one missed its echo (else 0)."""
+    """One ping: axis in the walk frame, range (0: none), power, odds that a silent one missed its echo (else 0), AFTER_ECHO or AFTER_SILENCE."""
 
     axis_rad: float
     range_m: float
     power: float
     missed: float
+    after: int
 
 
 def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
@@ -113,27 +123,29 @@ def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
 def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
     """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
 
-    With the entry's probability the echo is that of the expected range, else as where none is expected. The last entry: outside, where walls
-    are rare.
+    With the entry's probability the echo is that of the expected range, else as where none is expected; so is the last entry, outside.
     """
-    range_m = ping.range_m
-    even = 1.0 / (model.maximum_m - model.minimum_m)
+    range_m, missed, quiet = ping.range_m, MISSED[ping.after], QUIET[ping.after]
+    hidden_share, hidden_quiet = HIDDEN[ping.after], HIDDEN_QUIET[ping.after]
+    is_echo = range_m > 0.0
+    unlikely = (1.0 - quiet) / (model.maximum_m - model.minimum_m) if is_echo else quiet
+    of_hidden = (1.0 - hidden_quiet) / (1.0 - SILENT) if is_echo else hidden_quiet / SILENT
     for k in range(RANGES):
-        hidden = hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
-        if range_m <= 0.0:
-            likely, unlikely = MISSED, QUIET
-        else:
+        hidden = of_hidden * hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
+        likely = missed
+        if is_echo:
             z = (range_m - k * UNIT_M) / COARSE_SD_M
             near = math.exp(-0.5 * z * z)
             far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
             likely = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
-            likely *= (1.0 - MISSED) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
-            unlikely = (1.0 - QUIET) * even
+            likely *= (1.0 - missed) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
         for c in range(CHANCES):
             chance = (c + 0.5) / CHANCES if k > 0 else 0.0
             planned = chance * likely + (1.0 - chance) * unlikely
-            table[c * RANGES + k] = ping.power * math.log((1.0 - HIDDEN) * planned + HIDDEN * hidden + ping.missed)
-    table[OUTSIDE] = ping.power * math.log((0.9 if range_m <= 0.0 else 0.1 * even) + ping.missed)
+            table[c * RANGES + k] = ping.power * math.log(
+                (1.0 - hidden_share) * planned + hidden_share * hidden + ping.missed
+            )
+    table[OUTSIDE] = table[0]
 
 
 @kernel

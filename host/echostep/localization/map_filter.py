@@ -260,6 +260,7 @@ class MapFilter:
             cloud.propagate_and_reweight_coarsely(move, pings, self._model, self._building.walls, field)
             if not cloud.is_coarse:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
+                cloud.draw_veer()
         else:
             # A scattered cloud's particles stand for the places between them.
             model = self._blurred if cloud.is_scattered else self._model

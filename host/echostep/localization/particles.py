@@ -21,7 +21,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.localization.beacon_beliefs import BeaconBeliefs, empty_beliefs
-from echostep.localization.coarse_field import OUTSIDE, CoarseField, CoarsePing, reweight_coarsely
+from echostep.localization.coarse_field import OUTSIDE, CoarseField, reweight_coarsely
+from echostep.localization.coarse_pings import CoarsePings
 from echostep.localization.echo_likelihood import EchoModel
 from echostep.localization.hypotheses import Hypothesis, hypotheses
 from echostep.localization.level_changes import (
@@ -58,8 +59,6 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by reason: a gathered one is never so large
 SMALL = 2  # times the least size, by reason: a cloud has contracted
-COARSE_M = 0.25  # path between two pings of one ranger that a coarse cloud uses, by reason: a cell of its table
-COARSE_INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
 # Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
 COARSE_BEND = bend_of(math.radians(45.0))
 COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
@@ -153,8 +152,7 @@ class Cloud:
         self._lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
         self._settings = settings
         self._rng = rng
-        self._last_used_m = np.full(2, -math.inf)  # path at the last ping of each ranger that a coarse cloud used
-        self._path_m = 0.0
+        self._coarse_pings = CoarsePings()
         self.rescues = 0
         self.is_gathered = False
         self.is_on_any_level = (
@@ -166,6 +164,8 @@ class Cloud:
         if wanted < settings.largest:
             self.is_coarse = False
             self._keep(np.arange(min(wanted, len(self.x_m))))
+        if not self.is_coarse:
+            self.draw_veer()
 
     def _draw(self, start: Start, count: int, walk_heading_rad: float, floor: Floor) -> None:
         """Draw so many particles from the start."""
@@ -173,10 +173,6 @@ class Cloud:
         self.turn_rad: Floats = heading - walk_heading_rad
         self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
         self.veer_rad_m: Floats = np.zeros(count)
-        if (
-            self._settings.start_veer_sd_deg > 0.0
-        ):  # otherwise nothing is drawn: a walk on foot stays the same to the bit
-            self.veer_rad_m = math.radians(self._settings.start_veer_sd_deg) * self._rng.standard_normal(count)
         self.lag_m: Floats = np.full(count, 0.0 if start.air is None else start.air.zero_m)
         self.log_weight: Floats = np.zeros(count)
         self.hidden: Floats = np.zeros((2, count))
@@ -185,6 +181,12 @@ class Cloud:
         self.z_m: Floats = self.sheet.height_m[self.level] if self.sheet else np.zeros(count)
         if start.near_z_m is not None:
             self.z_m[: near_count(count)] = start.near_z_m
+
+    def draw_veer(self) -> None:
+        """Draw each particle's veer; not while the cloud is coarse, for its few particles about a place would differ in one thing more."""
+        sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
+        if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
+            self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
 
     @property
     def level(self) -> Ints:
@@ -293,33 +295,24 @@ class Cloud:
     def propagate_and_reweight_coarsely(
         self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
     ) -> None:
-        """The same for a coarse cloud: one ping of each ranger on COARSE_M of the path, looked up in the table, and none in a turn."""
+        """The same for a coarse cloud: the pings that `CoarsePings` takes, looked up in the table, and none in a turn."""
         length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE + 1), 0.0
         is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
-        noise = self._noise(move, 1.0)
+        noise, used = self._noise(move, 1.0), self._coarse_pings
         for k, share in enumerate([*pings.share.tolist(), 1.0]):
-            is_ping = k < len(pings.share)
-            if is_ping and is_turning:
-                continue
-            if is_ping and self._path_m + share * length < self._last_used_m[pings.ranger[k]] + COARSE_M:
+            is_end = k == len(pings.share)
+            ping = None if is_end or is_turning else used.take(pings, k, share * length)
+            if ping is None and not is_end:
                 continue
             if share > done:
                 noise = noise if noise.shape[1] == len(self.x_m) else self._noise(move, 1.0)
                 piece = piece_of(move, done, share)
                 propagate(self.arrays, piece, share - done, noise, COARSE_WALL_COST, walls.index)
                 done = share
-            if is_ping:
-                power = self._coarse_power(int(pings.ranger[k]), self._path_m + share * length)
-                axis_rad, range_m, missed = (float(v[k]) for v in (pings.axis_rad, pings.range_m, pings.missed))
-                ping = CoarsePing(axis_rad, range_m, power, missed)
+            if ping is not None:
                 reweight_coarsely(self.arrays, ping, field, model, table)
             self.resample_if_needed()
-        self._path_m += length
-
-    def _coarse_power(self, ranger: int, path_m: float) -> float:
-        """Share of information in a ping of a ranger at this length of the path, which is used."""
-        travel_m, self._last_used_m[ranger] = path_m - float(self._last_used_m[ranger]), path_m
-        return min(travel_m / COARSE_INDEPENDENT_M, 1.0)
+        used.path_m += length
 
     def change_levels(self, move: Move, change: HeightChange) -> None:
         """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
@@ -425,7 +418,7 @@ class Cloud:
     @property
     def _rest(self) -> float:
         """Weight outside of one place with which a coarse cloud has gathered."""
-        return COARSE_REST if self.sheet is None or self._path_m < LEVELS_M else LEVELS_REST
+        return COARSE_REST if self.sheet is None or self._coarse_pings.path_m < LEVELS_M else LEVELS_REST
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
