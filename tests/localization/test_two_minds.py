@@ -55,6 +55,18 @@ def test_before_the_search_is_judged_a_place_that_may_be_alike_is_not_sure(log_o
     assert two._right().here == pytest.approx(right)
 
 
+@pytest.mark.parametrize(
+    ("gained", "right"),
+    [(0.0, probability_of(1.2)), (5.0, probability_of(1.2)), (-2.0, probability_of(-0.8)), (12.0, UNDECIDED)],
+)
+def test_a_search_that_has_not_gathered_is_no_rival(gained: float, right: float) -> None:
+    """After a ride in a lift the place was said to be `lost` until the first echoes, though it was right with 0.8."""
+    two = of_two_minds(1.2, 0.0, 0.0)
+    two.search = two._new_search(Start(), 0.0)
+    two.tracked.plausibility.log_odds += gained
+    assert two._right().here == pytest.approx(right)
+
+
 @pytest.mark.parametrize(("log_odds", "search_log_odds", "stays"), [(10.0, 3.0, True), (4.0, 9.0, False)])
 def test_a_judged_search_is_followed_if_it_has_foretold_more(
     log_odds: float, search_log_odds: float, stays: bool

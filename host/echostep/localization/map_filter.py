@@ -83,6 +83,7 @@ class MapFilter:
         self.search: Hypothetical | None = None
         self._search_m = 0.0  # length of the path at which the search began
         self._coarse_m = 0.0  # length of the path on which it was coarse
+        self._before_search = self.tracked.plausibility.log_odds  # that the tracked cloud was right, when it began
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
@@ -299,7 +300,7 @@ class MapFilter:
     def _right(self) -> Right:
         """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height.
 
-        Where the search has none there, it is what the tracked cloud has foretold against what the search has.
+        Where the search has none there, or has not gathered, it is what the tracked cloud has foretold against what the search has.
         """
         here = self.tracked.plausibility.probability
         if self.search is None:
@@ -307,14 +308,19 @@ class MapFilter:
         cloud, mean = self.search.cloud, self._believed(0.0)
         place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
         near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
-        return Right(min(here, near if near > ELSEWHERE else self._against(self.search)), about)
+        most = near
+        if cloud.is_coarse or near <= ELSEWHERE:
+            most = max(near, self._against(self.search))
+        return Right(min(here, most), about)
 
     def _against(self, search: Hypothetical) -> float:
-        """Probability that the tracked cloud is right where a search is of another mind."""
-        log_odds = self.tracked.plausibility.log_odds
+        """Probability that the tracked cloud is right where a search is of another mind, or of none yet."""
+        log_odds, alike = self.tracked.plausibility.log_odds, ALIKE_NATS
         if search.judged_m > JUDGED_M:
             return probability_of(log_odds - search.plausibility.log_odds)
-        return min(probability_of(log_odds - ALIKE_NATS), UNDECIDED)
+        if search.cloud.is_coarse:  # there is no rival yet: what the tracked one had before is its own
+            alike = min(max(log_odds - self._before_search, 0.0), ALIKE_NATS)
+        return min(probability_of(log_odds - alike), UNDECIDED)
 
     def _choose(self, right: float, walk_heading_rad: float) -> bool:
         """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found.
@@ -378,6 +384,7 @@ class MapFilter:
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
         self._search_m, self._coarse_m = self._pings.path_m, 0.0
+        self._before_search = self.tracked.plausibility.log_odds
         self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 
