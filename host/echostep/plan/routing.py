@@ -29,6 +29,7 @@ MOST_TRIED = 60  # nearest free cells that are tried for one without a wall befo
 MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
 LIFT_M = 20.0  # cost of waiting for a lift, in metres of level walk
+TIGHT = 20.0  # cost of a metre of a connector within BODY_M of a wall, in metres of level walk: the way goes round a wall between two flights
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +78,7 @@ class Routes:
             )
         self._plan = plan
         self._blocked = np.zeros((len(plan.levels), rows, columns), np.bool_)
+        self._tight = np.zeros_like(self._blocked)
         for k, level in enumerate(plan.levels):
             walls_cells = (np.asarray(level.solid, np.float64) - np.tile(self._low, 2)) / CELL_M
             mark_near_walls(walls_cells, BODY_M / CELL_M, self._blocked[k])
@@ -87,7 +89,10 @@ class Routes:
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
 
     def _lay_connectors(self, plan: Plan) -> None:
-        """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free."""
+        """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free, or tight where a wall is near.
+
+        Some stairs are drawn so narrow that no cell of them is clear of walls.
+        """
         self._connector = np.full(self._blocked.shape, -1, np.int64)
         self._serves = np.zeros((len(plan.connectors), len(plan.levels)), np.bool_)
         for c, connector in enumerate(plan.connectors):
@@ -95,12 +100,13 @@ class Routes:
             for level_index in connector.levels:
                 self._serves[c, level_index] = True
                 self._connector[level_index][cells] = c
+                self._tight[level_index][cells] = self._blocked[level_index][cells]
                 self._blocked[level_index][cells] = False
 
     def way(self, start: RoutePlace, end: RoutePlace) -> Route:
         """The cheapest route; raises EchostepError when a position is outside the plan, or when there is no route."""
         a, b = self._cell(start, "the start"), self._cell(end, "the destination")
-        trail = _search(self._blocked, self._connector, self._serves, self._height, self._lift, a, b)
+        trail = _search(self._blocked, self._tight, self._connector, self._serves, self._height, self._lift, a, b)
         if not len(trail):
             raise EchostepError(
                 f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
@@ -115,7 +121,7 @@ class Routes:
             part, level = trail[first:beyond], int(trail[first, 0])
             if len(part) == 1 and first > 0 and beyond < len(trail):
                 continue  # a level that the connector only passes
-            kept = _straighten(self._blocked[level], part[:, 1:])
+            kept = _straighten(self._blocked[level] | self._tight[level], part[:, 1:])
             line = self._low + (part[kept][:, [2, 1]] + 0.5) * CELL_M
             by = ""
             if beyond < len(trail):
@@ -187,12 +193,12 @@ def mark_near_walls(walls: Floats, reach: float, blocked: Bools) -> None:
 
 @kernel
 def _search(
-    blocked: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
+    blocked: Bools, tight: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
     start: tuple[int, int, int], end: tuple[int, int, int],
 ) -> Ints:  # fmt: skip
     """The cheapest trail of cells (k, 3): level, row, column; (0, 3) when there is none [Dijkstra 1959].
 
-    `connector` (levels, rows, columns): connector of each cell, -1 for none. `serves` (connectors, levels).
+    All of (levels, rows, columns): `blocked`, `tight`, and `connector`, that of each cell, -1 for none. `serves` (connectors, levels).
     """
     levels, rows, columns = blocked.shape
     size = rows * columns
@@ -216,7 +222,8 @@ def _search(
                 and 0 <= x < columns
                 and not (blocked[level, y, x] or blocked[level, r, x] or blocked[level, y, c])
             ):
-                there, total = level * size + y * columns + x, spent + CELL_M * math.hypot(y - r, x - c)
+                way = CELL_M * math.hypot(y - r, x - c) * (TIGHT if tight[level, y, x] else 1.0)
+                there, total = level * size + y * columns + x, spent + way
                 if total < cost[there]:
                     cost[there], before[there] = total, here
                     heapq.heappush(heap, (total, there))
