@@ -12,6 +12,7 @@ from echostep.localization.background import Background, background
 from echostep.localization.coarse_field import CoarseField, coarse_field
 from echostep.localization.echo_likelihood import EchoModel
 from echostep.localization.estimate import Elsewhere
+from echostep.localization.upper_storeys import UpperStoreys
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
 from echostep.walls.indoors import indoors
@@ -26,6 +27,9 @@ class Building:
         self.sheet = sheet
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
+        self.upper_storeys = None
+        if sheet is not None and len(sheet.height_m) > 1 and len(self.floor.x_m):
+            self.upper_storeys = UpperStoreys(self.floor, sheet)
         self.elsewhere = _elsewhere(self.floor, sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
         self._fields: dict[EchoModel, CoarseField] = {}

@@ -248,8 +248,16 @@ class MapFilter:
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned, judged_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
+            self._fall(each.cloud, math.hypot(segment.dx_m, segment.dy_m))
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
             self._plan.confirm(math.hypot(segment.dx_m, segment.dy_m))
+
+    def _fall(self, cloud: Cloud, path_m: float) -> None:
+        """Take weight from particles in the air beside an upper storey."""
+        storeys = self._building.upper_storeys
+        loss = None if storeys is None else storeys.log_loss(cloud.x_m, cloud.y_m, path_m)
+        if loss is not None:
+            cloud.reweight(loss)
 
     def _follow_with(
         self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
