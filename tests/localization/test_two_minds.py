@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
+from echostep.localization.estimate import SURE
 from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.hypothetical import Hypothetical
-from echostep.localization.map_filter import AGREED, DOUBTED, JUDGED_M, UNDECIDED, MapFilter
+from echostep.localization.map_filter import AGREED, DOUBTED, JUDGED_M, REFUTED, UNDECIDED, MapFilter
 from echostep.localization.particles import Cloud, CloudSettings
 from echostep.localization.plausibility import Plausibility, probability_of
 from echostep.localization.start import Start
@@ -82,3 +83,16 @@ def test_a_search_that_agrees_is_asked_for_its_weight_there() -> None:
     """Whatever it has foretold: it is the same place."""
     two = of_two_minds(11.0, 11.0, 1.5 * JUDGED_M, at=HERE)
     assert two._right().here > AGREED
+
+
+@pytest.mark.parametrize(("lowest", "fits"), [(-2.0, True), (REFUTED - 0.5, False)])
+def test_a_cloud_that_was_refuted_gives_the_plan_nothing_back(lowest: float, fits: bool) -> None:
+    """On a mirrored plan the doubted cloud went astray until a search met it in a room that is alike."""
+    two = of_two_minds(lowest, 0.0, 0.0, at=HERE)
+    two._plan.reject_start(1.0)
+    after_a_step(two)
+    assert two.search is not None
+    two.tracked.plausibility.log_odds = 11.0
+    after_a_step(two)
+    assert two.search is None
+    assert (two._plan.probability > SURE) == fits

@@ -53,6 +53,7 @@ UNDECIDED = 0.8  # at most of the tracked one, while a search that has not gathe
 FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
 REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
 WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
+REFUTED = -5.0  # log-odds of a doubted cloud below which it was wrong, even if a search agrees with it later
 ALIKE_NATS = 8.0  # of evidence that a wrong place gains by being alike, before a search has found another
 JUDGED_M = 20.0  # path on which a search's place is judged before it counts against the tracked one
 ELSEWHERE = 0.05  # weight of a search about the tracked cloud, below which it is of another mind
@@ -84,6 +85,7 @@ class MapFilter:
         self._search_m = 0.0  # length of the path at which the search began
         self._coarse_m = 0.0  # length of the path on which it was coarse
         self._before_search = self.tracked.plausibility.log_odds  # that the tracked cloud was right, when it began
+        self._is_refuted = False  # whether the tracked cloud was as good as wrong since it was doubted
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._gaps = Gaps()
@@ -336,6 +338,7 @@ class MapFilter:
         `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
         """
         tracked, search = self.tracked, self.search
+        self._is_refuted = self._is_refuted or tracked.plausibility.log_odds < REFUTED
         self._note_coarse()
         if self._is_astray(tracked.cloud):
             self._plan.fail_search()
@@ -343,8 +346,7 @@ class MapFilter:
         elif search is None:
             return self._doubt(tracked, walk_heading_rad)
         elif right > AGREED:
-            self._plan.agree()
-            self.search, self._is_elsewhere = None, False
+            self._agree()
         elif search.plausibility.probability > FOUND and search.cloud.is_in_one_place and right < DOUBTED:
             self._follow_search(search)
         elif self._has_failed(search):
@@ -354,6 +356,14 @@ class MapFilter:
         else:
             return False
         return True
+
+    def _agree(self) -> None:
+        """The search agrees with the tracked cloud: that was right, unless it was refuted, and has come by chance to where it is now."""
+        if self._is_refuted:
+            self._plan.find(self._searched_m, math.inf)
+        else:
+            self._plan.agree()
+        self.search, self._is_elsewhere = None, False
 
     def _follow_search(self, search: Hypothetical) -> None:
         """Track from now on what a search has found."""
@@ -383,6 +393,7 @@ class MapFilter:
             self._plan.reject_start(self._pings.path_m)
         else:
             self._plan.reject_found(self._searched_m - self._found_within_m)
+        self._is_refuted = False
         self.search = self._new_search(self._nearby(walk_heading_rad), walk_heading_rad)
         return True
 
