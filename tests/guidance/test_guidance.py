@@ -226,12 +226,11 @@ def test_way_over_stairs_is_guided_level_by_level(kind: str) -> None:
     assert g.cue(at(50, 2.0, 2.0, 180, level=1)).kind is CueKind.ARRIVED
 
 
-def test_the_way_goes_round_a_wall_between_two_flights_of_stairs() -> None:
-    plan = two_storeys("stairs")
-    between = np.array([[16.5, 3.0, 16.5, 5.4]])
-    plan = replace(
-        plan, levels=(replace(plan.levels[0], walls=np.vstack([plan.levels[0].walls, between])), plan.levels[1])
-    )
+@pytest.mark.parametrize("connectors", [1, 2])
+def test_the_way_goes_round_a_wall_between_two_flights_of_stairs(connectors: int) -> None:
+    plan, between = two_storeys("stairs"), np.array([[16.5, 3.0, 16.5, 5.4]])
+    ground = replace(plan.levels[0], walls=np.vstack([plan.levels[0].walls, between]))
+    plan = replace(plan, levels=(ground, plan.levels[1]), connectors=connectors * plan.connectors)
     line = Routes(plan).way(RoutePlace(14.0, 4.5), RoutePlace(19.0, 4.5)).stretches[0].line_m
     at_wall = float(np.interp(16.5, line[:, 0], line[:, 1]))
     assert at_wall > 5.4 + BODY_M - 0.15 or at_wall < 3.0 - BODY_M + 0.15

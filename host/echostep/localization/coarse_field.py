@@ -35,18 +35,11 @@ LIKELY = 0.05  # probability of detection that the sources up to the expected ra
 CHANCES = 8  # steps of the probability that an echo is heard
 RANGES = 256  # steps of the expected range
 OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
-AFTER_ECHO, AFTER_SILENCE = (
-    0,
-    1,
-)  # the ping before, of the same ranger; silence goes on where nothing answers, and where an entry is wrong
-# Each after an echo, and after silence:
-MISSED = 0.02, 0.1  # share of the echoes heard by the entry that are none all the same
-QUIET = (
-    0.3,
-    0.8,
-)  # share of "no echo" where none is heard: the others are second reflections and things that no plan shows
-HIDDEN = 0.1, 0.2  # share of views that are hidden
-HIDDEN_QUIET = 0.1, 0.6  # share of "no echo" in these
+# The ping before, of the same ranger: silence goes on where nothing answers, and where an entry is wrong
+AFTER_ECHO, AFTER_SILENCE = 0, 1
+# Shares after an echo, and after silence: of echoes heard by the entry that are none all the same; of "no echo" where none is heard (the others are
+# second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
+MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
 

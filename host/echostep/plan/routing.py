@@ -100,7 +100,7 @@ class Routes:
             for level_index in connector.levels:
                 self._serves[c, level_index] = True
                 self._connector[level_index][cells] = c
-                self._tight[level_index][cells] = self._blocked[level_index][cells]
+                self._tight[level_index][cells] |= self._blocked[level_index][cells]
                 self._blocked[level_index][cells] = False
 
     def way(self, start: RoutePlace, end: RoutePlace) -> Route:
