@@ -245,14 +245,15 @@ class MapFilter:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it."""
         segment = measured.segment
         pings, unplanned = self._pings.take(measured if self._building.has_walls else measured.without_pings)
-        move = move_of(segment)
+        move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned, judged_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
-            self._fall(each.cloud, math.hypot(segment.dx_m, segment.dy_m))
+            if path_m > 0.0:
+                self._fall(each.cloud, path_m)
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
-            self._plan.confirm(math.hypot(segment.dx_m, segment.dy_m))
+            self._plan.confirm(path_m)
 
     def _fall(self, cloud: Cloud, path_m: float) -> None:
         """Take weight from particles in the air beside an upper storey."""
