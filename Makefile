@@ -15,12 +15,12 @@ help: ## list the targets
 
 setup: $(READY) ## make .venv with the host package, its tests and its tools
 
-$(READY): host/pyproject.toml
+$(READY): host/pyproject.toml host/studies/pyproject.toml
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || tools/apt.sh python3-venv
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c host/tested-versions.txt -e 'host[dev]' || { \
+	$(BIN)/pip install --quiet --disable-pip-version-check -c host/tested-versions.txt -e 'host[dev]' -e 'host/studies[cluster]' || { \
 		echo "The package index lacks some tested version: installing the newest ones."; \
-		$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]'; }
+		$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[dev]' -e 'host/studies[cluster]'; }
 	touch $@
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package
@@ -43,7 +43,7 @@ demo: $(READY) ## track a simulated walk through the real firmware in the simula
 	fi
 
 real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path, echoes simulated; prints the error
-	$(BIN)/python tools/real_walk.py --out out/real
+	$(BIN)/python -m echostep_studies.figures.real_walk --out out/real
 
 test: $(READY) ## run every test
 	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools, Mosquitto, Chromium, clang and OpenSCAD: tests that need them are skipped and named."
@@ -69,7 +69,7 @@ measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmwar
 	$(BIN)/python tools/twin/measure.py
 
 bench: $(VENV)/peers ## speed of the host as ratios against others, in the same run
-	$(BIN)/python tools/bench.py
+	$(BIN)/python -m echostep_studies.speed.bench
 
 page-speed: $(READY) ## latency and frame rate of the live page and of the commander's page in Chromium
 	@tools/apt.sh chromium || echo "Chromium is not installed."
@@ -81,8 +81,8 @@ operation: $(READY) ## 20 wearers on one broker, two with the real firmware, one
 	$(MAKE) --quiet -C tools/twin
 	$(BIN)/python tools/team_operation.py
 
-$(VENV)/peers: host/pyproject.toml $(READY)
-	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host[bench]' || echo "Not all peers could be installed: the table says which are missing."
+$(VENV)/peers: host/studies/pyproject.toml $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host/studies[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
 wheel: $(READY) ## build the wheel, install it in a fresh environment, run the demo in there; URL=https://... is the public address in it

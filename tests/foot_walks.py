@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.simulation.people.rolling_foot import MANNERS, Course, Manner, course, felt, pitched, samples
+from echostep_studies.simulation.rolling_foot import MANNERS, Course, Manner, course, felt, pitched, samples
 
 __all__ = ["MANNERS", "Course", "Manner", "any_rotation", "course", "felt", "pitched", "samples"]
 

@@ -66,7 +66,7 @@ def demo(out: Path) -> Iterator[tuple[str, str]]:
 
 def real(out: Path) -> Iterator[tuple[str, str]]:
     """Estimates of the recorded foot on the plan drawn around its path."""
-    said = run(sys.executable, ROOT / "tools/real_walk.py", "--out", out / "real")
+    said = run(sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", out / "real")
     yield "real/estimates", said.split("sha256 ")[1].split()[0]
 
 
@@ -79,7 +79,7 @@ def captures() -> Iterator[tuple[str, str]]:
 FOOT = """
 import hashlib, sys
 from pathlib import Path
-from echostep.evaluate.feet.datasets import read_recordings
+from echostep_studies.feet.datasets import read_recordings
 from echostep.foot.steps import walk_track
 for r in read_recordings(Path(sys.argv[1]))[0]:
     track = walk_track(r.t_s, r.accel, r.gyro, mag=r.mag)

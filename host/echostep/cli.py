@@ -26,8 +26,8 @@ app = typer.Typer(
 )
 for nameless in (runs, files, commander, hardware, recordings):
     app.add_typer(nameless.app)
-for name, group in {"evaluate": evaluate, "beacons": beacons, "plan": plan}.items():
-    app.add_typer(group.app, name=name)
+for name, group in {"evaluate": evaluate.studies(), "beacons": beacons.app, "plan": plan.app}.items():
+    app.add_typer(group, name=name)
 
 
 def _print_version(wanted: bool) -> None:

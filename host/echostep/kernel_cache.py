@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Where compiled kernels are kept: a folder for each state of the sources that they are made from.
 
-In: the file of a module of this package. Out: a folder for numba's cache. Owns the folders and their names.
+In: the file of a module of this package, or of another package whose kernels call those of this one. Out: a folder for numba's cache. Owns the
+folders and their names.
 
 numba compares the kernel's own file only. After an update in place it would run a kernel although a callee in another file has changed, and it fails
 on a NamedTuple that has been renamed, for it unpickles the whole index before it compares. So the name of the folder holds a digest of the module and
-of all modules of this package that it imports, directly or not: every other state has another folder, and is never read.
+of all modules of both packages that it imports, directly or not: every other state has another folder, and is never read.
 """
 
 from __future__ import annotations
@@ -17,56 +18,73 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = str(Path(__file__).parent)
-NAME = __package__.encode()
-IMPORT = re.compile(rb"^ *(?:from %b([\w.]*) import (\([^)]*\)|.*)|import %b([\w.]*))" % (NAME, NAME), re.MULTILINE)
+IMPORT = re.compile(rb"^ *(?:from ([\w.]+) import (\([^)]*\)|.*)|import ([\w.]+))", re.MULTILINE)
 WORD = re.compile(rb"\w+")
 DIGITS = 16  # of the digest, hexadecimal
+_roots = {__package__: PACKAGE}  # name -> folder of the packages whose imports are followed
 
 
 @cache
 def cache_folder(source: str) -> Path | None:
-    """The folder of the kernels of a module, by its file; files of its other states are deleted. None: the file is not a part of this package."""
+    """The folder of the kernels of a module, by its file; files of its other states are deleted. None: the file is not a part of a package."""
     path = Path(source)
-    if not path.is_relative_to(PACKAGE) or not path.is_file():
+    root = _root_of(path.parent)
+    if root is None or not path.is_file():
         return None
+    _roots.setdefault(root.name, str(root))
     module = path.stem
-    folder = _base(path.parent) / f"{module}-{_digest(source)}"
+    folder = _base(path.parent, root) / f"{module}-{_digest(source)}"
     if not folder.is_dir():
         for old in folder.parent.glob(f"{module}-*/*/*.nb[ic]"):
             old.unlink(missing_ok=True)  # their folders stay: another process may be about to write there
     return folder
 
 
-def _base(package: Path) -> Path:
+@cache
+def _root_of(folder: Path) -> Path | None:
+    """The outermost package that holds a folder; None: the folder is not a package."""
+    if not (folder / "__init__.py").is_file():
+        return None
+    return _root_of(folder.parent) or folder
+
+
+def _base(package: Path, root: Path) -> Path:
     """NUMBA_CACHE_DIR, or `__pycache__` beside the sources, or a folder of the user's where that is not writable."""
-    inside = package.relative_to(PACKAGE)
+    inside = package.relative_to(root.parent)
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen) / inside
     if os.access(package, os.W_OK):
         return package / "__pycache__"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / __package__ / inside
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / inside
 
 
 def _digest(source: str) -> str:
-    """A digest of the file and of all files of this package that it imports, directly or not."""
+    """A digest of the file and of all files of the known packages that it imports, directly or not."""
     found, waiting = {source}, [source]
     while waiting:
         new = _read(waiting.pop())[1] - found
         found |= new
         waiting += new
     states = hashlib.sha256()
-    for path in sorted(found):
-        states.update(b"%b %b\n" % (os.fsencode(path[len(PACKAGE) :]), _read(path)[0]))
+    for name, path in sorted((_name_of(path), path) for path in found):
+        states.update(b"%b %b\n" % (os.fsencode(name), _read(path)[0]))
     return states.hexdigest()[:DIGITS]
+
+
+def _name_of(source: str) -> str:
+    """The file's path from its package's folder on, wherever the package is installed."""
+    return next(source[len(root) - len(name) :] for name, root in _roots.items() if source.startswith(root + os.sep))
 
 
 @cache
 def _read(source: str) -> tuple[bytes, frozenset[str]]:
-    """Digest of one file, and the files of this package that it imports."""
+    """Digest of one file, and the files of the known packages that it imports."""
     text = Path(source).read_bytes()
     imported = set[str]()
     for parent, names, alone in IMPORT.findall(text):
         module = (parent or alone).decode()
+        if module.partition(".")[0] not in _roots:
+            continue
         imported |= _files_of(module)
         for word in WORD.findall(names):
             imported |= _files_of(f"{module}.{word.decode()}")
@@ -75,6 +93,7 @@ def _read(source: str) -> tuple[bytes, frozenset[str]]:
 
 @cache
 def _files_of(name: str) -> frozenset[str]:
-    """The file of a module or a package, by its name in this package, which begins with a point; none where it is a name in a module."""
-    path = PACKAGE + name.replace(".", os.sep)
-    return frozenset(file for file in (f"{path}.py", f"{path}{os.sep}__init__.py") if os.path.isfile(file))  # noqa: PTH113 (300 times a start)
+    """The file of a module or a package, by its full name; none where it is a name in a module."""
+    root, _, inside = name.partition(".")
+    path = os.path.join(_roots[root], inside.replace(".", os.sep)).rstrip(os.sep)  # noqa: PTH118 (300 times a start)
+    return frozenset(file for file in (f"{path}.py", f"{path}{os.sep}__init__.py") if os.path.isfile(file))  # noqa: PTH113

@@ -23,11 +23,11 @@ from echostep.barometer.floor_record import find_storeys, stays
 from echostep.cli import app
 from echostep.commands.floors import parse_heights, record_floors
 from echostep.errors import EchostepError
-from echostep.evaluate.floors import FloorScene, judge, longest_s
 from echostep.offline.pressure_csv import load_pressures
 from echostep.simulation.devices.board_sensors import Scp1000Model
-from echostep.simulation.people.vertical_day import climb
-from echostep.simulation.world.air_pressure import Weather, device_temperatures, pressures
+from echostep_studies.floors.study import FloorScene, judge, longest_s
+from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
+from echostep_studies.simulation.vertical_day import climb
 from needs_data import needs_data
 from recordings import DATA
 

@@ -25,8 +25,8 @@ from echostep.session import demo
 from echostep.session.browser import open_browser
 from echostep.simulation.people.tours import room_tour
 from echostep.simulation.scenario import DEMO_WAYPOINTS, start_of
-from echostep.simulation.world.tower import tower
 from echostep.tracker import Tracker
+from echostep_studies.simulation.tower import tower
 from page.browser import LOCAL
 from page.frames import header, opened_url
 from waiting import PATIENCE_S

@@ -7,9 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from board_runs import ROOT
-from echostep.evaluate.noplan.real_feet import names_in, read_hallway
 from echostep.recording.reading import open_recording
+from echostep_studies.noplan.real_feet import names_in, read_hallway
 from needs_data import needs_data
 from recordings import DATA
 from waiting import PATIENCE_S
@@ -18,7 +17,7 @@ pytestmark = needs_data("gx5_gcp")
 
 
 def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "tools/real_walk.py"), "--out", str(tmp_path), "--seed", "3"]
+    command = [sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", str(tmp_path), "--seed", "3"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)
     assert done.returncode == 0, done.stdout + done.stderr  # 1 when the RMSE is above 0.30 m
     assert "foot real" in done.stdout

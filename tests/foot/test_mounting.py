@@ -13,8 +13,6 @@ import pytest
 import foot_walks as fw
 from board_runs import ROOT
 from echostep.arrays import Floats
-from echostep.evaluate.feet.datasets import SETS
-from echostep.evaluate.recordings import read_sets
 from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
 from echostep.localization.metrics import Truth, errors
@@ -24,6 +22,8 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
+from echostep_studies.feet.datasets import SETS
+from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
 from recordings import DATA
 

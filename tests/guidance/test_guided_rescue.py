@@ -24,8 +24,8 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.teammate import TEAM, Teammate, parse_teammate
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
-from echostep.simulation.world.tower import tower
 from echostep.tracker import Tracker
+from echostep_studies.simulation.tower import tower
 
 TOWER = tower(3)
 DEMO = load_plan(ROOT / "host/echostep/plans/demo.json")

@@ -12,7 +12,7 @@ from echostep.arrays import Floats
 from echostep.legs.clipping import ClippingRepair, find_clipping_limits, repair_clipping
 from echostep.legs.stride import StrideSettings
 from echostep.legs.strides import StrideEstimator
-from echostep.simulation.people.joint_gait import FAST, draw_person, simulate_gait
+from echostep_studies.simulation.joint_gait import FAST, draw_person, simulate_gait
 
 LIMIT = math.radians(300.0)
 

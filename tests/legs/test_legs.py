@@ -18,10 +18,11 @@ from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
 from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples, load_legs
 from echostep.offline.leg_summary import describe_legs
-from echostep.offline.leg_track import track_default, track_lee2010
-from echostep.simulation.people.joint_gait import FAST, NATURAL, SLOW, WalkingPace, draw_person, simulate_gait
+from echostep.offline.leg_track import track_default
 from echostep.simulation.people.leg_angles import LegDimensions
 from echostep.simulation.people.walker import Person, Waypoint, walk
+from echostep_studies.papers.profiles import track_lee2010
+from echostep_studies.simulation.joint_gait import FAST, NATURAL, SLOW, WalkingPace, draw_person, simulate_gait
 
 STANDARD = LegLengths(0.43, 0.43)
 

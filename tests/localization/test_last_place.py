@@ -17,8 +17,8 @@ from echostep.localization.particles import CloudSettings
 from echostep.localization.plausibility import STATED
 from echostep.localization.start import Air, Start
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.simulation.world.tower import LIFT_AT, STOREY_M, tower
 from echostep.walls.level_sheet import lay_out_levels
+from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 
 ZERO_M = 100.0  # height by pressure on the lowest floor
 AWAY_S = 60.0

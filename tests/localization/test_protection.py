@@ -12,8 +12,8 @@ from echostep.localization.estimate import RISK, estimate
 from echostep.localization.particles import Cloud, CloudSettings
 from echostep.localization.start import ANY_LEVEL, Start
 from echostep.plan.model import Pose
-from echostep.simulation.world.tower import tower
 from echostep.walls.level_sheet import lay_out_levels
+from echostep_studies.simulation.tower import tower
 
 SHEET = lay_out_levels(tower(2)).sheet
 

@@ -9,8 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from echostep.evaluate.anywhere import sites
-from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
 from echostep.localization.building import Building
 from echostep.localization.echo_likelihood import EchoSettings, echo_model
 from echostep.localization.estimate import SURE_OF_LEVEL, Estimate, TrackStatus
@@ -24,8 +22,10 @@ from echostep.localization.start import Air, Start
 from echostep.localization.usable_pings import UsablePings
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, Pose
-from echostep.simulation.world.tower import STOREY_M, tower
 from echostep.walls.level_sheet import lay_out_levels
+from echostep_studies.anywhere import sites
+from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.simulation.tower import STOREY_M, tower
 
 STOREYS, TRUE, WRONG = 3, 1, 2
 SEED = 5

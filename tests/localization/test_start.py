@@ -10,8 +10,8 @@ from echostep.localization.building import Building
 from echostep.localization.particles import Cloud, CloudSettings
 from echostep.localization.start import ANY_LEVEL, NEAR_M, NEAR_SHARE, Start, draw_poses, near_count
 from echostep.plan.model import Pose
-from echostep.simulation.world.tower import LIFT_AT, tower
 from echostep.walls.level_sheet import lay_out_levels, level_of
+from echostep_studies.simulation.tower import LIFT_AT, tower
 
 COUNT, STOREYS = 9_000, 3
 

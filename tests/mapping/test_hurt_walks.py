@@ -13,7 +13,6 @@ import pytest
 from board_runs import ROOT
 from command_line import echostep
 from echostep.arrays import Floats
-from echostep.evaluate.anywhere.tours import clearance_m
 from echostep.mapping.mapper import map_walk
 from echostep.mapping.plan import plan_of
 from echostep.path import MeasuredSegment, PathSegment
@@ -24,6 +23,7 @@ from echostep.session.metadata import run_metadata
 from echostep.session.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
+from echostep_studies.anywhere.tours import clearance_m
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 HEADING_RAD = 0.5 * math.pi

@@ -14,12 +14,6 @@ from command_line import echostep
 from echostep.arrays import Floats
 from echostep.commands.mapping import segments_of
 from echostep.errors import EchostepError
-from echostep.evaluate.anywhere.sites import plan_of
-from echostep.evaluate.anywhere.tours import clearance_m
-from echostep.evaluate.anywhere.walks import CORNER_M, SimulatedWalk, simulate
-from echostep.evaluate.noplan.joined import again, joined_row
-from echostep.evaluate.noplan.judgement import known_start, path_columns, true_path
-from echostep.evaluate.noplan.sites import corridors, office
 from echostep.mapping.joining import doubt_of, join_walks
 from echostep.mapping.mapper import Mapped, solve_walk
 from echostep.mapping.placing import Place, find_place
@@ -32,6 +26,12 @@ from echostep.session.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Person
 from echostep.simulation.scenario import Scenario
+from echostep_studies.anywhere.sites import plan_of
+from echostep_studies.anywhere.tours import clearance_m
+from echostep_studies.anywhere.walks import CORNER_M, SimulatedWalk, simulate
+from echostep_studies.noplan.joined import again, joined_row
+from echostep_studies.noplan.judgement import known_start, path_columns, true_path
+from echostep_studies.noplan.sites import corridors, office
 
 LENGTH_M = 280.0  # of a walk
 SEEDS = {"a": 901, "b": 1901}

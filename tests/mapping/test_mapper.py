@@ -12,10 +12,6 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from echostep.evaluate.anywhere.sites import Site
-from echostep.evaluate.anywhere.tours import clearance_m
-from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
-from echostep.evaluate.noplan.judgement import known_start, path_columns
 from echostep.mapping.drawing import Drawing, draw
 from echostep.mapping.graph import Closure, contradicted
 from echostep.mapping.growing import GrowingMap
@@ -28,6 +24,10 @@ from echostep.session.metadata import run_metadata
 from echostep.session.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import DEMO_WAYPOINTS, demo_scenario
+from echostep_studies.anywhere.sites import Site
+from echostep_studies.anywhere.tours import clearance_m
+from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.noplan.judgement import known_start, path_columns
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 

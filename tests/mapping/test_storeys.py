@@ -12,9 +12,6 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.evaluate.anywhere.sites import Site
-from echostep.evaluate.anywhere.tours import clearance_m
-from echostep.evaluate.anywhere.walks import SimulatedWalk, simulate
 from echostep.mapping.joining import join_walks
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.nodes import nodes_of
@@ -26,7 +23,10 @@ from echostep.plan.check import check_plan
 from echostep.plan.model import Plan, parse_plan
 from echostep.plan.writer import plan_json
 from echostep.simulation.people.walker import Waypoint
-from echostep.simulation.world.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
+from echostep_studies.anywhere.sites import Site
+from echostep_studies.anywhere.tours import clearance_m
+from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.simulation.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 
 NO_PINGS = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 

@@ -9,8 +9,8 @@ from echostep.board.calibration import LSM6DSO_M_S2, LSM6DSO_RAD_S
 from echostep.board.frames import encode
 from echostep.board.messages import Motion
 from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.simulation.people.falling import BodySamples
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
+from echostep_studies.simulation.falling import BodySamples
 
 BEGIN_NS = 1_000_000_000
 TICKS_HZ = 2e6

@@ -14,9 +14,9 @@ from echostep.odometry.wearer_signs import StepTaken
 from echostep.plan.model import Pose, load_plan
 from echostep.ports.check_in import PERSON, Call
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.simulation.people.body_motion import MTX
-from echostep.simulation.people.falling import sideways, walk_then
 from echostep.tracker import Tracker
+from echostep_studies.simulation.body_motion import MTX
+from echostep_studies.simulation.falling import sideways, walk_then
 from odometry.fall_bytes import fall_chunks
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from echostep.evaluate.falls import message_index, signs_of
 from echostep.odometry.falls import FRESH_S, Fall
 from echostep.odometry.wearer_signs import Sign, WearerSigns
-from echostep.simulation.people.body_motion import ICM20649, MTX, Samples
-from echostep.simulation.people.falling import (
+from echostep_studies.incapacity.falls import message_index, signs_of
+from echostep_studies.simulation.body_motion import ICM20649, MTX, Samples
+from echostep_studies.simulation.falling import (
     FALLS,
     NO_FALLS,
     BodySamples,

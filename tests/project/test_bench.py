@@ -10,11 +10,9 @@ from pathlib import Path
 
 from waiting import PATIENCE_S
 
-BENCH = Path(__file__).parents[2] / "tools" / "bench.py"
-
 
 def test_a_tiny_benchmark(tmp_path: Path) -> None:
-    command = [sys.executable, str(BENCH), "--tiny", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "echostep_studies.speed.bench", "--tiny", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=10.0 * PATIENCE_S, check=False)
     assert done.returncode == 0, done.stderr
     rows = json.loads((tmp_path / "bench.json").read_text())

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import walk_picture
 from echostep.arrays import Ints
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep.plan.model import load_plan
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
+from echostep_studies.figures import walk_picture
 
 PLAN = load_plan(walk_picture.PLAN)
 
@@ -40,7 +40,9 @@ def test_the_picture_in_the_manual_moves_is_small_and_is_of_this_walk() -> None:
         assert shown.n_frames > 60
         assert shown.info["loop"] == 0
         described = picture.getexif()[walk_picture.IMAGE_DESCRIPTION]
-        assert described == walk_picture.source(PLAN), "the walk or the walls changed: python tools/walk_picture.py"
+        assert described == walk_picture.source(PLAN), (
+            "the walk or the walls changed: python -m echostep_studies.figures.walk_picture"
+        )
         picture.seek(shown.n_frames // 2)
         middle = picture.convert("RGB")
     for colour in (TRACK_COLOUR, walk_picture.PARTICLE_COLOUR):

@@ -26,8 +26,8 @@ from echostep.scorecard.track_columns import load_path
 from echostep.scorecard.zones import NO_ZONE, Zones
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
-from echostep.simulation.world.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
 from echostep.tracker import Tracker
+from echostep_studies.simulation.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
 from walks import walk_chunks
 
 DEMO = load_plan(ROOT / "host/echostep/plans/demo.json")

@@ -19,8 +19,8 @@ from echostep.localization.level_changes import ClimbSettings
 from echostep.localization.start import Air, Start
 from echostep.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
 from echostep.session.metadata import parse_start, recorded_start, run_metadata
-from echostep.simulation.world.tower import tower
 from echostep.tracker import Tracker
+from echostep_studies.simulation.tower import tower
 
 PLAN = tower(3)
 BOARD = "85837343139351E09080"

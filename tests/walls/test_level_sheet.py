@@ -16,7 +16,6 @@ from shapely import Point, Polygon
 
 from echostep.arrays import Floats
 from echostep.board import messages as m
-from echostep.evaluate.multi_floor import judge, through
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.localization.level_changes import (
     ClimbSettings,
@@ -34,7 +33,6 @@ from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Person, Waypoint, walk
 from echostep.simulation.scenario import Scenario
-from echostep.simulation.world.tower import LIFT_AT, STOREY_M, tour, tower
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import (
     LIFT,
@@ -46,6 +44,8 @@ from echostep.walls.level_sheet import (
     level_sheet_of,
     nearest_level,
 )
+from echostep_studies.floors.storeys import judge, through
+from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tour, tower
 from needs_data import needs_data
 from recordings import DATA
 

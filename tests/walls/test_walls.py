@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.papers.girard2011_rays import POSES, lambda_ray_ranges
 from echostep.walls.echo_sources import CORNER, EDGE, MOST_SOURCES, WALL, Walls, echo_sources
 from echostep.walls.index import WallIndex, build_index, crosses_wall
+from echostep_studies.papers.girard2011_rays import POSES, lambda_ray_ranges
 from naive import walls as naive
 
 Sources = list[tuple[float, float, float]]

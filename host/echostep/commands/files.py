@@ -39,7 +39,10 @@ def foot(
     imu: Annotated[Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
     profile: Annotated[
-        str, typer.Option("--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning.")
+        str,
+        typer.Option(
+            "--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning (echostep-studies)."
+        ),
     ] = "default",
     plot: Annotated[bool, typer.Option("--plot", help="Draw the track as PNG, beside the CSV.")] = False,
 ) -> None:
@@ -64,7 +67,8 @@ def legs(
     shank: Annotated[float, typer.Option("--shank", metavar="M", help="Knee to ankle, or to the floor, metres.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
     profile: Annotated[
-        str, typer.Option("--profile", metavar="NAME", help="default, or lee2010: that paper's method.")
+        str,
+        typer.Option("--profile", metavar="NAME", help="default, or lee2010: that paper's method (echostep-studies)."),
     ] = "default",
     scale: Annotated[
         float | None, typer.Option("--scale", help="The wearer's stride scale, as --walked printed it.")

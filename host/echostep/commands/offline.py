@@ -11,8 +11,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from echostep.errors import EchostepError
 from echostep.foot.alignment import aligned
 from echostep.foot.steps import Track, walk_track
@@ -22,15 +20,14 @@ from echostep.offline.leg_csv import load_pair
 from echostep.offline.leg_lengths import calibrated_scale, checked_lengths
 from echostep.offline.leg_pair import track_pair
 from echostep.offline.leg_summary import describe_legs, describe_strides, write_leg_track
-from echostep.offline.leg_track import PROFILES as LEG_PROFILES
+from echostep.offline.leg_track import track_default
+from echostep.offline.profiles import DEFAULT, method
 from echostep.output.leg_plot import draw_legs
 from echostep.output.track_plot import draw_foot
-from echostep.papers import fischer2008
 from echostep.recording.capture import Decoder, as_json, read_capture
 from echostep.recording.capture_summary import summary
 from echostep.session.console import console
 from echostep.xsens.message import MessageReader
-from echostep.xsens.onboard_filter import orientations
 from echostep.xsens.output_formats import OutputFormats
 
 SCALE_RANGE = (0.5, 2.0)  # of --scale; by reason: beyond it the lengths of the leg are wrong
@@ -38,12 +35,11 @@ SCALE_RANGE = (0.5, 2.0)  # of --scale; by reason: beyond it the lengths of the 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:
     """Track a recorded foot IMU with this project's method or that of a paper."""
-    if profile not in FOOT_PROFILES:
-        raise EchostepError(f"--profile {profile}: the foot has no such profile; it has {', '.join(FOOT_PROFILES)}")
+    track_recording = method("foot", profile, _own_track)
     imu = load_imu(path)
     for note in imu.notes:
         console.print(f"{path.name}: {note}")
-    track = FOOT_PROFILES[profile](imu, path.name)
+    track = track_recording(imu, path.name)
     write_foot_track(out, track)
     console.print(f"{path.name}: {describe_track(track)}")
     if plot:
@@ -55,27 +51,13 @@ def _own_track(imu: Imu, name: str) -> Track:
     return checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro, mag=imu.mag)), name)
 
 
-def _fischer2008_track(imu: Imu, name: str) -> Track:
-    """The paper's method. It needs the MTx's rotation matrices, which no CSV holds: they come from a model of the MTx's filter."""
-    if imu.mag is None:
-        console.print(f"{name}: no columns mx,my,mz: the MTx's filter is modelled without its magnetometer.")
-    good = fischer2008.usable(imu.t_s, imu.accel, imu.gyro)[0]
-    matrices = np.full((len(imu.t_s), 3, 3), np.nan)
-    mag = None if imu.mag is None else imu.mag[good]
-    matrices[good] = orientations(imu.t_s[good], imu.accel[good], imu.gyro[good], mag)
-    return fischer2008.walk_track(imu.t_s, imu.accel, imu.gyro, matrices)
-
-
-FOOT_PROFILES = {"default": _own_track, "fischer2008": _fischer2008_track}
-
-
 @dataclass(frozen=True, slots=True)
 class LegOptions:
     """Lengths of the leg (hip to knee, knee to ankle or floor), the wearer's stride scale, and the true length of the walk if known."""
 
     thigh_m: float
     shank_m: float
-    profile: str = "default"
+    profile: str = DEFAULT
     scale: float | None = None
     walked_m: float | None = None
 
@@ -83,21 +65,20 @@ class LegOptions:
 def legs(paths: list[Path], out: Path, options: LegOptions, *, plot: bool = False) -> None:
     """Track a recorded leg, or both of one person, with this project's method or that of a paper."""
     profile, scale = options.profile, options.scale
-    if profile not in LEG_PROFILES:
-        raise EchostepError(f"--profile {profile}: legs have no such profile; they have {', '.join(LEG_PROFILES)}")
+    track_leg = method("legs", profile, track_default)
     if scale is not None and not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
         raise EchostepError(f"--scale {scale:g}: expected about 1, as --walked prints it")
     lengths = checked_lengths(options.thigh_m, options.shank_m, scale or 1.0)
     path, pair = paths[0], load_pair(paths)
     for note in (note for leg in pair for note in leg.notes):
         console.print(f"{path.name}: {note}")
-    if lengths.measured_to_floor and profile == "default":
+    if lengths.measured_to_floor and profile == DEFAULT:
         ankle = f"{lengths.to_ankle_m:.3f} m to the ankle"
         console.print(f"--shank {options.shank_m:g} is taken as knee to floor: {ankle}")
     settings = StrideSettings(lengths, calibrated=scale is not None)
-    if len(pair) == 2 and profile != "default":
+    if len(pair) == 2 and profile != DEFAULT:
         raise EchostepError(f"--profile {profile} is a method for one leg: give one file, without columns other_...")
-    track = track_pair(*pair, settings) if len(pair) == 2 else LEG_PROFILES[profile](pair[0], settings)
+    track = track_pair(*pair, settings) if len(pair) == 2 else track_leg(pair[0], settings)
     write_leg_track(out, track)
     for line in describe_strides(track):
         console.print(line)

@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from echostep.errors import EchostepError
-from echostep.evaluate.report import Table
 from echostep.output.score_page import ScoreReport, page, short_names
+from echostep.output.table import Table
 from echostep.plan.importers.limited import open_limited
 from echostep.scorecard.card import score as score_track
 from echostep.scorecard.definitions import METRICS, as_text, notes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The track of a recorded leg, by this project's method or by that of Lee and Lee 2010.
+"""The track of a recorded leg, by this project's method.
 
 In: `LegSamples`, `StrideSettings`. Out: `LegTrack`. Owns nothing. The estimators are the same as live.
 """
@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.legs import swing_detection as leg_swings
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.heading import Heading
 from echostep.legs.leg_side import about_trunk
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples
-from echostep.papers import lee2010
 
 # By reason, all of them.
 START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read from a plan
@@ -94,27 +92,6 @@ def fused_heading(
     accepted = heading.read - heading.refused
     read = (f"compass accepted in {accepted} of {heading.read} readings",) if heading.read else ()
     return angles, (*notes, *read)
-
-
-def track_lee2010(samples: LegSamples, settings: StrideSettings) -> LegTrack:
-    """The method of Lee and Lee 2010 at 10 Hz; the sign of each gyro is found by `Swings`."""
-    rates = np.column_stack([samples.thigh, samples.shank])
-    swings = leg_swings.Swings()
-    watched_s = np.cumsum(np.minimum(np.diff(samples.t_s, prepend=samples.t_s[0]), lee2010.LONGEST_GAP_S))
-    grid = np.arange(0.0, watched_s[-1], 1.0 / leg_swings.GRID_HZ)
-    even = np.column_stack([np.interp(grid, watched_s, column) for column in rates.T])
-    thigh, shank = swings.sign if swings.decide(even, final=True) else (1.0, 1.0)
-    sign, sign_notes = belt_sign(samples)
-    lee = lee2010.LeeSettings(legs=lee2010.Lee2010Legs(settings.segments.thigh_m, settings.segments.shank_m))
-    walker = lee2010.Walker(lee)
-    if np.isnan(samples.compass).all():
-        walker.heading = lee2010.Fused(0.0, 0.0)
-    belt = np.where(np.isnan(samples.belt), 0.0, sign * samples.belt)
-    rows = walker.feed(samples.t_s, thigh * samples.thigh, shank * samples.shank, belt, samples.compass)
-    return LegTrack(rows, (), None, source_of(samples), math.sqrt(walker.heading.variance), sign_notes)
-
-
-PROFILES = {"default": track_default, "lee2010": track_lee2010}
 
 
 def doubts(strides: tuple[Stride, ...]) -> tuple[str, ...]:

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
+from echostep.simulation.devices.onboard_filter import OnBoardFilter, orientations
 from echostep.simulation.devices.serial_delivery import deliver
 from echostep.simulation.people.attitude import quaternions, rotations, turns
 from echostep.simulation.people.walker import RATE_HZ, Walk
 from echostep.simulation.world.magnetic_field import EARTH, MagneticField
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
-from echostep.xsens.onboard_filter import OnBoardFilter, orientations
 
 GRAVITY_M_S2 = 9.81
 ACCEL_LIMIT_M_S2, GYRO_LIMIT_RAD_S = 180.0, math.radians(1200.0)

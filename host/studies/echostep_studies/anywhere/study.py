@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""The study `anywhere`: every trial of every seed, judged.
+
+In: seeds; the public recordings for westport-house. Out: the table, JSON, Parquet, Stanford diagrams. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from fnmatch import fnmatch
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echostep.errors import EchostepError
+from echostep.output.table import Table
+from echostep_studies.anywhere.amcl import track_by_amcl
+from echostep_studies.anywhere.columns import run_row, summaries, tables
+from echostep_studies.anywhere.filtering import FilterRun, track
+from echostep_studies.anywhere.judgement import SEARCH_M, JudgedRun, Truth, judge, true_levels
+from echostep_studies.anywhere.pictures import draw_stanford
+from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
+from echostep_studies.anywhere.walks import T, X, Y, Z
+from echostep_studies.frame.report import Row
+from echostep_studies.frame.study import Study, StudyRequest
+
+PEER = "/amcl"  # ending of the rows of augmented MCL
+
+
+def one_run(names: tuple[str, ...], data: Path | None, seed: int) -> list[Row]:
+    """The trials of these names with the walks of this seed."""
+    walks, rows = Walks(seed, data), []
+    for name in names:
+        trial = TRIALS[name.removesuffix(PEER)](walks)
+        method = track_by_amcl if name.endswith(PEER) else track
+        run = method(trial.walk.segments, trial.plan, trial.start, seed)
+        rows.append(run_row(name, seed, _judged(trial, run) if trial.on_plan else None, run))
+    return rows
+
+
+def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
+    """The claims from the beginning of the search on."""
+    walk, claims = trial.walk, [c for c in run.claims if c.t_s >= trial.from_s]
+    t_s = np.array([c.t_s for c in claims])
+    x, y, z = (np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y, Z))
+    place = np.column_stack([x, y])
+    walked_m = walk.walked_m(t_s) - walk.walked_m(np.array([trial.from_s]))
+    return judge(claims, Truth(place, true_levels(place, z, trial.plan)), walked_m)
+
+
+def anywhere_study(data: Path | None, rows: str = "*") -> Study:
+    """The study of the rows whose names match a pattern; `data`: folder of the public recordings, without which westport-house is left out."""
+    if data is not None and not (data / "maps" / "westport-house").is_dir():
+        raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its row is left out")
+    every = [name for trial in TRIALS if data or trial not in NEEDS_DATA for name in _methods(trial)]
+    names = tuple(name for name in every if fnmatch(name, rows))
+    if not names:
+        raise EchostepError(f"--rows {rows}: no row is named so; there are: {', '.join(every)}")
+    return Study("anywhere", partial(one_run, names, data), summaries, _tables, draw_runs=draw_stanford)
+
+
+def _methods(trial: str) -> list[str]:
+    """Names of the rows of a trial."""
+    return [trial, trial + PEER] if trial in PEERED else [trial]
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    title = f"Found from nowhere, found again, and the radius: {request.runs} simulated walks a row"
+    return tables(title, rows, SEARCH_M)

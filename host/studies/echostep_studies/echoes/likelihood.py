@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""What the tracker's echo likelihood expects of simulated pings, and the settings under which it explains them best.
+
+In: poses and ranges. Out: log-densities; fitted settings. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model, log_echo
+from echostep.output.table import console
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep_studies.frame.report import Row
+from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
+from echostep_studies.simulation.sites import angled, otb, thousand
+
+FITTED = ("sd_m", "slant_m", "rim_db", "soft_db", "edge_db", "corner_db", "stray")
+
+
+def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model: EchoModel) -> Floats:
+    """What the likelihood says of ranges (n,) of the left ranger at a pose."""
+    x, y, heading = pose
+    away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
+    axis = heading + 0.5 * math.pi
+    index = plan.near(np.array([x]), np.array([y]))
+    count = echo_sources(x, y, axis, index, away, off, kind)
+    return np.array([log_echo(0.0 if math.isnan(z) else z, count, away, off, kind, model) for z in ranges_m.tolist()])
+
+
+def fitted(seed: int) -> list[Row]:
+    """The settings that explain pings at true poses best, beside those in use: maximum likelihood over three simulated buildings."""
+    from scipy.optimize import minimize
+
+    seen = _at_true_poses(seed)
+    start = np.log([getattr(EchoSettings(), name) for name in FITTED])
+
+    def cost(x: Floats) -> float:
+        chosen = dict(zip(FITTED, np.exp(x).tolist(), strict=True))
+        if chosen["stray"] >= 0.95:
+            return math.inf
+        model = echo_model(replace(EchoSettings(), **chosen))
+        return -float(np.mean([log_echo(z, n, d, off, kind, model) for z, n, d, off, kind in seen]))
+
+    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
+    console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-found.fun:.3f} fitted")
+    rows: list[Row] = [
+        {"name": f"fit: {name}", "set": getattr(EchoSettings(), name), "fitted": round(value, 4)}
+        for name, value in zip(FITTED, np.exp(found.x).tolist(), strict=True)
+    ]
+    return rows
+
+
+def _at_true_poses(seed: int) -> list[tuple[float, int, Floats, Floats, Floats]]:
+    seen = []
+    for site in (otb(), angled(), thousand()):
+        walk = walk_markers(lay_markers(site.route), site.built, 10_000 + seed)
+        plan, p = Walls(site.plan), walk.pings
+        for x, y, axis, z in zip(*p.pose.T.tolist(), p.range_m.tolist(), strict=True):
+            away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
+            count = echo_sources(x, y, axis, plan.near(np.array([x]), np.array([y])), away, off, kind)
+            seen.append((0.0 if math.isnan(z) else z, count, away, off, kind))
+    return seen

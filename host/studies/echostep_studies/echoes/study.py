@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""What simulated rangers hear, effect by effect [Girard 2011, 2.6, Figures 1-5], and how well the tracker's likelihood expects it.
+
+In: a seed. Out: rows, a picture of each effect, and on demand the settings that explain simulated pings best. The simulation and the likelihood share
+nothing but the plan: one computes levels of sound from mirror images, the other has a handful of numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.output.table import Table, console
+from echostep.simulation.world.acoustics import SRF02, directivity_db
+from echostep.walls.echo_sources import Walls
+from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
+from echostep_studies.echoes.findings import FINDINGS
+from echostep_studies.echoes.likelihood import fitted, log_p
+from echostep_studies.echoes.pictures import draw_effects
+from echostep_studies.frame.report import Row
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
+from echostep_studies.simulation.sites import otb
+
+UNIFORM = -math.log(6.0)  # log-density of a range of which nothing is known
+COLUMNS = {
+    "name": "effect", "pings": "pings", "heard": "heard", "log_p": "mean log p", "uniform": "of a uniform", "finding": "finding",
+}  # fmt: skip
+SETTINGS_COLUMNS = {"name": "setting", "set": "as set", "fitted": "fitted"}
+
+
+def echoes_study(*, fit: bool) -> Study:
+    """The study, which has one run; `fit`: also fit the likelihood's settings to simulated pings, which takes minutes."""
+    return Study(
+        "echoes", partial(one_run, fit=fit), lambda rows: rows, _tables, draw_figures, journal=False, parquet=None
+    )
+
+
+def one_run(seed: int, *, fit: bool) -> list[Row]:
+    """Rows of the effects, of the angular response, of the schedules, and of the fitted settings."""
+    rows = [_row(effect) for effect in simulated_effects(seed)] + [_cone()] + _schedules(seed)
+    return rows + fitted(seed) if fit else rows
+
+
+def draw_figures(folder: Path, seed: int, _rows: list[Row]) -> None:
+    """The picture of all effects."""
+    path = folder / "figures1-5.png"
+    draw_effects(path, simulated_effects(seed))
+    console.print(f"{path}")
+
+
+def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
+    found = [row for row in rows if "set" not in row]
+    settings = [row for row in rows if "set" in row]
+    tables = [Table("Simulated pings, and how the likelihood expects them", found, COLUMNS)]
+    return [*tables, Table("Echo settings", settings, SETTINGS_COLUMNS)] if settings else tables
+
+
+def _row(effect: Effect) -> Row:
+    plan, model = Walls(effect.plan), echo_model(EchoSettings())
+    explained = np.concatenate([log_p(plan, h.pose, h.range_m, model) for h in effect.heard])
+    ranges = np.concatenate([h.range_m for h in effect.heard])
+    return {
+        "name": effect.name,
+        "pings": len(ranges),
+        "heard": round(float(np.mean(~np.isnan(ranges))), 3),
+        "log_p": round(float(explained.mean()), 3),
+        "uniform": round(UNIFORM, 3),
+        "finding": FINDINGS[effect.name](effect),
+    }
+
+
+def _cone() -> Row:
+    angles = np.radians(np.arange(0.0, 50.0, 0.1))
+    level = np.array([directivity_db(float(a), SRF02.size) for a in angles])
+    six = math.degrees(float(angles[int(np.argmax(level < -6.0))]))
+    finding = f"-6 dB at {six:.1f} degrees; the pipe is heard to {pipe_range_m(0.0):.1f} m ahead, {pipe_range_m(math.radians(25.0)):.1f} m at 25"
+    return {"name": "angular response", "finding": finding}
+
+
+def _schedules(seed: int) -> list[Row]:
+    """Pings answered by the other ranger's sound, in the paper's building, by schedule."""
+    site, rows = otb(), []
+    for name, offset_s in (("both at once", 0.0), ("concurrent", 0.033), ("sequential", 0.07)):
+        pings = walk_markers(lay_markers(site.route), site.built, seed, offset_s=offset_s).pings
+        share = float(np.mean(pings.cross))
+        finding = f"{100 * share:.1f} % are the other ranger's sound; {len(pings.t_s) / pings.t_s[-1]:.0f} pings/s"
+        rows.append({"name": f"schedule: {name}", "pings": len(pings.t_s), "finding": finding})
+    return rows

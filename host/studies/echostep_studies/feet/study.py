@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""`echostep evaluate feet`: the foot on real recordings with truth, one setting for all, beside the peers' figures.
+
+In: the folder of recordings. Out: rows `{set, recording, metric, value, distance_m, peer, peer_name}`, JSON, a table, on request a picture.
+Owns nothing. Nothing is set for a recording: the foot has one setting, and it stays at its default.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from statistics import median
+
+from echostep.foot.ins import Noise
+from echostep.foot.steps import Track, walk_track
+from echostep.output.table import Table, console
+from echostep_studies.feet.datasets import FootRecording
+from echostep_studies.feet.latency import LIVE, pace_rows
+from echostep_studies.feet.leave_one_out import add_left_out, describe, leave_one_out
+from echostep_studies.feet.metrics import Figure, way
+from echostep_studies.feet.pictures import draw_tracks
+from echostep_studies.frame.report import Row
+from echostep_studies.frame.study import Study, StudyRequest
+
+COLUMNS = {
+    "set": "set",
+    "recording": "recording",
+    "metric": "metric",
+    "value": "m",
+    "distance_m": "way m",
+    "peer": "peer's",
+}
+
+
+def feet_study(recordings: list[FootRecording], out: Path | None, *, left_out: bool) -> Study:
+    """The study of these recordings; `out`: folder of the picture, if one is wanted; `left_out`: also leave one set out."""
+    tracks = [track_of(recording) for recording in recordings]
+    return Study(
+        "feet",
+        lambda _seed: _rows_of_all(recordings, tracks, left_out=left_out),
+        lambda rows: rows,
+        _tables,
+        None if out is None else lambda folder, _seed, _rows: draw_tracks(folder / "feet.png", recordings, tracks),
+        seeds=range(1),
+        journal=False,
+        parquet=None,
+    )
+
+
+def _rows_of_all(recordings: list[FootRecording], tracks: list[Track], *, left_out: bool) -> list[Row]:
+    """Rows of the recordings, the medians of the sets, and the rows of the live foot."""
+    rows = [row for recording, track in zip(recordings, tracks, strict=True) for row in rows_of(recording, track)]
+    rows += medians(rows)
+    if left_out:
+        choices = leave_one_out(recordings, track_of)
+        add_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
+        for group, noise in choices.items():
+            console.print(f"{group} left out, the others choose: {describe(noise)}")
+    return rows + pace_rows(recordings)
+
+
+def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
+    """The figures of the recordings; below, those of the live foot."""
+    live = [f"{row['metric']}: {row['value']:.4f}" for row in rows if row["set"] == LIVE]
+    figures = [row for row in rows if row["set"] != LIVE]
+    columns = COLUMNS | {"left_out": "left out, m"} if any("left_out" in row for row in figures) else COLUMNS
+    return [Table("The foot on real recordings, one setting", [_printed(row) for row in figures], columns, live)]
+
+
+def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> list[Row]:
+    """The rows of one set with other constants."""
+    rows = [row for r in recordings if r.group == group for row in rows_of(r, track_of(r, noise))]
+    return rows + medians(rows)
+
+
+def track_of(recording: FootRecording, noise: Noise | None = None) -> Track:
+    """The foot's track, with the one setting unless other constants are given."""
+    return walk_track(recording.t_s, recording.accel, recording.gyro, noise=noise)
+
+
+def rows_of(recording: FootRecording, track: Track) -> list[Row]:
+    """One row for each figure of a recording."""
+    return [_row(recording.group, recording.name, figure, way(track)) for figure in recording.judge(track)]
+
+
+def medians(rows: list[Row]) -> list[Row]:
+    """The median of each metric of a set that has several recordings; of its size where it has a sign."""
+    found = []
+    for group, metric in dict.fromkeys((row["set"], row["metric"]) for row in rows if row["set"] != "stairs"):
+        same = [row for row in rows if (row["set"], row["metric"]) == (group, metric)]
+        if len(same) > 1:
+            middle = Figure(metric, median(abs(row["value"]) for row in same))
+            found.append(_row(group, f"median of {len(same)}", middle, median(row["distance_m"] for row in same)))
+    return found
+
+
+def _row(group: str, name: str, figure: Figure, way_m: float) -> Row:
+    peer_name, peer = figure.peer or (None, None)
+    return {
+        "set": group,
+        "recording": name,
+        "metric": figure.metric,
+        "value": round(figure.value, 4),
+        "distance_m": round(way_m, 2),
+        "peer": peer,
+        "peer_name": peer_name,
+    }
+
+
+def _printed(row: Row) -> Row:
+    """With three digits, and the peer's name beside its figure."""
+    peer = "" if row["peer"] is None else f"{row['peer']:.3f} {row['peer_name']}"
+    digits = {key: f"{row[key]:.3f}" for key in ("value", "left_out") if row.get(key) is not None}
+    return row | digits | {"peer": peer}

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""The guided returns of [Fischer 2008, 4]: success of dead reckoning alone, the paper's fusion and the particle filter, also with worse beacons.
+
+Simulated. The particle filter has the tracker's kernels, but some rules of its own: see `beacon_cloud` and `guidance`.
+In: number of returns, seed. Out: rows `{name, success, low95, high95, runs}`, the paper's Figures 9 and 10, a picture of the sweeps. Return k of
+every row is on the same ground: trail, beacons and sources of seed + k.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echostep.output.table import Table
+from echostep.simulation.world.beacon_ground import GroundSettings, ground
+from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, Knowledge, guided_return
+from echostep_studies.fischer2008.walker import EXACT, Obedience
+from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.study import Study, StudyRequest
+
+BATCH = 50  # returns a task
+INEXACT = Obedience(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)  # by reason
+SYSTEMS = {"pdr": PDR, "fischer2008": PAPER, "default": OURS}
+NOMINAL = GroundSettings()
+UNCERTAIN = replace(NOMINAL, place_sd_m=1.0, axis_sd_deg=15.0, outliers=0.2)
+SWEEPS: dict[str, tuple[float, ...]] = {
+    "place_sd_m": (0.5, 1.0, 2.0, 3.0),
+    "axis_sd_deg": (15.0, 45.0, 90.0),
+    "reach_m": (3.0, 5.0, 12.0),
+    "spacing_m": (3.0, 8.0, 12.0),
+    "outliers": (0.0, 0.2, 0.4),
+    "period_s": (1.0, 2.0, 5.0),
+}
+SAMPLE = 20  # rows of the sweeps and of rare conditions have one return for so many of the main rows
+CLOSER = 4  # rows of the conditions that matter most likewise
+COLUMNS = {"name": "", "percent": "% out", "low_percent": "from", "high_percent": "to (95 %)", "runs": "runs"}
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A row: the system, the ground, the time between measurements, the person's obedience.
+
+    `deployed`: the beacons' places are known from the way in alone. `every`: the row has one of so many returns.
+    """
+
+    name: str
+    system: int
+    settings: GroundSettings = NOMINAL
+    period_s: float = 0.2
+    obedience: Obedience = EXACT
+    deployed: bool = False
+    every: int = 1
+
+
+def cases() -> Iterator[Case]:
+    """All rows of the study."""
+    for name, system in SYSTEMS.items():
+        yield Case(name, system)
+    for name, system in list(SYSTEMS.items())[1:]:
+        yield Case(f"{name}/known-to-1m", system, replace(UNCERTAIN, axis_sd_deg=0.0), every=CLOSER)
+        yield Case(f"{name}/uncertain", system, UNCERTAIN, every=CLOSER)
+        yield Case(f"{name}/people", system, obedience=INEXACT, every=CLOSER)
+        yield Case(f"{name}/moved", system, replace(NOMINAL, moved=0.1), every=SAMPLE)
+        yield Case(f"{name}/dead", system, replace(NOMINAL, dead=0.2), every=SAMPLE)
+    yield Case("default/deployed", OURS, deployed=True, every=SAMPLE)
+    yield Case("default/deployed-no-iron", OURS, replace(NOMINAL, sources=0), deployed=True, every=SAMPLE)
+    for parameter, values in SWEEPS.items():
+        for value in values:
+            for name, system in list(SYSTEMS.items())[1:]:
+                label = f"sweep/{parameter}={value:g}/{name}"
+                if parameter == "period_s":
+                    yield Case(label, system, period_s=value, every=SAMPLE)
+                else:
+                    yield Case(label, system, _with(parameter, value), every=SAMPLE)
+
+
+def _with(parameter: str, value: float) -> GroundSettings:
+    """The nominal ground with one parameter changed."""
+    changed: dict[str, Any] = {parameter: value}
+    return replace(NOMINAL, **changed)
+
+
+def fischer2008_study(runs: int, seed: int) -> Study:
+    """The study of `runs` returns from `seed` on. Its runs are batches of returns: the seed of a run is the batch's index."""
+    return Study(
+        "fischer2008",
+        partial(one_batch, first=seed, runs=runs),
+        lambda rows: [_summary(group) for group in rows_by_name(rows)],
+        _tables,
+        draw,
+        seeds=range(math.ceil(runs / BATCH)),
+        parquet="summary",
+    )
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    """Success rates with 95 % intervals, in percent."""
+    printed = [
+        r | {"percent": 100 * r["success"], "low_percent": 100 * r["low95"], "high_percent": 100 * r["high95"]}
+        for r in rows
+    ]
+    return [Table(f"People guided back to the exit in time, {request.runs} simulated returns", printed, COLUMNS)]
+
+
+def one_batch(batch: int, first: int, runs: int) -> list[Row]:
+    """The returns [batch * BATCH, ...) of all rows: their number, and the number of those that reached the exit."""
+    returns = range(batch * BATCH, min((batch + 1) * BATCH, runs))
+    rows = []
+    for case in cases():
+        chosen = [k for k in returns if k % case.every == 0]
+        if chosen:
+            rows.append(
+                {"name": case.name, "runs": len(chosen), "out": sum(one_return(case, first + k) for k in chosen)}
+            )
+    return rows
+
+
+def one_return(case: Case, seed: int) -> bool:
+    """Whether one person reaches the exit in time."""
+    world = ground(case.settings, np.random.default_rng([seed, 1]))
+    knowledge = Knowledge(case.settings.place_sd_m, math.radians(case.settings.axis_sd_deg), case.deployed)
+    return guided_return(world, case.system, seed, case.period_s, case.obedience, knowledge).arrived
+
+
+def _summary(batches: list[Row]) -> Row:
+    """The batches of one row added up: the success rate and its 95 % interval."""
+    runs, out = sum(b["runs"] for b in batches), sum(b["out"] for b in batches)
+    low, high = wilson95(out, runs)
+    return {"name": batches[0]["name"], "success": out / runs, "low95": low, "high95": high, "runs": runs}
+
+
+def wilson95(successes: int, runs: int) -> tuple[float, float]:
+    """Interval that holds the true rate with 95 % confidence [Wilson 1927]."""
+    z = 1.959963984540054
+    share, part = successes / runs, z * z / runs
+    middle = (share + part / 2) / (1 + part)
+    half = z * math.sqrt(share * (1 - share) / runs + part / (4 * runs)) / (1 + part)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def draw(out: Path, _seed: int, rows: list[Row]) -> None:
+    """The paper's Figures 9 and 10, the same return by the particle filter, and the sweeps."""
+    from echostep_studies.fischer2008.pictures import draw_returns, draw_sweeps
+
+    trail = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [45.0, 15.0], [45.0, -5.0], [70.0, -5.0]])
+    world = ground(NOMINAL, np.random.default_rng(9), trail)
+    returns = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
+    draw_returns(out / "figures9-10.png", world, returns)
+    by_name = {r["name"]: r for r in rows}
+    nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
+    draw_sweeps(out / "sweeps.png", SWEEPS, nominal, by_name)

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""Walks through all floors of a building, tracked on its plan: by foot and board, by the board alone, from an unknown floor.
+
+In: seeds, and westport-house where it is at hand. Out: rows `storeys/...`. Everything is simulated but the plan. The whole tracker runs, from the
+bytes of the simulated board and MTx.
+
+The true floor is the one nearest to the wearer, of those where the lift stops during a ride; within half a metre of the middle between two floors
+both are right (`floor_right`); `strict_right` gives nothing away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.localization.error_statistics import error_statistics
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.localization.start import ANY_LEVEL
+from echostep.output.table import Table
+from echostep.plan.importers.formats import open_plan
+from echostep.plan.model import Connector, Plan, Pose
+from echostep.plan.routing import RoutePlace, Routes
+from echostep.ports.chunks import MTX, portion_of
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.people.tours import tour as tour_of
+from echostep.simulation.people.walker import Person, Waypoint
+from echostep.simulation.scenario import Scenario
+from echostep.tracker import Tracker
+from echostep_studies.frame.report import LOST_M, Row, rows_by_name
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.simulation.tower import tour, tower
+
+STOREYS = 5
+WESTPORT = "storeys/westport"  # name of the row of the real plan
+TIE_M = 0.5
+PORTION = 1000
+AWAY_M = (8.0, 30.0)  # of a place to visit from the stairs, as one walks
+COLUMNS = {
+    "name": "", "runs": "runs", "mean_m": "mean m", "ce95_m": "CE95 m", "max_m": "max m", "ending_m": "end m", "floor_right": "right %",
+    "strict_right": "strict %", "longest_wrong_s": "longest wrong s", "coverage95": "in 95 % ellipse", "lost": "lost",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class BuildingScene:
+    """`foot`: an MTx is worn; `known`: the floor of the start is given."""
+
+    foot: bool = True
+    known: bool = True
+
+
+SCENES = {"": BuildingScene(), "-legs": BuildingScene(foot=False), "-any": BuildingScene(known=False)}
+
+
+def one_run(real: Path | None, seed: int) -> list[Row]:
+    """Every scene with the person of this seed."""
+    rows = [_row(f"storeys/tower{name}", scene, tower(STOREYS), tour(STOREYS), seed) for name, scene in SCENES.items()]
+    if real is not None:
+        plan = open_plan(real)
+        rows.append(_row(WESTPORT, BuildingScene(), plan, through(plan, seed), seed))
+    return rows
+
+
+def through(plan: Plan, seed: int) -> list[Waypoint]:
+    """A place on each floor, one after the other by the nearest stairs or lift, and back to the first."""
+    rng, routes, places = np.random.default_rng([seed, 60]), Routes(plan), list[RoutePlace]()
+    stairs = next(c for c in plan.connectors if len(c.levels) == len(plan.levels))
+    x, y = stairs.outline_m.mean(axis=0).tolist()
+    low, high = plan.levels[0].solid.reshape(-1, 2).min(0), plan.levels[0].solid.reshape(-1, 2).max(0)
+    while len(places) < len(plan.levels):
+        k = len(places)
+        at = rng.uniform(np.maximum(low, [x - 25.0, y - 25.0]), np.minimum(high, [x + 25.0, y + 25.0]))
+        try:
+            route = routes.way(RoutePlace(x, y, k), RoutePlace(float(at[0]), float(at[1]), k))
+        except EchostepError:
+            continue
+        line = route.stretches[-1].line_m
+        if len(route.stretches) == 1 and len(line) > 2 and AWAY_M[0] < route.length_m < AWAY_M[1]:
+            places.append(RoutePlace(float(line[-2, 0]), float(line[-2, 1]), k))
+    return tour_of(plan, [*places, places[0]])
+
+
+def _row(name: str, scene: BuildingScene, plan: Plan, way: Sequence[Waypoint], seed: int) -> Row:
+    scenario = Scenario(plan, way, seed, PythonBoard(seed), Person(corner_m=0.3))
+    chunks = [c for c in scenario.chunks() if scene.foot or c.port != MTX]
+    start = scenario.start
+    tracker = Tracker(
+        plan, Pose(start.x_m, start.y_m, start.heading_rad, start.level if scene.known else ANY_LEVEL), seed=seed
+    )
+    estimates = [e for k in range(0, len(chunks), PORTION) for e in tracker.take(portion_of(chunks[k : k + PORTION]))]
+    return {"name": name, "profile": "default", "seed": seed, **judge(plan, scenario.truth, estimates)}
+
+
+def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate]) -> Row:
+    """Errors of a walk; `truth` (n, 5): t_s, x, y, heading, height."""
+    t_s = np.array([e.t_s for e in estimates])
+    x, y, z = (np.interp(t_s, truth[:, 0], truth[:, k]) for k in (1, 2, 4))
+    error = np.hypot(x - [e.x_m for e in estimates], y - [e.y_m for e in estimates])
+    places = list(zip(estimates, x.tolist(), y.tolist(), z.tolist(), strict=True))
+    right = np.array([_right(plan, e, (px, py, pz), TIE_M) for e, px, py, pz in places])
+    strict = np.array([_right(plan, e, (px, py, pz), 0.0) for e, px, py, pz in places])
+    wrong_s, since = 0.0, None
+    for t, good in zip(t_s.tolist(), right.tolist(), strict=True):
+        since = None if good else t if since is None else since
+        wrong_s = max(wrong_s, 0.0 if since is None else t - since)
+    found = error_statistics(error)
+    return {
+        "mean_m": found.mean_m, "sd_m": found.sd_m, "max_m": found.max_m, "min_m": found.min_m,
+        "ending_m": found.ending_m, "ce95_m": found.p95_m,
+        "coverage95": float(np.mean([e.holds(px, py) for e, px, py, _ in places])),
+        "lost": int(error[-1] > LOST_M), "said_lost": float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
+        "floor_right": float(right.mean()), "strict_right": float(strict.mean()), "longest_wrong_s": wrong_s,
+        "floors": len({e.level for e in estimates}),
+    }  # fmt: skip
+
+
+def _right(plan: Plan, e: Estimate, at_m: tuple[float, float, float], tie_m: float) -> bool:
+    """Whether an estimate's floor is the nearest to a place, or as good."""
+    x, y, z = at_m
+    served = {k for c in plan.connectors if c.kind == "lift" and _holds(c, x, y) for k in c.levels}
+    away = {k: abs(z - plan.levels[k].height_m) for k in served or range(len(plan.levels))}
+    return e.level in away and away[e.level] <= min(away.values()) + 2.0 * tie_m
+
+
+def _holds(connector: Connector, x: float, y: float) -> bool:
+    from shapely import Point, Polygon
+
+    return bool(Polygon(connector.outline_m).buffer(0.3).contains(Point(x, y)))
+
+
+def _summary(rows: Sequence[Row]) -> Row:
+    def over(key: str, how: Callable[[list[float]], float]) -> float:
+        return round(how([row[key] for row in rows]), 4)
+
+    def mean(values: list[float]) -> float:
+        return sum(values) / len(values)
+
+    found: Row = {"name": rows[0]["name"], "profile": "default", "runs": len(rows)}
+    found |= {
+        k: over(k, mean) for k in ("mean_m", "sd_m", "ending_m", "ce95_m", "coverage95", "floor_right", "strict_right")
+    }
+    found |= {"max_m": over("max_m", max), "min_m": over("min_m", min), "lost": sum(row["lost"] for row in rows)}
+    return found | {"longest_wrong_s": over("longest_wrong_s", max)}
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
+    real = any(row["name"] == WESTPORT for row in rows)
+    notes = () if real else ("Without --data westport-house is left out.",)
+    return [Table(f"All floors of a building, {request.runs} simulated walks", shown, COLUMNS, notes)]
+
+
+def storeys_study(data: Path | None) -> Study:
+    """The study; `data`: folder of the public recordings, which holds the plan of westport-house."""
+    westport = None if data is None else data / "maps" / "westport-house"
+    if westport is not None and not westport.is_dir():
+        raise EchostepError(f"{westport}: not there: the tower alone can do without --data")
+    return Study(
+        "storeys", partial(one_run, westport), lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables
+    )

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""Floors by pressure, simulated: how often the right floor is named, and for how long a wrong one.
+
+In: seeds. Out: rows `floors/...`. A run is 20 minutes about five storeys under weather of 1 hPa/h (`simulation.people.vertical_day`,
+`simulation.world.air_pressure`).
+
+The true floor is the storey nearest to the wearer: on stairs and in a lift it changes at the middle between two. Within a quarter of
+a metre of the middle both count as right (`floor_right`), because landings lie there; `strict_right` gives nothing away. Unless a scene is of a
+`whole` record, each sample is judged by what was known at it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats, Ints, spans
+from echostep.barometer import vertical_model as vertical
+from echostep.barometer.altitude import BarometerSettings, Pressures
+from echostep.barometer.floor_filter import FloorFilter, Floors
+from echostep.output.table import Table
+from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
+from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
+from echostep_studies.simulation.vertical_day import VerticalMove, climb
+
+STOREYS_M = (0.0, 3.5, 7.0, 10.5, 14.0)
+RUN_S = 1200.0
+TIE_M = 0.25
+COUNTS_PA = 0.25
+MODE_HZ: dict[Mode, float] = {"high-speed": 9.0, "high-resolution": 1.8}
+
+
+STORM = Weather()
+
+
+@dataclass(frozen=True, slots=True)
+class FloorScene:
+    """`known_start`: the first floor is given; `gait`: walking and standing are given, as legs or foot report them.
+
+    `whole`: judged with the whole record, as `echostep floors` does.
+    """
+
+    ways: Literal["stairs", "lift", "both"] = "both"
+    weather: Weather = STORM
+    mode: Mode = "high-speed"
+    known_start: bool = True
+    gait: bool = True
+    whole: bool = False
+
+
+SCENES = {
+    "floors/stairs": FloorScene("stairs"),
+    "floors/lift": FloorScene("lift"),
+    "floors/both": FloorScene(),
+    "floors/pulses": FloorScene(weather=replace(STORM, doors_s=30.0, fan_s=90.0, fan_pa=15.0)),
+    "floors/high-resolution": FloorScene(mode="high-resolution"),
+    "floors/pressure-only": FloorScene(gait=False),
+    "floors/unknown-start": FloorScene(known_start=False, gait=False, whole=True),
+    "floors/record": FloorScene(gait=False, whole=True),
+}
+COLUMNS = {
+    "name": "", "runs": "runs", "floor_right": "right %", "strict_right": "strict %", "worst_right": "worst run %",
+    "longest_wrong_s": "longest wrong s",    "changes": "changes",
+}  # fmt: skip
+
+
+def one_run(seed: int) -> list[Row]:
+    """Every scene with the person and the weather of this seed."""
+    return [_row(name, scene, seed) for name, scene in SCENES.items()]
+
+
+def _row(name: str, scene: FloorScene, seed: int) -> Row:
+    rng = np.random.default_rng([seed, 50])
+    way = climb(STOREYS_M, RUN_S, rng, scene.ways)
+    sign = float(rng.choice((-1.0, 1.0)))
+    weather = replace(scene.weather, trend_pa_h=sign * scene.weather.trend_pa_h, air_c=float(rng.uniform(17.0, 26.0)))
+    at, samples = _measured(way, weather, scene, rng)
+    heights = np.array(STOREYS_M)
+    away = np.abs(way.height_m[at][:, None] - heights)
+    true = away.argmin(axis=1)
+    prior = np.eye(len(heights))[true[0]] if scene.known_start else None
+    filter_ = FloorFilter(heights, BarometerSettings(PRESSURE_NOISE_PA[scene.mode]), prior)
+    found = filter_.smooth(samples) if scene.whole else filter_.feed(samples)
+    return {"name": name, "seed": seed, **judge(found, away)}
+
+
+def _measured(
+    way: VerticalMove, weather: Weather, scene: FloorScene, rng: np.random.Generator
+) -> tuple[Ints, Pressures]:
+    """What the SCP1000 reports of it, in counts and back, and which times of the walk these are."""
+    air = pressures(way.t_s, way.height_m, way.in_shaft, weather, rng)
+    device = device_temperatures(way.t_s, weather.air_c, rng)
+    rate = 1.0 / float(way.t_s[1] - way.t_s[0])
+    at = np.floor(np.arange(0.0, RUN_S, 1.0 / MODE_HZ[scene.mode]) * rate).astype(np.int64)
+    noisy = air[at] + PRESSURE_NOISE_PA[scene.mode] * rng.standard_normal(len(at))
+    gait = np.where(way.walking[at], vertical.WALKING, vertical.STILL).astype(np.int8) if scene.gait else None
+    return at, Pressures(way.t_s[at], COUNTS_PA * np.rint(noisy / COUNTS_PA), np.rint(20.0 * device[at]) / 20.0, gait)
+
+
+def judge(found: Floors, away_m: Floats) -> Row:
+    """Share of right floors with ties and strict, the longest time without one, changes of the true floor; `away_m`: (n, k) from each storey."""
+    n = np.arange(len(found.floor))
+    ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * TIE_M
+    wrong = ~ties[n, found.floor]
+    true = away_m.argmin(axis=1)
+    return {
+        "floor_right": float(1.0 - wrong.mean()),
+        "strict_right": float((found.floor == true).mean()),
+        "longest_wrong_s": longest_s(found.t_s, wrong),
+        "changes": int(np.count_nonzero(np.diff(true))),
+    }
+
+
+def longest_s(t_s: Floats, wrong: Bools) -> float:
+    """The longest time without a right sample, to the first right one."""
+    return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in spans(wrong).tolist()), default=0.0)
+
+
+def _summary(rows: Sequence[Row]) -> Row:
+    def over(key: str, how: Callable[[list[float]], float]) -> float:
+        return round(how([row[key] for row in rows]), 5)
+
+    return {
+        "name": rows[0]["name"],
+        "runs": len(rows),
+        "floor_right": over("floor_right", lambda v: sum(v) / len(v)),
+        "strict_right": over("strict_right", lambda v: sum(v) / len(v)),
+        "worst_right": over("floor_right", min),
+        "longest_wrong_s": over("longest_wrong_s", max),
+        "late_runs": sum(row["longest_wrong_s"] > 10.0 for row in rows),
+        "changes": sum(row["changes"] for row in rows),
+    }
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
+    title = f"Floors by pressure, {request.runs} simulated runs of 20 minutes, weather of 1 hPa/h"
+    return [Table(title, shown, COLUMNS)]
+
+
+STUDY = Study("floors", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

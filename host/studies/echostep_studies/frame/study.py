@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""The frame of every study: runs -> rows -> summary rows -> tables -> JSON -> Parquet -> pictures.
+
+In: a `Study` and a `StudyRequest`. Out: tables on the terminal, files. Owns the order of these stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from echostep.output.table import Table
+from echostep_studies.frame.report import Row, write_json, write_parquet
+from echostep_studies.frame.runs import Run, SeededRuns
+
+
+@dataclass(frozen=True, slots=True)
+class StudyRequest:
+    """Options of a command: `runs` from `seed` on, the file for `json`, the folder `out` for the journal, Parquet and pictures.
+
+    `scheduler`: address of a Dask scheduler; None: the cores of this machine.
+    """
+
+    runs: int
+    seed: int
+    json: Path | None
+    out: Path
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """What one study states.
+
+    `run`: rows of the run of one seed, importable and picklable. `summarize`: rows of all runs -> summary rows, which JSON gets.
+    `tables`: summary rows -> tables. `draw`: pictures from the folder, the first seed and the summary rows. `draw_runs`: from the folder and the
+    rows of all runs.
+    `seeds`: arguments of `run`; None: `request.seed` + 0 ... `request.runs` - 1. `journal`: False for a short study of one
+    run, which is done in this process. `parquet`: which rows the Parquet file holds, if one is written.
+    """
+
+    name: str
+    run: Run
+    summarize: Callable[[list[Row]], list[Row]]
+    tables: Callable[[list[Row], StudyRequest], Sequence[Table]]
+    draw: Callable[[Path, int, list[Row]], None] | None = None
+    draw_runs: Callable[[Path, list[Row]], None] | None = None
+    seeds: range | None = None
+    journal: bool = True
+    parquet: Literal["runs", "summary"] | None = "runs"
+
+
+def run_study(study: Study, request: StudyRequest) -> list[Row]:
+    """Run the study, print its tables and write its files; returns the summary rows. Raises EchostepError when a file cannot be written."""
+    rows_of_runs = _rows(study, request)
+    rows = study.summarize(rows_of_runs)
+    for table in study.tables(rows, request):
+        table.print()
+    if request.json is not None:
+        write_json(request.json, study.name, request.runs, request.seed, rows)
+    if study.parquet is not None:
+        write_parquet(request.out / f"{study.name}.parquet", rows_of_runs if study.parquet == "runs" else rows)
+    if study.draw is not None:
+        study.draw(request.out, request.seed, rows)
+    if study.draw_runs is not None:
+        study.draw_runs(request.out, rows_of_runs)
+    return rows
+
+
+def _rows(study: Study, request: StudyRequest) -> list[Row]:
+    """Rows of all runs in order of their seeds."""
+    seeds = study.seeds if study.seeds is not None else range(request.seed, request.seed + request.runs)
+    if not study.journal:
+        return [row for seed in seeds for row in study.run(seed)]
+    return SeededRuns(study.name, len(seeds), seeds.start, study.run, request.out, request.scheduler).rows()

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""The three experiments of [Lee 2010] in simulation: a lap of 40 x 30 m, the way down from the 5th floor to the 1st, the 3D track;
+the method of the paper and the default one.
+
+In: seeds. Out: rows `lap/lee2010`, `lap/default`, `lap/default+plan`, `floors`, `storeys`, `storeys/default`; pictures as its Figures 6, 7, 8.
+Owns the routes.
+Everything is simulated, from the bytes of the simulated board on: frames, clock and counts are read as live. Each run is another person in another
+magnetic field. All methods are given the place and the heading of the start, and the wearer's legs to within a centimetre; with the plan the wearer
+is calibrated by a walk of 10 m before.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.output.table import Table
+from echostep.simulation.people.walker import Walk
+from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
+from echostep_studies.lee2010.pictures import draw
+from echostep_studies.lee2010.walks import STOREY_M, chunks_of, descent_of, lap_of, lap_plan, measure, start_of, storeys
+
+PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
+COLUMNS = {
+    "name": "", "ending_m": "ending", "ending_max_m": "worst", "mean_m": "mean", "distance_error_percent": "way %", "floor_right": "floor right",
+}  # fmt: skip
+LEGEND = "ending, mean: error of the place at the end and on the way; way: error of the distance walked. Simulated."
+
+
+def one_run(seed: int) -> list[Row]:
+    """All rows of one person."""
+    lap, plan = lap_of(seed), lap_plan()
+    chunks = chunks_of(lap, plan.levels, seed)
+    measured = measure(chunks, seed)
+    rows = [_row(f"lap/{name}", name, seed, lap, method(measured, start_of(lap))) for name, method in METHODS.items()]
+    rows.append(_row("lap/default+plan", "default", seed, lap, with_plan(plan, chunks, measured, start_of(lap), seed)))
+    descent = descent_of(seed)
+    measured = measure(chunks_of(descent, storeys(), seed), seed)
+    floors = floors_of(measured.pressure)
+    right = {"floor_right": floor_right(floors, descent)}
+    for name, method in METHODS.items():
+        shown = "storeys" if name == "lee2010" else f"storeys/{name}"
+        rows.append(_row(shown, name, seed, descent, method(measured, start_of(descent))) | right)
+    rows.append({"name": "floors", "profile": "lee2010", "seed": seed, **right, **_heights_off(floors, descent)})
+    return rows
+
+
+def _row(name: str, profile: str, seed: int, walked: Walk, found: MethodTrack) -> Row:
+    truth = np.column_stack([np.interp(found.track[:, 0], walked.t_s, walked.trunk_m[:, k]) for k in (0, 1)])
+    off = np.hypot(*(found.track[:, 1:] - truth).T)
+    way = float(np.hypot(*np.diff(walked.foot_m[::50, :2], axis=0).T).sum())
+    return {
+        "name": name, "profile": profile, "seed": seed, "ending_m": float(off[-1]), "mean_m": float(off.mean()),
+        "distance_error_percent": 100.0 * (found.distance_m / way - 1.0),
+    }  # fmt: skip
+
+
+def floor_right(floors: Floats, walked: Walk) -> float:
+    """Share of the readings with the floor that is nearest in truth."""
+    return float((floors[:, 1] == np.rint(_height_at(floors[:, 0], walked) / STOREY_M)).mean())
+
+
+def _heights_off(floors: Floats, walked: Walk) -> Row:
+    """Error of the height that is put out, which is the floor's own, at the end and on the way."""
+    off = np.abs(floors[:, 1] * STOREY_M - _height_at(floors[:, 0], walked))
+    return {"ending_m": float(off[-1]), "mean_m": float(off.mean())}
+
+
+def _height_at(t_s: Floats, walked: Walk) -> Floats:
+    return np.interp(t_s, walked.t_s, walked.height_m)
+
+
+def _summary(rows: list[Row]) -> Row:
+    """Means over the runs, and the worst ending."""
+    found: Row = {"name": rows[0]["name"], "profile": rows[0]["profile"], "runs": len(rows)}
+    for key in ("ending_m", "mean_m", "distance_error_percent", "floor_right"):
+        if key in rows[0]:
+            found[key] = round(sum(row[key] for row in rows) / len(rows), 4)
+    found["ending_max_m"] = round(max(row["ending_m"] for row in rows), 4)
+    return found
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    title = f"Lee and Lee 2010: {request.runs} simulated runs, metres; last, the paper's one real lap"
+    return [Table(title, [*rows, *PRINTED], COLUMNS, (LEGEND,))]
+
+
+def _draw(folder: Path, seed: int, _rows: list[Row]) -> None:
+    draw(folder, seed)
+
+
+STUDY = Study("lee2010", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, _draw)

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""The study `noplan`: each building drawn from one walk, beside the foot alone and FootSLAM on the same path; another person tracked on the drawing.
+
+In: seeds; the public recordings for westport-house, real feet and real clutter. Out: the table, JSON, Parquet, a picture of each drawing of the
+first seed. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from fnmatch import fnmatch
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.errors import EchostepError
+from echostep.localization.start import Start
+from echostep.mapping.mapper import map_walk
+from echostep.mapping.nodes import nodes_of
+from echostep.mapping.picture import draw_picture
+from echostep.mapping.plan import plan_in
+from echostep.output.table import Table
+from echostep.plan.model import Plan
+from echostep_studies.anywhere.filtering import track
+from echostep_studies.anywhere.sites import Site
+from echostep_studies.anywhere.walks import SimulatedWalk
+from echostep_studies.feet.metrics import rmse
+from echostep_studies.frame.report import LOST_M, Row, rows_by_name
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.noplan import real_clutter, real_feet, sites
+from echostep_studies.noplan.footslam import footslam
+from echostep_studies.noplan.joined import again, joined_row, joined_summary, strangers_row, walked_pair
+from echostep_studies.noplan.judgement import (
+    closure_columns,
+    known_start,
+    levels_of,
+    path_columns,
+    storey_columns,
+    true_path,
+    wall_columns,
+)
+from echostep_studies.noplan.walks import walked
+
+SPEED_M_S = 0.93  # of a tour with its pauses and turns, as simulated
+SECOND_M = 150.0  # way of the second person
+MINUTES = (10, 60)
+SITES = ("office", "corridors", "westport", "storeys")
+REAL = ("westport", "storeys")  # of the public recordings
+JOINED_MIN = 5  # of each of two walks
+STRANGERS = {"office": "corridors", "corridors": "westport", "westport": "office"}  # another building
+COLUMNS = {
+    "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "shape_m": "shape m", "foot_rmse_m": "foot alone",
+    "footslam_rmse_m": "FootSLAM", "wall_median_m": "walls m", "wall95_m": "95 %", "drawn_pc": "drawn %", "absent_pc": "not there %",
+    "closures": "closures", "wrong": "wrong", "map_s": "s",
+}  # fmt: skip
+JOINED_COLUMNS = {
+    "name": "row", "joined": "joined", "misplaced": "misplaced", "runs": "runs", "joined_rmse_m": "RMSE m", "worst_rmse_m": "worst",
+    "drawn_pc": "drawn %", "closures": "closures", "wrong": "wrong",
+}  # fmt: skip
+SECOND_COLUMNS = {"name": "row", "mean_m": "mean m", "worst_m": "worst mean m", "lost": "lost", "runs": "runs"}
+
+
+def names_of(data: Path | None) -> list[str]:
+    """Names of the rows; without the recordings there is no westport-house."""
+    known = [site for site in SITES if data or site not in REAL]
+    pairs = [f"{kind}/{site}" for kind in ("joined", "strangers") for site in STRANGERS if site in known]
+    if not data:
+        pairs.remove("strangers/corridors")
+    return [f"{site}/{minutes}min" for minutes in MINUTES for site in known] + pairs + _real_names(data)
+
+
+def _real_names(data: Path | None) -> list[str]:
+    """Rows of real feet, and of real clutter."""
+    if data is None:
+        return []
+    known = {"feet": real_feet.names_in(data), "clutter": real_clutter.names_in(data)}
+    return [f"{kind}/{name}" for kind, names in known.items() for name in names]
+
+
+def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: int, seed: int) -> list[Row]:
+    """The rows of these names for the walk of this seed; pictures for the first seed."""
+    rows = []
+    for name in names:
+        kind, minutes = name.split("/")
+        picture = pictures / f"{name.replace('/', '-')}.png" if seed == first else None
+        if kind in ("joined", "strangers"):
+            rows.append(_pair_row(name, seed, data))
+        elif kind in ("feet", "clutter"):
+            assert data is not None
+            rows.append(_real_row(name, seed, data, picture))
+        else:
+            site = _site(kind, seed, 60.0 * SPEED_M_S * int(minutes.removesuffix("min")), data)
+            rows += drawn_rows(name, site, seed, picture)
+    return rows
+
+
+def _real_row(name: str, seed: int, data: Path, picture: Path | None) -> Row:
+    """A recording with the echoes of this seed; a foot is judged at its footprints."""
+    kind, recording = name.split("/")
+    if kind == "clutter":
+        return drawn_row(name, real_clutter.walked_log(real_clutter.names_in(data)[recording], seed), seed, picture)[0]
+    hallway = real_feet.read_hallway(real_feet.names_in(data)[recording])
+    walk = real_feet.walked_hallway(hallway, seed)
+    return drawn_row(name, walk, seed, picture, real_feet.START_S + hallway.print_t_s)[0]
+
+
+def _pair_row(name: str, seed: int, data: Path | None) -> Row:
+    """Two walks of JOINED_MIN through one building, or through two."""
+    pairing, kind = name.split("/")
+    length_m = 60.0 * SPEED_M_S * JOINED_MIN
+    site = _site(kind, seed, length_m, data)
+    if pairing == "joined":
+        return joined_row(name, walked_pair(site, again(site, length_m, seed), seed), seed)
+    return strangers_row(name, walked_pair(site, _site(STRANGERS[kind], seed, length_m, data), seed), seed)
+
+
+def _site(kind: str, seed: int, length_m: float, data: Path | None) -> Site:
+    if kind in REAL:
+        assert data is not None
+        return {"westport": sites.westport, "storeys": sites.storeys}[kind](seed, length_m, data)
+    return sites.office(seed, length_m) if kind == "office" else sites.corridors(seed, length_m)
+
+
+def drawn_rows(name: str, site: Site, seed: int, picture: Path | None) -> list[Row]:
+    """One walk drawn and judged; its drawing tried by a second person."""
+    row, plan, levels = drawn_row(name, walked(site, seed), seed, picture)
+    return [row, {"name": f"second/{name}", "seed": seed} | _second(site, plan, levels, seed)]
+
+
+def drawn_row(
+    name: str, walk: SimulatedWalk, seed: int, picture: Path | None, at_s: Floats | None = None
+) -> tuple[Row, Plan, list[int]]:
+    """One walk drawn and judged, its path at times `at_s` (k,), or at every node; its plan in the map, and the true level of each drawn one."""
+    begin_s = time.process_time()
+    mapped = map_walk(walk.segments)
+    map_s = time.process_time() - begin_s
+    nodes, pose = mapped.graph.nodes, mapped.graph.pose
+    truth, levels = true_path(walk, nodes.t_s), levels_of(mapped, walk)
+    frame = known_start(pose[:, :2], truth)
+    drawn = [np.zeros((0, 4))] * len(walk.built.levels)
+    for level, drawing in zip(levels, mapped.drawings, strict=True):
+        walls = frame.to_map(drawing.walls.reshape(-1, 2)).reshape(-1, 4)
+        drawn[level] = np.concatenate([drawn[level], walls])
+    row: Row = {"name": name, "seed": seed, "map_s": map_s}
+    row |= wall_columns(drawn, walk) | storey_columns(mapped, walk)
+    row |= closure_columns(mapped.graph.closures, pose, truth, frame)
+    row["shape_m"] = rmse(pose[:, :2], truth)
+    at_s = nodes.t_s if at_s is None else at_s
+    foot, _ = nodes_of(walk.segments)  # by foot and belt live: the mapper smooths, and takes a bias out of it
+    paths = {"": pose, "foot_": foot.pose, "footslam_": footslam(foot, np.random.default_rng([seed, 85]))}
+    for of, path in paths.items():
+        placed = known_start(path[:, :2], truth).to_map(path[:, :2])
+        at = np.column_stack([np.interp(at_s, nodes.t_s, placed[:, k]) for k in (0, 1)])
+        row |= {of + key: value for key, value in path_columns(at, true_path(walk, at_s)).items()}
+    plan, walked_m = plan_in(mapped, frame.to_map, walk.pose_at(float(nodes.t_s[0])), name)
+    if picture is not None:
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        draw_picture(picture, plan, walked_m, [walk.built.levels[level] for level in levels])
+    return row, plan, levels
+
+
+def _second(site: Site, drawn: Plan, levels: list[int], seed: int) -> Row:
+    """Another person on the drawing, from a known start, the other way round along the first one's tour.
+
+    `levels`: the true level of each drawn one.
+    """
+    way, points = 0.0, [site.waypoints[-1]]
+    for point in site.waypoints[-2::-1]:
+        way += float(np.hypot(point[0] - points[-1][0], point[1] - points[-1][1]))
+        points.append(point)
+        if way > SECOND_M:
+            break
+    walk: SimulatedWalk = walked(Site(site.built, tuple(points)), seed + 500_000)
+    begin = walk.pose_at(walk.segments[0].segment.t0_s)
+    run = track(walk.segments, drawn, Start(replace(begin, level=levels.index(begin.level))), seed)
+    places = np.array([(c.x_m, c.y_m) for c in run.claims])
+    error = np.hypot(*(places - true_path(walk, np.array([c.t_s for c in run.claims]))).T)
+    return {"mean_m": float(error.mean()), "end_m": float(error[-1])}
+
+
+def _summaries(rows: list[Row]) -> list[Row]:
+    """Means over the runs; of the errors also the worst."""
+    return [SUMMARIES.get(group[0]["name"].split("/")[0], _summary)(group) for group in rows_by_name(rows)]
+
+
+def _summary(group: list[Row]) -> Row:
+    def mean(key: str) -> float:
+        return float(np.mean([row[key] for row in group if key in row]))
+
+    row: Row = {"name": group[0]["name"], "runs": len(group)}
+    row |= {
+        key: mean(key)
+        for key in ("rmse_m", "shape_m", "foot_rmse_m", "footslam_rmse_m", "wall_median_m", "wall95_m", "map_s")
+    }
+    row |= {
+        "worst_rmse_m": max(r["rmse_m"] for r in group),
+        "drawn_pc": 100.0 * mean("drawn"),
+        "absent_pc": 100.0 * mean("absent"),
+        "wrong_storey_pc": 100.0 * mean("wrong_storey"),
+    }
+    return row | {key: sum(r[key] for r in group) for key in ("closures", "wrong")}
+
+
+def _second_summary(group: list[Row]) -> Row:
+    means = [row["mean_m"] for row in group]
+    lost = sum(row["end_m"] > LOST_M for row in group)
+    return {
+        "name": group[0]["name"],
+        "runs": len(group),
+        "mean_m": float(np.mean(means)),
+        "worst_m": max(means),
+        "lost": lost,
+    }
+
+
+SUMMARIES = {"second": _second_summary, "joined": joined_summary, "strangers": joined_summary}
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    first = [row for row in rows if "rmse_m" in row]
+    second = [row for row in rows if "mean_m" in row]
+    pairs = [row for row in rows if "joined" in row]
+    title = f"Drawn without a plan: {request.runs} simulated walks a row"
+    tables = [
+        Table(title, first, COLUMNS),
+        Table("Another person, tracked on the drawing", second, SECOND_COLUMNS),
+        Table("Two walks of unknown start, of one building and of two", pairs, JOINED_COLUMNS),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study:
+    """The study of the rows whose names match a pattern; `data`: folder of the public recordings."""
+    if data is not None and not (data / "maps" / "westport-house").is_dir():
+        raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its rows are left out")
+    every = names_of(data)
+    names = tuple(name for name in every if fnmatch(name, pattern))
+    if not names:
+        raise EchostepError(f"--rows {pattern}: no row is named so; there are: {', '.join(every)}")
+    return Study("noplan", partial(one_run, names, data, request.out, request.seed), _summaries, _tables)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""The study of operations: scores of all points, by manner of moving, before and after the change of the battery.
+
+In: seeds. Out: a row of all points, and one of each part. Simulated. The scores are those of `echostep score`, over the points of all runs together.
+
+`floor`: share of the points on the nearest floor; `floor_tied`: the same, where both floors are right within TIE_M of the middle between them, as in
+the study `anywhere` (`judgement.true_levels`). Estimates that say lost count in both, but not in the row `not lost`, of the points that availability
+counts too. `search_s`: from the change of the battery on, until the new tracker says `tracking`. The rows `resumed` have the estimates of the tracker
+that begins where the first one ended, the others those of the one that knows nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.localization.error_statistics import error_statistics, quantile
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.output.table import Table
+from echostep.scorecard.card import FLOOR_PENALTY_M, score
+from echostep_studies.anywhere.judgement import true_levels
+from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.operation.own_tracks import track_of, truth_of
+from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
+
+ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for: by reason, a door; hardly ever another floor
+ALL, RESUMED = "all", "all, resumed"  # the rows of all points
+Parts = Callable[[OperationWalk, Floats, Any], dict[str, Bools]]
+COLUMNS = {
+    "name": "", "points": "points", "ce50_m": "CE50 m", "ce95_m": "CE95 m", "se95_m": "SE95 m", "max_m": "max m",
+    "evaal_m": "EvAAL m", "floor": "floor %", "floor_tied": "both at a tie %",
+}  # fmt: skip
+PERCENT = ("floor", "floor_tied")
+
+
+def one_run(half_m: float, seed: int) -> list[Row]:
+    """Rows of one operation: its points, all of them and by part."""
+    walk = operation(seed, half_m)
+    return _rows(walk, walk.after, seed, _parts) + _rows(walk, walk.resumed, seed, _resumed_parts)
+
+
+def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Parts) -> list[Row]:
+    """Rows of the parts of one operation, with the estimates of one of the trackers after the change of the battery."""
+    estimates = [*walk.before, *after]
+    scored = score(track_of(estimates), truth_of(walk.truth, walk.plan), walk.plan)
+    at = scored.matched
+    assert at.level is not None
+    assert at.true_level is not None
+    assert at.height_m is not None
+    assert at.true_height_m is not None
+    right = true_levels(at.true_xy_m, at.true_height_m, walk.plan)
+    points = {
+        "error_m": at.error_m,
+        "above_m": at.height_m - at.true_height_m,
+        "floors_off": np.abs(at.level - at.true_level),
+        "tied_right": right[np.arange(len(at.level)), at.level.astype(np.int64)],
+    }
+    found = [e.t_s for e in after if e.status is TrackStatus.TRACKING]
+    whole: Row = {
+        "zone": scored.card.zone_probability, "available": scored.card.availability,
+        "search_s": found[0] - walk.restart_s if found else None,
+    }  # fmt: skip
+    rows = []
+    says = np.array([e.status.value for e in estimates])[at.row]
+    for name, chosen in parts(walk, at.t_s, says).items():
+        row: Row = {"name": name, "seed": seed} | {key: values[chosen].tolist() for key, values in points.items()}
+        rows.append(row | (whole if name in (ALL, RESUMED) else {}))
+    return rows
+
+
+def _parts(walk: OperationWalk, t_s: Floats, says: Any) -> dict[str, Bools]:
+    """Which points belong to each part, by name; those of a manner are of before the change of the battery."""
+    begins, names = zip(*walk.manners, strict=True)
+    manner = np.array(names)[np.maximum(np.searchsorted(np.array(begins), t_s, side="right") - 1, 0)]
+    known = t_s < walk.restart_s
+    parts = {
+        ALL: np.ones(len(t_s), bool), "not lost": says != TrackStatus.LOST.value,
+        "says tracking": says == TrackStatus.TRACKING.value, "known start": known, "unknown start": ~known,
+    }  # fmt: skip
+    return parts | {name: (manner == name) & known for name in sorted(set(names))}
+
+
+def _resumed_parts(walk: OperationWalk, t_s: Floats, says: Any) -> dict[str, Bools]:
+    """The same where the new tracker begins at the last place."""
+    return {
+        RESUMED: np.ones(len(t_s), bool), "not lost, resumed": says != TrackStatus.LOST.value,
+        "says tracking, resumed": says == TrackStatus.TRACKING.value, "resumed": t_s >= walk.restart_s,
+    }  # fmt: skip
+
+
+def _summary(rows: Sequence[Row]) -> Row:
+    """Scores of the points of all runs together."""
+    error, above, off, right = (
+        np.concatenate([np.asarray(row[key]) for row in rows])
+        for key in ("error_m", "above_m", "floors_off", "tied_right")
+    )
+    found: Row = {"name": rows[0]["name"], "runs": len(rows), "points": len(error)}
+    if not len(error):
+        return found
+    statistics = error_statistics(error)
+    found |= {
+        "mean_m": statistics.mean_m, "ce50_m": statistics.median_m, "ce95_m": statistics.p95_m,
+        "max_m": statistics.max_m, "ve95_m": quantile(np.abs(above), 0.95), "se95_m": quantile(np.hypot(error, above), 0.95),
+        "evaal_m": quantile(error + FLOOR_PENALTY_M * off, 0.75), "floor": float((off == 0.0).mean()),
+        "floor_tied": float(right.mean()),
+    }  # fmt: skip
+    for key, how in (("zone", np.mean), ("available", np.mean), ("search_s", np.max)):
+        values = [row[key] for row in rows if row.get(key) is not None]
+        found[key] = float(how(values)) if values else None
+    return {key: round(value, 4) if isinstance(value, float) else value for key, value in found.items()}
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    shown = [
+        {key: 100.0 * value if key in PERCENT and value is not None else value for key, value in row.items()}
+        for row in rows
+    ]
+    told = [_told(row) for row in rows if row["name"] in (ALL, RESUMED)]
+    return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, told)]
+
+
+def _told(row: Row) -> str:
+    """What was asked for and is met, of a row of all points."""
+    return (
+        f"{row['name']}: asked were CE95 at most {ASKED_CE95_M} m: {_met(row['ce95_m'] <= ASKED_CE95_M)}; "
+        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(row['floor'] >= ASKED_FLOOR)} by the nearest floor, "
+        f"{_met(row['floor_tied'] >= ASKED_FLOOR)} with both at a tie. Zone detection {100 * row['zone']:.1f} %, "
+        f"availability {100 * row['available']:.1f} %, search after the change at most {row['search_s'] or math.inf:.0f} s. Simulated."
+    )
+
+
+def _met(is_met: bool) -> str:
+    return "met" if is_met else "not met"
+
+
+def operation_study(half_m: float = HALF_M) -> Study:
+    """The study; `half_m`: length of the way before the change of the battery, and after it."""
+    return Study(
+        "operation", partial(one_run, half_m), lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables
+    )

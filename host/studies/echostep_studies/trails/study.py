@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""`echostep evaluate trails`: the trails of [Fischer 2008, section 3.2], walked in simulation, by the paper's method and by ours.
+
+In: seeds. Out: rows for each trail, method and rate; pictures as its Figures 3-6. Owns nothing. All results are simulated. The magnitudes of the
+paper's errors were used to set the model of the MTx's filter (`xsens.onboard_filter`) and the machines, so they test the method, not the MTx.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from echostep.output.table import Table
+from echostep_studies.frame.report import Row, rows_by_name, summary
+from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
+from echostep_studies.trails.pictures import draw_trails
+from echostep_studies.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
+
+COLUMNS = {
+    "name": "trail/method",
+    "distance_error_percent": "way %",
+    "printed": "printed",
+    "heading_error_deg": "turned",
+    "max_m": "max",
+    "ending_m": "end m",
+    "lost": "lost",
+}
+LEGEND = (
+    "way: error of the distance walked; printed: the paper's own; turned: rms error of the heading, degrees; max, end: error of the "
+    "position, metres; lost: runs that end more than 3 m off."
+)
+
+
+def one_run(seed: int) -> list[Row]:
+    """Rows of one run: every trail, rate and method."""
+    rows = []
+    for trail in TRAILS:
+        walked = walk_trail(trail, seed)
+        for rate_hz in RATES_HZ:
+            samples = measure_trail(trail, walked, rate_hz, seed)
+            rows += [_row(trail, rate_hz, profile, judge(track(samples, profile), walked)) for profile in METHODS]
+    return rows
+
+
+def _row(trail: Trail, rate_hz: int, profile: str, walked: JudgedTrack) -> Row:
+    degrees = np.degrees(walked.heading_errors_rad)
+    row: Row = {
+        "name": f"{trail.name}/{profile}" + ("" if rate_hz == RATES_HZ[0] else f"/{rate_hz}Hz"),
+        "profile": profile,
+        "rate_hz": rate_hz,
+        "distance_m": walked.distance_m,
+        "distance_error_percent": 100.0 * (walked.distance_m / walked.true_distance_m - 1.0),
+        "heading_error_deg": float(np.sqrt((degrees**2).mean())),
+        "heading_max_deg": float(degrees.max()),
+        "errors_m": walked.errors_m.round(4).tolist(),
+    }
+    if profile == "fischer2008":
+        row |= {"printed": trail.printed, "printed_distance_error_percent": trail.printed_percent}
+    return row
+
+
+def summaries(rows: list[Row]) -> list[Row]:
+    """One row for each trail, method and rate, over all runs."""
+    return [_summary(group) for group in rows_by_name(rows)]
+
+
+def _summary(rows: list[Row]) -> Row:
+    first = rows[0]
+    off = [row["distance_error_percent"] for row in rows]
+    found = summary(first["name"], first["profile"], [row["errors_m"] for row in rows], [])
+    found |= {
+        "rate_hz": first["rate_hz"],
+        "distance_m": round(sum(row["distance_m"] for row in rows) / len(rows), 2),
+        "distance_error_percent": round(sum(off) / len(off), 2),
+        "distance_error_min_percent": round(min(off), 2),
+        "distance_error_max_percent": round(max(off), 2),
+        "heading_error_deg": round(sum(row["heading_error_deg"] for row in rows) / len(rows), 2),
+        "heading_max_deg": round(max(row["heading_max_deg"] for row in rows), 2),
+    }
+    printed = {key: first[key] for key in ("printed", "printed_distance_error_percent") if key in first}
+    return found | printed
+
+
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    """One table for each rate; below the last one the printed and simulated errors of the way."""
+    tables = []
+    for rate_hz in RATES_HZ:
+        shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in rows if row["rate_hz"] == rate_hz]
+        notes = (
+            ("Printed and simulated error of the way: " + "; ".join(_ranges(rows)), LEGEND)
+            if rate_hz == RATES_HZ[-1]
+            else ()
+        )
+        title = f"Trails of Fischer et al. 2008, simulated: {request.runs} runs at {rate_hz} Hz"
+        tables.append(Table(title, shown, COLUMNS, notes))
+    return tables
+
+
+def _ranges(rows: list[Row]) -> list[str]:
+    """The printed distance errors, each with the range of the simulated walkers."""
+    return [
+        f"{row['name']} {row['printed']}, {row['distance_error_min_percent']:+.1f} to {row['distance_error_max_percent']:+.1f} %"
+        for row in rows
+        if row.get("printed_distance_error_percent") is not None
+    ]
+
+
+def _draw(folder: Path, seed: int, _rows: list[Row]) -> None:
+    draw_trails(folder, seed)
+
+
+STUDY = Study("trails", one_run, summaries, _tables, _draw, parquet=None)

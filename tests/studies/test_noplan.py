@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: MIT
+"""The study of buildings drawn without a plan: its definitions, its peer, and one short walk (simulated)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from board_runs import ROOT
+from carmen_logs import WALLS as WALLS_OF_LOG
+from carmen_logs import write_log
+from echostep.errors import EchostepError
+from echostep.mapping.graph import Closure
+from echostep.mapping.nodes import Nodes
+from echostep.path import MeasuredSegment, PathSegment
+from echostep.plan.check import check_plan
+from echostep.plan.model import Level, load_plan
+from echostep.simulation.scenario import DEMO_WAYPOINTS
+from echostep_studies.anywhere.sites import Site, plan_of
+from echostep_studies.anywhere.walks import SimulatedWalk
+from echostep_studies.frame.study import StudyRequest
+from echostep_studies.noplan.footslam import RADIUS_M, footslam, hexagon
+from echostep_studies.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
+from echostep_studies.noplan.real_clutter import walked_log, with_stated_drift
+from echostep_studies.noplan.sites import furnished, loop_walls
+from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run
+from needs_data import needs_data
+from recordings import DATA
+
+WALLS = np.array([[0.0, 0.0, 10.0, 0.0], [0.0, 3.0, 10.0, 3.0], [0.0, 6.0, 10.0, 6.0]])
+
+
+def along_the_corridor() -> SimulatedWalk:
+    """Ten metres between the two lower walls, at 1 m/s."""
+    t = np.linspace(0.0, 10.0, 101)
+    return SimulatedWalk(plan_of("corridor", WALLS), (), np.column_stack([t, t, np.full(101, 1.5), 0.0 * t, 0.0 * t]))
+
+
+def test_a_path_is_judged_from_its_known_start() -> None:
+    """The true path, turned by 90 degrees and moved, has no error; one that is 1 % too long errs at its end."""
+    truth = np.column_stack([np.linspace(0.0, 20.0, 41), np.zeros(41)])
+    path = np.column_stack([-truth[:, 1] + 5.0, truth[:, 0] - 3.0])
+    assert path_columns(known_start(path, truth).to_map(path), truth)["max_m"] == pytest.approx(0.0, abs=1e-9)
+    longer = 1.01 * path
+    assert path_columns(known_start(longer, truth).to_map(longer), truth)["max_m"] == pytest.approx(0.2, abs=1e-6)
+
+
+def test_walls_are_judged_by_those_in_sight() -> None:
+    """Of the two walls of the corridor one and a half are drawn, 10 cm off; a third of what is drawn is in no place."""
+    drawn = np.array([[0.0, 0.1, 10.0, 0.1], [0.0, 3.1, 5.0, 3.1], [0.0, 10.0, 7.5, 10.0]])
+    row = wall_columns([drawn], along_the_corridor())
+    assert row["drawn"] == pytest.approx(0.77, abs=0.02), "the third wall is behind the second"
+    assert row["absent"] == pytest.approx(1.0 / 3.0, abs=0.01)
+    assert row["wall_median_m"] == pytest.approx(0.1, abs=1e-6)
+    assert wall_columns([drawn[:0]], along_the_corridor())["drawn"] == 0.0
+
+
+def test_each_storey_is_judged_by_its_own_walls() -> None:
+    """The lower wall below, the upper one above: a drawing of the other storey's walls is in no place."""
+    levels = (Level("0", 0.0, WALLS[:1]), Level("1", 3.5, WALLS[2:]))
+    t = np.linspace(0.0, 20.0, 201)
+    z = np.where(t < 10.0, 0.0, 3.5)
+    truth = np.column_stack([t, np.minimum(t, 20.0 - t), np.where(t < 10.0, 1.5, 4.5), 0.0 * t, z])
+    walk = SimulatedWalk(replace(plan_of("two", WALLS), levels=levels), (), truth)
+    right = wall_columns([WALLS[:1], WALLS[2:]], walk)
+    assert (right["drawn"], right["absent"]) == (1.0, 0.0)
+    wrong = wall_columns([WALLS[2:], WALLS[:1]], walk)
+    assert (wrong["drawn"], wrong["absent"]) == (0.0, 1.0)
+
+
+def test_a_closure_is_wrong_along_what_it_claims_to_know() -> None:
+    """Two metres off along the corridor is no error of a closure that knows its width only."""
+    truth = np.column_stack([np.linspace(0.0, 20.0, 41), np.zeros(41)])
+    frame = known_start(truth, truth)
+    between = np.array([12.0, 0.1, 0.0])
+    across, both = (Closure(0, 20, between, np.diag(d), 12.0) for d in ([0.0, 100.0, 0.0], [100.0, 100.0, 0.0]))
+    row = closure_columns([across, both], truth, truth, frame)
+    assert (row["closures"], row["wrong"]) == (2, 1)
+
+
+def test_footslam_finds_its_way_round_a_block() -> None:
+    """Six laps of a block of 12 x 8 m by a foot that turns 4 degrees a lap too far: the map holds the laps together."""
+    corners = np.array([[0.0, 0.0], [12.0, 0.0], [12.0, 8.0], [0.0, 8.0]])
+    lap = np.concatenate(
+        [
+            a + np.linspace(0.0, 1.0, 13)[:-1, None] * (b - a)
+            for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)
+        ]
+    )
+    truth = np.concatenate([*[lap] * 6, lap[:1]])
+    turned = np.radians(4.0) * np.arange(len(truth) - 1) / len(lap)
+    dx, dy = np.diff(truth, axis=0).T
+    moves = np.column_stack([np.cos(turned) * dx - np.sin(turned) * dy, np.sin(turned) * dx + np.cos(turned) * dy])
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(moves, axis=0)])
+    pose = np.column_stack([path, np.zeros(len(path))])
+    n = len(path) - 1
+    nodes = Nodes(np.arange(n + 1.0), pose, np.full(n, 0.03), np.full(n, math.radians(0.7)), np.arange(n + 1.0))
+    found = footslam(nodes, np.random.default_rng(1))
+    foot = path_columns(path, truth)["rmse_m"]
+    assert path_columns(found, truth)["rmse_m"] < 0.7 * foot
+
+
+def test_hexagons_are_where_their_middle_is_nearest() -> None:
+    """The hexagon of a place has the nearest middle of all."""
+    rng = np.random.default_rng(2)
+    grid = [(q, r) for q in range(-8, 9) for r in range(-8, 9)]
+    middle = np.array([(RADIUS_M * math.sqrt(3.0) * (q + 0.5 * r), RADIUS_M * 1.5 * r) for q, r in grid])
+    for x, y in rng.uniform(-2.0, 2.0, (200, 2)):
+        assert hexagon(x, y) == grid[int(np.argmin(np.hypot(*(middle - (x, y)).T)))]
+
+
+def test_the_loop_has_its_rooms_and_its_furniture() -> None:
+    """Twenty rooms, each with a door; furniture stands in no doorway."""
+    rng = np.random.default_rng(3)
+    plan = furnished(plan_of("loop", loop_walls(rng)), 16, rng)
+    assert len(plan.levels[0].obstacles) > 8
+    assert not [finding for finding in check_plan(plan) if finding.kind == "overlap"]
+
+
+def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
+    """The demo's walk, drawn: better than the foot alone; a second person is tracked on the drawing."""
+    site = Site(load_plan(ROOT / "host/echostep/plans/demo.json"), DEMO_WAYPOINTS)
+    row, second = drawn_rows("office/demo", site, 2, tmp_path / "office.png")
+    assert row["rmse_m"] < 0.5
+    assert row["wrong"] == 0
+    assert row["absent"] < 0.1
+    assert second["mean_m"] < 1.0
+    assert (tmp_path / "office.png").stat().st_size > 20_000
+
+
+def test_rows_without_recordings_and_unknown_rows() -> None:
+    """Without the recordings there is no westport-house and nothing real; a pattern that names nothing is refused."""
+    assert not {name.split("/")[0] for name in names_of(None)} & {"westport", "storeys", "feet", "clutter"}
+    with pytest.raises(EchostepError, match="no row is named so"):
+        noplan_study(None, "castle/*", StudyRequest(1, 1, None, Path()))
+
+
+@needs_data("gx5_gcp")
+def test_a_real_foot_is_drawn(tmp_path: Path) -> None:
+    """The surveyed hallway 34, with simulated echoes: nearly all that is drawn is there."""
+    assert "feet/34" in names_of(DATA)
+    (row,) = one_run(("feet/34",), DATA, tmp_path, 1, 1)
+    assert row["rmse_m"] < 0.5
+    assert row["absent"] < 0.05
+    assert row["rmse_m"] < row["footslam_rmse_m"]
+
+
+def test_a_log_states_how_its_heading_drifts() -> None:
+    """Headings that jitter by 3 degrees and drift by 0.5 per square root of a metre: the drift only; without any, none."""
+    rng = np.random.default_rng(4)
+    count, stated = 2000, math.radians(4.0)
+    drift = np.cumsum(rng.normal(0.0, math.radians(0.5), count + 1))
+    jitter = rng.normal(0.0, math.radians(3.0), count + 1)
+    none = np.zeros(0)
+    truth = np.zeros((count + 1, 5))
+    truth[:, 0] = truth[:, 1] = np.arange(count + 1.0)
+    for heading, drifts_deg in ((drift + jitter, 0.5), (jitter, 0.0)):
+        pieces = [PathSegment(k, k + 1.0, 1.0, 0.0, heading[k], heading[k + 1], 0.02, stated, k) for k in range(count)]
+        segments = [MeasuredSegment(piece, none, none.astype(np.int64), none) for piece in pieces]
+        found = with_stated_drift(segments, truth)
+        assert math.degrees(found[0].segment.turn_sd_rad) == pytest.approx(drifts_deg, abs=0.15)
+    short = with_stated_drift(segments[:5], truth)
+    assert short == segments[:5]
+
+
+def test_a_log_is_drawn(tmp_path: Path) -> None:
+    """A made log of two rooms: by odometry without errors; what its few pings show is there."""
+    (tmp_path / "carmen").mkdir()
+    write_log(tmp_path / "carmen" / "made.log", WALLS_OF_LOG)
+    assert "clutter/made" in names_of(tmp_path)
+    (row,) = one_run(("clutter/made",), tmp_path, tmp_path, 1, 1)
+    assert row["rmse_m"] < 0.5
+    assert row["storeys"] == 1
+
+
+def test_rangers_with_whole_cones_look_abeam(tmp_path: Path) -> None:
+    """Unlike those of the study `clutter`, which has the cones' front halves only."""
+    path = tmp_path / "made.log"
+    write_log(path, WALLS_OF_LOG)
+    axes = np.concatenate([m.off_heading_rad for m in walked_log(path, 1).segments])
+    assert set(axes.tolist()) == {0.5 * math.pi, -0.5 * math.pi}

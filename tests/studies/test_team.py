@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""The study of teams on a short one: who meets whom, and what the rows say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from board_runs import ROOT
+from echostep.arrays import Floats
+from echostep.board.gateway import Gateway
+from echostep.localization.estimate import Estimate, TrackStatus
+from echostep.plan.model import load_plan
+from echostep.simulation.scenario import START_NS
+from echostep_studies.frame.study import StudyRequest, run_study
+from echostep_studies.team import study, tracking, walks
+from echostep_studies.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons
+from echostep_studies.team.walks import AGAIN_S, TeamWalks, encounters
+
+PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
+T_S = np.arange(0.0, 100.0, 0.02)
+
+
+def walked(x_m: Floats | float, y_m: float, z_m: float = 0.0) -> Floats:
+    """A truth along x."""
+    zero = np.zeros_like(T_S)
+    return np.column_stack([T_S, zero + x_m, zero + y_m, zero, zero + z_m])
+
+
+def test_two_who_pass_in_a_corridor_meet_at_their_nearest() -> None:
+    """In the corridor of the demo office (y from 6.5 to 8.5 m), at 1 m/s each, once; not through a wall and not on another floor."""
+    going, coming = walked(4.0 + 0.15 * T_S, 7.2), walked(20.0 - 0.15 * T_S, 7.8)
+    (met,) = encounters(PLAN, [going, coming])
+    assert met.who == (0, 1)
+    assert met.t_s == pytest.approx(16.0 / 0.3, abs=0.02)
+    assert met.distance_m == pytest.approx(0.6, abs=0.01)
+    assert not encounters(PLAN, [walked(4.5 + 0.05 * T_S, 8.2), walked(7.5, 8.8)])  # an office's wall between
+    assert not encounters(PLAN, [going, walked(20.0 - 0.15 * T_S, 7.8, 3.0)])
+
+
+def test_two_who_stay_together_meet_once_and_again_after_a_while() -> None:
+    swinging = walked(10.0 + 3.0 * np.sin(2.0 * np.pi * T_S / 10.0), 7.2)
+    met = encounters(PLAN, [swinging, walked(10.0, 7.8)])
+    assert len(met) == 100.0 // AGAIN_S or len(met) == 100.0 // AGAIN_S + 1
+    assert min(np.diff([e.t_s for e in met])) >= AGAIN_S
+    assert len(encounters(PLAN, [walked(10.0, 7.2), walked(10.0, 7.8)])) == 1
+
+
+def test_beacons_are_heard_from_when_they_are_dropped_on_their_floor_and_through_no_wall() -> None:
+    """One wearer walks along the corridor at 0.2 m/s and drops beacons, a second one waits there, a third one in an office, a fourth upstairs."""
+    going = walked(4.0 + 0.2 * T_S, 7.5)
+    truth = (going, walked(20.0, 7.5), walked(20.0, 10.5), walked(20.0, 7.5, 3.0))
+    heard = with_dropped_beacons(TeamWalks(PLAN, ((),) * 4, truth, (), ()), 3).chunks
+    dropped = {b.number: b for b in dropped_on(going, 0, np.random.default_rng(1))}
+    assert [b.x_m for b in dropped.values()] == pytest.approx([4.0, 9.0, 14.0, 19.0], abs=0.31)
+    assert [b.t_s for b in dropped.values()] == pytest.approx([0.0, 25.0, 50.0, 75.0], abs=0.03)
+    for who, chunks in enumerate(heard):
+        gateway, first_s = Gateway(), dict[int, float]()
+        for chunk in chunks:
+            for reading in gateway.read(chunk.data, 1e-9 * (chunk.t_arrival_ns - START_NS)):
+                first_s.setdefault(gateway.numbers[reading.slot], reading.t_s)
+        of_first = {number: t_s for number, t_s in first_s.items() if number in dropped}
+        assert all(t_s >= dropped[number].t_s - 0.01 for number, t_s in of_first.items())
+        assert set(of_first) == ({1, 2, 3, 4} if who == 0 else {3, 4} if who == 1 else set())
+        assert who * MOST_EACH + 1 in first_s  # its own
+
+
+def test_the_columns_are_those_of_all_wearers() -> None:
+    row = {"name": "office/tap", "seed": 1, "meetings": 2, "false_alone": 0.0, "false_together": 0.0}
+    rows = [
+        row | {"wearer": k, "alone_m": a, "together_m": b, "again_m": a}
+        for k, a, b in ((0, 4.0, 1.0), (1, 0.5, 0.5), (2, 0.5, 0.55))
+    ]
+    found = study._summary(rows)
+    assert (found["ratio"], found["worst"], found["by_chance"]) == (0.41, 1.1, 1.0)
+    assert (found["first_alone_m"], found["others_together_m"]) == (4.0, 0.525)
+
+
+def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two wearers on one way; the first one's start is wrong. They meet when, alone, it says lost and the other says tracking.
+
+    It changes the first one's track alone.
+    """
+    for module in (walks, study):
+        monkeypatch.setattr(module, "WEARERS", 2)
+    made, alone = walks.team_walks, []
+
+    def on_one_way(*args: Any, **more: Any) -> walks.TeamWalks:
+        team = made(*args, **more)
+        return replace(team, chunks=(team.chunks[0],) * 2, truth=(team.truth[0],) * 2, starts=(team.starts[0],) * 2)
+
+    def with_encounter(team: walks.TeamWalks, told: Any, how: tracking.How | None, seed: int) -> list[list[Estimate]]:
+        if how is None:
+            alone.append(tracking.track_team(team, told, None, seed))
+            return alone[-1]
+        encounter = walks.Encounter(meeting_time_s(*alone[0]), (0, 1), 0.0)
+        return tracking.track_team(replace(team, encounters=(encounter,)), told, how, seed)
+
+    monkeypatch.setattr(study, "team_walks", on_one_way)
+    monkeypatch.setattr(study, "track_team", with_encounter)
+    short = replace(study.team_study("office/tap", 12.0), journal=False)
+    run_study(short, StudyRequest(1, 3, tmp_path / "rows.json", tmp_path))
+    (row,) = json.loads((tmp_path / "rows.json").read_text())["rows"]
+    assert set(study.COLUMNS) <= set(row)
+    assert row["first_alone_m"] > 3.0
+    assert row["first_together_m"] < row["first_alone_m"]
+    assert row["worst"] == pytest.approx(1.0, abs=0.05)
+
+
+def meeting_time_s(first: list[Estimate], second: list[Estimate]) -> float:
+    """From when on the first wearer says lost and the second one tracking, for as long as a tap may take."""
+    fits = [
+        (a.t_s, (a.status, b.status) == (TrackStatus.LOST, TrackStatus.TRACKING))
+        for a, b in zip(first, second, strict=True)
+    ]
+    return next(t_s for t_s, _ in fits if all(fit for at_s, fit in fits if t_s <= at_s <= t_s + 2.0 * tracking.TAP_S))
