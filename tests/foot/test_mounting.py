@@ -15,9 +15,9 @@ from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
-from echostep.localization.metrics import Truth, errors
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
+from echostep.scorecard.truth import Truth, errors
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker

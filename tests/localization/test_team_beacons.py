@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.board.gateway import BeaconReading
+from echostep.localization.belief import Plausibility
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, digest
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.meetings import RENEWED_M, MeetingEffect, MeetingMemory, MeetingQueue
-from echostep.localization.plausibility import Plausibility
-from echostep.localization.start import Start
-from echostep.localization.team_beacons import MOST_TEAMMATES, TeamBeaconMap
+from echostep.localization.particles.start import Start
+from echostep.localization.team.meetings import RENEWED_M, MeetingEffect, MeetingMemory, MeetingQueue
+from echostep.localization.team.shared_beacons import MOST_TEAMMATES, TeamBeaconMap
 from echostep.page.elements.beacon_marks import beacon_marks
 from echostep.plan.model import Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echostep.localization.belief import BELIEVED, DOUBTED
 from echostep.localization.estimate import Estimate, digest
-from echostep.localization.map_filter import BELIEVED, DOUBTED
 from echostep.page import requests
 from echostep.page.live import LivePage
 from echostep.plan.model import Pose

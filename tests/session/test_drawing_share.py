@@ -13,10 +13,10 @@ import pytest
 
 from command_line import echostep
 from echostep.localization.estimate import Estimate
-from echostep.localization.metrics import Truth, errors
 from echostep.page.server import Address
 from echostep.plan.model import NO_PLAN, Plan, load_plan
 from echostep.ports.chunks import Chunk, Portion, portion_of
+from echostep.scorecard.truth import Truth, errors
 from echostep.session import teammates_ear
 from echostep.session.metadata import run_metadata
 from echostep.session.options import OutputOptions

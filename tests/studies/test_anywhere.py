@@ -15,7 +15,7 @@ import shapely
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Connector, ConnectorKind, Level, Plan, Pose
 from echostep_studies.anywhere import amcl, echo_changes, kidnaps, plan_changes, sites, walks

@@ -18,8 +18,8 @@ from command_line import echostep
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
 from echostep_studies.anywhere.filtering import Claim, FilterRun

@@ -162,7 +162,9 @@ def test_an_interrupted_study_waits_for_no_run(tmp_path: Path, monkeypatch: pyte
 
 
 def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')")
+    distributed = pytest.importorskip(
+        "distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')"
+    )
     here, there = tmp_path / "here", tmp_path / "there"
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"

@@ -17,16 +17,17 @@ from shapely import Point, Polygon
 from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.level_changes import (
+from echostep.localization.height.levels import (
     ClimbSettings,
     HeightArrays,
     HeightChange,
     change_levels,
     level_change_model,
 )
-from echostep.localization.particle_kernels import Move, ParticleArrays
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.start import ANY_LEVEL, Start
+from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import ANY_LEVEL, Start
+from echostep.localization.settings import CloudSettings
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of

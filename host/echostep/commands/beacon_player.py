@@ -17,11 +17,11 @@ import numpy as np
 import serial
 
 from echostep.errors import EchostepError
-from echostep.localization.metrics import load_truth
 from echostep.plan.importers.limited import open_limited
 from echostep.ports.datagram_key import seal
 from echostep.ports.port_faults import PORT_FAULTS
 from echostep.ports.udp import key_of
+from echostep.scorecard.truth import load_truth
 from echostep.session.console import console
 from echostep.simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 

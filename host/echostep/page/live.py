@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from echostep.guidance.cue_list import CueList
-from echostep.localization.echo_likelihood import echo_model
+from echostep.localization.echoes.likelihood import echo_model
 from echostep.localization.estimate import Estimate, unobserved
 from echostep.page.drawing_process import DrawingProcess
 from echostep.page.elements.alarm import shown_alarm

@@ -15,12 +15,12 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.localization.metrics import load_truth
 from echostep.page.elements.true_position import TruePath
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk, Portion
 from echostep.recording.recorder import Recorder
+from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of, recorded, with_check_ins, with_teammates
 from echostep.session.console import console, print_notices
 from echostep.session.metadata import SIMULATED, run_metadata

@@ -19,7 +19,7 @@ from echostep.board.messages import Identify
 from echostep.board.subscription import SUBSCRIBE, Subscription
 from echostep.errors import EchostepError
 from echostep.interruption import holding_signals, raise_held
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan
 from echostep.ports.arrival_clock import SleepWatch, now_ns
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk

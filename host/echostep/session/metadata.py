@@ -21,7 +21,7 @@ import numpy as np
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.localization.start import ANY_LEVEL, Air, Start
+from echostep.localization.particles.start import ANY_LEVEL, Air, Start
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.arrival_clock import now_ns

@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from echostep.localization.metrics import load_truth
 from echostep.plan.model import Plan
 from echostep.recording.reading import Recording, open_recording
+from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of
 from echostep.session.console import console
 from echostep.session.metadata import CHECK_IN_START, SIMULATED, plan_of, recorded_seed, recorded_start, start_given

@@ -13,10 +13,10 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.guidance.cue_list import CueList
 from echostep.localization.estimate import Estimate, digest
-from echostep.localization.metrics import Errors, Truth, errors
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Plan
 from echostep.plan.whereabouts import Whereabouts
+from echostep.scorecard.truth import Errors, Truth, errors
 from echostep.session.console import console
 from echostep.tracker import Tracker
 

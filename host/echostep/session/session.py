@@ -21,7 +21,6 @@ from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
 from echostep.interruption import holding_signals, raise_held
 from echostep.localization.estimate import Estimate
-from echostep.localization.metrics import Truth
 from echostep.output.derived import Derived
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
@@ -29,6 +28,7 @@ from echostep.ports.chunks import Portion
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import Recorder
+from echostep.scorecard.truth import Truth
 from echostep.session.browser import open_browser
 from echostep.session.console import console, print_notices
 from echostep.session.losses import Losses

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from echostep.errors import EchostepError
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan, Pose
 from echostep.plan.standing import refuse_impossible
 from echostep.session.console import console

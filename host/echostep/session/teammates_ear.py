@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from echostep.localization.team_beacons import MOST_TEAMMATES
+from echostep.localization.team.shared_beacons import MOST_TEAMMATES
 from echostep.page.shared_drawing import SharedDrawing
 from echostep.plan.model import Plan
 from echostep.ports.team_beacons import SharedBeacon, TeamBeacons, parse_team_beacons

@@ -15,7 +15,7 @@ from echostep.board.gateway import GatewayCounts
 from echostep.board.health import board_findings
 from echostep.board.messages import Identity, Status
 from echostep.localization.estimate import Estimate
-from echostep.localization.meetings import MeetingNews
+from echostep.localization.team.meetings import MeetingNews
 from echostep.odometry.alarm import Alarm
 from echostep.odometry.front_end import FrontEndCounts
 from echostep.path import PathSegment

@@ -14,10 +14,9 @@ import numpy as np
 
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
 from echostep.walls.level_sheet import lay_out_levels

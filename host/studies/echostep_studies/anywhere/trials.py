@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan, Pose
 from echostep_studies.anywhere import echo_changes, plan_changes, sites
 from echostep_studies.anywhere.kidnaps import Kidnapped, asleep_in_lift, carried, off_in_lift, restarted

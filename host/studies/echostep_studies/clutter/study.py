@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
 from echostep.output.table import Table
 from echostep_studies.anywhere.columns import run_row, summaries, tables
 from echostep_studies.anywhere.filtering import FilterRun, track

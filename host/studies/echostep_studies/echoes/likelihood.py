@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model, log_echo
+from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model, log_echo
 from echostep.output.table import console
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep_studies.frame.report import Row

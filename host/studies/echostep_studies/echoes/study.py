@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.output.table import Table, console
 from echostep.simulation.world.acoustics import SRF02, directivity_db
 from echostep.walls.echo_sources import Walls

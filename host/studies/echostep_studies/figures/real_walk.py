@@ -22,10 +22,10 @@ from rich.console import Console
 from echostep.arrays import Floats
 from echostep.foot.steps import Step, walk_track
 from echostep.localization.estimate import Estimate, digest
-from echostep.localization.metrics import load_truth
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Pose, load_plan
 from echostep.recording.reading import open_recording
+from echostep.scorecard.truth import load_truth
 from echostep.session.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker

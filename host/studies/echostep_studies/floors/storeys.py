@@ -19,14 +19,14 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.error_statistics import error_statistics
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.start import ANY_LEVEL
+from echostep.localization.particles.start import ANY_LEVEL
 from echostep.output.table import Table
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Plan, Pose
 from echostep.plan.routing import RoutePlace, Routes
 from echostep.ports.chunks import MTX, portion_of
+from echostep.scorecard.error_statistics import error_statistics
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.tours import tour as tour_of
 from echostep.simulation.people.walker import Person, Waypoint

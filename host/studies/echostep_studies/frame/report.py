@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.errors import EchostepError
-from echostep.localization.error_statistics import error_statistics
+from echostep.scorecard.error_statistics import error_statistics
 
 Row = dict[str, Any]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from echostep.board.messages import Part, Schedule
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.ranger_models import ECHO_OF
+from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.echoes.rangers import ECHO_OF
 from echostep.output.table import Table
 from echostep.simulation.devices.srf02 import HALF_US
 from echostep.simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics

@@ -16,10 +16,10 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import FilterSettings
 from echostep.output.table import Table
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose

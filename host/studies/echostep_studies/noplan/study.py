@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.mapping.mapper import map_walk
 from echostep.mapping.nodes import nodes_of
 from echostep.mapping.picture import draw_picture

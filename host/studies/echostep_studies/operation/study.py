@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.error_statistics import error_statistics, quantile
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.output.table import Table
 from echostep.scorecard.card import FLOOR_PENALTY_M, score
+from echostep.scorecard.error_statistics import error_statistics, quantile
 from echostep_studies.anywhere.judgement import true_levels
 from echostep_studies.frame.report import Row, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest

@@ -230,8 +230,8 @@ def _json_s(path: Path) -> float:
 FIRST_FIX = """
 import time
 import numpy as np
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.particle_kernels import ParticleArrays, Ping, reweight_by_ping
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization.particles.kernels import ParticleArrays, Ping, reweight_by_ping
 from echostep.walls.echo_sources import Walls
 x = np.linspace(0.5, 3.5, 300)
 index = Walls(np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0]])).near(x, x * 0.5)

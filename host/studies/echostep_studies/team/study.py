@@ -23,7 +23,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.output.table import Table
 from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace

@@ -16,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from echostep.localization.estimate import Estimate
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.meeting import MEETING, Meeting
