@@ -12,7 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from echostep.team.report import schema
+from echostep.team.messages.report import schema
 from pages import DOCS, commands, hardware, plan, python, recordings, settings, teams
 
 

@@ -24,12 +24,12 @@ from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Plan, load_plan
-from echostep.recording.edit import repair
 from echostep.recording.mcap_records import HEAD_SIZE, LOG_TIME_OFFSET, MCAP_MAGIC, MESSAGE
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
+from echostep.recording.repair.edit import repair
 from echostep.session.options import TrackingOptions
-from echostep.session.replay import tracker_of
+from echostep.session.runs.replay import tracker_of
 from echostep.session.skipped import skipped
 from walks import walk_chunks
 

@@ -21,17 +21,17 @@ from echostep.offline.pressure_csv import load_pressures
 from echostep.page.requests import parse_request
 from echostep.plan.importers.formats import import_plan
 from echostep.plan.model import load_plan, parse_plan
-from echostep.ports.check_in import parse_person
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.ports.datagram_key import Opener, seal
+from echostep.ports.people.check_in import parse_person
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
-from echostep.recording.recovery import Recovery
+from echostep.recording.repair.recovery import Recovery
 from echostep.settings import parse_settings
 from echostep.simulation.devices.beacon_gateway import message
-from echostep.team.report import decode
-from echostep.team.report import encode as report_bytes
-from echostep.team.shared_drawings import checked_drawing
+from echostep.team.messages.report import decode
+from echostep.team.messages.report import encode as report_bytes
+from echostep.team.messages.shared_drawings import checked_drawing
 from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
 from imported_plans import write_seven_floors

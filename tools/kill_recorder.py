@@ -28,9 +28,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echostep.errors import EchostepError
-from echostep.recording.edit import repair
 from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
+from echostep.recording.repair.edit import repair
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
 ROW = struct.Struct("<Qq")
@@ -41,7 +41,7 @@ import os, struct, sys, time
 from pathlib import Path
 from echostep.recording.recorder import DerivedMessage
 from echostep.ports.chunks import Chunk
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.output.foxglove import pose
 path, pipe = sys.argv[1], int(sys.argv[2])
 number, busy = 0, [(k * 7919) % 100_003 for k in range(100_003)]

@@ -27,10 +27,10 @@ from pathlib import Path
 
 from echostep.plan.model import Plan, load_plan
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.mqtt import MqttTransport
+from echostep.team.messages.report import Motion, Position, Report, StreamReport
+from echostep.team.mqtt.publisher import MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
-from echostep.team.report import Motion, Position, Report, StreamReport
 
 TICKS = os.sysconf("SC_CLK_TCK")
 

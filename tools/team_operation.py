@@ -38,7 +38,7 @@ from echostep.simulation.scenario import Scenario
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.inbox import Inbox, Receiver
-from echostep.team.mqtt import Listener, MqttTransport
+from echostep.team.mqtt.publisher import Listener, MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
 from echostep.team.roster import Member, MemberState, Roster

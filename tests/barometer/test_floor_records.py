@@ -11,7 +11,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.barometer.altitude import Altitude, BarometerSettings, Pressures, noise_of
 from echostep.barometer.floor_record import climbed_m, describe, find_storeys, noise_of_record, thinned, visits
-from echostep.commands.floors import record_floors
+from echostep.commands.actions.floors import record_floors
 from echostep.errors import EchostepError
 from echostep.offline.pressure_csv import load_pressures
 

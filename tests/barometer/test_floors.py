@@ -21,7 +21,7 @@ from echostep.barometer.altitude import Altitude, BarometerSettings, Heights, Pr
 from echostep.barometer.floor_filter import FloorFilter, checked_heights
 from echostep.barometer.floor_record import find_storeys, stays
 from echostep.cli import app
-from echostep.commands.floors import parse_heights, record_floors
+from echostep.commands.actions.floors import parse_heights, record_floors
 from echostep.errors import EchostepError
 from echostep.offline.pressure_csv import load_pressures
 from echostep.simulation.devices.board_sensors import Scp1000Model

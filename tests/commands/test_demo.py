@@ -21,8 +21,8 @@ from echostep.plan.model import Door, Plan, Room, load_plan
 from echostep.ports.chunks import portion_of
 from echostep.recording.reading import open_recording
 from echostep.scorecard.truth import load_truth
-from echostep.session import demo
 from echostep.session.browser import open_browser
+from echostep.session.runs import demo
 from echostep.simulation.people.tours import room_tour
 from echostep.simulation.scenario import DEMO_WAYPOINTS, start_of
 from echostep.tracker import Tracker

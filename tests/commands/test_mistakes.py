@@ -94,7 +94,7 @@ def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
             signal.raise_signal(signal.SIGINT)
 
     patch.setattr(Outbox, "_print_state", heard)
-    patch.setattr("echostep.session.live.print_notices", ending)
+    patch.setattr("echostep.session.runs.live.print_notices", ending)
     with pseudo_terminal() as (_, port):
         done = echostep(
             "live", "--plan", PLAN, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",

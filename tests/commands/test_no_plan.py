@@ -18,7 +18,7 @@ from echostep.localization.height.levels import HeightChange
 from echostep.page.elements.scene import status_text
 from echostep.plan.model import NO_PLAN
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from page.frames import PLAN, told

@@ -15,7 +15,7 @@ import pytest
 
 from board_runs import ROOT, needs_twin
 from command_line import echostep, interrupt_after, interrupt_when
-from echostep.board.findings import Severity
+from echostep.board.faults.findings import Severity
 from echostep.commissioning import port_search
 from echostep.commissioning.doctor import examine
 from echostep.commissioning.port_search import find_ports

@@ -39,7 +39,7 @@ from echostep.localization.team.meetings import (
 from echostep.path import PathSegment
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.meeting import MEETING, Meeting, parse_meeting
+from echostep.ports.people.meeting import MEETING, Meeting, parse_meeting
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
 from walks import walk_chunks

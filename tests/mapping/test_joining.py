@@ -12,7 +12,7 @@ import pytest
 
 from command_line import echostep
 from echostep.arrays import Floats
-from echostep.commands.mapping import segments_of
+from echostep.commands.actions.mapping import segments_of
 from echostep.errors import EchostepError
 from echostep.mapping.joining import doubt_of, join_walks
 from echostep.mapping.mapper import Mapped, solve_walk
@@ -22,7 +22,7 @@ from echostep.plan.model import NO_PLAN, load_plan
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import open_recording
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Person
 from echostep.simulation.scenario import Scenario

@@ -12,16 +12,16 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from echostep.mapping.drawing import Drawing, draw
-from echostep.mapping.graph import Closure, contradicted
+from echostep.mapping.graph.graph import Closure, contradicted
 from echostep.mapping.growing import GrowingMap
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.plan import plan_of
+from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import NO_PLAN, Pose, load_plan
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import DEMO_WAYPOINTS, demo_scenario
 from echostep_studies.anywhere.sites import Site

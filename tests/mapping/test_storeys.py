@@ -12,12 +12,12 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.mapping.graph.nodes import nodes_of
+from echostep.mapping.graph.storeys import STAIRS, find_storeys
 from echostep.mapping.joining import join_walks
 from echostep.mapping.mapper import Mapped, map_walk
-from echostep.mapping.nodes import nodes_of
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import Walked, plan_of
-from echostep.mapping.storeys import STAIRS, find_storeys
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import Plan, parse_plan

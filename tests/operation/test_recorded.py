@@ -19,8 +19,8 @@ from echostep.operation.operation import Operation, TableScene
 from echostep.operation.past import PastView
 from echostep.operation.record import Heard, decode_record
 from echostep.operation.tape import Player, Tape, load
-from echostep.recording import contents, edit
 from echostep.recording.reading import open_recording
+from echostep.recording.repair import contents, edit
 from operation.teams import TOWER, Recording, Team, place, whole_team
 from team.team_reports import PLAN
 from waiting import until

@@ -14,8 +14,8 @@ from board_runs import ROOT
 from carmen_logs import WALLS as WALLS_OF_LOG
 from carmen_logs import write_log
 from echostep.errors import EchostepError
-from echostep.mapping.graph import Closure
-from echostep.mapping.nodes import Nodes
+from echostep.mapping.graph.graph import Closure
+from echostep.mapping.graph.nodes import Nodes
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import Level, load_plan

@@ -19,14 +19,14 @@ from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
-from echostep.team import mesh
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
-from echostep.team.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
-from echostep.team.mesh_airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
-from echostep.team.mesh_report import Unpacker, pack
+from echostep.team.mesh import mesh
+from echostep.team.mesh.airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
+from echostep.team.mesh.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
+from echostep.team.mesh.mesh_report import Unpacker, pack
+from echostep.team.messages.report import Report, ReportedAlarm, decode, encode
 from echostep.team.outbox import Outbox
-from echostep.team.report import Report, ReportedAlarm, decode, encode
 from team.mesh_node import Air
 from team.team_reports import PLAN, POSITION, report
 from waiting import until

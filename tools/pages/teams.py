@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """host/docs/teams.md: its tables of every field of a report, and the report's JSON Schema, from the dataclasses that the host checks with.
 
-In: `echostep.team.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
+In: `echostep.team.messages.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from echostep.team.report import schema
+from echostep.team.messages.report import schema
 from pages import DOCS, HOST, between_marks
 
 SCHEMA = HOST / "echostep/team/report.schema.json"

@@ -27,7 +27,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.commands.beacon_player import simulate_gateway
+from echostep.commands.actions.beacon_player import simulate_gateway
 from echostep.plan.model import Plan, load_plan
 from echostep.simulation.devices.beacon_gateway import SPACING_M
 from echostep.simulation.devices.board import Sent

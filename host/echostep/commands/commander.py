@@ -45,7 +45,7 @@ def command(
 ) -> None:
     """Follow a team on one plan, lost and silent ones first, on a page and as a table, and record it; or show a recording again."""
     from echostep.operation import command as commander
-    from echostep.operation.views import Views
+    from echostep.operation.page import Views
     from echostep.page.server import Address
 
     views = Views(Address(host, port) if page else None, picture, as_json=as_json)
@@ -55,7 +55,7 @@ def command(
 def _plan_file(plan: Path, url: str, team: str | None, folder: Path) -> Path:
     """The file of `--plan`; that of wearer:NAME comes from the broker at `url`, of any team unless one is given."""
     from echostep.team.endpoint import BROKERS, parse_endpoint
-    from echostep.team.report import checked_name
+    from echostep.team.messages.report import checked_name
     from echostep.team.wearer_plan import drawing_wearer, plan_file
 
     if drawing_wearer(plan) is None:

@@ -29,7 +29,7 @@ def map_command(
     ] = None,
 ) -> None:
     """Draw the plan of a building from recorded walks."""
-    from echostep.commands import mapping
+    from echostep.commands.actions import mapping
 
     mapping.map_recordings(recordings, plan, out, picture)
 
@@ -47,7 +47,7 @@ def foot(
     plot: Annotated[bool, typer.Option("--plot", help="Draw the track as PNG, beside the CSV.")] = False,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
-    from echostep.commands import offline
+    from echostep.commands.actions import offline
 
     offline.foot(imu, out, profile, plot=plot)
 
@@ -80,7 +80,7 @@ def legs(
     plot: Annotated[bool, typer.Option("--plot", help="Draw track and strides as PNG, beside the CSV.")] = False,
 ) -> None:
     """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
-    from echostep.commands import offline
+    from echostep.commands.actions import offline
 
     offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), plot=plot)
 
@@ -103,7 +103,7 @@ def floors(
     plot: Annotated[bool, typer.Option("--plot", help="Draw the floors as PNG, beside the CSV.")] = False,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
-    from echostep.commands import floors as floor_run
+    from echostep.commands.actions import floors as floor_run
 
     floor_run.floors(pressure, heights, out, start, plot=plot)
 
@@ -129,7 +129,7 @@ def score(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """Score tracks against the truth by ISO/IEC 18305 and EvAAL."""
-    from echostep.commands import score as scoring
+    from echostep.commands.actions import score as scoring
 
     scoring.score(tracks, truth, plan, html, setup, as_json=as_json)
 
@@ -153,6 +153,6 @@ def decode(
     ] = None,
 ) -> None:
     """Print captured bytes as JSON, one message a line; on stderr, what was found and rejected."""
-    from echostep.commands import offline
+    from echostep.commands.actions import offline
 
     offline.decode(file, output_mode, output_settings)

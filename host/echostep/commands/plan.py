@@ -59,8 +59,8 @@ def import_(
     ] = None,
 ) -> None:
     """Make a plan of a building that is drawn in another format."""
-    from echostep.plan.importers.assumed_doors import ASSUMED
     from echostep.plan.importers.formats import Hints
+    from echostep.plan.importers.imdf.assumed_doors import ASSUMED
     from echostep.plan.importers.limited import import_limited
     from echostep.plan.writer import save_plan
 

@@ -96,8 +96,8 @@ def demo(
     ] = True,
 ) -> None:
     """Track a simulated walk through a simulated building."""
-    from echostep.session import demo as demo_run
     from echostep.session.options import OutputOptions
+    from echostep.session.runs import demo as demo_run
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, browser and sys.stdout.isatty())
@@ -130,8 +130,8 @@ def live(
     foxglove: Foxglove = None,
 ) -> None:
     """Track a wearer live and record everything. With nothing on the foot the board's leg gyros are used."""
-    from echostep.session import live as live_run
     from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
+    from echostep.session.runs import live as live_run
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, foxglove=_foxglove(foxglove))
@@ -153,8 +153,8 @@ def record(
     keep: Keep = None,
 ) -> None:
     """Record the ports without tracking."""
-    from echostep.session import live as live_run
     from echostep.session.options import PortOptions
+    from echostep.session.runs import live as live_run
 
     board, mtx, foot = _ports(board, mtx, foot)
     live_run.record(PortOptions(board, mtx, beacons, seconds, keep, foot), out)
@@ -183,8 +183,8 @@ def replay(
     foxglove: Foxglove = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
-    from echostep.session import replay as replay_run
     from echostep.session.options import OutputOptions, TrackingOptions
+    from echostep.session.runs import replay as replay_run
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(

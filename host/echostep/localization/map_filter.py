@@ -57,7 +57,7 @@ from echostep.localization.team.meetings import (
 from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
-from echostep.ports.meeting import Meeting
+from echostep.ports.people.meeting import Meeting
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, by reason
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact

@@ -20,19 +20,18 @@ from rich.live import Live
 
 from echostep.errors import EchostepError
 from echostep.operation.operation import Operation
-from echostep.operation.page import TablePage
+from echostep.operation.page import TablePage, Views, finish
 from echostep.operation.record import OperationRecorder
 from echostep.operation.replay import replay
 from echostep.operation.tape import Keyframe, Tape
-from echostep.operation.views import Views, finish
 from echostep.page.guarded_socket import FRAME_S
 from echostep.plan.model import Plan, load_plan
 from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, ReceivedMessage, Receiver
-from echostep.team.marks import ALL, is_shared
-from echostep.team.mqtt import Listener
-from echostep.team.report import checked_name
+from echostep.team.messages.marks import ALL, is_shared
+from echostep.team.messages.report import checked_name
+from echostep.team.mqtt.publisher import Listener
 from echostep.team.restorer import Restorer
 
 TABLE_S = 0.25  # between two drawings of the table, by reason
@@ -115,7 +114,7 @@ def _receiver(
 ) -> Receiver:
     """A subscription to the reports of a team, or of all teams: at a broker, or over a Meshtastic node."""
     if endpoint.scheme == "mesh":
-        from echostep.team.mesh import MeshListener
+        from echostep.team.mesh.mesh import MeshListener
 
         listener = MeshListener(endpoint, team, plan, inbox.put)
         return Receiver(listener, lambda text: print_line(f"{endpoint}: {text}"))

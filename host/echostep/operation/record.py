@@ -27,7 +27,7 @@ from echostep.plan.model import Plan
 from echostep.ports.chunks import Chunk
 from echostep.recording.numbered import numbered_recorder
 from echostep.team.inbox import ReceivedMessage
-from echostep.team.report import MAX_PAYLOAD, printable
+from echostep.team.messages.report import MAX_PAYLOAD, printable
 from echostep.team.roster import MAX_REASONS
 
 OPERATION = "operation"  # name of the port

@@ -15,10 +15,9 @@ from rich.console import Console
 
 from echostep.errors import EchostepError
 from echostep.operation.operation import Operation
-from echostep.operation.page import TablePage
+from echostep.operation.page import TablePage, Views, finish
 from echostep.operation.record import KIND
 from echostep.operation.tape import Player, Tape, load
-from echostep.operation.views import Views, finish
 from echostep.page.guarded_socket import FRAME_S
 from echostep.plan.model import Plan
 from echostep.recording.reading import open_recording

@@ -21,11 +21,10 @@ import msgspec
 import numpy as np
 
 from echostep.page.elements.alarm import ShownAlarm
-from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
-from echostep.page.elements.marks import ShownMark
+from echostep.page.elements.marks import BeaconMark, ShownMark
 from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, ParticleSample
 from echostep.page.elements.stream_rates import StreamRates

@@ -25,7 +25,7 @@ from echostep.page.guarded_socket import FRAME_S, MOST_UNDRAWN, GuardedSocket
 from echostep.page.mailbox import Mailbox
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
-from echostep.ports.check_in import Call, CheckIn, Undo
+from echostep.ports.people.check_in import Call, CheckIn, Undo
 
 
 class PageSession(GuardedSocket):

@@ -15,7 +15,7 @@ from echostep.guidance.cue_list import CueList
 from echostep.localization.estimate import Estimate, digest
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Plan
-from echostep.plan.whereabouts import Whereabouts
+from echostep.plan.places.whereabouts import Whereabouts
 from echostep.scorecard.truth import Errors, Truth, errors
 from echostep.session.console import console
 from echostep.tracker import Tracker

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
     from echostep.page.shared_drawing import SharedDrawing
-    from echostep.session.marks_ear import MarksEar
-    from echostep.session.team_ear import TeamEar
-    from echostep.session.teammates_ear import TeammatesEar
+    from echostep.session.team.marks_ear import MarksEar
+    from echostep.session.team.team_ear import TeamEar
+    from echostep.session.team.teammates_ear import TeammatesEar
     from echostep.team.endpoint import Endpoint
     from echostep.team.publish import Publishing, Source
 
@@ -102,7 +102,7 @@ class Session:
         """A live walk without a plan is drawn for the team, by the page or, without one, unseen."""
         if self.recorded is not None or self.tracker.plan.is_drawn or self._broker is None:
             return
-        from echostep.session.drawing_share import UnseenDrawing, shared_drawing
+        from echostep.session.team.drawing_share import UnseenDrawing, shared_drawing
 
         assert self.output.outlet
         name, say = self.output.outlet.name, partial(console.print, markup=False, highlight=False)
@@ -173,7 +173,7 @@ class Session:
         """A rescuer's live run listens to the other wearer; a replay has in its recording what was heard."""
         if self.recorded is not None or not isinstance(self.guided, GuidedRescue):
             return
-        from echostep.session.team_ear import TeamEar
+        from echostep.session.team.team_ear import TeamEar
 
         print_line = partial(console.print, markup=False, highlight=False)
         self.ear = TeamEar(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
@@ -184,8 +184,8 @@ class Session:
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
         if outlet is None or publishing is None or broker is None or self.recorded is not None:
             return
-        from echostep.session.marks_ear import MarksEar
-        from echostep.session.teammates_ear import TeammatesEar
+        from echostep.session.team.marks_ear import MarksEar
+        from echostep.session.team.teammates_ear import TeammatesEar
 
         print_line = partial(console.print, markup=False, highlight=False)
         self.teammates = TeammatesEar(broker, outlet, publishing.run, self.tracker.plan, print_line)

@@ -13,7 +13,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from echostep.errors import EchostepError
-from echostep.team.report import checked_name
+from echostep.team.messages.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
 FILES = ("ca", "cert", "key")

@@ -17,9 +17,9 @@ from echostep.errors import EchostepError
 from echostep.plan.model import Plan
 from echostep.team.endpoint import Endpoint
 from echostep.team.inbox import Receiver
-from echostep.team.mqtt import Listener
-from echostep.team.report import checked_name
-from echostep.team.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
+from echostep.team.messages.report import checked_name
+from echostep.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
+from echostep.team.mqtt.publisher import Listener
 
 PREFIX = "wearer:"
 WAIT_S = 60.0  # for a drawing, by reason: the other wearer may just have set out

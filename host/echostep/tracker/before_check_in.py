@@ -16,7 +16,7 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.map_filter import MapFilter
 from echostep.localization.team.meetings import TimedMeeting
 from echostep.path import MeasuredSegment
-from echostep.ports.check_in import CheckIn
+from echostep.ports.people.check_in import CheckIn
 
 UNDO_S = (
     120.0  # for so long a check-in can be undone. By reason: 10 s for a person, in a demo at several times real time

@@ -28,15 +28,15 @@ from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
 from echostep.localization.team.meetings import MeetingEffect, MeetingQueue, carries_position, on_the_way, start_at
 from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
-from echostep.odometry.alarm import WearerAlarm
 from echostep.odometry.front_end import FrontEnd
+from echostep.odometry.incapacity.alarm import WearerAlarm
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
-from echostep.ports.meeting import MEETING
-from echostep.ports.team_beacons import TEAM_BEACONS, SharedBeacon
-from echostep.ports.teammate import TEAM
+from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
+from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
+from echostep.ports.people.teammate import TEAM
 from echostep.settings import Settings
 from echostep.tracker.before_check_in import BeforeCheckIn
 from echostep.tracker.last_place import LastPlace, last_place

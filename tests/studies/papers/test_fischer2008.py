@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from echostep.arrays import Floats
 from echostep.cli import app
-from echostep.commands.offline import foot as run_foot
+from echostep.commands.actions.offline import foot as run_foot
 from echostep.errors import EchostepError
 from echostep.foot import steps as foot
 from echostep.simulation.devices import onboard_filter as onboard

@@ -35,8 +35,8 @@ from echostep.localization.estimate import LOST_M, TAIL, ellipse95
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
 from echostep.path import PathSegment
-from echostep.ports.check_in import MOST_SD_M, CheckIn
-from echostep.ports.meeting import Meeting, parse_meeting
+from echostep.ports.people.check_in import MOST_SD_M, CheckIn
+from echostep.ports.people.meeting import Meeting, parse_meeting
 
 # All by reason.
 SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length

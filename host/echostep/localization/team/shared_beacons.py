@@ -19,7 +19,7 @@ from echostep.board.gateway import BeaconReading
 from echostep.localization.beacon_map import BeaconMap
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.team.meetings import PreparedMeeting, TimedMeeting
-from echostep.ports.team_beacons import SharedBeacon, parse_team_beacons
+from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest; by reason
 TEAM_RANGE_SD_M = 0.4  # of a range to the trunk: BeaconSettings.range_sd_m, for the same reasons

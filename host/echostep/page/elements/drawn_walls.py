@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate
+from echostep.mapping.graph.storeys import STAIRS
 from echostep.mapping.mapper import Mapped
-from echostep.mapping.storeys import STAIRS
 
 MOST_WALLS, MOST_POINTS = 2000, 4000  # in a message; of more walls those nearest to the wearer. By reason: 72 KB
 

@@ -26,7 +26,7 @@ from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Pose, load_plan
 from echostep.recording.reading import open_recording
 from echostep.scorecard.truth import load_truth
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
 from echostep_studies.feet.metrics import align, rmse

@@ -15,8 +15,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, Step
 from echostep.foot.trunk_path import GaitSettings, TrunkPath
-from echostep.odometry.falls import STRIDE_M, Fall
-from echostep.odometry.wearer_signs import WearerSigns
+from echostep.odometry.incapacity.falls import STRIDE_M, Fall
+from echostep.odometry.incapacity.wearer_signs import WearerSigns
 from echostep.path import PathSegment
 from echostep_studies.feet.datasets import SETS as FEET
 from echostep_studies.frame.recordings import Sets, read_sets

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.odometry.alarm import AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.falls import Fall
-from echostep.odometry.wearer_signs import Sign, WearerSigns
+from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason, WearerAlarm
+from echostep.odometry.incapacity.falls import Fall
+from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep.output.table import Table
 from echostep.path import PathSegment
 from echostep_studies.frame.report import Row, rows_by_name

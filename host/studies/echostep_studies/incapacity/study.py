@@ -17,9 +17,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.alarm import AlarmKind, WearerAlarm
-from echostep.odometry.stillness import WINDOW_S, Stillness, Window
-from echostep.odometry.wearer_signs import StepTaken
+from echostep.odometry.incapacity.alarm import AlarmKind, WearerAlarm
+from echostep.odometry.incapacity.stillness import WINDOW_S, Stillness, Window
+from echostep.odometry.incapacity.wearer_signs import StepTaken
 from echostep.output.table import Table
 from echostep_studies.feet.datasets import SETS as FEET
 from echostep_studies.frame.recordings import read_sets

@@ -15,9 +15,9 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Bools, Floats
-from echostep.mapping.graph import Closure
+from echostep.mapping.graph.graph import Closure
+from echostep.mapping.graph.storeys import STAIRS
 from echostep.mapping.mapper import Mapped
-from echostep.mapping.storeys import STAIRS
 from echostep_studies.anywhere.walks import SimulatedWalk, T, X, Y, Z
 from echostep_studies.frame.report import Row
 

@@ -14,9 +14,9 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.gaps import door_gaps
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Level, Plan, load_plan
+from echostep.plan.places.gaps import door_gaps
 from echostep.plan.routing import RoutePlace
 from echostep_studies.anywhere.sites import OFFICE_DOOR, OFFICE_PLAN, Site, level_alone, plan_of
 from echostep_studies.anywhere.tours import random_tour

@@ -18,8 +18,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.particles.start import Start
+from echostep.mapping.graph.nodes import nodes_of
 from echostep.mapping.mapper import map_walk
-from echostep.mapping.nodes import nodes_of
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import plan_in
 from echostep.output.table import Table

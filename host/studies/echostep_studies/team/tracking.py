@@ -19,13 +19,13 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.particles.start import Start
 from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.meeting import MEETING, Meeting
-from echostep.ports.team_beacons import TEAM_BEACONS, TeamBeacons
+from echostep.ports.people.meeting import MEETING, Meeting
+from echostep.ports.people.team_beacons import TEAM_BEACONS, TeamBeacons
 from echostep.simulation.scenario import START_NS
-from echostep.team.meeting import meeting_with
+from echostep.team.messages.meeting import meeting_with
+from echostep.team.messages.shared_beacons import SHARE_S
 from echostep.team.outbox import aged
 from echostep.team.publish import position_of
-from echostep.team.shared_beacons import SHARE_S
 from echostep.tracker import Tracker
 from echostep_studies.anywhere.walks import T
 from echostep_studies.team.walks import Encounter, TeamWalks
