@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The commander's page: an operation served to browsers.
 
-In: an operation, an address, options of the command. Out: the page, a picture, the roster as JSON. Owns the server. Server, guards and style are those of the live page (`echostep.page`).
+In: an operation, an address, options of the command. Out: the page, a picture, the roster as JSON. Owns the
+server. Server, guards and style are those of the live page (`echostep.page`).
 """
 
 from __future__ import annotations
