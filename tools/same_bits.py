@@ -79,9 +79,10 @@ def captures() -> Iterator[tuple[str, str]]:
 FOOT = """
 import hashlib, sys
 from pathlib import Path
-from echostep_studies.feet.datasets import read_recordings
+from echostep_studies.feet.datasets import SETS
+from echostep_studies.frame.recordings import read_sets
 from echostep.foot.steps import walk_track
-for r in read_recordings(Path(sys.argv[1]))[0]:
+for r in read_sets(Path(sys.argv[1]), SETS)[0]:
     track = walk_track(r.t_s, r.accel, r.gyro, mag=r.mag)
     print(r.group, r.name, hashlib.sha256(track.position_m.tobytes()).hexdigest(), sep="\\t")
 """
