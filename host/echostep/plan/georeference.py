@@ -19,7 +19,7 @@ class EarthTransform:
 
     def __init__(self, georeference: Georeference) -> None:
         """Raises ValueError when pyproj does not know the coordinate system, or when it is not in degrees; EchostepError without pyproj."""
-        require("a georeference", "pyproj")
+        require("the plan's georeference", "pyproj")
         from pyproj import CRS, Transformer
         from pyproj.exceptions import CRSError
 
