@@ -22,8 +22,15 @@ from echostep.localization.beacon_beliefs import (
 )
 from echostep.localization.beacon_initialisation import locate_beacon
 from echostep.localization.beacon_model import BeaconSettings, beacon_model
-from echostep.localization.beacon_slam import initial_health, propose_heading_jumps, reweight
-from echostep.localization.beacon_step import Beacons, no_waiting, update_by_reading
+from echostep.localization.beacon_slam import (
+    CLOUD_FIT,
+    LOST_FIT,
+    initial_health,
+    propose_heading_jumps,
+    reweight,
+    update_by_measurement,
+)
+from echostep.localization.beacon_step import MOST_WAITING, Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_kernels import ParticleArrays
 from echostep.walls.index import build_index
 from naive import beacon_readings as naive_readings
@@ -121,6 +128,22 @@ def test_jumps_are_those_of_the_twin() -> None:
     assert found == pytest.approx(expected)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_a_lost_cloud_recovers_as_its_twin(seed: int) -> None:
+    """A wrong measurement is one too many: some particles go where it allows, about a known axis or all around."""
+    rng = np.random.default_rng(seed)
+    particles, beliefs = any_cloud(rng, 8, 2)
+    cloud, health = twin_of(particles, beliefs), initial_health(2)
+    measurement = BeaconMeasurement(0, 14.0, float(rng.choice([math.nan, rng.uniform(-4.0, 4.0)])))
+    health.all[CLOUD_FIT] = LOST_FIT
+    draws = np.random.default_rng(seed), np.random.default_rng(seed)
+    update_by_measurement(particles, beliefs, health, measurement, MODEL, build_index(NOTHING), draws[0])
+    fit, _ = naive.reweight(cloud, measurement, MODEL, NOTHING)
+    if fit < LOST_FIT:
+        naive.recover(cloud, measurement, MODEL, draws[1])
+    assert_same(particles, beliefs, cloud)
+
+
 def any_readings(rng: np.random.Generator) -> Floats:
     """Of a beacon that is passed on a straight or bent path, with wrong ranges and missing bearings."""
     n = int(rng.integers(11, 18))
@@ -150,6 +173,41 @@ def test_a_place_is_that_of_the_twin() -> None:
             other = naive_readings.cost(readings, np.array([found.x_m, found.y_m]))
             assert other == pytest.approx(naive_readings.cost(readings, place))
     assert {(True, False), (False, False), (False, True)} == set(verdicts)
+
+
+def assert_waits_as_its_twin(rows: list[tuple[float, float, float]]) -> bool:
+    """Readings (x, y, range) of a beacon that is not placed yet, by three particles; returns whether it was placed."""
+    rng, beacons = np.random.default_rng(1), Beacons(empty_beliefs(3, 1), initial_health(1), no_waiting(1))
+    particles = ParticleArrays(np.zeros(3), np.zeros(3), np.zeros(3), np.ones(3), np.array([0.0, -1.0, -0.2]))
+    twin = naive_readings.Beacons(twin_of(particles, beacons.beliefs), 1)
+    for x, y, range_m in rows:
+        for i, p in enumerate(twin.cloud):
+            p.place = np.array([x + 0.1 * i, y - 0.2 * i])
+            particles.x_m[i], particles.y_m[i] = p.place
+        measurement = BeaconMeasurement(0, range_m, math.nan)
+        update_by_reading(particles, beacons, measurement, MODEL, build_index(NOTHING), False, rng)
+        twin.read(measurement, MODEL, NOTHING, False, rng)
+        assert_same(particles, beacons.beliefs, twin.cloud)
+        assert beacons.waiting.taken[0] == len(twin.known[0].waiting)
+    assert beacons.health.known[0] == twin.known[0].placed
+    return twin.known[0].placed
+
+
+@pytest.mark.parametrize("from_afar", range(6))
+@pytest.mark.parametrize("near", [0.99, 1.01])
+def test_a_beacon_is_dropped_as_by_its_twin(from_afar: int, near: float) -> None:
+    """Within two standard deviations of its place, among its first readings."""
+    rows = [(0.1 * t, 0.0, 5.0) for t in range(from_afar)]
+    assert assert_waits_as_its_twin([*rows, (0.5, 0.0, near)]) == (from_afar < 4 and near < 1.0)
+
+
+def test_a_long_wait_is_that_of_the_twin() -> None:
+    """A straight path leaves open on which side the beacon lies; its bend tells. The first readings, wrong ones, are forgotten by then."""
+    wrong = [(0.0, 0.0, 3.5)] * 20
+    there = [(x, 0.0, math.hypot(x - 1.5, 1.2)) for x in np.linspace(0.0, 3.0, MOST_WAITING - 8).tolist()]
+    bend = [(3.0, y, math.hypot(1.5, y - 1.2)) for y in np.linspace(0.1, 2.0, 16).tolist()]
+    assert assert_waits_as_its_twin([*wrong, *there, *bend])
+    assert not assert_waits_as_its_twin([*wrong, *there])
 
 
 def walk(rng: np.random.Generator) -> list[tuple[float, int, float, float]]:
