@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
-from echostep.localization.beacon_beliefs import (
+from echostep.localization.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
@@ -20,9 +20,9 @@ from echostep.localization.beacon_beliefs import (
     place_covariance,
     resample_beliefs,
 )
-from echostep.localization.beacon_initialisation import locate_beacon
-from echostep.localization.beacon_model import BeaconSettings, beacon_model
-from echostep.localization.beacon_slam import (
+from echostep.localization.beacons.initialisation import locate_beacon
+from echostep.localization.beacons.model import BeaconSettings, beacon_model
+from echostep.localization.beacons.slam import (
     CLOUD_FIT,
     LOST_FIT,
     initial_health,
@@ -30,8 +30,8 @@ from echostep.localization.beacon_slam import (
     reweight,
     update_by_measurement,
 )
-from echostep.localization.beacon_step import MOST_WAITING, Beacons, no_waiting, update_by_reading
-from echostep.localization.particle_kernels import ParticleArrays
+from echostep.localization.beacons.step import MOST_WAITING, Beacons, no_waiting, update_by_reading
+from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import build_index
 from naive import beacon_readings as naive_readings
 from naive import beacons as naive

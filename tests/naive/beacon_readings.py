@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.beacon_beliefs import BeaconMeasurement
-from echostep.localization.beacon_initialisation import (
+from echostep.localization.beacons.beliefs import BeaconMeasurement
+from echostep.localization.beacons.initialisation import (
     APART_M,
     BEARING_SD_RAD,
     FEWEST,
@@ -25,15 +25,15 @@ from echostep.localization.beacon_initialisation import (
     PATH_M,
     RANGE_SD_M,
 )
-from echostep.localization.beacon_model import BeaconModel
-from echostep.localization.beacon_slam import (
+from echostep.localization.beacons.model import BeaconModel
+from echostep.localization.beacons.slam import (
     ACQUITTED_FIT,
     FIT_SHARE,
     LOST_FIT,
     MISFIT,
     RECOVERED_FIT,
 )
-from echostep.localization.beacon_step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_WAITING
+from echostep.localization.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_WAITING
 from naive.beacons import Belief, Particle, recover, reweight
 
 

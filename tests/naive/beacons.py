@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.beacon_beliefs import BeaconMeasurement
-from echostep.localization.beacon_model import BeaconModel
-from echostep.localization.beacon_slam import (
+from echostep.localization.beacons.beliefs import BeaconMeasurement
+from echostep.localization.beacons.model import BeaconModel
+from echostep.localization.beacons.slam import (
     CLOSE_BEARING_M2,
     GATE,
     GREATEST_ODDS,
