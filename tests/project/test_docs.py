@@ -96,6 +96,7 @@ def test_a_code_flow_names_what_its_files_hold(flow: str) -> None:
         assert re.search(rf"\b{name}\b", source), name
 
 
+@pytest.mark.process
 def test_every_make_target_that_is_named_exists() -> None:
     listed = subprocess.run(["make", "-s", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     targets = {line.split()[0] for line in listed.splitlines()}
