@@ -10,9 +10,9 @@ from itertools import islice
 
 import pytest
 
-import fuzz_host
 from echostep.errors import EchostepError
-from fuzz_targets import TARGETS
+from reliability.fuzz import host as fuzz_host
+from reliability.fuzz.targets import TARGETS
 
 SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "imdf": 5, "wrld": 5}  # inputs, where one takes tens of milliseconds
 

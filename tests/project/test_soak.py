@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-import long_tour
-import soak
 from board_runs import ROOT, needs_twin
 from echostep.board.frames import encode
 from echostep.board.messages import Configure, PressureMode, Schedule
@@ -19,6 +17,7 @@ from echostep.ports.chunks import MTX
 from echostep.simulation.devices.board import PythonBoard, Sent
 from echostep.simulation.stimulus import NO_SYNC
 from echostep.xsens import MtxReader
+from reliability import long_tour, soak
 
 ROUND = ((16.0, 7.5), (24.0, 7.5), (24.0, 2.0), (2.0, 2.0), (2.0, 7.5), (16.0, 7.5))
 WRAP_S = soak.WRAP / soak.TICKS_S

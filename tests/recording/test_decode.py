@@ -24,7 +24,7 @@ from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
 from naive.mt_frames import valid_frames
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
 HALF = math.sqrt(0.5)

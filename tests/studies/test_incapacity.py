@@ -8,7 +8,7 @@ import pytest
 from echostep_studies.incapacity import study as incapacity
 from echostep_studies.incapacity.study import TOLD_S, incapacitated, one_run, recorded, summarize, work_day
 from needs_data import data_or_skip
-from recordings import DATA
+from places import DATA
 
 
 def test_every_wearer_who_cannot_move_is_told_within_35_s() -> None:

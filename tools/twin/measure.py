@@ -13,7 +13,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -26,9 +25,8 @@ from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.kits import Kit
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
+from places import TWIN
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
 SETTLED_S = 2.0  # enumeration and start-up take less
 TICK_US = 0.5
 Figure = tuple[str, str, str, bool | None]  # what, measured, limit, passed (None: no limit)

@@ -43,7 +43,8 @@ from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
 from echostep.team.roster import Member, MemberState, Roster
 from echostep.tracker import Tracker
-from team_load import report_at
+from places import TWIN
+from reliability.team_load import report_at
 
 FALLEN_WAY: tuple[Waypoint, ...] = (
     (2.0, 7.5),
@@ -53,8 +54,6 @@ FALLEN_WAY: tuple[Waypoint, ...] = (
 RESCUE_WAY: tuple[Waypoint, ...] = ((24.0, 2.0), (24.0, 7.5), (9.5, 7.5), (9.5, 10.8))
 RATE_HZ = 10.0  # of the simulated reports
 LONGEST_S = 300.0  # by reason: of the whole operation
-ROOT = Path(__file__).resolve().parents[1]
-TWIN = f"{ROOT}/tools/twin/build/echostep-twin --elf {ROOT}/firmware/build/echostep.elf"
 
 
 def walk(role: str, url: str, plan: Plan, speed: float) -> None:
@@ -148,12 +147,14 @@ def operate(url: str, plan_path: Path, wearers: int, firmware: int, speed: float
         )
         for k in range(firmware):
             out, name = str(folder / f"firmware-{k}"), f"firmware {k}"
-            _start(opened, ["-m", "echostep", "demo", "--headless", "--speed", "1", "--board-command", TWIN, "--publish", url,
+            _start(opened, ["-m", "echostep", "demo", "--headless", "--speed", "1", "--board-command", " ".join(TWIN), "--publish", url,
                             "--name", name, "--team", "load", "--seed", str(k + 1), "--out", out])  # fmt: skip
         crowd = Crowd(url, plan, wearers - firmware - 2)
-        _start(opened, [__file__, "--role", "fallen", "--url", url, "--speed", str(speed)])
+        _start(opened, ["-m", "reliability.team_operation", "--role", "fallen", "--url", url, "--speed", str(speed)])
         told_s = _wait(ear.mayday_s)
-        rescuer = _start(opened, [__file__, "--role", "rescuer", "--url", url, "--speed", str(speed)])
+        rescuer = _start(
+            opened, ["-m", "reliability.team_operation", "--role", "rescuer", "--url", url, "--speed", str(speed)]
+        )
         out, _ = rescuer.communicate(timeout=LONGEST_S)
         arrived = json.loads(out.splitlines()[-1])
         commander.send_signal(signal.SIGINT)  # before the wearers end

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Plan, load_plan
@@ -31,9 +30,9 @@ from echostep.recording.repair.edit import repair
 from echostep.session.options import TrackingOptions
 from echostep.session.runs.replay import tracker_of
 from echostep.session.skipped import skipped
+from places import PLAN
 from walks import walk_chunks
 
-DEMO = ROOT / "host/echostep/plans/demo.json"
 ASTRAY_M = 0.5  # from the track of the undamaged recording; by reason: half the radius of a sure position
 EARLY_S = 1.0  # before the end of the undamaged track; by reason: two estimates
 
@@ -68,7 +67,7 @@ def replay(path: Path, plan: Plan) -> Replayed:
     """Track a recording as `echostep replay` does."""
     try:
         recording = open_recording(path)
-        tracker = tracker_of(recording, plan, TrackingOptions(DEMO))
+        tracker = tracker_of(recording, plan, TrackingOptions(PLAN))
         estimates = [estimate for portion in recording.portions() for estimate in tracker.take(portion)]
     except EchostepError as error:
         return Replayed([], [str(error)])
@@ -144,7 +143,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=30.0, help="of the simulated walk")
     options = parser.parse_args()
-    plan = load_plan(DEMO)
+    plan = load_plan(PLAN)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         record_walk(folder / "walk.mcap", options.seconds)

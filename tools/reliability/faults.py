@@ -26,13 +26,11 @@ from echostep.session.chunk_streams import portions_of
 from echostep.simulation.devices.board import Board, BoardProcess
 from echostep.simulation.scenario import START_NS, Scenario, demo_scenario
 from echostep.tracker import Tracker
-from fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams, table
+from places import OUT, PLAN, ROOT, TWIN
+from reliability.fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams, table
 from twin.host_faults import HOST_FAULTS
 from twin.live_walk import BEGIN_S, END_S, HostFault, LiveWalk
 
-ROOT = Path(__file__).resolve().parent.parent
-TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
-PLAN = ROOT / "host/echostep/plans/demo.json"
 PAGE = ROOT / "host/docs/faults.md"
 MARKS = "<!-- table -->\n", "<!-- end of table -->\n"
 SEED = 1
@@ -175,7 +173,7 @@ def run_live(fault: HostFault, folder: Path) -> Outcome:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument(
-        "--out", type=Path, default=ROOT / "out/faults.jsonl", help="outcomes so far; they are not run again"
+        "--out", type=Path, default=OUT / "faults.jsonl", help="outcomes so far; they are not run again"
     )
     parser.add_argument("--page", action="store_true", help="write the table into host/docs/faults.md")
     options = parser.parse_args()

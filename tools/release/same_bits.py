@@ -19,11 +19,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from recordings import DATA
+from places import DATA, ROOT, TWIN
 
-ROOT = Path(__file__).resolve().parent.parent
-TWIN = ROOT / "tools/twin/build/echostep-twin"
-ELF = ROOT / "firmware/build/echostep.elf"
 STUDIES = ("girard2011", "echoes", "trails", "lee2010", "floors", "legs", "storeys", "fischer2008", "feet")
 WITHOUT_RUNS = ("echoes", "feet")
 WITH_DATA = ("feet", "storeys")
@@ -52,13 +49,13 @@ def sha256(text: str | bytes) -> str:
 
 def demo(out: Path) -> Iterator[tuple[str, str]]:
     """track.csv of three simulated walks through the real firmware."""
-    if not TWIN.exists():
+    if not Path(TWIN[0]).exists():
         print("demo: skipped, the twin is not built (make demo builds it)", file=sys.stderr)
         return
     for seed in (1, 2, 3):
         folder = out / f"demo{seed}"
         said = echostep(
-            "demo", "--headless", "--no-page", "--seed", seed, "--out", folder, "--board-command", f"{TWIN} --elf {ELF}"
+            "demo", "--headless", "--no-page", "--seed", seed, "--out", folder, "--board-command", " ".join(TWIN)
         )
         yield f"demo/{seed}/estimates", said.split("sha256 ")[1].split()[0].rstrip(";")
         yield f"demo/{seed}/track", sha256((folder / "track.csv").read_bytes())

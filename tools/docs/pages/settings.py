@@ -10,8 +10,8 @@ import dataclasses
 import inspect
 from typing import Any
 
+from docs.pages import MADE
 from echostep.settings import Settings
-from pages import MADE
 
 SETTINGS = """\
 `--settings FILE` of `live` and `replay`: TOML, one section a stage, every field has a default. A wrong section, field or value is

@@ -16,19 +16,20 @@ import numpy as np
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from hardware import HARDWARE
+from hardware import HARDWARE, solids
 from hardware.solids import Triangles, faults, picture, read_stl, volume
+from places import OUT
 
 BOXES = HARDWARE / "boxes"
 NAMES = ("belt_box", "ranger_holder", "imu_clip", "ankle_box")
 PARTS = ("box", "lid")
-OUT = HARDWARE.parents[1] / "out" / "hardware"
+STL = OUT / "hardware"
 WIDTH = 420  # of a part's picture, pixels
 
 
 def sources(name: str) -> str:
     """A fingerprint of all that a picture is made from."""
-    files = (BOXES / "common.scad", BOXES / f"{name}.scad", HARDWARE.parents[1] / "tools/hardware/solids.py")
+    files = (BOXES / "common.scad", BOXES / f"{name}.scad", Path(solids.__file__))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
 
@@ -59,7 +60,7 @@ def main() -> int:
     """Make, check and draw all boxes."""
     sound = True
     for name in NAMES:
-        parts = [compiled(name, part, OUT) for part in PARTS]
+        parts = [compiled(name, part, STL) for part in PARTS]
         for part, triangles in zip(PARTS, parts, strict=True):
             size = np.ptp(triangles.reshape(-1, 3), axis=0)
             found = faults(triangles)

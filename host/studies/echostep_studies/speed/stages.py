@@ -70,7 +70,7 @@ def main() -> None:
     runs = [replay(options.recording, options.plan) for _ in range(options.rounds)]
     least = {stage: min(spent[stage] for spent, _ in runs) for stage in runs[0][0]}
     read_s, span_s = min(reading_time(options.recording) for _ in range(options.rounds)), runs[0][1]
-    inner = ("board frames", "MTx samples", "timeline", "foot and path")
+    inner = ("board frames", "foot samples", "timeline", "foot and path")
     rows = {"reading the recording": read_s} | {stage: least[stage] for stage in inner}
     rows["ports, pings, waiting"] = least["all of the front end"] - sum(least[stage] for stage in inner)
     rows["bytes to legs and pings"] = read_s + least["all of the front end"]

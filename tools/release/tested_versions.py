@@ -8,13 +8,13 @@ In: the installed packages. Out: host/tested-versions.txt. Owns that file. `make
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from packaging.utils import canonicalize_name
 
-from licences import needed
+from places import ROOT
+from release.licences import needed
 
-FILE = Path(__file__).resolve().parents[1] / "host/tested-versions.txt"
+FILE = ROOT / "host/tested-versions.txt"
 HEAD = "# The versions with which the tests have passed. Made by make lock; make setup installs them, make audit checks them.\n"
 
 

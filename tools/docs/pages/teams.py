@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from docs.pages import DOCS, HOST, between_marks
 from echostep.team.messages.report import schema
-from pages import DOCS, HOST, between_marks
 
 SCHEMA = HOST / "echostep/team/report.schema.json"
 

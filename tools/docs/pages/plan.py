@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from pages import DOCS, HOST, between_marks
+from docs.pages import DOCS, HOST, between_marks
 
 SCHEMA = HOST / "echostep/plans/plan.schema.json"
 FIELDS = "| field | type | needed | meaning |\n|---|---|---|---|\n"

@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Any, ForwardRef, Literal, get_origin
 
 import echostep
-from pages import MADE
+from docs.pages import MADE
 
 LINE = 100  # characters; by reason: the width of the page
 HEAD = """# Python

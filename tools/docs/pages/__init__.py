@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The pages of host/docs that are made from the code: one module a page.
 
-In: the installed package. Out: the text of each page. Owns nothing: `tools/docs.py` writes and compares.
+In: the installed package. Out: the text of each page. Owns nothing: `docs.generate` writes and compares.
 """
 
-from pathlib import Path
+from places import ROOT
 
-HOST = Path(__file__).resolve().parents[2] / "host"
+HOST = ROOT / "host"
 DOCS = HOST / "docs"
 MADE = "Made by `make docs` from the code: do not edit.\n"
 BEGIN, END = "<!-- made by make docs -->\n", "<!-- end -->\n"  # around the part of a page that is made

@@ -12,8 +12,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from docs.pages import DOCS, commands, hardware, plan, python, recordings, settings, teams
 from echostep.team.messages.report import schema
-from pages import DOCS, commands, hardware, plan, python, recordings, settings, teams
 
 
 def pages() -> dict[Path, str]:

@@ -10,12 +10,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from docs.pages import END
 from hardware import HARDWARE
 from hardware.drawing import drawing
 from hardware.kicad import schematic
 from hardware.wearing import wearing
 from hardware.wiring import POWER, Board, boards
-from pages import END
 
 README = HARDWARE.parent / "README.md"
 KITS = {"papers": "parts of the papers", "2026": "parts of 2026"}

@@ -17,14 +17,15 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from places import OUT, ROOT
+
 FIRMWARE = ROOT / "firmware"
 SOURCES = [
     ROOT / "tests/firmware/fuzz_codec.c",
     *(FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c", "link.c", "status.c")),
 ]
 CORPUS = ROOT / "tests/firmware/corpus.txt"
-FOLDER = ROOT / "out/fuzz"
+FOLDER = OUT / "fuzz"
 FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined"]
 LONGEST = (70, 600)  # bytes of an input, in turn by shard: a frame, as many as fuzz_codec.c takes
 

@@ -14,8 +14,8 @@ from typing import Any, get_args, get_type_hints
 import typer
 import typer.models
 
+from docs.pages import MADE
 from echostep.cli import app
-from pages import MADE
 
 
 def page() -> str:

@@ -41,11 +41,9 @@ from echostep.session.runs.recording import start_recording
 from echostep.session.session import Session
 from echostep.simulation.devices.board import BoardProcess
 from echostep.tracker import Tracker
-from long_tour import LongTour, TracedBoard
+from places import OUT, PLAN, TWIN
+from reliability.long_tour import LongTour, TracedBoard
 
-ROOT = Path(__file__).resolve().parent.parent
-TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
-PLAN = ROOT / "host/echostep/plans/demo.json"
 SEED = 1
 PORTION = 100  # chunks that are tracked together: about a tenth of a second
 SAMPLE_S = 60.0  # simulated, between two looks at the memory
@@ -237,7 +235,7 @@ def figures(measured: Measured) -> list[tuple[str, str, str, bool]]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--hours", type=float, default=8.0, help="simulated")
-    parser.add_argument("--out", type=Path, default=ROOT / "out/soak")
+    parser.add_argument("--out", type=Path, default=OUT / "soak")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     measured = run(3600.0 * options.hours, options.out)

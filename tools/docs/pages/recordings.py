@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import json
 
+from docs.pages import DOCS, between_marks
 from echostep.output.derived import TOPICS
 from echostep.output.foxglove import FRAME, LOCATION, POSE, SCENE
 from echostep.recording.recorder import Topic
-from pages import DOCS, between_marks
 
 SHOWN_BY = {
     POSE.name: "where the trunk is; 3D panel",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Mutated inputs on every way into the host (`make fuzz-host`): every run goes on where the last one stopped.
 
-In: the targets of `fuzz_targets.py`, tests/hostile_inputs.jsonl (inputs that once were faults), the log in out/fuzz. Out: the log with one more line;
+In: the targets of `targets.py`, tests/hostile_inputs.jsonl (inputs that once were faults), the log in out/fuzz. Out: the log with one more line;
 executions so far by target. Exit status 1 when a target raises what it may not, takes longer than `LONGEST_S` or more than `MOST_MEMORY`; the
 input is then added to tests/hostile_inputs.jsonl. Owns both files.
 """
@@ -20,15 +20,14 @@ import traceback
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from types import FrameType
 
 from echostep.errors import EchostepError
-from fuzz_targets import ALLOWED, TARGETS
+from places import OUT, ROOT
+from reliability.fuzz.targets import ALLOWED, TARGETS
 
-ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "tests/hostile_inputs.jsonl"
-LOG = ROOT / "out/fuzz/host.jsonl"
+LOG = OUT / "fuzz/host.jsonl"
 LONGEST_S = 10.0  # of one input, on a busy machine
 MOST_MEMORY = 2_000_000  # kB, of the whole process
 SHARD_S = 1.0  # of one target, then the next has its turn
