@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
-TOOL := PYTHONPATH=tools:tests $(BIN)/python -m
+TOOL := env PYTHONPATH=tools:tests $(BIN)/python -m
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
 TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev openscad
@@ -59,6 +59,9 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
 	$(TOOL) docs.generate --check
+	$(MAKE) --quiet check-c
+
+check-c: ## the C checks of make check, where cppcheck is installed
 	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
 size: ## flash, static RAM and stack of the firmware
@@ -143,4 +146,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation help setup firmware twin demo real test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean
+.PHONY: operation help setup firmware twin demo real test check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean

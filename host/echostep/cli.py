@@ -15,6 +15,7 @@ import typer
 
 from echostep.commands import beacons, commander, evaluate, files, hardware, plan, recordings, runs
 from echostep.errors import EchostepError
+from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
 
 app = typer.Typer(
@@ -57,6 +58,12 @@ def main() -> None:
         app()
     except EchostepError as error:
         print(f"echostep: {error}", file=sys.stderr)
+        sys.exit(2)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS or not (words := lacks("this", package)):
+            raise
+        print(f"echostep: {words}", file=sys.stderr)
         sys.exit(2)
     except BrokenPipeError:
         sys.stderr.close()

@@ -227,9 +227,9 @@ def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
     )
     away = np.abs(way.height_m[at][:, None] - heights)
     found = FloorFilter(heights, prior=known(int(away[0].argmin()), 5)).smooth(samples)
-    score = judge(found, away)
-    assert score["floor_right"] > 0.99
-    assert score["longest_wrong_s"] < 10.0
+    score = judge(found, away, "", 1)
+    assert score.floor_right > 0.99
+    assert score.longest_wrong_s < 10.0
 
 
 def test_the_judge_counts() -> None:
@@ -301,7 +301,7 @@ def test_any_rate(rate_hz: float) -> None:
     way = stairs_up(rate_hz)
     found = record_floors(record(way, rate_hz, noise_pa=1.5), np.array([0.0, 3.5]))
     away = np.abs(way[:, None] - np.array([0.0, 3.5]))
-    assert judge(found, away)["floor_right"] > 0.97
+    assert judge(found, away, "", 1).floor_right > 0.97
     assert len(found.t_s) == len(way)
 
 

@@ -9,7 +9,7 @@ import pytest
 import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
-from echostep_studies.feet.datasets import SETS
+from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
 from places import DATA

@@ -22,7 +22,7 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
-from echostep_studies.feet.datasets import SETS
+from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
 from places import DATA

@@ -23,8 +23,8 @@ from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_studies.anywhere import sites
-from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.bench import sites
+from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import STOREY_M, tower
 
 STOREYS, TRUE, WRONG = 3, 1, 2

@@ -23,7 +23,7 @@ from echostep.session.metadata import run_metadata
 from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
-from echostep_studies.anywhere.tours import clearance_m
+from echostep_studies.bench.tours import clearance_m
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 HEADING_RAD = 0.5 * math.pi

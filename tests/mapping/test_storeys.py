@@ -23,9 +23,9 @@ from echostep.plan.check import check_plan
 from echostep.plan.model import Plan, parse_plan
 from echostep.plan.writer import plan_json
 from echostep.simulation.people.walker import Waypoint
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.tours import clearance_m
-from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.tours import clearance_m
+from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 
 NO_PINGS = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0))

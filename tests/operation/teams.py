@@ -12,8 +12,8 @@ from typing import Any, Self
 
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.page import TablePage
-from echostep.operation.record import OperationRecorder
-from echostep.operation.tape import Keyframe, Tape
+from echostep.operation.recorded.record import OperationRecorder
+from echostep.operation.recorded.tape import Keyframe, Tape
 from echostep.page.server import Address
 from echostep.plan.model import Plan
 from echostep.plan.places.whereabouts import Whereabouts

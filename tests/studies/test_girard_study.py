@@ -8,6 +8,7 @@ import math
 import multiprocessing
 import os
 import sys
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from shapely import LineString, MultiLineString
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep_studies.echoes.study import echoes_study
-from echostep_studies.frame.report import Row, summary, write_json
+from echostep_studies.frame.report import summary, write_json
 from echostep_studies.frame.runs import Journal, SeededRuns
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.girard2011 import study
@@ -48,12 +49,12 @@ def test_the_imu_row_is_calibrated_to_the_papers() -> None:
     """Means over walks: mean, deviation and maximum within 15 % of 0.59, 0.35 and 1.47 m; the end, the paper's maximum as well, within 20 %."""
     site = sites.otb()
     walks = [walk_markers(lay_markers(site.route), site.built, seed) for seed in range(100)]
-    errors = [study._row("imu", "", 0, w, list(study.dead_reckoned(site, w, 0)))["errors_m"] for w in walks]
+    errors = [study._row("imu", "", 0, w, list(study.dead_reckoned(site, w, 0))).errors_m for w in walks]
     row = summary("imu", "girard2011", errors, [])
-    assert row["mean_m"] == pytest.approx(0.59, rel=0.15)
-    assert row["sd_m"] == pytest.approx(0.35, rel=0.15)
-    assert row["max_m"] == pytest.approx(1.47, rel=0.15)
-    assert row["ending_m"] == pytest.approx(1.47, rel=0.20)
+    assert row.mean_m == pytest.approx(0.59, rel=0.15)
+    assert row.sd_m == pytest.approx(0.35, rel=0.15)
+    assert row.max_m == pytest.approx(1.47, rel=0.15)
+    assert row.ending_m == pytest.approx(1.47, rel=0.20)
 
 
 def test_a_walk_is_a_function_of_its_seed() -> None:
@@ -95,23 +96,34 @@ def test_what_rangers_hear(tmp_path: Path) -> None:
     assert "between 0.15 m and 6.00 m" in rows["limits"]["finding"]
 
 
-def counted(folder: str, seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counted:
+    """A row."""
+
+    name: str
+    value: float
+
+
+KINDS = (Counted,)
+
+
+def counted(folder: str, seed: int) -> list[Counted]:
     """A run that leaves a trace."""
     (Path(folder) / f"ran-{seed}-{os.getpid()}").touch()
-    return [{"name": "a", "value": math.sqrt(seed)}]
+    return [Counted(name="a", value=math.sqrt(seed))]
 
 
-class Counted:
+class CountingRun:
     """A picklable run."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def __call__(self, seed: int) -> list[Row]:
+    def __call__(self, seed: int) -> list[Counted]:
         return counted(str(self.folder), seed)
 
     def __repr__(self) -> str:
-        return "Counted"
+        return "CountingRun"
 
 
 def ran(folder: Path) -> int:
@@ -119,44 +131,44 @@ def ran(folder: Path) -> int:
 
 
 def test_a_killed_study_goes_on_where_it_was(tmp_path: Path) -> None:
-    one = Counted(tmp_path)
-    first = SeededRuns("s", 3, 10, one, tmp_path).rows()
+    one = CountingRun(tmp_path)
+    first = SeededRuns("s", 3, 10, one, tmp_path, KINDS).rows()
     (journal,) = tmp_path.glob("s.*.journal.jsonl")
     journal.write_text(journal.read_text() + '{"seed": 13, "rows": [{"na')  # killed while writing
-    whole = SeededRuns("s", 5, 10, one, tmp_path).rows()
+    whole = SeededRuns("s", 5, 10, one, tmp_path, KINDS).rows()
     assert whole[:3] == first
-    assert [row["value"] for row in whole] == [math.sqrt(seed) for seed in range(10, 15)]
+    assert [row.value for row in whole] == [math.sqrt(seed) for seed in range(10, 15)]
     assert ran(tmp_path) == 5
     journal.rename(tmp_path / "s.other.journal.jsonl")
-    assert SeededRuns("s", 2, 10, one, tmp_path).rows() == whole[:2]
+    assert SeededRuns("s", 2, 10, one, tmp_path, KINDS).rows() == whole[:2]
     assert ran(tmp_path) >= 6  # other code's rows are not taken
 
 
-def named(name: str, _seed: int) -> list[Row]:
-    return [{"name": name}]
+def named(name: str, _seed: int) -> list[Counted]:
+    return [Counted(name=name, value=0.0)]
 
 
 def test_rows_of_other_arguments_are_not_taken(tmp_path: Path) -> None:
     for name in ("first", "second", "first"):
-        assert SeededRuns("s", 1, 10, partial(named, name), tmp_path).rows() == [{"name": name}]
+        assert SeededRuns("s", 1, 10, partial(named, name), tmp_path, KINDS).rows() == named(name, 10)
     assert len(list(tmp_path.glob("s.*.journal.jsonl"))) == 2  # neither was overwritten
 
 
-def held(folder: str, seed: int) -> list[Row]:
+def held(folder: str, seed: int) -> list[Counted]:
     """The first run ends at once, another one only when it is patient no more."""
     if seed > 1:
         until((Path(folder) / "never").exists)
         (Path(folder) / "finished").touch()
-    return [{"name": "held"}]
+    return [Counted(name="held", value=0.0)]
 
 
 def test_an_interrupted_study_waits_for_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(_journal: Journal, _seed: int, _rows: list[Row]) -> None:
+    def interrupt(_journal: Journal[Counted], _seed: int, _rows: list[Counted]) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Journal, "add", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        SeededRuns("s", 2, 1, partial(held, str(tmp_path)), tmp_path).rows()
+        SeededRuns("s", 2, 1, partial(held, str(tmp_path)), tmp_path, KINDS).rows()
     assert not multiprocessing.active_children()
     assert not (tmp_path / "finished").exists()
 
@@ -169,20 +181,20 @@ def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
     ) as cluster:
-        far = SeededRuns("s", 4, 1, math_run, there, cluster.scheduler_address).rows()
-    assert far == SeededRuns("s", 4, 1, math_run, here).rows()
+        far = SeededRuns("s", 4, 1, math_run, there, KINDS, cluster.scheduler_address).rows()
+    assert far == SeededRuns("s", 4, 1, math_run, here, KINDS).rows()
 
 
-def math_run(seed: int) -> list[Row]:
+def math_run(seed: int) -> list[Counted]:
     """Importable by the workers of a cluster."""
-    return [{"name": "m", "value": float(np.random.default_rng(seed).random())}]
+    return [Counted(name="m", value=float(np.random.default_rng(seed).random()))]
 
 
 def test_no_cluster_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')")
     monkeypatch.setattr("echostep_studies.frame.runs.SCHEDULER_TIMEOUT", "1s")
     with pytest.raises(EchostepError, match="no Dask scheduler answers there"):
-        SeededRuns("s", 2, 1, math_run, tmp_path, "tcp://127.0.0.1:9").rows()
+        SeededRuns("s", 2, 1, math_run, tmp_path, KINDS, "tcp://127.0.0.1:9").rows()
 
 
 def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> None:
@@ -190,4 +202,4 @@ def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> N
     with pytest.raises(EchostepError, match="cannot write"):
         write_json(tmp_path / "file" / "x.json", "s", 1, 1, [])
     with pytest.raises(EchostepError, match="cannot write there"):
-        SeededRuns("s", 1, 1, math_run, tmp_path / "file").rows()
+        SeededRuns("s", 1, 1, math_run, tmp_path / "file", KINDS).rows()

@@ -13,16 +13,16 @@ from echostep_studies.simulation.sites import otb
 
 def test_both_kinds_of_rangers_hold_the_papers_figure_on_the_same_steps() -> None:
     rows = kits.one_run(3)
-    names = [row["name"] for row in rows]
-    of_rangers = [row for row in rows if not row["name"].startswith("foot alone")]
+    names = [row.name for row in rows]
+    of_rangers = [row for row in rows if not row.name.startswith("foot alone")]
     assert len(set(names)) == 12 + 8
     assert len(of_rangers) == 12
-    assert all(len(row["errors_m"]) == 52 for row in of_rangers)
-    means = {row["name"]: float(np.mean(row["errors_m"])) for row in rows}
+    assert all(len(row.errors_m) == 52 for row in of_rangers)
+    means = {row.name: float(np.mean(row.errors_m)) for row in rows}
     assert means["default, SRF02"] < 0.13  # what the paper's system reached with ranging [Girard 2011, Table 1]
     assert means["default, pulse"] < 0.13
     assert means["default, MaxSonar"] < 0.13
-    assert [group[0]["name"] for group in rows_by_name(rows)]
+    assert [group[0].name for group in rows_by_name(rows)]
     walks = [kits._walk(otb(), 3, kind) for kind in kits.kinds().values()]
     assert all(np.array_equal(walk.trunk_m, walks[0].trunk_m) for walk in walks)
     assert all(np.array_equal(walk.heading_rad, walks[0].heading_rad) for walk in walks)
@@ -43,10 +43,9 @@ def test_the_tracker_and_the_simulation_agree_on_the_reach_of_rangers(name: str,
 def test_a_foot_board_is_as_good_as_an_mtx_on_the_same_steps() -> None:
     rows = [kit_feet.rows(seed) for seed in (1, 2, 3)]
     means = {
-        row["name"]: float(np.mean([np.mean(of_seed[k]["errors_m"]) for of_seed in rows]))
-        for k, row in enumerate(rows[0])
+        row.name: float(np.mean([np.mean(of_seed[k].errors_m) for of_seed in rows])) for k, row in enumerate(rows[0])
     }
-    assert all(len(row["errors_m"]) > 20 for of_seed in rows for row in of_seed)
+    assert all(len(row.errors_m) > 20 for of_seed in rows for row in of_seed)
     for pace in kit_feet.PACES:
         assert means[f"foot alone, {pace}, foot board, calibrated"] < 2.0 * means[f"foot alone, {pace}, MTx 18 g"] + 0.1
     assert max(means.values()) < 3.0

@@ -76,9 +76,9 @@ def captures() -> Iterator[tuple[str, str]]:
 FOOT = """
 import hashlib, sys
 from pathlib import Path
-from echostep_studies.feet.datasets import SETS
-from echostep_studies.frame.recordings import read_sets
 from echostep.foot.steps import walk_track
+from echostep_studies.bench.recordings.feet import SETS
+from echostep_studies.frame.recordings import read_sets
 for r in read_sets(Path(sys.argv[1]), SETS)[0]:
     track = walk_track(r.t_s, r.accel, r.gyro, mag=r.mag)
     print(r.group, r.name, hashlib.sha256(track.position_m.tobytes()).hexdigest(), sep="\\t")

@@ -145,7 +145,11 @@ def _chain_joint(later: Floats, earlier: Floats) -> Floats:
     for s in range(len(total)):
         if total[s] > 0.0:
             conditional[s] = earlier[s] / total[s]
-    return later @ conditional
+    joint = np.zeros_like(earlier)  # no matrix product: numba's needs BLAS of scipy
+    for now in range(len(later)):
+        for s in range(len(total)):
+            joint[now] += later[now, s] * conditional[s]
+    return joint
 
 
 @kernel

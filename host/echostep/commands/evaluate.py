@@ -8,13 +8,22 @@ Owns nothing.
 from __future__ import annotations
 
 from importlib.metadata import entry_points
+from typing import Any, NoReturn
 
 import typer
+import typer.core
 
 from echostep.errors import EchostepError
 
 GROUP = "echostep.commands"
-HELP = "The papers' experiments and ours, with figures and plots."
+MISSING = "The studies are a package of their own: pip install echostep-studies."
+
+
+class _MissingStudies(typer.core.TyperGroup):
+    """A group of commands that are not there: any name of one raises EchostepError."""
+
+    def get_command(self, *_: Any) -> NoReturn:
+        raise EchostepError(f"evaluate: {MISSING}")
 
 
 def studies() -> typer.Typer:
@@ -22,11 +31,10 @@ def studies() -> typer.Typer:
     for entry in entry_points(group=GROUP, name="evaluate"):
         app: typer.Typer = entry.load()
         return app
-    missing = typer.Typer(help=HELP, invoke_without_command=True)
+    missing = typer.Typer(cls=_MissingStudies, no_args_is_help=True, help=MISSING)
 
-    @missing.callback(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+    @missing.callback(help=MISSING)
     def evaluate() -> None:
-        """The papers' experiments and ours, with figures and plots (pip install echostep-studies)."""
-        raise EchostepError("evaluate: the studies are a package of their own: pip install echostep-studies")
+        """Nothing to do."""
 
     return missing

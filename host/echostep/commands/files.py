@@ -11,6 +11,9 @@ from typing import Annotated
 
 import typer
 
+from echostep.commands.options import needs
+from echostep.extras import require
+
 app = typer.Typer()
 
 
@@ -25,10 +28,14 @@ def map_command(
         typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw plan and path there (PNG, SVG).")
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", callback=needs("matplotlib"), help="Draw plan and path there (PNG, SVG)."
+        ),
     ] = None,
 ) -> None:
     """Draw the plan of a building from recorded walks."""
+    require("a drawing of walks", "scipy")
     from echostep.commands.actions import mapping
 
     mapping.map_recordings(recordings, plan, out, picture)
@@ -44,7 +51,9 @@ def foot(
             "--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning (echostep-studies)."
         ),
     ] = "default",
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the track as PNG, beside the CSV.")] = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", callback=needs("matplotlib"), help="Draw the track as PNG, beside the CSV.")
+    ] = False,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
     from echostep.commands.actions import offline
@@ -77,7 +86,10 @@ def legs(
         float | None,
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw track and strides as PNG, beside the CSV.")] = False,
+    plot: Annotated[
+        bool,
+        typer.Option("--plot", callback=needs("matplotlib"), help="Draw track and strides as PNG, beside the CSV."),
+    ] = False,
 ) -> None:
     """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
     from echostep.commands.actions import offline
@@ -100,7 +112,9 @@ def floors(
     start: Annotated[
         int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
     ] = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the floors as PNG, beside the CSV.")] = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", callback=needs("matplotlib"), help="Draw the floors as PNG, beside the CSV.")
+    ] = False,
 ) -> None:
     """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
     from echostep.commands.actions import floors as floor_run
@@ -121,7 +135,10 @@ def score(
         Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with the table and the pictures.")
+        Path | None,
+        typer.Option(
+            "--html", metavar="FILE", callback=needs("matplotlib"), help="Write a page with the table and the pictures."
+        ),
     ] = None,
     setup: Annotated[
         float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)

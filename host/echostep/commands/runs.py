@@ -36,6 +36,7 @@ from echostep.commands.options import (
     Start,
     StartSd,
     Team,
+    page_address,
 )
 from echostep.errors import EchostepError
 from echostep.simulation.kits import Kit
@@ -245,8 +246,6 @@ def _ports(board: str | None, mtx: str | None, foot: str | None) -> tuple[str, s
 
 def _page_address(headless: bool, page: bool | None, host: str, port: int | None) -> Address | None:
     """Where to serve the page; None: no page."""
-    from echostep.page.server import Address
-
     if headless and page:
         raise EchostepError("--headless excludes --page: give one of the two")
-    return None if headless or page is False else Address(host, port)
+    return None if headless else page_address(page, host, port)

@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The commander's page: an operation served to browsers.
 
-In: an operation, an address, options of the command. Out: the page, a picture, the roster as JSON. Owns the
-server. Server, guards and style are those of the live page (`echostep.page`).
+In: an operation, an address. Out: the page. Owns the server. Server, guards and style are those of the live page (`echostep.page`).
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from collections import deque
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -18,34 +14,13 @@ from typing import Self
 from starlette.websockets import WebSocket
 
 from echostep.operation.operation import Operation, TableScene
+from echostep.operation.recorded.tape import Tape
 from echostep.operation.session import TableFeed, TableSession
-from echostep.operation.tape import Tape
 from echostep.page.server import STATIC, Address, Site, SocketServer
 from echostep.page.shared import PageCounts
 from echostep.page.web.faults import Faults
-from echostep.team.commander import as_tree
-from echostep.team.picture import draw_team
 
 TABLE = Path(__file__).parent / "static"
-
-
-@dataclass(frozen=True, slots=True)
-class Views:
-    """Where a team is shown. `page` None: no page. `picture`: drawn at the end. `as_json`: the roster at the end, instead of the table."""
-
-    page: Address | None = None
-    picture: Path | None = None
-    as_json: bool = False
-
-
-def finish(operation: Operation, now_s: float, views: Views) -> None:
-    """Draw the picture and print the roster, where asked for; `now_s` on the operation's clock."""
-    roster, plan = operation.roster, operation.plan
-    if views.picture:
-        draw_team(views.picture, plan, roster.members(now_s), now_s)
-    if views.as_json:
-        json.dump(as_tree(roster, plan, now_s), sys.stdout, indent=2)
-        sys.stdout.write("\n")
 
 
 class TablePage:

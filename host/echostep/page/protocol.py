@@ -35,6 +35,7 @@ from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 
+FRAME_S = 1.0 / 30.0  # shortest time between two frames
 GRID = 65535.0  # cells across the cloud: the greatest u16
 TRAIL_ROW_BYTES = 12  # float32 x, y, level
 

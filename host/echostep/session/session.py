@@ -16,6 +16,7 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from echostep.extras import lacks
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
@@ -210,6 +211,8 @@ class Session:
             sink for sink in (recorder and recorder.write_derived, self._foxglove and self._foxglove.write) if sink
         ]
         derived = Derived(self.tracker) if sinks else None
+        if derived and self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
+            console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
         shown = self.output.terminal and console.is_terminal
         view = TerminalView(self.tracker, self.title, progress, console) if shown else None
         with view or nullcontext(), holding_signals():

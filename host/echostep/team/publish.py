@@ -35,7 +35,6 @@ from echostep.team.messages.report import (
     moment,
     printable,
 )
-from echostep.team.mqtt.publisher import MqttTransport
 from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
 from echostep.tracker import Tracker
 
@@ -244,6 +243,8 @@ def _transport(
 
         return MeshTransport(endpoint, (outlet.team, outlet.name), print_line)
     if endpoint.scheme in ("mqtt", "mqtts"):
+        from echostep.team.mqtt.publisher import MqttTransport
+
         return MqttTransport(endpoint, outlet.team, outlet.name, run)
     if plan.georeference is None:
         raise EchostepError(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate
 from echostep.mapping.graph.storeys import STAIRS
-from echostep.mapping.mapper import Mapped
+
+if TYPE_CHECKING:
+    from echostep.mapping.mapper import Mapped
 
 MOST_WALLS, MOST_POINTS = 2000, 4000  # in a message; of more walls those nearest to the wearer. By reason: 72 KB
 

@@ -34,14 +34,6 @@ EARLY = 0.1  # share of the interval by which a packet may go out earlier, so th
 MOST_WAITING = 1000  # packets that wait to be read
 
 
-def check_installed(endpoint: Endpoint) -> None:
-    """Raises EchostepError without the package."""
-    try:
-        import meshtastic  # noqa: F401
-    except ImportError as error:
-        raise EchostepError(f"{endpoint}: a Meshtastic node needs a package: pip install 'echostep[mesh]'") from error
-
-
 class MeshNode:
     """An open node: `send` a payload, `receive` those of others; every fault is an OSError."""
 
@@ -123,8 +115,7 @@ class MeshTransport:
     """A `Transport` to a node. Reports that come before the next packet is due are left out: a newer one will be there."""
 
     def __init__(self, endpoint: Endpoint, names: tuple[str, str], print_line: Callable[[str], None]) -> None:
-        """`names` of team and wearer; raises EchostepError when they are too long or the package is missing."""
-        check_installed(endpoint)
+        """`names` of team and wearer; raises EchostepError when they are too long."""
         if sum(len(name.encode()) for name in names) > MOST_NAMES:
             raise EchostepError(f"{endpoint}: --team and --name have more than {MOST_NAMES} bytes together")
         self._endpoint, self._print_line = endpoint, print_line
@@ -171,8 +162,7 @@ class MeshListener:
     def __init__(
         self, endpoint: Endpoint, team: str | None, plan: Plan, put: Callable[[str | None, bytes, bool], None]
     ) -> None:
-        """`team`: only this one; raises EchostepError without the package."""
-        check_installed(endpoint)
+        """`team`: only this one."""
         self._endpoint, self._team, self._put = endpoint, team, put
         self._unpacker = Unpacker(plan)
         self._node: MeshNode | None = None

@@ -35,7 +35,7 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import walkable_floor
 from echostep.walls.level_sheet import LevelSheet, lay_out_levels, level_of
 from echostep_studies.anywhere.amcl_kernels import weight_by_ping
-from echostep_studies.anywhere.filtering import WARM_UP, Claim, FilterRun
+from echostep_studies.bench.filtering import WARM_UP, Claim, FilterRun
 
 SIZE = 20_000
 ALPHA_SLOW, ALPHA_FAST = (

@@ -29,9 +29,17 @@ from echostep.scorecard.truth import load_truth
 from echostep.session.runs.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
-from echostep_studies.feet.metrics import align, rmse
+from echostep_studies.bench.recordings.foot_metrics import align, rmse
+from echostep_studies.bench.recordings.hallways import (
+    LONG_STEP_M,
+    SETTINGS,
+    START_S,
+    Hallway,
+    chunks,
+    names_in,
+    read_hallway,
+)
 from echostep_studies.frame.recordings import DATA
-from echostep_studies.noplan.real_feet import LONG_STEP_M, SETTINGS, START_S, Hallway, chunks, names_in, read_hallway
 
 NAME = "GX5 33"
 NOTE = "foot real (GX5 33, surveyed footprints); plan drawn around the surveyed path, echoes simulated from it at the true positions"

@@ -27,8 +27,8 @@ from echostep.simulation.people.walker import Manner, Person, Waypoint
 from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
 from echostep.tracker.last_place import start_after
-from echostep_studies.anywhere.sites import LOBBY
-from echostep_studies.anywhere.tours import random_tour
+from echostep_studies.bench.sites import LOBBY
+from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.tower import STOREY_M, tower
 
 STOREYS = 3

@@ -27,7 +27,7 @@ from echostep.team.messages.shared_beacons import SHARE_S
 from echostep.team.outbox import aged
 from echostep.team.publish import position_of
 from echostep.tracker import Tracker
-from echostep_studies.anywhere.walks import T
+from echostep_studies.bench.walks import T
 from echostep_studies.team.walks import Encounter, TeamWalks
 
 TAP_S = 1.0  # from the encounter to the tap, at most, by reason

@@ -14,7 +14,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 from echostep.jit import kernel
-from echostep_studies.clutter.carmen_log import CarmenLog
+from echostep_studies.bench.laser.carmen_log import CarmenLog
 
 CELL_M = 0.1
 STANDING = 0.25  # [GMapping's threshold of an occupied cell]

@@ -10,18 +10,22 @@ import math
 import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from echostep.errors import EchostepError
 from echostep.operation.operation import Operation
-from echostep.operation.page import TablePage, Views, finish
-from echostep.operation.record import KIND
-from echostep.operation.tape import Player, Tape, load
-from echostep.page.guarded_socket import FRAME_S
+from echostep.operation.recorded.record import KIND
+from echostep.operation.recorded.tape import Player, Tape, load
+from echostep.operation.views import Views, finish, open_page
+from echostep.page.protocol import FRAME_S
 from echostep.plan.model import Plan
 from echostep.recording.reading import open_recording
 from echostep.team.commander import table
+
+if TYPE_CHECKING:
+    from echostep.operation.page import TablePage
 
 
 def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console: Console) -> None:
@@ -35,10 +39,7 @@ def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console:
         )
     operation, tape = Operation(plan), Tape(path, grows=False)
     with ExitStack() as opened:
-        page = TablePage(operation, "echostep command, recorded", views.page, tape) if views.page else None
-        if page:
-            opened.enter_context(page)
-            console.print(f"The page: {page.url}", highlight=False)
+        page = open_page(opened, operation, "echostep command, recorded", views, tape, console)
         with suppress(KeyboardInterrupt):
             player = _read(tape, operation, page)
             if player is None:

@@ -23,7 +23,7 @@ from echostep.simulation.devices.mtx import MtxModel
 from echostep.simulation.people.walker import Person
 from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
-from echostep_studies.anywhere.sites import Site
+from echostep_studies.bench.sites import Site
 
 CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs
 PORTION = 1000  # chunks that the front end gets at once

@@ -16,12 +16,12 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan, Pose
-from echostep_studies.anywhere.sites import plan_of
-from echostep_studies.clutter.carmen_log import CarmenLog, read_log
-from echostep_studies.clutter.occupancy import standing_places
-from echostep_studies.clutter.odometry import Odometry, odometry_of
-from echostep_studies.clutter.scan_pings import AHEAD_RAD, hear
-from echostep_studies.clutter.wall_lines import straight_pieces, wall_segments
+from echostep_studies.bench.laser.carmen_log import CarmenLog, read_log
+from echostep_studies.bench.laser.occupancy import standing_places
+from echostep_studies.bench.laser.odometry import Odometry, odometry_of
+from echostep_studies.bench.laser.scan_pings import AHEAD_RAD, hear
+from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
+from echostep_studies.bench.sites import plan_of
 
 WALL_M = 1.5  # shortest straight piece that an architect's plan shows
 # Time is made up, for the logs' own is damaged in some: a slow walk, and turns on the spot.

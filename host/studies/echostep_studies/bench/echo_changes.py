@@ -14,9 +14,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.tours import clearance_m
-from echostep_studies.anywhere.walks import SimulatedWalk
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.tours import clearance_m
+from echostep_studies.bench.walks import SimulatedWalk
 
 PASSING_S = 1.0  # mean time for which a person is beside a ranger
 PERSON_M = (0.3, 3.0)  # distance of a person

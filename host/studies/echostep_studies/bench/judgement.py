@@ -18,7 +18,7 @@ import shapely
 from echostep.arrays import Bools, Floats, Ints
 from echostep.localization.estimate import TrackStatus
 from echostep.plan.model import Plan
-from echostep_studies.anywhere.filtering import Claim
+from echostep_studies.bench.filtering import Claim
 
 FOUND_M = 1.0  # a wearer is found within this error
 SEARCH_M = 40.0  # of the way, after which a wearer must be found

@@ -25,9 +25,9 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import RATE_HZ, Walk
 from echostep.simulation.stimulus import BoardSensors
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
-from echostep_studies.anywhere.sites import plan_of
-from echostep_studies.anywhere.walks import SimulatedWalk, walk_of
-from echostep_studies.feet.datasets import FootRecording, hallway
+from echostep_studies.bench.recordings.feet import FootRecording, hallway
+from echostep_studies.bench.sites import plan_of
+from echostep_studies.bench.walks import SimulatedWalk, walk_of
 
 FILES = "gx5_gcp/*_LLIO.mat"
 SETTINGS = "[mtx]\nrate_hz = 200\n\n[gait]\nfoot_left_m = 0.0\n"

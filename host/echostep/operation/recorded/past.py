@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from echostep.operation import requests
 from echostep.operation.operation import Operation, TableScene
-from echostep.operation.tape import Player, Tape
+from echostep.operation.recorded.tape import Player, Tape
 
 NEAR_END_S = (
     0.5  # closer to the end of a growing tape is now; by reason: what was heard just now is not on the disk yet

@@ -14,7 +14,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.simulation.world.acoustics import SRF02, Acoustics, wall_db
 from echostep.simulation.world.echoes import ranger_bias_m
-from echostep_studies.clutter.carmen_log import CarmenLog
+from echostep_studies.bench.laser.carmen_log import CarmenLog
 
 HALF_CONE_RAD = math.radians(27.5)  # half of the 55 degree cone [Robot Electronics, sonar FAQ]
 AHEAD_RAD = 0.5 * HALF_CONE_RAD  # middle of the half before abeam

@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Track
-from echostep_studies.feet.metrics import Figure, climb, closure, mocap, outbound, survey
+from echostep_studies.bench.recordings.foot_metrics import Figure, climb, closure, mocap, outbound, survey
 from echostep_studies.frame.recordings import Sets
 
 G_M_S2 = 9.80665

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The buildings of the study, and a walk through each.
+"""The buildings of the studies, and a walk through each.
 
 In: a seed. Out: `Site`: the building as it stands, and waypoints. Owns nothing.
 """
@@ -19,7 +19,7 @@ from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Level, Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
 from echostep.simulation.people.walker import Waypoint
-from echostep_studies.anywhere.tours import random_tour
+from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.sites import hall as hall_site
 from echostep_studies.simulation.tower import CORRIDOR_Y, LENGTH_M, LIFT_AT, STOREY_M, tower
 

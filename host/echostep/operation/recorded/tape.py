@@ -17,7 +17,7 @@ from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.operation.operation import Operation, TableScene
-from echostep.operation.record import OPERATION, Condition, Heard, decode_record
+from echostep.operation.recorded.record import OPERATION, Condition, Heard, decode_record
 from echostep.ports.chunks import Portion
 from echostep.recording.reading import Recording
 from echostep.team.inbox import ReceivedMessage

@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep_studies.clutter.carmen_log import CarmenLog
+from echostep_studies.bench.laser.carmen_log import CarmenLog
 
 FITS_RAD = math.radians(10.0)  # error of a turn between two scans above which the odometry's times do not fit the scans
 FITTING = 0.95  # least share of turns that fit
