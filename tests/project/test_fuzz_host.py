@@ -32,7 +32,7 @@ def test_mutated_inputs_are_no_fault(name: str) -> None:
 
 
 def test_inputs_that_once_were_faults_are_none() -> None:
-    kept = list(fuzz_host.kept())
+    kept = list(fuzz_host.kept_inputs())
     assert len(kept) >= 4
     for name, data in kept:
         assert fuzz_host.fault(name, data) == ""

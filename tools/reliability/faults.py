@@ -7,8 +7,6 @@ too. Faults that the file has already are not run again. Owns the list of the tw
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
@@ -27,6 +25,7 @@ from echostep.simulation.devices.board import Board, BoardProcess
 from echostep.simulation.scenario import START_NS, Scenario, demo_scenario
 from echostep.tracker import Tracker
 from places import OUT, PLAN, ROOT, TWIN
+from reliability.campaign import Journal, options
 from reliability.fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams, table
 from twin.host_faults import HOST_FAULTS
 from twin.live_walk import BEGIN_S, END_S, HostFault, LiveWalk
@@ -171,27 +170,19 @@ def run_live(fault: HostFault, folder: Path) -> Outcome:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument(
-        "--out", type=Path, default=OUT / "faults.jsonl", help="outcomes so far; they are not run again"
+    asked = options(
+        __doc__,
+        out=(OUT / "faults.jsonl", "outcomes so far; they are not run again"),
+        page=(False, "write the table into host/docs/faults.md"),
     )
-    parser.add_argument("--page", action="store_true", help="write the table into host/docs/faults.md")
-    options = parser.parse_args()
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    done = (
-        [Outcome(**json.loads(line)) for line in options.out.read_text().splitlines()] if options.out.exists() else []
-    )
-    matrix = dict(_matrix(options.out.with_suffix("")))
+    journal, matrix = Journal(asked.out), dict(_matrix(asked.out.with_suffix("")))
     for name, play in matrix.items():
-        if name in {outcome.name for outcome in done}:
-            continue
-        done.append(play())
-        with options.out.open("a") as file:
-            file.write(json.dumps(asdict(done[-1])) + "\n")
-        print(table(done[-1:]).splitlines()[-1], flush=True)
-    names = list(matrix)
-    done = sorted((o for o in done if o.name in names), key=lambda o: names.index(o.name))
-    if options.page:
+        if name not in {row["name"] for row in journal.rows}:
+            journal.add(asdict(play()))
+            print(table([Outcome(**journal.rows[-1])]).splitlines()[-1], flush=True)
+    outcomes = {row["name"]: Outcome(**row) for row in journal.rows}
+    done = [outcomes[name] for name in matrix]
+    if asked.page:
         head, _, rest = PAGE.read_text().partition(MARKS[0])
         PAGE.write_text(head + MARKS[0] + table(done) + MARKS[1] + rest.partition(MARKS[1])[2])
     print(table(done))

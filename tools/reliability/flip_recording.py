@@ -9,7 +9,6 @@ Half of the flips are in arrival times, half anywhere in the file.
 
 from __future__ import annotations
 
-import argparse
 import math
 import random
 import struct
@@ -31,6 +30,7 @@ from echostep.session.options import TrackingOptions
 from echostep.session.runs.replay import tracker_of
 from echostep.session.skipped import skipped
 from places import PLAN
+from reliability.campaign import Figure, none, options, report, track
 from walks import walk_chunks
 
 ASTRAY_M = 0.5  # from the track of the undamaged recording; by reason: half the radius of a sure position
@@ -138,31 +138,27 @@ def record_walk(path: Path, seconds: float) -> None:
 
 def main() -> int:
     """Flip, replay, print."""
-    parser = argparse.ArgumentParser(description="replay a recording with one flipped bit, many times")
-    parser.add_argument("--flips", type=int, default=314)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=30.0, help="of the simulated walk")
-    options = parser.parse_args()
+    asked = options(
+        __doc__, flips=(314, "how many"), seed=(1, "of the places"), seconds=(30.0, "of the simulated walk")
+    )
     plan = load_plan(PLAN)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        record_walk(folder / "walk.mcap", options.seconds)
+        record_walk(folder / "walk.mcap", asked.seconds)
         content = (folder / "walk.mcap").read_bytes()
         expected = replay(folder / "walk.mcap", plan).estimates
         flips = [
             flip_once(content, where, plan, expected, folder)
-            for where in draw_flips(content, options.flips, options.seed)
+            for where in track(draw_flips(content, asked.flips, asked.seed), "flips")
         ]
-    for flip in flips:
-        if flip.bad:
-            print(f"byte {flip.offset}, bit {flip.bit}: {flip}")
-    print(f"{len(flips)} flips of {len(content)} bytes, {len(expected)} estimates")
-    for title, results in (
-        ("replayed", Counter(f"{f.result}, {'said' if f.said else 'silent'}" for f in flips)),
-        ("repaired and replayed", Counter(f.repaired for f in flips)),
-    ):
-        print(f"{title}: " + "; ".join(f"{text} {count}" for text, count in results.most_common()))
-    return int(any(flip.bad for flip in flips))
+    bad = [flip for flip in flips if flip.bad]
+    print(*(f"byte {flip.offset}, bit {flip.bit}: {flip}" for flip in bad), sep="\n", end="\n" * bool(bad))
+    results = Counter(f"replayed: {f.result}, {'said' if f.said else 'silent'}" for f in flips)
+    results += Counter(f"repaired and replayed: {f.repaired}" for f in flips)
+    return report(
+        f"{len(flips)} flips of {len(content)} bytes, {len(expected)} estimates",
+        [*(Figure(text, str(count)) for text, count in results.most_common()), none("bad ones", len(bad))],
+    )
 
 
 if __name__ == "__main__":

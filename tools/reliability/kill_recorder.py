@@ -13,7 +13,6 @@ is lost.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import os
 import random
@@ -31,10 +30,11 @@ from echostep.errors import EchostepError
 from echostep.recording.mcap_records import MCAP_MAGIC
 from echostep.recording.reading import open_recording
 from echostep.recording.repair.edit import repair
+from reliability.campaign import Figure, none, options, report, track
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
 ROW = struct.Struct("<Qq")
-LIMIT_S = 1.0
+LIMIT_MS = 1000.0
 
 WRITER = """
 import os, struct, sys, time
@@ -125,26 +125,27 @@ def _loss(path: Path, given: Sequence[tuple[int, int]], changed: int) -> Kill:
 
 def main() -> int:
     """Run the kills and print the losses."""
-    parser = argparse.ArgumentParser(description="kill -9 a recorder at random moments")
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--longest", type=float, default=3.0, metavar="S", help="latest moment of a kill")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    rng, kills = random.Random(options.seed), []
-    with tempfile.TemporaryDirectory() as folder:
-        for k in range(options.kills):
-            kills.append(kill_once(Path(folder) / "walk.mcap", rng.uniform(0.05, options.longest)))
-            if not (k + 1) % 20:
-                print(f"{k + 1} kills, worst {max(kill.missing_s for kill in kills) * 1e3:.0f} ms missing", flush=True)
-    worst = max(kill.missing_s for kill in kills)
-    typical = sorted(kill.missing_s for kill in kills)[len(kills) // 2]
-    closed, changed = sum(not kill.opens for kill in kills), sum(kill.changed for kill in kills)
-    print(
-        f"{len(kills)} kills: the last {typical * 1e3:.0f} ms missing (median), {worst * 1e3:.0f} ms at worst; "
-        f"{sum(kill.given for kill in kills)} chunks recorded, {sum(kill.missing for kill in kills)} missing; {closed} files do not open, "
-        f"{changed} earlier recordings changed"
+    asked = options(
+        __doc__, kills=(200, "how many"), longest=(3.0, "latest moment of a kill, s"), seed=(1, "of the moments")
     )
-    return int(worst > LIMIT_S or closed > 0 or changed > 0)
+    rng = random.Random(asked.seed)
+    with tempfile.TemporaryDirectory() as folder:
+        kills = [
+            kill_once(Path(folder) / "walk.mcap", rng.uniform(0.05, asked.longest))
+            for _ in track(range(asked.kills), "kill -9")
+        ]
+    missing_ms = sorted(1e3 * kill.missing_s for kill in kills)
+    return report(
+        f"{len(kills)} kills",
+        [
+            Figure("missing at the end, median", f"{missing_ms[len(kills) // 2]:.0f} ms"),
+            Figure("missing at worst", f"{missing_ms[-1]:.0f} ms", f"<= {LIMIT_MS:.0f} ms", missing_ms[-1] <= LIMIT_MS),
+            Figure("chunks recorded", f"{sum(kill.given for kill in kills)}"),
+            Figure("chunks missing", f"{sum(kill.missing for kill in kills)}"),
+            none("files that do not open", sum(not kill.opens for kill in kills)),
+            none("earlier recordings that changed", sum(kill.changed for kill in kills)),
+        ],
+    )
 
 
 if __name__ == "__main__":

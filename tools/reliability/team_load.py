@@ -7,18 +7,15 @@ publish simulated reports through the code of `--publish`; one commander draws i
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
 import resource
-import shutil
 import signal
 import socket
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from dataclasses import replace
@@ -31,6 +28,8 @@ from echostep.team.messages.report import Motion, Position, Report, StreamReport
 from echostep.team.mqtt.publisher import MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
+from reliability.broker import broker
+from reliability.campaign import options
 
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -142,27 +141,13 @@ def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: f
 
 
 def main() -> None:
-    """Parse, run the broker, measure."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--trackers", type=int, default=20)
-    parser.add_argument("--rate", type=float, default=10.0)
-    parser.add_argument("--seconds", type=float, default=30.0)
-    parser.add_argument("--flood", type=float, default=0.0, help="invalid messages per second besides")
-    asked = parser.parse_args()
-    mosquitto = shutil.which("mosquitto", path=os.environ["PATH"] + ":/usr/sbin")
-    if mosquitto is None:
-        sys.exit("mosquitto is not installed: apt install mosquitto")
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    with tempfile.TemporaryDirectory() as folder, as_file(files("echostep") / "plans" / "demo.json") as plan_path:
-        configuration = Path(folder) / "mosquitto.conf"
-        configuration.write_text(f"user root\nlistener {port} 127.0.0.1\nallow_anonymous true\n")
-        broker = subprocess.Popen([mosquitto, "-c", str(configuration)], stderr=subprocess.DEVNULL)
-        try:
-            measure(f"mqtt://127.0.0.1:{port}", plan_path, asked.trackers, asked.rate, asked.seconds, asked.flood)
-        finally:
-            broker.terminate()
-            broker.wait(10)
+    """Run the broker, measure."""
+    asked = options(
+        __doc__, trackers=(20, "how many"), rate=(10.0, "reports of each a second"), seconds=(30.0, "of publishing"),
+        flood=(0.0, "invalid messages per second besides"),
+    )  # fmt: skip
+    with broker() as url, as_file(files("echostep") / "plans" / "demo.json") as plan_path:
+        measure(url, plan_path, asked.trackers, asked.rate, asked.seconds, asked.flood)
 
 
 if __name__ == "__main__":

@@ -8,13 +8,10 @@ when the mayday has come. Exit status 1 when something of this did not happen.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import resource
-import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -44,6 +41,8 @@ from echostep.team.publish import empty_report
 from echostep.team.roster import Member, MemberState, Roster
 from echostep.tracker import Tracker
 from places import TWIN
+from reliability.broker import broker
+from reliability.campaign import options
 from reliability.team_load import report_at
 
 FALLEN_WAY: tuple[Waypoint, ...] = (
@@ -221,36 +220,27 @@ def _wait(found: object) -> float | None:
 
 
 def main() -> None:
-    """Parse, run the broker, operate."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--wearers", type=int, default=20)
-    parser.add_argument("--firmware", type=int, default=2, help="wearers with the real firmware in the twin")
-    parser.add_argument(
-        "--speed", type=float, default=1.0, help="times real time, of the fallen wearer and of the rescuer"
+    """Run the broker, operate."""
+    asked = options(
+        __doc__,
+        wearers=(20, "of the team"),
+        firmware=(2, "wearers with the real firmware in the twin"),
+        speed=(1.0, "times real time, of the fallen wearer and of the rescuer"),
+        role=("", "internal: one wearer"),
+        url=("", "internal: the broker"),
     )
-    parser.add_argument("--role", help="internal: one wearer")
-    parser.add_argument("--url", help="internal: the broker")
-    asked = parser.parse_args()
-    mosquitto = shutil.which("mosquitto", path=os.environ["PATH"] + ":/usr/sbin")
     with ExitStack() as opened:
         plan_path = opened.enter_context(as_file(files("echostep") / "plans" / "demo.json"))
         if asked.role:
             walk(asked.role, asked.url, load_plan(plan_path), asked.speed)
             return
-        if mosquitto is None:
-            sys.exit("mosquitto is not installed: apt install mosquitto")
+        url = opened.enter_context(broker())
         print(
             "Preparing: kernels that are not compiled yet are compiled once, not by four wearers at a time", flush=True
         )
         Tracker(load_plan(plan_path)).warm_up()
         folder = Path(opened.enter_context(tempfile.TemporaryDirectory()))
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
-        (folder / "mosquitto.conf").write_text(f"user root\nlistener {port} 127.0.0.1\nallow_anonymous true\n")
-        broker = subprocess.Popen([mosquitto, "-c", str(folder / "mosquitto.conf")], stderr=subprocess.DEVNULL)
-        opened.callback(broker.wait, 10)
-        opened.callback(broker.terminate)
-        happened = operate(f"mqtt://127.0.0.1:{port}", plan_path, asked.wearers, asked.firmware, asked.speed, folder)
+        happened = operate(url, plan_path, asked.wearers, asked.firmware, asked.speed, folder)
     sys.exit(0 if happened else 1)
 
 

@@ -8,8 +8,6 @@ fails. Owns the build of the fuzzer. The sanitizers for addresses and undefined 
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 import subprocess
 import sys
@@ -18,6 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from places import OUT, ROOT
+from reliability.campaign import Figure, Journal, options, report
 
 FIRMWARE = ROOT / "firmware"
 SOURCES = [
@@ -65,16 +64,12 @@ def executions(log: str) -> int:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--seconds", type=int, default=60)
-    seconds = parser.parse_args().seconds
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    log = FOLDER / "codec.jsonl"
-    runs = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    seconds = options(__doc__, seconds=(60, "of this run")).seconds
+    journal = Journal(FOLDER / "codec.jsonl")
+    shard = len(journal.rows) + 1
     with tempfile.TemporaryDirectory() as temporary:
         program = build(Path(temporary) / "fuzz")
         corpus, reduced = unpack(Path(temporary) / "corpus"), Path(temporary) / "reduced"
-        shard = len(runs) + 1
         done = fuzz(program, corpus, shard, f"-max_total_time={seconds}", f"-artifact_prefix={FOLDER}/")
         if done.returncode:
             print(done.stderr[-4000:], file=sys.stderr)
@@ -82,12 +77,12 @@ def main() -> int:
         reduced.mkdir()
         subprocess.run([str(program), "-merge=1", str(reduced), str(corpus)], check=True, capture_output=True)
         CORPUS.write_text(packed(reduced.iterdir()))
-    runs.append({"shard": shard, "executions": executions(done.stderr)})
-    with log.open("a") as file:
-        file.write(json.dumps(runs[-1]) + "\n")
-    total = sum(run["executions"] for run in runs)
-    print(f"shard {shard}: {runs[-1]['executions']:,} executions, none failed; {total:,} in all")
-    return 0
+    journal.add({"shard": shard, "executions": executions(done.stderr)})
+    counts = [row["executions"] for row in journal.rows]
+    return report(
+        f"codec, shard {shard}: none failed",
+        [Figure("executions", f"{counts[-1]:,}"), Figure("of all shards", f"{sum(counts):,}")],
+    )
 
 
 if __name__ == "__main__":

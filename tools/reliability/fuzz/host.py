@@ -8,9 +8,7 @@ input is then added to tests/hostile_inputs.jsonl. Owns both files.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-import json
 import random
 import resource
 import signal
@@ -24,6 +22,7 @@ from types import FrameType
 
 from echostep.errors import EchostepError
 from places import OUT, ROOT
+from reliability.campaign import Figure, Journal, none, options, report
 from reliability.fuzz.targets import ALLOWED, TARGETS
 
 KEPT = ROOT / "tests/hostile_inputs.jsonl"
@@ -97,10 +96,9 @@ def fault(name: str, data: bytes) -> str:
     return f"{used} kB of memory are used" if used > MOST_MEMORY else ""
 
 
-def kept() -> Iterator[tuple[str, bytes]]:
+def kept_inputs() -> Iterator[tuple[str, bytes]]:
     """Inputs that once were faults."""
-    for line in KEPT.read_text().splitlines() if KEPT.exists() else ():
-        row = json.loads(line)
+    for row in Journal(KEPT).rows:
         yield row["target"], bytes.fromhex(row["hex"])
 
 
@@ -133,34 +131,27 @@ def too_slow(_number: int, _frame: FrameType | None) -> None:
 
 def main() -> int:
     """Replay the kept inputs, then fuzz all targets in turn."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--target", choices=sorted(TARGETS), action="append")
-    options = parser.parse_args()
+    asked = options(__doc__, seconds=(60.0, "of this run"), targets=(sorted(TARGETS), "only these"))
     signal.signal(signal.SIGALRM, too_slow)
-    LOG.parent.mkdir(parents=True, exist_ok=True)
-    runs = [json.loads(line) for line in LOG.read_text().splitlines()] if LOG.exists() else []
-    total, shard = sum((Counter(run["executions"]) for run in runs), Counter[str]()), len(runs) + 1
-    names = options.target or sorted(TARGETS)
-    failures = [(name, data, text) for name, data in kept() if (text := fault(name, data))]
-    done: Counter[str] = Counter()
-    end_s, turn = time.monotonic() + options.seconds, 0
+    journal, kept = Journal(LOG), Journal(KEPT)
+    shard, done = len(journal.rows) + 1, Counter[str]()
+    failures = [(name, text) for name, data in kept_inputs() if (text := fault(name, data))]
+    end_s, turn = time.monotonic() + asked.seconds, 0
     while time.monotonic() < end_s:
-        name = names[turn % len(names)]
+        name = asked.targets[turn % len(asked.targets)]
         count, data, text = run_shard(name, shard * 1_000_000 + turn, SHARD_S)
         done[name], turn = done[name] + count, turn + 1
         if text:
-            failures.append((name, data, text))
-            with KEPT.open("a") as file:
-                file.write(json.dumps({"target": name, "hex": data.hex()}) + "\n")
-    with LOG.open("a") as file:
-        file.write(json.dumps({"shard": shard, "executions": done}) + "\n")
-    total += done
-    for name, _, text in failures:
+            failures.append((name, text))
+            kept.add({"target": name, "hex": data.hex()})
+    journal.add({"shard": shard, "executions": done})
+    for name, text in failures:
         print(f"{name}: {text}")
-    print(f"shard {shard}: {done.total():,} executions, {len(failures)} faults; {total.total():,} in all")
-    print(", ".join(f"{name} {count:,}" for name, count in sorted(total.items())))
-    return int(bool(failures))
+    total = sum((Counter(row["executions"]) for row in journal.rows), Counter[str]())
+    return report(
+        f"host, shard {shard}: {done.total():,} executions, {total.total():,} of all shards",
+        [*(Figure(name, f"{count:,}") for name, count in sorted(total.items())), none("faults", len(failures))],
+    )
 
 
 if __name__ == "__main__":

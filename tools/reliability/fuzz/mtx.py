@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Fuzzes the MTx decoder with mutated frames: no exception, bounded memory, and only samples within the limits pass.
 
-In: a number of frames and a seed. Out: frames per second and counts of the reader; exit status 1 on a failure.
+In: a number of frames and a seed. Out: frames per second and counts of the reader; a failure ends it by its exception.
 """
 
 from __future__ import annotations
 
-import argparse
 import resource
 import sys
 import time
@@ -20,6 +19,7 @@ from echostep.xsens.configuration.requests import project_requests
 from echostep.xsens.configuration.setup import MtxSetup
 from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.packets import read_packets
+from reliability.campaign import Figure, options, report
 
 BLOCK = 20_000  # frames mutated together
 MAX_PENDING = MAX_LENGTH + 6  # bytes of the longest unfinished frame
@@ -126,25 +126,20 @@ def feed_setup(stream: bytes) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--frames", type=int, default=200_000)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    asked = options(__doc__, frames=(200_000, "mutated ones"), seed=(1, "of the mutations"))
     fuzz(2_000, 0)  # compiles the kernels
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    try:
-        found = fuzz(options.frames, options.seed)
-    except Exception as error:  # any exception is a failure
-        print(f"FAILED: {type(error).__name__}: {error}")
-        return 1
+    found = fuzz(asked.frames, asked.seed)
     elapsed_s = time.perf_counter() - began
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    print(
-        f"{found['frames']} mutated frames, {found['bytes']} bytes in {elapsed_s:.1f} s: {found['frames'] / elapsed_s:.0f} frames/s, no exception"
+    return report(
+        f"{found['frames']} mutated frames, no exception",
+        [
+            Figure("frames/s", f"{found['frames'] / elapsed_s:.0f}"),
+            Figure("growth of the peak memory", f"{grown:.0f} MB"),
+            *(Figure(name, f"{count}") for name, count in found.items()),
+        ],
     )
-    print(f"peak memory grew by {grown:.0f} MB; the reader held at most {MAX_PENDING} bytes")
-    print(", ".join(f"{name} {value}" for name, value in found.items() if name not in ("frames", "bytes")))
-    return 0
 
 
 if __name__ == "__main__":
