@@ -7,6 +7,7 @@ standard output, exit status 1 when a surface is not closed. A picture states th
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import subprocess
 import sys
@@ -58,6 +59,7 @@ def draw(name: str, parts: list[Triangles]) -> None:
 
 def main() -> int:
     """Make, check and draw all boxes."""
+    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
     sound = True
     for name in NAMES:
         parts = [compiled(name, part, STL) for part in PARTS]

@@ -7,6 +7,7 @@ In: the installed packages. Out: host/tested-versions.txt. Owns that file. `make
 
 from __future__ import annotations
 
+import argparse
 import sys
 
 from packaging.utils import canonicalize_name
@@ -26,6 +27,7 @@ def text() -> str:
 
 def main() -> int:
     """Write the file."""
+    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
     FILE.write_text(text())
     print(f"{FILE}: {len(text().splitlines()) - 1} packages")
     return 0

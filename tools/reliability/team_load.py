@@ -18,9 +18,10 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import replace
-from importlib.resources import as_file, files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from echostep.plan.model import Plan, load_plan
 from echostep.team.endpoint import parse_endpoint
@@ -28,6 +29,7 @@ from echostep.team.messages.report import Motion, Position, Report, StreamReport
 from echostep.team.mqtt.publisher import MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
+from places import PLAN
 from reliability.broker import broker
 from reliability.campaign import options
 
@@ -83,20 +85,9 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
-def start_commander(url: str, plan_path: Path, *more: str, terminal: bool) -> subprocess.Popen[str]:
+def start_commander(url: str, plan_path: Path, out: Path, *more: str, terminal: bool) -> subprocess.Popen[str]:
     """Start a commander, on a pseudo terminal or with its output kept."""
-    command = [
-        sys.executable,
-        "-m",
-        "echostep",
-        "command",
-        "--plan",
-        str(plan_path),
-        url,
-        "--out",
-        "out/load/operation.mcap",
-        *more,
-    ]
+    command = [sys.executable, "-m", "echostep", "command", "--plan", str(plan_path), url, "--out", str(out), *more]
     if not terminal:
         return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     ours, theirs = os.openpty()
@@ -106,11 +97,22 @@ def start_commander(url: str, plan_path: Path, *more: str, terminal: bool) -> su
     return running
 
 
-def measure(url: str, plan_path: Path, trackers: int, rate_hz: float, seconds: float, flood_hz: float) -> None:
+def wait_for_recordings(folder: Path, commanders: Sequence[subprocess.Popen[str]]) -> None:
+    """Until all of them record, and a second more, in which they subscribe."""
+    while len(list(folder.glob("*.mcap"))) < len(commanders):
+        if any(commander.poll() is not None for commander in commanders):
+            raise SystemExit("a commander has ended by itself")
+        time.sleep(0.1)
+    time.sleep(1.0)
+
+
+def measure(
+    url: str, plan_path: Path, folder: Path, trackers: int, rate_hz: float, seconds: float, flood_hz: float
+) -> None:
     """Run two commanders, one with its table, one with JSON, and the trackers; print CPU shares and message counts."""
-    drawing = start_commander(url, plan_path, terminal=True)
-    printing = start_commander(url, plan_path, "--json", terminal=False)
-    time.sleep(5.0)
+    drawing = start_commander(url, plan_path, folder / "table.mcap", terminal=True)
+    printing = start_commander(url, plan_path, folder / "roster.mcap", "--json", terminal=False)
+    wait_for_recordings(folder, (drawing, printing))
     before_s, mine_s = (cpu_s(drawing.pid), cpu_s(printing.pid)), sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     began = time.monotonic()
     ended = threading.Event()
@@ -146,8 +148,8 @@ def main() -> None:
         __doc__, trackers=(20, "how many"), rate=(10.0, "reports of each a second"), seconds=(30.0, "of publishing"),
         flood=(0.0, "invalid messages per second besides"),
     )  # fmt: skip
-    with broker() as url, as_file(files("echostep") / "plans" / "demo.json") as plan_path:
-        measure(url, plan_path, asked.trackers, asked.rate, asked.seconds, asked.flood)
+    with broker() as url, TemporaryDirectory() as folder:
+        measure(url, PLAN, Path(folder), asked.trackers, asked.rate, asked.seconds, asked.flood)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from importlib.resources import as_file, files
 from pathlib import Path
 
 from echostep.guidance.cues import CueKind
@@ -40,7 +39,7 @@ from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
 from echostep.team.roster import Member, MemberState, Roster
 from echostep.tracker import Tracker
-from places import TWIN
+from places import PLAN, TWIN
 from reliability.broker import broker
 from reliability.campaign import options
 from reliability.team_load import report_at
@@ -230,17 +229,16 @@ def main() -> None:
         url=("", "internal: the broker"),
     )
     with ExitStack() as opened:
-        plan_path = opened.enter_context(as_file(files("echostep") / "plans" / "demo.json"))
         if asked.role:
-            walk(asked.role, asked.url, load_plan(plan_path), asked.speed)
+            walk(asked.role, asked.url, load_plan(PLAN), asked.speed)
             return
         url = opened.enter_context(broker())
         print(
             "Preparing: kernels that are not compiled yet are compiled once, not by four wearers at a time", flush=True
         )
-        Tracker(load_plan(plan_path)).warm_up()
+        Tracker(load_plan(PLAN)).warm_up()
         folder = Path(opened.enter_context(tempfile.TemporaryDirectory()))
-        happened = operate(url, plan_path, asked.wearers, asked.firmware, asked.speed, folder)
+        happened = operate(url, PLAN, asked.wearers, asked.firmware, asked.speed, folder)
     sys.exit(0 if happened else 1)
 
 
