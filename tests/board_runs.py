@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +31,11 @@ needs_twin = pytest.mark.skipif(
     if not shutil.which("avr-gcc")
     else "the twin is not built: make -C firmware; make -C tools/twin",
 )
+
+
+def tool(name: str) -> list[str]:
+    """The command that starts a tool of tools/, as the Makefile does; it becomes the tool's own process."""
+    return ["env", f"PYTHONPATH={ROOT / 'tools'}:{ROOT / 'tests'}", sys.executable, "-m", name]
 
 
 def quiet_rows(milliseconds: int) -> NDArray[Any]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
+from board_runs import ROOT, needs_twin, tool
 from command_line import echostep, interrupt_after, interrupt_when
 from echostep.board.faults.findings import Severity
 from echostep.commissioning import port_search
@@ -127,7 +127,7 @@ def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyP
 @contextmanager
 def two_boards(folder: Path) -> Iterator[tuple[str, str]]:
     """The ports of a belt board and a foot board, real firmware in two simulators."""
-    command = [sys.executable, str(ROOT / "tools/twin/run.py"), "--kit", "2026", "--out", str(folder)]
+    command = [*tool("twin.run"), "--kit", "2026", "--out", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
         try:
             assert twin.stdout is not None

@@ -12,7 +12,7 @@ from echostep.foot.steps import Foot, walk_track
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 EARTH = np.array([0.2, 0.05, -0.43])  # gauss, walk frame
 IRON = np.array([0.05, -0.08, 0.03])  # of the shoe

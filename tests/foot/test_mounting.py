@@ -25,7 +25,7 @@ from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 
 def axis_mountings() -> list[Floats]:

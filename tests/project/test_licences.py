@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-import licences
 from board_runs import ROOT
+from release import licences
 
 SOURCES = {".py", ".c", ".h", ".js", ".css", ".html", ".svg", ".sh", ".toml", ".rules"}
 BUILT = {"__pycache__", "build", "dist", "node_modules"}

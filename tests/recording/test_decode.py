@@ -24,7 +24,7 @@ from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFo
 from echostep_studies.simulation.mtx_setup import pack
 from naive.mt_frames import valid_frames
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
 HALF = math.sqrt(0.5)

@@ -20,7 +20,7 @@ from echostep.recording.repair.contents import info
 from echostep.recording.repair.edit import repair
 from echostep.session.skipped import skipped
 from echostep.tracker import Tracker
-from flip_recording import Replayed, arrival_offsets, compare, draw_flips, flip_once, replay
+from reliability.flip_recording import Replayed, arrival_offsets, compare, draw_flips, flip_once, replay
 from walks import DEMO, walk_chunks
 
 SECONDS = 8.0

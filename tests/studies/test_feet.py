@@ -25,7 +25,7 @@ from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import recordings_in
 from foot_walks import any_rotation
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 Row = dict[str, Any]
 needs_recordings = needs_data()

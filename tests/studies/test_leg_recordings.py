@@ -27,7 +27,7 @@ from echostep_studies.legs.recordings import (
     strides_of,
 )
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ from echostep_studies.noplan.real_clutter import walked_log, with_stated_drift
 from echostep_studies.noplan.sites import furnished, loop_walls
 from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 WALLS = np.array([[0.0, 0.0, 10.0, 0.0], [0.0, 3.0, 10.0, 3.0], [0.0, 6.0, 10.0, 6.0]])
 

@@ -26,7 +26,7 @@ from echostep.xsens import (
 )
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
 from echostep_studies.simulation.mtx_setup import pack
-from fuzz_mtx import fuzz
+from reliability.fuzz.mtx import fuzz
 
 
 def sample(counter: int, gyro_x: float = 0.1) -> MtSample:

@@ -10,7 +10,7 @@ from echostep_studies.incapacity.columns import TOLD_S, DaySummary, LyingRun, Ly
 from echostep_studies.incapacity.falls import FallRun, NoFallRun
 from echostep_studies.incapacity.study import incapacitated, one_run, recorded, work_day
 from needs_data import data_or_skip
-from recordings import DATA
+from places import DATA
 
 
 def test_every_wearer_who_cannot_move_is_told_within_35_s() -> None:
