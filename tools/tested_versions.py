@@ -12,7 +12,7 @@ from pathlib import Path
 
 from packaging.utils import canonicalize_name
 
-from licences import needed
+from licences import for_developers
 
 FILE = Path(__file__).resolve().parents[1] / "host/tested-versions.txt"
 HEAD = "# The versions with which the tests have passed. Made by make lock; make setup installs them, make audit checks them.\n"
@@ -20,8 +20,8 @@ HEAD = "# The versions with which the tests have passed. Made by make lock; make
 
 def text() -> str:
     """A line for each package that echostep and its tests need."""
-    packages = needed("echostep", ("cluster", "foxglove", "ifc", "mesh", "dev"))
-    return HEAD + "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages.items())
+    packages = for_developers().items()
+    return HEAD + "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages)
 
 
 def main() -> int:
