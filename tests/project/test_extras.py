@@ -66,6 +66,11 @@ def test_all_is_every_extra_but_the_gpl_and_the_studies() -> None:
     assert everything.extras == set(OPTIONAL) - FOR_DEVELOPERS - {"all", "mesh", "studies"}
 
 
+def test_the_readme_names_every_extra() -> None:
+    rows = "".join(line for line in (ROOT / "host/README.md").read_text().splitlines() if line.startswith("| `"))
+    assert [extra for extra in OPTIONAL if extra not in FOR_DEVELOPERS and f"`{extra}`" not in rows] == []
+
+
 def test_every_import_is_required_or_has_an_extra() -> None:
     required = imports(PROJECT["dependencies"])
     assert {"numpy", "serial", "lz4"} <= required
@@ -75,7 +80,7 @@ def test_every_import_is_required_or_has_an_extra() -> None:
 
 
 def test_no_kernel_multiplies_matrices_without_saying_so() -> None:
-    """Numba does it with the BLAS of scipy."""
+    """A product in a kernel needs the BLAS of scipy."""
     for path in PACKAGE.rglob("*.py"):
         for function in ast.walk(ast.parse(text := path.read_text())):
             if isinstance(function, ast.FunctionDef) and any(
