@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: MIT
 """Property tests draw the same examples everywhere and know no deadline, for the first one may compile a kernel.
 
-One Chromium for all tests of a module.
+Each test has its layer, by which `make quick` chooses. One Chromium for all tests of a module.
 """
 
+import contextlib
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import settings
+
+import layers
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
@@ -30,6 +33,19 @@ def pytest_configure(config: pytest.Config) -> None:
     parts = [subprocess.Popen([sys.executable, COMPILER, part], env=environment) for part in ("front-end", "filter")]
     for part in parts:
         part.wait()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks by rule."""
+    for item in items:
+        layers.mark(item)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """A test of `make quick` that starts a process fails in every run."""
+    with layers.no_process() if layers.is_quick(item) else contextlib.nullcontext():
+        return (yield)
 
 
 @pytest.fixture(scope="module")

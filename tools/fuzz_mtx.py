@@ -14,12 +14,12 @@ from collections import Counter
 
 import numpy as np
 
-from echostep.simulation.devices.mtx_setup import pack
 from echostep.xsens import MTDATA, MTDATA2, PROJECT, MtBatch, MtSample, MtxLimits, MtxReader, OutputFormat, encode_frame
 from echostep.xsens.configuration.requests import project_requests
 from echostep.xsens.configuration.setup import MtxSetup
 from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.packets import read_packets
+from echostep_studies.simulation.mtx_setup import pack
 
 BLOCK = 20_000  # frames mutated together
 MAX_PENDING = MAX_LENGTH + 6  # bytes of the longest unfinished frame

@@ -17,7 +17,6 @@ from echostep.board.frames import encode
 from echostep.board.gateway import Gateway
 from echostep.offline.imu_csv import load_imu
 from echostep.offline.leg_csv import load_legs
-from echostep.offline.pressure_csv import load_pressures
 from echostep.page.requests import parse_request
 from echostep.plan.importers.formats import import_plan
 from echostep.plan.model import load_plan, parse_plan
@@ -34,6 +33,7 @@ from echostep.team.messages.report import encode as report_bytes
 from echostep.team.messages.shared_drawings import checked_drawing
 from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
+from echostep_studies.barometer.pressure_csv import load_pressures
 from imported_plans import write_seven_floors
 from team.team_reports import report
 from walks import DEMO, walk_chunks

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_model as vertical
-from echostep.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
-from echostep.barometer.floor_filter import FloorFilter, checked_heights
-from echostep.barometer.floor_record import find_storeys, stays
 from echostep.cli import app
-from echostep.commands.actions.floors import parse_heights, record_floors
 from echostep.errors import EchostepError
-from echostep.offline.pressure_csv import load_pressures
 from echostep.simulation.devices.board_sensors import Scp1000Model
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
+from echostep_studies.barometer.floor_filter import FloorFilter, checked_heights
+from echostep_studies.barometer.floor_record import find_storeys, stays
+from echostep_studies.barometer.floors_command import parse_heights, record_floors
+from echostep_studies.barometer.pressure_csv import load_pressures
 from echostep_studies.floors.study import FloorScene, judge, longest_s
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import climb

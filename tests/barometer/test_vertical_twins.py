@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_filter
-from echostep.barometer import vertical_model as model
-from echostep.barometer.vertical_filter import Hypotheses
-from echostep.barometer.vertical_kernels import filter_samples, smooth_backward, start
-from echostep.barometer.vertical_model import State
+from echostep_studies.barometer import vertical_filter
+from echostep_studies.barometer import vertical_model as model
+from echostep_studies.barometer.vertical_filter import Hypotheses
+from echostep_studies.barometer.vertical_kernels import filter_samples, smooth_backward, start
+from echostep_studies.barometer.vertical_model import State
 from naive.vertical import Gaussian, smoothed, started
 from naive.vertical_steps import VerticalFilter
 

@@ -23,8 +23,8 @@ from echostep.commissioning.serial_ports import PortSeen, Role
 from echostep.ports.chunks import Chunk
 from echostep.recording.device import sender
 from echostep.recording.reading import open_recording
-from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT
+from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
 from mt_lines import on_a_terminal
 from players import babbling_port, pseudo_terminal, python_board
 from waiting import PATIENCE_S

@@ -49,7 +49,7 @@ def any_cloud(rng: np.random.Generator, n: int, beacons: int) -> tuple[ParticleA
     cov = root @ root.transpose(0, 1, 3, 2)
     unknown = rng.random((n, beacons)) < 0.3
     cov[unknown, 2, :] = cov[unknown, :, 2] = 0.0
-    cov[unknown, 2, 2] = math.pi**2
+    cov[unknown, 2, 2] = rng.choice([math.pi**2, 1.5], int(unknown.sum()))
     mean = rng.normal(0.0, [rng.choice([0.3, 4.0])] * 2 + [2.0], (n, beacons, 3))
     mean[..., 2] = np.angle(np.exp(1j * mean[..., 2]))
     return particles, BeaconBeliefs(

@@ -14,8 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_model as model
-from echostep.barometer.vertical_model import CALM, FADING, GUST, HEIGHT, HELD, LIFT_UP, ON, RATE, STAIRS_UP, WEATHER
+from echostep_studies.barometer import vertical_model as model
+from echostep_studies.barometer.vertical_model import (
+    CALM,
+    FADING,
+    GUST,
+    HEIGHT,
+    HELD,
+    LIFT_UP,
+    ON,
+    RATE,
+    STAIRS_UP,
+    WEATHER,
+)
 
 UNIT = np.eye(model.SIZE)
 SUM = UNIT[HEIGHT] + UNIT[WEATHER] + UNIT[GUST]  # what pressure measures

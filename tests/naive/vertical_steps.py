@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_model as model
-from echostep.barometer.vertical_model import (
+from echostep_studies.barometer import vertical_model as model
+from echostep_studies.barometer.vertical_model import (
     CALM,
     FADING,
     GUST,

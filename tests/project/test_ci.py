@@ -7,7 +7,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from board_runs import ROOT
+
+pytestmark = pytest.mark.process
 
 MAKE, PYTHON = 'echo "make $@"', '[ "$1" != --version ] || echo "Python {}"'
 

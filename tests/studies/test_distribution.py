@@ -9,10 +9,12 @@ import sys
 import zipfile
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from board_runs import ROOT
-from echostep.commands import evaluate
+from echostep.cli import app
+from echostep.commands import studies
 from echostep.errors import EchostepError
 from echostep.offline import profiles
 from echostep_studies.commands import STUDIES, StudyCommand
@@ -42,16 +44,20 @@ def test_each_entry_point_leads_into_the_wheel(wheel: zipfile.ZipFile) -> None:
     points = configparser.ConfigParser()
     points.read_string(wheel.read(name).decode())
     found = {group: dict(points[group]) for group in points.sections()}
-    assert set(found) == {evaluate.GROUP, profiles.GROUP}
-    assert set(found[evaluate.GROUP]) == {"evaluate"}
+    assert set(found) == {studies.GROUP, profiles.GROUP}
+    assert set(found[studies.GROUP]) == set(studies.NAMES)
     assert set(found[profiles.GROUP]) == {"foot.fischer2008", "legs.lee2010"}
     modules = [point.split(":")[0] for group in found.values() for point in group.values()]
     assert {f"{module.replace('.', '/')}.py" for module in modules} <= set(wheel.namelist())
 
 
-def test_without_the_distribution_evaluate_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(evaluate, "entry_points", lambda **_: ())
-    alone, asked = (CliRunner().invoke(evaluate.studies(), words) for words in ([], ["girard2011", "--runs", "1"]))
+@pytest.mark.parametrize("name", studies.NAMES)
+def test_without_the_distribution_a_command_says_how_to_get_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "entry_points", lambda **_: ())
+    alone_app = typer.Typer()
+    studies.add_studies(alone_app)
+    words = name, "girard2011", "--runs", "1"
+    alone, asked = (CliRunner().invoke(alone_app, given) for given in (words[:1], words))
     assert "pip install echostep-studies" in alone.output
     assert isinstance(asked.exception, EchostepError)
     assert "pip install echostep-studies" in str(asked.exception)
@@ -69,7 +75,7 @@ def test_without_the_distribution_a_profile_says_how_to_get_it(
 
 @pytest.mark.parametrize("row", STUDIES, ids=lambda row: row.name)
 def test_each_command_has_its_help(row: StudyCommand) -> None:
-    done = CliRunner().invoke(evaluate.studies(), [row.name, "--help"], env={"COLUMNS": "150"})
+    done = CliRunner().invoke(app, ["evaluate", row.name, "--help"], env={"COLUMNS": "150"})
     assert done.exit_code == 0, done.output
     assert all(f"--{option.name.replace('_', '-')}" in done.output for option in row.options)
 

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.simulation.devices.mtx_setup import pack
 from echostep.xsens import (
     MTDATA,
     MTDATA2,
@@ -26,6 +25,7 @@ from echostep.xsens import (
     pack_mtdata,
 )
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
+from echostep_studies.simulation.mtx_setup import pack
 from fuzz_mtx import fuzz
 
 

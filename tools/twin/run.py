@@ -32,14 +32,14 @@ from echostep.plan.model import Plan, load_plan
 from echostep.simulation.devices.beacon_gateway import SPACING_M
 from echostep.simulation.devices.board import Sent
 from echostep.simulation.devices.foot_board import FootBoardPort
-from echostep.simulation.devices.mtx_setup import MtxDevice
 from echostep.simulation.kits import Kit
-from echostep.simulation.poses import LyingParts
-from echostep.simulation.rehearsal import Act, Rehearsal
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
+from echostep_studies.simulation.mtx_setup import MtxDevice
+from echostep_studies.simulation.poses import LyingParts
+from echostep_studies.simulation.rehearsal import Act, Rehearsal
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]

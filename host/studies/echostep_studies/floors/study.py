@@ -18,11 +18,11 @@ from typing import Literal
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
-from echostep.barometer import vertical_model as vertical
-from echostep.barometer.altitude import BarometerSettings, Pressures
-from echostep.barometer.floor_filter import FloorFilter, Floors
 from echostep.output.table import Table
 from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.altitude import BarometerSettings, Pressures
+from echostep_studies.barometer.floor_filter import FloorFilter, Floors
 from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures

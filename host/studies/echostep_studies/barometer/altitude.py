@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats
-from echostep.barometer import vertical_model as vertical
-from echostep.barometer.vertical_filter import Hypotheses
 from echostep.jit import kernel
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.vertical_filter import Hypotheses
 
 Codes = NDArray[np.int8]
 

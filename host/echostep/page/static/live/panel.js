@@ -2,7 +2,7 @@
 // Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
 
 import { drawnText } from './drawing.js';
-import { marksText } from './marks.js';
+import { marksText } from '../marks.js';
 
 const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
 const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];

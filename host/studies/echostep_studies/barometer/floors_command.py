@@ -12,11 +12,11 @@ import numpy as np
 from rich.console import Console
 
 from echostep.arrays import Floats
-from echostep.barometer.altitude import BarometerSettings, Pressures
-from echostep.barometer.floor_filter import FloorFilter, Floors, checked_heights
-from echostep.barometer.floor_record import describe, find_storeys, noise_of_record, thinned
 from echostep.errors import EchostepError
-from echostep.offline.pressure_csv import load_pressures, write_floors
+from echostep_studies.barometer.altitude import BarometerSettings, Pressures
+from echostep_studies.barometer.floor_filter import FloorFilter, Floors, checked_heights
+from echostep_studies.barometer.floor_record import describe, find_storeys, noise_of_record, thinned
+from echostep_studies.barometer.pressure_csv import load_pressures, write_floors
 
 console = Console(soft_wrap=True, highlight=False)
 MOST_POINTS = 5000  # about, of a curve in the picture

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.barometer import vertical_model as vertical
-from echostep.barometer.altitude import AirColumn, BarometerSettings, Pressures
-from echostep.barometer.vertical_filter import Hypotheses
 from echostep.errors import EchostepError
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.altitude import AirColumn, BarometerSettings, Pressures
+from echostep_studies.barometer.vertical_filter import Hypotheses
 
 TIED = 0.9  # of the best floor's probability: then the lowest of them is named
 CLOSEST_M, HIGHEST_M, MOST_STOREYS = 1.5, 2000.0, 64

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints, spans
-from echostep.barometer.altitude import AirColumn, Altitude, BarometerSettings, Heights, Pressures, noise_of
-from echostep.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
-from echostep.barometer.vertical_model import CLAIMED
 from echostep.errors import EchostepError
+from echostep_studies.barometer.altitude import AirColumn, Altitude, BarometerSettings, Heights, Pressures, noise_of
+from echostep_studies.barometer.floor_filter import CLOSEST_M, FloorFilter, Floors
+from echostep_studies.barometer.vertical_model import CLAIMED
 
 Change = tuple[int, int, float]  # of floor: index before, index after, rise (m)
 

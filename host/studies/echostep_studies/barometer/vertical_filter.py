@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_kernels as kernels
-from echostep.barometer import vertical_model as vertical
+from echostep_studies.barometer import vertical_kernels as kernels
+from echostep_studies.barometer import vertical_model as vertical
 
 BLOCK = 256  # samples whose joint weights are in memory at once
 

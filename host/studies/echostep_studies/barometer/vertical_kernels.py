@@ -17,7 +17,8 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.barometer.vertical_model import (
+from echostep.jit import kernel
+from echostep_studies.barometer.vertical_model import (
     BETWEEN_S,
     CALM,
     CLAIMED,
@@ -85,7 +86,6 @@ from echostep.barometer.vertical_model import (
     probability_within,
     reset_component,
 )
-from echostep.jit import kernel
 
 
 def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) -> tuple[Floats, Floats, Floats]:

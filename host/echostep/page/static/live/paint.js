@@ -2,7 +2,7 @@
 // Paints the moving things on a canvas: particles, trail, beacons, echo lines, position with its ellipse, heading, route, a pose that is being entered.
 
 import { paintDrawing } from './drawing.js';
-import { paintMarks } from './marks.js';
+import { paintMarks } from '../marks.js';
 
 const GRADES = 4;  // shades of the particles' weight
 const PARTICLE_PX = 2.5;
