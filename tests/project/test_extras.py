@@ -178,7 +178,6 @@ WALK = CAPTURES / "walk.mcap"
     ("matplotlib", ("score", "x.csv", "--truth", "x.csv", "--html", "x.html")),
     ("matplotlib", ("foot", "x.csv", "--plot")),
     ("matplotlib", ("legs", "x.csv", "--thigh", "0.4", "--shank", "0.4", "--plot")),
-    ("matplotlib", ("floors", "x.csv", "--heights", "0,3", "--plot")),
 ])  # fmt: skip
 def test_a_command_that_lacks_a_package_says_which_before_it_begins(
     package: str, words: tuple[object, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
