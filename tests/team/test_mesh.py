@@ -314,7 +314,7 @@ def test_a_port_that_the_package_closes_under_a_write_is_an_os_error(air: Air) -
 
 def test_without_the_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "meshtastic", None)
-    with pytest.raises(EchostepError, match=r"mesh:///dev/ttyUSB0: .* pip install 'echostep\[mesh\]'"):
+    with pytest.raises(EchostepError, match=r"mesh:///dev/ttyUSB0 needs meshtastic, .* pip install 'echostep\[mesh\]'"):
         MeshTransport(parse_endpoint("mesh:///dev/ttyUSB0"), ("red", "kim"), print)
 
 

@@ -39,6 +39,12 @@ def needed(name: str, extras: Iterable[str] = ()) -> dict[str, Distribution]:
     return {key: found[key] for key in sorted(found) if key != name}
 
 
+def for_developers() -> dict[str, Distribution]:
+    """Installed packages that echostep, its extras, its tests or its studies need, by name."""
+    found = needed("echostep", ("dev",)) | needed("echostep-studies", ("cluster",))
+    return {key: found[key] for key in sorted(found) if key != "echostep"}
+
+
 def licence(package: Distribution) -> str:
     """What the package's metadata states: an SPDX expression, else classifiers, else `License`, else its file."""
     lines = [line.rsplit(" :: ", 1)[1] for line in _fields(package, "Classifier") if line.startswith("License :: ")]
@@ -65,10 +71,10 @@ def main() -> int:
     """Print the table; the dependencies of `pip install echostep` first."""
     parser = argparse.ArgumentParser(description="licences of all dependencies, as a Markdown table")
     parser.parse_args()
-    runtime, everything = needed("echostep"), needed("echostep", ("cluster", "foxglove", "ifc", "mesh", "dev"))
+    runtime, optional, everything = needed("echostep"), needed("echostep", ("all", "mesh")), for_developers()
     print("| package | version | licence | needed |\n|---|---|---|---|")
     for name, package in sorted(everything.items(), key=lambda item: (item[0] not in runtime, item[0])):
-        use = "to run" if name in runtime else "to develop, or by an extra"
+        use = "to run" if name in runtime else "by an extra" if name in optional else "to develop, or by the studies"
         print(f"| {name} | {package.version} | {licence(package)} | {use} |")
     unknown = [name for name, package in everything.items() if licence(package) == UNKNOWN]
     if unknown:

@@ -13,7 +13,7 @@ import sys
 from packaging.utils import canonicalize_name
 
 from places import ROOT
-from release.licences import needed
+from release.licences import for_developers
 
 FILE = ROOT / "host/tested-versions.txt"
 HEAD = "# The versions with which the tests have passed. Made by make lock; make setup installs them, make audit checks them.\n"
@@ -21,8 +21,8 @@ HEAD = "# The versions with which the tests have passed. Made by make lock; make
 
 def text() -> str:
     """A line for each package that echostep and its tests need."""
-    packages = needed("echostep", ("cluster", "foxglove", "ifc", "mesh", "dev"))
-    return HEAD + "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages.items())
+    packages = for_developers().items()
+    return HEAD + "".join(f"{canonicalize_name(name)}=={package.version}\n" for name, package in packages)
 
 
 def main() -> int:
