@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 ELF := firmware/build/echostep.elf
 SHIPPED := host/echostep/firmware/echostep.hex
+TOOL := env PYTHONPATH=tools:tests $(BIN)/python -m
 TWIN := tools/twin/build/echostep-twin
 APT_PACKAGES := gcc make gcc-avr avr-libc binutils-avr libsimavr-dev libelf-dev cppcheck python3-venv
 TEST_PACKAGES := mosquitto chromium clang libclang-rt-14-dev openscad
@@ -31,7 +32,7 @@ twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL
 	@tools/apt.sh $(APT_PACKAGES)
 	$(MAKE) -C firmware
 	$(MAKE) -C tools/twin
-	$(BIN)/python tools/twin/run.py $(if $(STILL),--still) $(if $(KIT),--kit $(KIT))
+	$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT))
 
 demo: $(READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
 	@if tools/apt.sh $(APT_PACKAGES); then \
@@ -60,7 +61,10 @@ check: $(READY) ## types, style, layers, generated files, C checks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python protocol/generate.py --check
-	$(BIN)/python tools/docs.py --check
+	$(TOOL) docs.generate --check
+	$(MAKE) --quiet check-c
+
+check-c: ## the C checks of make check, where cppcheck is installed
 	@if command -v cppcheck >/dev/null; then $(MAKE) --quiet -C firmware check && $(MAKE) --quiet -C tools/twin check; else echo "cppcheck is not installed: C checks skipped"; fi
 
 size: ## flash, static RAM and stack of the firmware
@@ -69,7 +73,7 @@ size: ## flash, static RAM and stack of the firmware
 measure: $(READY) ## rates, stamp errors, drops, memory and speed of the firmware in the twin, ten simulated minutes
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(BIN)/python tools/twin/measure.py
+	$(TOOL) twin.measure
 
 bench: $(VENV)/peers ## speed of the host as ratios against others, in the same run
 	$(BIN)/python -m echostep_studies.speed.bench
@@ -82,59 +86,59 @@ operation: $(READY) ## 20 wearers on one broker, two with the real firmware, one
 	@tools/apt.sh $(APT_PACKAGES) mosquitto
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(BIN)/python tools/team_operation.py
+	$(TOOL) reliability.team_operation
 
 $(VENV)/peers: host/studies/pyproject.toml $(READY)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e 'host/studies[bench]' || echo "Not all peers could be installed: the table says which are missing."
 	touch $@
 
 wheel: $(READY) ## build the wheel, install it in a fresh environment, run the demo in there; URL=https://... is the public address in it
-	ECHOSTEP_URL=$(URL) $(BIN)/python tools/wheel.py
+	ECHOSTEP_URL=$(URL) $(TOOL) release.wheel
 
 site: $(READY) ## the manual as a site with search in out/site (open out/site/index.html); a dead link fails
-	$(BIN)/sphinx-build -q -n -W --keep-going -c tools/manual -d out/site-cache . out/site
+	$(BIN)/sphinx-build -q -n -W --keep-going -c tools/docs/manual -d out/site-cache . out/site
 	@echo "out/site/index.html"
 
 lock: $(READY) ## write the installed versions to host/tested-versions.txt, after the tests have passed
-	$(BIN)/python tools/tested_versions.py
+	$(TOOL) release.tested_versions
 
 audit: $(READY) ## known faults of the tested versions (pip-audit; needs the network)
 	@[ -x $(VENV)/audit/bin/pip-audit ] || { $(PYTHON) -m venv $(VENV)/audit && $(VENV)/audit/bin/pip install --quiet --disable-pip-version-check pip-audit; }
 	$(VENV)/audit/bin/pip-audit --strict --requirement host/tested-versions.txt --no-deps --disable-pip
 
 licences: $(READY) ## the licence of every dependency
-	$(BIN)/python tools/licences.py
+	$(TOOL) release.licences
 
 docs: $(READY) ## make the pages anew that come from the code
 	$(BIN)/python protocol/generate.py
-	$(BIN)/python tools/docs.py
+	$(TOOL) docs.generate
 
 fuzz: $(READY) ## fuzz the firmware's codec for a minute from its kept corpus, on from where the last minute stopped
 	@tools/apt.sh clang libclang-rt-14-dev
-	$(BIN)/python tools/fuzz_codec.py
+	$(TOOL) reliability.fuzz.codec
 
 fuzz-host: $(READY) ## mutated inputs on every way into the host for a minute, on from where the last minute stopped
-	PYTHONPATH=tests $(BIN)/python tools/fuzz_host.py
+	$(TOOL) reliability.fuzz.host
 
 faults: $(READY) ## each fault of the twin and of the host during one walk: what was lost, how long, what the tracker claimed; on from where it stopped
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(BIN)/python tools/faults.py --page
+	$(TOOL) reliability.faults --page
 
 soak: $(READY) ## eight simulated hours of the firmware through the live pipeline: memory, losses, the clock's wraps, replay; HOURS=0.05 for less
 	$(MAKE) --quiet -C firmware
 	$(MAKE) --quiet -C tools/twin
-	$(BIN)/python tools/soak.py $(if $(HOURS),--hours $(HOURS))
+	$(TOOL) reliability.soak $(if $(HOURS),--hours $(HOURS))
 
 kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording
-	$(BIN)/python tools/kill_recorder.py
+	$(TOOL) reliability.kill_recorder
 
 flips: $(READY) ## flip 314 random bits of a recording, one at a time: what becomes of the track, and what the replay says
-	PYTHONPATH=tests $(BIN)/python tools/flip_recording.py
+	$(TOOL) reliability.flip_recording
 
 hardware: $(READY) ## the printed boxes: STL in out/hardware, checked to be closed, and their pictures; not built yet
 	@tools/apt.sh openscad || echo "OpenSCAD is not installed, and this user may not install it."
-	$(BIN)/python tools/boxes.py
+	$(TOOL) hardware.boxes
 
 flash: ## build the firmware and write it to a board: make flash PORT=/dev/ttyACM0
 	@tools/flash.sh "$(PORT)"
@@ -145,4 +149,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation help setup firmware twin demo real quick test check size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean
+.PHONY: operation help setup firmware twin demo real quick test check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 from echostep.board import messages as m
-from echostep.board.findings import BoardReports
+from echostep.board.faults.findings import BoardReports
+from echostep.board.faults.health import board_findings
 from echostep.board.frames import BoardReader, encode
-from echostep.board.health import board_findings
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.stimulus import NO_SYNC, ROW
 
@@ -30,6 +31,11 @@ needs_twin = pytest.mark.skipif(
     if not shutil.which("avr-gcc")
     else "the twin is not built: make -C firmware; make -C tools/twin",
 )
+
+
+def tool(name: str) -> list[str]:
+    """The command that starts a tool of tools/, as the Makefile does; it becomes the tool's own process."""
+    return ["env", f"PYTHONPATH={ROOT / 'tools'}:{ROOT / 'tests'}", sys.executable, "-m", name]
 
 
 def quiet_rows(milliseconds: int) -> NDArray[Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from recordings import DATA
+from places import DATA
 
 
 def needs_data(folder: str = "") -> pytest.MarkDecorator:

@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import math
 import os
-import sys
 import threading
 import time
 import tty
@@ -17,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from board_runs import ROOT, quiet_rows
+from board_runs import quiet_rows
 from echostep.simulation.devices.board import PythonBoard
+from twin.run import PtyBoard
 from waiting import PATIENCE_S
-
-sys.path.insert(0, str(ROOT / "tools/twin"))
 
 
 @contextlib.contextmanager
@@ -104,7 +101,7 @@ def python_board(shape: Callable[[NDArray[Any], int], None] = some_noise) -> Ite
 @contextlib.contextmanager
 def twin_board(*faults: str, rows: Callable[[int], NDArray[Any]] = quiet_rows) -> Iterator[str]:
     """The port of the real firmware in the twin, in real time, with these faults thrown from the start; its inputs, by milliseconds."""
-    board = importlib.import_module("run").PtyBoard()
+    board = PtyBoard()
     for fault in faults:
         board.fault(fault)
     due_s = time.monotonic()

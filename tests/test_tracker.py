@@ -12,9 +12,9 @@ import pytest
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from echostep.localization.estimate import Estimate, TrackStatus, digest
-from echostep.localization.metrics import Truth, errors
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
+from echostep.scorecard.truth import Truth, errors
 from echostep.simulation.devices.board import BoardProcess, PythonBoard
 from echostep.simulation.scenario import Scenario, demo_scenario
 from echostep.tracker import Tracker

@@ -13,8 +13,10 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands import beacons, commander, evaluate, files, hardware, plan, recordings, runs
+from echostep.commands import beacons, commander, files, hardware, plan, recordings, runs
+from echostep.commands.studies import add_studies
 from echostep.errors import EchostepError
+from echostep.extras import EXTRAS, lacks
 from echostep.interruption import end_by_signals
 
 app = typer.Typer(
@@ -26,8 +28,9 @@ app = typer.Typer(
 )
 for nameless in (runs, files, commander, hardware, recordings):
     app.add_typer(nameless.app)
-for name, group in {"evaluate": evaluate.studies(), "beacons": beacons.app, "plan": plan.app}.items():
-    app.add_typer(group, name=name)
+add_studies(app)
+for name, group in {"beacons": beacons, "plan": plan}.items():
+    app.add_typer(group.app, name=name)
 
 
 def _print_version(wanted: bool) -> None:
@@ -57,6 +60,12 @@ def main() -> None:
         app()
     except EchostepError as error:
         print(f"echostep: {error}", file=sys.stderr)
+        sys.exit(2)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS or not (words := lacks("this", package)):
+            raise
+        print(f"echostep: {words}", file=sys.stderr)
         sys.exit(2)
     except BrokenPipeError:
         sys.stderr.close()

@@ -19,10 +19,10 @@ from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import WearerSettings
-from echostep.localization.beacon_model import BeaconSettings
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.level_changes import ClimbSettings
-from echostep.localization.particles import CloudSettings
+from echostep.localization.beacons.model import BeaconSettings
+from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.height.levels import ClimbSettings
+from echostep.localization.settings import CloudSettings
 from echostep.timing.timeline import MtxTiming
 
 

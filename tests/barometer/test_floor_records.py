@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.barometer.altitude import Altitude, BarometerSettings, Pressures, noise_of
-from echostep.barometer.floor_record import climbed_m, describe, find_storeys, noise_of_record, thinned, visits
-from echostep.commands.floors import record_floors
 from echostep.errors import EchostepError
-from echostep.offline.pressure_csv import load_pressures
+from echostep_studies.barometer.altitude import Altitude, BarometerSettings, Pressures, noise_of
+from echostep_studies.barometer.floor_record import climbed_m, describe, find_storeys, noise_of_record, thinned, visits
+from echostep_studies.barometer.floors_command import record_floors
+from echostep_studies.barometer.pressure_csv import load_pressures
 
 STOREYS = np.array([0.0, 3.5, 7.0])
 METRE_PA = 11.7

@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from echostep.arrays import Floats
-from echostep.barometer import vertical_model as vertical
-from echostep.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
-from echostep.barometer.floor_filter import FloorFilter, checked_heights
-from echostep.barometer.floor_record import find_storeys, stays
 from echostep.cli import app
-from echostep.commands.floors import parse_heights, record_floors
 from echostep.errors import EchostepError
-from echostep.offline.pressure_csv import load_pressures
 from echostep.simulation.devices.board_sensors import Scp1000Model
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.altitude import Altitude, BarometerSettings, Heights, Pressures, noise_of
+from echostep_studies.barometer.floor_filter import FloorFilter, checked_heights
+from echostep_studies.barometer.floor_record import find_storeys, stays
+from echostep_studies.barometer.floors_command import parse_heights, record_floors
+from echostep_studies.barometer.pressure_csv import load_pressures
 from echostep_studies.floors.study import FloorScene, judge, longest_s
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import climb
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 STOREYS = np.array([0.0, 3.5, 7.0])
 PA_PER_M = 101_325.0 * 9.80665 / (287.053 * 293.15)
@@ -227,9 +227,9 @@ def test_a_simulated_quarter_of_an_hour(ways: str) -> None:
     )
     away = np.abs(way.height_m[at][:, None] - heights)
     found = FloorFilter(heights, prior=known(int(away[0].argmin()), 5)).smooth(samples)
-    score = judge(found, away)
-    assert score["floor_right"] > 0.99
-    assert score["longest_wrong_s"] < 10.0
+    score = judge(found, away, "", 1)
+    assert score.floor_right > 0.99
+    assert score.longest_wrong_s < 10.0
 
 
 def test_the_judge_counts() -> None:
@@ -301,7 +301,7 @@ def test_any_rate(rate_hz: float) -> None:
     way = stairs_up(rate_hz)
     found = record_floors(record(way, rate_hz, noise_pa=1.5), np.array([0.0, 3.5]))
     away = np.abs(way[:, None] - np.array([0.0, 3.5]))
-    assert judge(found, away)["floor_right"] > 0.97
+    assert judge(found, away, "", 1).floor_right > 0.97
     assert len(found.t_s) == len(way)
 
 

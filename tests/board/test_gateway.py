@@ -15,7 +15,7 @@ from echostep.board.frames import encode
 from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity
 from echostep.errors import EchostepError
-from echostep.localization.beacon_initialisation import locate_beacon
+from echostep.localization.beacons.initialisation import locate_beacon
 from echostep.ports.chunks import BOARD, GATEWAY, Chunk, portion_of
 from echostep.ports.serial_ports import SerialPorts
 from echostep.ports.udp import UdpPort

@@ -14,7 +14,7 @@ import pytest
 from board_runs import ROOT
 from echostep.board.frames import encode
 from echostep.board.gateway import FEW_S, MOST_BEACONS, Gateway
-from echostep.commands.beacon_player import _open_sender
+from echostep.commands.actions.beacon_player import _open_sender
 from echostep.errors import EchostepError
 from echostep.ports import chunk_queue, udp
 from echostep.ports.chunk_queue import ChunkQueue

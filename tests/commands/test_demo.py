@@ -15,14 +15,14 @@ from websockets.sync.client import ClientConnection
 
 from board_runs import ELF, ROOT, TWIN, needs_twin
 from command_line import echostep
-from echostep.localization.metrics import load_truth
 from echostep.page.elements.true_position import TruePath
 from echostep.page.live import LivePage
 from echostep.plan.model import Door, Plan, Room, load_plan
 from echostep.ports.chunks import portion_of
 from echostep.recording.reading import open_recording
-from echostep.session import demo
+from echostep.scorecard.truth import load_truth
 from echostep.session.browser import open_browser
+from echostep.session.runs import demo
 from echostep.simulation.people.tours import room_tour
 from echostep.simulation.scenario import DEMO_WAYPOINTS, start_of
 from echostep.tracker import Tracker

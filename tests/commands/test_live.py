@@ -10,7 +10,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 import tty
 from collections import Counter
@@ -19,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
+from board_runs import ROOT, needs_twin, tool
 from command_line import PROGRAM, echostep, interrupt_after
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
@@ -47,9 +46,7 @@ def test_a_live_run_replays_to_identical_estimates(
     place = {"x_m": 2.0, "y_m": 7.5, "sd_m": 0.1, "level": 0, "air": None}
     kept = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": load_plan(PLAN).digest, "board": "", "place": place}
     (tmp_path / "live/last.json").write_text(json.dumps(kept))
-    twin = subprocess.Popen(
-        [sys.executable, ROOT / "tools/twin/run.py", "--out", tmp_path], stdout=subprocess.PIPE, text=True
-    )
+    twin = subprocess.Popen([*tool("twin.run"), "--out", tmp_path], stdout=subprocess.PIPE, text=True)
     try:
         assert twin.stdout is not None
         board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))

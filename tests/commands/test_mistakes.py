@@ -19,8 +19,8 @@ from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.recording.background_writer import BackgroundWriter
 from echostep.session.console import print_notices
-from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.team.outbox import Outbox
+from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
 from mt_lines import on_a_terminal
 from players import babbling_port, pseudo_terminal, python_board
 from waiting import PATIENCE_S
@@ -94,7 +94,7 @@ def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
             signal.raise_signal(signal.SIGINT)
 
     patch.setattr(Outbox, "_print_state", heard)
-    patch.setattr("echostep.session.live.print_notices", ending)
+    patch.setattr("echostep.session.runs.live.print_notices", ending)
     with pseudo_terminal() as (_, port):
         done = echostep(
             "live", "--plan", PLAN, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",

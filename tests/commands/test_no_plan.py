@@ -13,12 +13,12 @@ import pytest
 
 from command_line import echostep
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.level_changes import HeightChange
-from echostep.localization.relative_height import RelativeHeight
+from echostep.localization.height.height_filter import RelativeHeight
+from echostep.localization.height.levels import HeightChange
 from echostep.page.elements.scene import status_text
 from echostep.plan.model import NO_PLAN
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from page.frames import PLAN, told

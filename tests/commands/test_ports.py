@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT, needs_twin
+from board_runs import ROOT, needs_twin, tool
 from command_line import echostep, interrupt_after, interrupt_when
-from echostep.board.findings import Severity
+from echostep.board.faults.findings import Severity
 from echostep.commissioning import port_search
 from echostep.commissioning.doctor import examine
 from echostep.commissioning.port_search import find_ports
@@ -23,8 +23,8 @@ from echostep.commissioning.serial_ports import PortSeen, Role
 from echostep.ports.chunks import Chunk
 from echostep.recording.device import sender
 from echostep.recording.reading import open_recording
-from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT
+from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
 from mt_lines import on_a_terminal
 from players import babbling_port, pseudo_terminal, python_board
 from waiting import PATIENCE_S
@@ -127,7 +127,7 @@ def test_a_search_without_a_board_says_what_is_there(monkeypatch: pytest.MonkeyP
 @contextmanager
 def two_boards(folder: Path) -> Iterator[tuple[str, str]]:
     """The ports of a belt board and a foot board, real firmware in two simulators."""
-    command = [sys.executable, str(ROOT / "tools/twin/run.py"), "--kit", "2026", "--out", str(folder)]
+    command = [*tool("twin.run"), "--kit", "2026", "--out", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
         try:
             assert twin.stdout is not None

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 from echostep.recording.reading import open_recording
-from echostep_studies.noplan.real_feet import names_in, read_hallway
+from echostep_studies.bench.recordings.hallways import names_in, read_hallway
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 from waiting import PATIENCE_S
 
 pytestmark = needs_data("gx5_gcp")

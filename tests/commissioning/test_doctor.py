@@ -15,8 +15,8 @@ import pytest
 from board_runs import Bench, needs_twin, quiet_rows
 from command_line import echostep
 from echostep.board import messages as m
+from echostep.board.faults.health import Severity
 from echostep.board.frames import encode
-from echostep.board.health import Severity
 from echostep.commissioning import serial_ports as ports
 from echostep.commissioning.diagnosis import Diagnosis, judge_board
 from echostep.commissioning.doctor import examine

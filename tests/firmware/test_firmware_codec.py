@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-import fuzz_codec
+from reliability.fuzz import codec as fuzz_codec
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
-from echostep.board.findings import BoardReports, part_text_of
-from echostep.board.health import board_findings, gyro_celsius
+from echostep.board.faults.findings import BoardReports, part_text_of
+from echostep.board.faults.health import board_findings, gyro_celsius
 from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.stimulus import EXTENDED_ROW
 

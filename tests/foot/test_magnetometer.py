@@ -9,10 +9,10 @@ import pytest
 import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
-from echostep_studies.feet.datasets import SETS
+from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 EARTH = np.array([0.2, 0.05, -0.43])  # gauss, walk frame
 IRON = np.array([0.05, -0.08, 0.03])  # of the shoe

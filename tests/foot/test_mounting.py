@@ -15,17 +15,17 @@ from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
-from echostep.localization.metrics import Truth, errors
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
+from echostep.scorecard.truth import Truth, errors
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
-from echostep_studies.feet.datasets import SETS
+from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 
 def axis_mountings() -> list[Floats]:

@@ -21,7 +21,7 @@ from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.plan.routing import Route
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.teammate import TEAM, Teammate, parse_teammate
+from echostep.ports.people.teammate import TEAM, Teammate, parse_teammate
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker

@@ -10,15 +10,12 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.legs.angle_grid import AngleGrid
-from echostep.legs.edges import Swing, leaving_share
 from echostep.legs.gyro_bias import GyroBias
-from echostep.legs.leg_angles import LegAngles
-from echostep.legs.leg_side import HALF_PELVIS_M, about_trunk, leg_left_m
-from echostep.legs.level import Level
+from echostep.legs.leg_angles import LegAngles, Level
 from echostep.legs.mounting import walking_axis
-from echostep.legs.stride import Flag, Stride, StrideSettings
+from echostep.legs.stride import HALF_PELVIS_M, Flag, Stride, StrideSettings, about_trunk, leg_left_m
 from echostep.legs.strides import StrideEstimator
-from echostep.legs.walking_bout import stairs_flag
+from echostep.legs.walking_bout import Swing, leaving_share, stairs_flag
 from echostep.offline.leg_csv import LegSamples
 from echostep.offline.leg_track import track_default
 from echostep.simulation.people.walker import Person, Walk, Waypoint, walk

@@ -18,11 +18,10 @@ from command_line import echostep
 from echostep.angles import mean_angle
 from echostep.errors import EchostepError
 from echostep.guidance.guided_run import GuidedRun, destination
-from echostep.localization.beacon_beliefs import BeaconBeliefs, moments
+from echostep.localization.beacons.beliefs import BeaconBeliefs, moments
+from echostep.localization.belief import Hypothetical, Plausibility
 from echostep.localization.estimate import digest
-from echostep.localization.hypothetical import Hypothetical
-from echostep.localization.plausibility import Plausibility
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import GATEWAY, Chunk, portion_of

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.localization.beacon_beliefs import (
+from echostep.localization.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
@@ -18,8 +18,8 @@ from echostep.localization.beacon_beliefs import (
     set_beliefs,
     wrap_angle,
 )
-from echostep.localization.beacon_model import BeaconSettings, beacon_model
-from echostep.localization.beacon_slam import (
+from echostep.localization.beacons.model import BeaconSettings, beacon_model
+from echostep.localization.beacons.slam import (
     CLOUD_FIT,
     SUSPECT,
     TIMES_MOVED,
@@ -28,8 +28,8 @@ from echostep.localization.beacon_slam import (
     reweight,
     update_by_measurement,
 )
-from echostep.localization.beacon_step import Beacons, no_waiting, update_by_reading
-from echostep.localization.particle_kernels import ParticleArrays
+from echostep.localization.beacons.step import Beacons, no_waiting, update_by_reading
+from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex
 

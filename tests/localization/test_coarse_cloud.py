@@ -9,16 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from echostep.localization.belief import DOUBTED, FOUND_WITHIN_M, PLAN_FITS
 from echostep.localization.building import Building
-from echostep.localization.coarse_field import AFTER_ECHO, AFTER_SILENCE
-from echostep.localization.coarse_pings import INDEPENDENT_M, USED_M, CoarsePings
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.filter_settings import FilterSettings
-from echostep.localization.map_filter import DOUBTED, MapFilter
-from echostep.localization.particle_kernels import Move, PingBatch
-from echostep.localization.particles import COARSE_REST, Cloud, CloudSettings
-from echostep.localization.plan_verdict import FOUND_WITHIN_M, PLAN_FITS
-from echostep.localization.start import Start
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, CoarsePings
+from echostep.localization.map_filter import MapFilter
+from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particles.cloud import COARSE_REST, Cloud
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
 

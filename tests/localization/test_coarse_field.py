@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.coarse_field import (
+from echostep.localization.echoes.likelihood import EchoSettings, detection, echo_model
+from echostep.localization.echoes.range_table import (
     AFTER_ECHO,
     AFTER_SILENCE,
     CHANCES,
@@ -22,8 +23,7 @@ from echostep.localization.coarse_field import (
     log_densities,
     reweight_coarsely,
 )
-from echostep.localization.echo_likelihood import EchoSettings, detection, echo_model
-from echostep.localization.particle_kernels import ParticleArrays
+from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 
 ROOM = Building(

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echostep.localization.gaps import LONG_S, MUTE_S, PAUSE_S, Gap, Gaps
+from echostep.localization.motion import LONG_S, MUTE_S, PAUSE_S, Gap, Gaps
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
 

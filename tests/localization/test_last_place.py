@@ -8,15 +8,14 @@ import math
 import numpy as np
 import pytest
 
+from echostep.localization.belief import STATED
 from echostep.localization.building import Building
-from echostep.localization.filter_settings import FilterSettings
-from echostep.localization.last_place import MOVED_M, LastPlace, start_after
-from echostep.localization.level_changes import ClimbSettings
+from echostep.localization.height.levels import ClimbSettings
 from echostep.localization.map_filter import UNOBSERVED_DOUBT, MapFilter
-from echostep.localization.particles import CloudSettings
-from echostep.localization.plausibility import STATED
-from echostep.localization.start import Air, Start
+from echostep.localization.particles.start import Air, Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
+from echostep.tracker.last_place import MOVED_M, LastPlace, start_after
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tower
 

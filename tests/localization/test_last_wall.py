@@ -9,11 +9,17 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization.background import BIN_M, Background, PlacedPings, RangeMemory, UnplannedDensities
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.filter_settings import FilterSettings, with_plan_error
-from echostep.localization.last_wall import LastWall
-from echostep.localization.plausibility import beyond_errors_that_stay
+from echostep.localization.belief import beyond_errors_that_stay
+from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.echoes.unplanned import (
+    BIN_M,
+    Background,
+    LastWall,
+    PlacedPings,
+    RangeMemory,
+    UnplannedDensities,
+)
+from echostep.localization.settings import FilterSettings, with_plan_error
 
 SD_M = 0.036
 SPACING_M = 0.25

@@ -14,10 +14,19 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.arrays import Floats
+from echostep.localization.belief import STATED, Plausibility
 from echostep.localization.building import Building
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.meeting_model import (
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
+from echostep.localization.team.meetings import (
+    MOST_NAMES,
+    PLACE_M,
+    RENEWED_M,
     WRONG,
+    MeetingEffect,
+    MeetingMemory,
     PreparedMeeting,
     best_omega,
     covariance,
@@ -27,14 +36,10 @@ from echostep.localization.meeting_model import (
     start_at,
     weigh,
 )
-from echostep.localization.meetings import MOST_NAMES, PLACE_M, RENEWED_M, MeetingEffect, MeetingMemory
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.plausibility import STATED, Plausibility
-from echostep.localization.start import Start
 from echostep.path import PathSegment
 from echostep.plan.model import Plan, Pose, load_plan
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.meeting import MEETING, Meeting, parse_meeting
+from echostep.ports.people.meeting import MEETING, Meeting, parse_meeting
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
 from walks import walk_chunks

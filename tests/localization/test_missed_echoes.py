@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echostep.localization.missed_echoes import PRIOR_HEARD, PRIOR_MISSED, MissedEchoes
+from echostep.localization.echoes.likelihood import PRIOR_HEARD, PRIOR_MISSED, MissedEchoes
 
 PRIOR = PRIOR_MISSED / PRIOR_HEARD
 

@@ -10,19 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.localization.echo_likelihood import EchoSettings, echo_model, log_echo
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model, log_echo
 from echostep.localization.estimate import TrackStatus, ellipse95, estimate, trust
-from echostep.localization.particle_kernels import (
-    NOISE_BEND,
-    Move,
-    PingBatch,
-    effective_size,
-    piece_of,
-    propagate,
-    systematic,
-)
-from echostep.localization.particles import BENDS, Cloud, CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particles.cloud import BENDS, Cloud
+from echostep.localization.particles.kernels import NOISE_BEND, effective_size, piece_of, propagate, systematic
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.tile_points import CORNER, EDGE

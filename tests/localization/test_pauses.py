@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.level_sheet import lay_out_levels

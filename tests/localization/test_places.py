@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.angles import mean_angle
-from echostep.localization import hypotheses as module
-from echostep.localization.hypotheses import hypotheses
-from echostep.localization.level_changes import SAME_LEVEL_M
-from echostep.localization.moments import moments, weight_about
+from echostep.localization.estimate import moments, weight_about
+from echostep.localization.height.levels import SAME_LEVEL_M
+from echostep.localization.particles import places as module
+from echostep.localization.particles.places import hypotheses
 from naive.places import places
 
 

@@ -9,21 +9,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from echostep.localization.belief import ALIKE_M, EARLY_M, FAILS, NEAR_M, PLAN_FITS, PlanVerdict
 from echostep.localization.building import Building
 from echostep.localization.estimate import SURE, Estimate, TrackStatus
-from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles import CloudSettings
-from echostep.localization.plan_verdict import (
-    ALIKE_M,
-    EARLY_M,
-    FAILS,
-    NEAR_M,
-    PLAN_FITS,
-    PlanVerdict,
-)
-from echostep.localization.plausibility import UNPLANNED_DOOR
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import UNPLANNED_DOOR, CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.localization.estimate import RISK, estimate
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.start import ANY_LEVEL, Start
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import ANY_LEVEL, Start
+from echostep.localization.settings import CloudSettings
 from echostep.plan.model import Pose
 from echostep.walls.level_sheet import lay_out_levels
 from echostep_studies.simulation.tower import tower

@@ -8,8 +8,8 @@ import numpy as np
 from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import encode
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.ranger_models import ECHO_OF, echo_of
+from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.echoes.rangers import ECHO_OF, echo_of
 from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment
 from echostep.plan.model import load_plan

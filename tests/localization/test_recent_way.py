@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.unplanned import UsablePings
 from echostep.localization.estimate import SURE_OF_LEVEL, Estimate, TrackStatus
-from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.moves import height_change, move_of
-from echostep.localization.particle_kernels import Move
-from echostep.localization.particles import PASSING, Cloud, CloudSettings
-from echostep.localization.recent_way import MOST_PIECES, PAST_M, RecentWay
-from echostep.localization.start import Air, Start
-from echostep.localization.usable_pings import UsablePings
+from echostep.localization.motion import height_change, move_of
+from echostep.localization.particle_arrays import Move
+from echostep.localization.particles.cloud import PASSING, Cloud
+from echostep.localization.particles.start import Air, Start
+from echostep.localization.settings import CloudSettings, FilterSettings
+from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels
-from echostep_studies.anywhere import sites
-from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.bench import sites
+from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import STOREY_M, tower
 
 STOREYS, TRUE, WRONG = 3, 1, 2

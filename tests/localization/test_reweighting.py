@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.localization.echo_likelihood import GATE_SD, EchoSettings, echo_model
-from echostep.localization.particle_kernels import ParticleArrays, Ping, reweight_by_ping
+from echostep.localization.echoes.likelihood import GATE_SD, EchoSettings, echo_model
+from echostep.localization.particle_arrays import ParticleArrays
+from echostep.localization.particles.kernels import Ping, reweight_by_ping
 from echostep.walls.echo_sources import Walls
 
 MODEL = echo_model(EchoSettings())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.localization.riding_height import RidingHeight
+from echostep.localization.height.height_filter import RidingHeight
 
 SEGMENT_S, SAMPLES = 0.5, 5
 NOISE_M = 0.25  # of an SCP1000 in its fast mode [SCP1000 data sheet]: 3 Pa

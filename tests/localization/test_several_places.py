@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
 from echostep.plan.model import Pose
 
 APART_M = 30.0

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.start import ANY_LEVEL, NEAR_M, NEAR_SHARE, Start, draw_poses, near_count
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import ANY_LEVEL, NEAR_M, NEAR_SHARE, Start, draw_poses, near_count
+from echostep.localization.settings import CloudSettings
 from echostep.plan.model import Pose
 from echostep.walls.level_sheet import lay_out_levels, level_of
 from echostep_studies.simulation.tower import LIFT_AT, tower

@@ -6,14 +6,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from echostep.localization.belief import (
+    AGREED,
+    DOUBTED,
+    JUDGED_M,
+    REFUTED,
+    UNDECIDED,
+    Hypothetical,
+    Plausibility,
+    probability_of,
+)
 from echostep.localization.building import Building
 from echostep.localization.estimate import SURE
-from echostep.localization.filter_settings import FilterSettings
-from echostep.localization.hypothetical import Hypothetical
-from echostep.localization.map_filter import AGREED, DOUBTED, JUDGED_M, REFUTED, UNDECIDED, MapFilter
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.plausibility import Plausibility, probability_of
-from echostep.localization.start import Start
+from echostep.localization.map_filter import MapFilter
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from echostep.localization.building import Building
-from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.height.levels import FALL_PER_M
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
-from echostep.localization.upper_storeys import FALL_PER_M
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Level, Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels

@@ -8,8 +8,8 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.usable_pings import UsablePings
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.unplanned import UsablePings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.settings import parse_settings
 from echostep.walls.echo_sources import Walls

@@ -10,10 +10,10 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.localization.building import Building
-from echostep.localization.filter_settings import FilterSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings, FilterSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from echostep.mapping.bias import find_bias, without_bias
+from echostep.mapping.graph.bias import find_bias, without_bias
+from echostep.mapping.graph.nodes import nodes_of
 from echostep.mapping.mapper import map_walk
-from echostep.mapping.nodes import nodes_of
 from echostep.path import MeasuredSegment, PathSegment
 
 SIDE_M, LEG_M, PING_S = 1.0, 12, 0.07

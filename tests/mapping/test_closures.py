@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.mapping.closures import KNOWN_SD_M, find_closure, gained
-from echostep.mapping.fragments import Fragments
-from echostep.mapping.graph import Graph, Walls
-from echostep.mapping.matching import match
-from echostep.mapping.nodes import Nodes
-from echostep.mapping.stretches import pieces, stretches
+from echostep.mapping.graph.closures import KNOWN_SD_M, find_closure, gained, pieces, stretches
+from echostep.mapping.graph.fragments import Fragments
+from echostep.mapping.graph.graph import Graph, Walls
+from echostep.mapping.graph.matching import match
+from echostep.mapping.graph.nodes import Nodes
 
 SHIFTS_M = np.linspace(-0.8, 0.8, 17)
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Ints
-from echostep.mapping import companions
-from echostep.mapping.companions import density_along_path, people_share
-from echostep.mapping.directions import find_directions
-from echostep.mapping.fragments import find_fragments
-from echostep.mapping.nodes import Nodes, Pings, nodes_of
+from echostep.mapping.graph import companions
+from echostep.mapping.graph.companions import density_along_path, people_share
+from echostep.mapping.graph.directions import find_directions
+from echostep.mapping.graph.fragments import find_fragments
+from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
 from echostep.path import MeasuredSegment, PathSegment
 
 HALL_M, CORRIDOR_M = 160, 40

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.mapping.fragments import Fragments
-from echostep.mapping.graph import Closure, Graph, Walls
-from echostep.mapping.nodes import Nodes
+from echostep.mapping.graph.fragments import Fragments
+from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.nodes import Nodes
 
 STEP = 1e-6
 

@@ -20,10 +20,10 @@ from echostep.plan.model import NO_PLAN, Pose, load_plan, parse_plan
 from echostep.plan.writer import plan_json
 from echostep.ports.chunks import Chunk
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
-from echostep_studies.anywhere.tours import clearance_m
+from echostep_studies.bench.tours import clearance_m
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 HEADING_RAD = 0.5 * math.pi

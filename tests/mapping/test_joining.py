@@ -12,7 +12,7 @@ import pytest
 
 from command_line import echostep
 from echostep.arrays import Floats
-from echostep.commands.mapping import segments_of
+from echostep.commands.actions.mapping import segments_of
 from echostep.errors import EchostepError
 from echostep.mapping.joining import doubt_of, join_walks
 from echostep.mapping.mapper import Mapped, solve_walk
@@ -22,14 +22,14 @@ from echostep.plan.model import NO_PLAN, load_plan
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import open_recording
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Person
 from echostep.simulation.scenario import Scenario
-from echostep_studies.anywhere.sites import plan_of
-from echostep_studies.anywhere.tours import clearance_m
-from echostep_studies.anywhere.walks import CORNER_M, SimulatedWalk, simulate
-from echostep_studies.noplan.joined import again, joined_row
+from echostep_studies.bench.sites import plan_of
+from echostep_studies.bench.tours import clearance_m
+from echostep_studies.bench.walks import CORNER_M, SimulatedWalk, simulate
+from echostep_studies.noplan.joined import JoinedRun, again, joined_row
 from echostep_studies.noplan.judgement import known_start, path_columns, true_path
 from echostep_studies.noplan.sites import corridors, office
 
@@ -90,7 +90,7 @@ def test_the_second_walk_finds_its_place_on_the_first(
     graph, second = mapped.graph, mapped.graph.nodes.begins[1]
     truth = [true_path(walk, t) for walk, t in zip(walks, np.split(graph.nodes.t_s, [second]), strict=True)]
     frame = known_start(graph.pose[:second, :2], truth[0])
-    assert path_columns(frame.to_map(graph.pose[second:, :2]), truth[1])["rmse_m"] < 0.4
+    assert path_columns(frame.to_map(graph.pose[second:, :2]), truth[1]).rmse_m < 0.4
     assert join.place.log_odds > math.log(1e3)
     assert len(join.closures) >= 2
     assert [len(path) for path in mapped.drawing.paths_m] == [second, len(graph.pose) - second]
@@ -129,7 +129,8 @@ def test_doubts_of_a_place_are_named() -> None:
 def test_the_study_judges_two_walks(walks: tuple[SimulatedWalk, ...]) -> None:
     """The same pair (simulated): joined, and not at a wrong place."""
     row = joined_row("joined/office", (walks[0], walks[1]), 2)
-    assert (row["joined"], row["misplaced"], row["wrong"]) == (1, 0, 0)
+    assert isinstance(row, JoinedRun)
+    assert (row.joined, row.misplaced, row.wrong) == (1, 0, 0)
 
 
 def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:

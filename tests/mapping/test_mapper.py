@@ -12,21 +12,21 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
-from echostep.mapping.drawing import Drawing, draw
-from echostep.mapping.graph import Closure, contradicted
+from echostep.mapping.graph.graph import Closure, contradicted
 from echostep.mapping.growing import GrowingMap
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.plan import plan_of
+from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import NO_PLAN, Pose, load_plan
 from echostep.session.metadata import run_metadata
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import DEMO_WAYPOINTS, demo_scenario
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.tours import clearance_m
-from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.tours import clearance_m
+from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.noplan.judgement import known_start, path_columns
 
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
@@ -146,7 +146,7 @@ def test_a_walk_may_begin_out_of_hearing_of_any_wall(walk: SimulatedWalk) -> Non
     graph = map_walk(heard).graph
     truth = np.column_stack([np.interp(graph.nodes.t_s, walk.truth[:, 0], walk.truth[:, k]) for k in (1, 2)])
     path = graph.pose[:, :2]
-    assert path_columns(known_start(path, truth).to_map(path), truth)["rmse_m"] < 0.5
+    assert path_columns(known_start(path, truth).to_map(path), truth).rmse_m < 0.5
 
 
 def test_a_person_who_goes_along_is_no_wall() -> None:

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from echostep.mapping.evidence import cell_counts
-from echostep.mapping.fragments import fit_line
-from echostep.mapping.lines import Lines
-from echostep.mapping.matching import Pieces, match
+from echostep.mapping.graph.fragments import fit_line
+from echostep.mapping.graph.matching import Pieces, match
+from echostep.mapping.walls.evidence import cell_counts
+from echostep.mapping.walls.lines import Lines
 from naive import mapping as naive
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats, Ints
-from echostep.mapping.fragments import find_fragments
-from echostep.mapping.graph import Graph, Walls
-from echostep.mapping.nodes import nodes_of
-from echostep.mapping.relief import find_relief
+from echostep.mapping.graph.fragments import find_fragments
+from echostep.mapping.graph.graph import Graph, Walls
+from echostep.mapping.graph.nodes import nodes_of
+from echostep.mapping.graph.relief import find_relief
 from echostep.path import MeasuredSegment, PathSegment
 
 LENGTH_M = 120

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from echostep.mapping.evidence import CELL_M, Cells
-from echostep.mapping.lines import Lines
-from echostep.mapping.segments import Run, segments_of
+from echostep.mapping.walls.evidence import CELL_M, Cells
+from echostep.mapping.walls.lines import Lines
+from echostep.mapping.walls.segments import Run, segments_of
 
 CELLS = 500
 

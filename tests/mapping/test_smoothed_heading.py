@@ -12,7 +12,7 @@ import pytest
 from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.foot.steps import Step
-from echostep.mapping.nodes import HELD_TURN_SD_RAD, TURN_SD_RAD, nodes_of
+from echostep.mapping.graph.nodes import HELD_TURN_SD_RAD, TURN_SD_RAD, nodes_of
 from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.odometry.heading_fusion import HeadingFusion
 from echostep.path import MeasuredSegment, PathSegment

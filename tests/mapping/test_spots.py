@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Ints
-from echostep.mapping.directions import Directions
-from echostep.mapping.fragments import find_fragments
+from echostep.mapping.graph.directions import Directions
+from echostep.mapping.graph.fragments import find_fragments
+from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
+from echostep.mapping.graph.spots import is_spot, with_spots
 from echostep.mapping.mapper import find_pieces, map_walk
-from echostep.mapping.nodes import Nodes, Pings, nodes_of
-from echostep.mapping.spots import is_spot, with_spots
 from echostep.path import MeasuredSegment, PathSegment
 
 PING_S, HALF_CONE_RAD = 0.07, math.radians(27.5)

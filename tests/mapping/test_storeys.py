@@ -12,20 +12,20 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.mapping.graph.nodes import nodes_of
+from echostep.mapping.graph.storeys import STAIRS, find_storeys
 from echostep.mapping.joining import join_walks
 from echostep.mapping.mapper import Mapped, map_walk
-from echostep.mapping.nodes import nodes_of
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import Walked, plan_of
-from echostep.mapping.storeys import STAIRS, find_storeys
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import Plan, parse_plan
 from echostep.plan.writer import plan_json
 from echostep.simulation.people.walker import Waypoint
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.tours import clearance_m
-from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.tours import clearance_m
+from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 
 NO_PINGS = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0))

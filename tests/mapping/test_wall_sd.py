@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats, Ints
-from echostep.mapping.fragments import Fragments
-from echostep.mapping.graph import Closure, Graph, Walls
-from echostep.mapping.lines import Lines
-from echostep.mapping.nodes import Nodes, Pings
-from echostep.mapping.segments import Run
-from echostep.mapping.wall_sd import distance_derivatives, distance_variances, wall_sds
+from echostep.mapping.graph.fragments import Fragments
+from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.nodes import Nodes, Pings
+from echostep.mapping.walls.lines import Lines
+from echostep.mapping.walls.segments import Run
+from echostep.mapping.walls.wall_sd import distance_derivatives, distance_variances, wall_sds
 
 STEP_SD_M = 0.03  # of each metre of path
 COUNT = 21  # nodes of a passage, a metre apart

@@ -11,9 +11,10 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.mapping import evidence, matching
-from echostep.mapping.lines import Lines
-from echostep.mapping.matching import Pieces
+from echostep.mapping.graph import matching
+from echostep.mapping.graph.matching import Pieces
+from echostep.mapping.walls import evidence
+from echostep.mapping.walls.lines import Lines
 
 
 def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: Floats) -> Floats:

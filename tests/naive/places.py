@@ -7,7 +7,7 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
-from echostep.localization.hypotheses import LEAST, MOST, REACH_M
+from echostep.localization.particles.places import LEAST, MOST, REACH_M
 
 Place = tuple[float, float, float, int, float, float]  # probability, x, y, level, standard deviation, heading
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.odometry.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.stillness import Window
-from echostep.odometry.wearer_signs import StepTaken
+from echostep.odometry.incapacity.alarm import ASK_S, MAYDAY_S, OVER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.odometry.incapacity.stillness import Window
+from echostep.odometry.incapacity.wearer_signs import StepTaken
 from echostep.plan.model import load_plan
-from echostep.ports.check_in import PERSON, Call, CheckIn
 from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker

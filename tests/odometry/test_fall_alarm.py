@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.odometry.alarm import ANSWER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.falls import Fall
-from echostep.odometry.stillness import Window
-from echostep.odometry.wearer_signs import StepTaken
+from echostep.odometry.incapacity.alarm import ANSWER_S, Alarm, AlarmKind, AlarmReason, WearerAlarm
+from echostep.odometry.incapacity.falls import Fall
+from echostep.odometry.incapacity.stillness import Window
+from echostep.odometry.incapacity.wearer_signs import StepTaken
 from echostep.plan.model import Pose, load_plan
-from echostep.ports.check_in import PERSON, Call
 from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker
 from echostep_studies.simulation.body_motion import MTX
 from echostep_studies.simulation.falling import sideways, walk_then

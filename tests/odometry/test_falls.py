@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.odometry.falls import FRESH_S, Fall
-from echostep.odometry.wearer_signs import Sign, WearerSigns
+from echostep.odometry.incapacity.falls import FRESH_S, Fall
+from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep_studies.incapacity.falls import message_index, signs_of
 from echostep_studies.simulation.body_motion import ICM20649, MTX, Samples
 from echostep_studies.simulation.falling import (

@@ -15,9 +15,9 @@ from echostep.errors import EchostepError
 from echostep.foot.steps import FootSettings
 from echostep.foot.trunk_path import GaitSettings
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
-from echostep.localization.usable_pings import UsablePings
-from echostep.mapping.nodes import nodes_of
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.unplanned import UsablePings
+from echostep.mapping.graph.nodes import nodes_of
 from echostep.odometry.front_end import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import load_plan

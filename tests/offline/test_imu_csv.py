@@ -22,7 +22,7 @@ from echostep.offline.imu_csv import load_imu
 from echostep.simulation.devices.mtx import specific_force_and_rate
 from echostep.simulation.people.walker import Person, walk
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
 Spoil = Callable[[np.ndarray, np.random.Generator], np.ndarray]

@@ -16,8 +16,8 @@ from typing import Self
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from echostep.page.guarded_socket import FRAME_S
-from echostep.team.report import Position, encode
+from echostep.page.protocol import FRAME_S
+from echostep.team.messages.report import Position, encode
 from operation.teams import FLOORS, STOREYS, ServedTeam, Team
 from team.team_reports import POSITION, report
 

@@ -12,14 +12,14 @@ from typing import Any, Self
 
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.page import TablePage
-from echostep.operation.record import OperationRecorder
-from echostep.operation.tape import Keyframe, Tape
+from echostep.operation.recorded.record import OperationRecorder
+from echostep.operation.recorded.tape import Keyframe, Tape
 from echostep.page.server import Address
 from echostep.plan.model import Plan
-from echostep.plan.whereabouts import Whereabouts
+from echostep.plan.places.whereabouts import Whereabouts
 from echostep.team.inbox import Inbox, ReceivedMessage
-from echostep.team.marks import Mark, MarkKind
-from echostep.team.report import Position, Report, ReportedAlarm, encode, moment
+from echostep.team.messages.marks import Mark, MarkKind
+from echostep.team.messages.report import Position, Report, ReportedAlarm, encode, moment
 from echostep_studies.simulation.tower import tower
 from team.team_reports import POSITION, report
 

@@ -16,13 +16,13 @@ from echostep.page.elements.marks import ShownMark
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.plan.model import load_plan
-from echostep.session import marks_ear
-from echostep.session.marks_ear import MarksEar
+from echostep.session.team import marks_ear
+from echostep.session.team.marks_ear import MarksEar
 from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.inbox import Inbox, Receiver
-from echostep.team.marks import ALL
-from echostep.team.mqtt import Listener
-from echostep.team.report import ReportedAlarm
+from echostep.team.messages.marks import ALL
+from echostep.team.messages.report import ReportedAlarm
+from echostep.team.mqtt.publisher import Listener
 from echostep.team.restorer import Restorer
 from operation.teams import TOWER, ServedTeam, whole_team
 from operation.test_table_page import shot, table

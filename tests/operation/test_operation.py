@@ -11,7 +11,7 @@ import pytest
 from echostep.operation import trails
 from echostep.operation.operation import MOST_EVENTS
 from echostep.operation.words import heard_words, place_words, tilt_words
-from echostep.team.report import ReportedAlarm, decode, encode
+from echostep.team.messages.report import ReportedAlarm, decode, encode
 from operation.teams import TOWER, Team, place, whole_team
 from team.team_reports import POSITION, report
 

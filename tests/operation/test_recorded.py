@@ -14,13 +14,14 @@ import pytest
 from board_runs import ROOT
 from command_line import echostep
 from echostep.errors import EchostepError
-from echostep.operation import requests, tape
+from echostep.operation import requests
 from echostep.operation.operation import Operation, TableScene
-from echostep.operation.past import PastView
-from echostep.operation.record import Heard, decode_record
-from echostep.operation.tape import Player, Tape, load
-from echostep.recording import contents, edit
+from echostep.operation.recorded import tape
+from echostep.operation.recorded.past import PastView
+from echostep.operation.recorded.record import Heard, decode_record
+from echostep.operation.recorded.tape import Player, Tape, load
 from echostep.recording.reading import open_recording
+from echostep.recording.repair import contents, edit
 from operation.teams import TOWER, Recording, Team, place, whole_team
 from team.team_reports import PLAN
 from waiting import until

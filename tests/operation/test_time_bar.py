@@ -13,7 +13,7 @@ from websockets.typing import Origin
 
 from echostep.operation.operation import Operation
 from echostep.operation.page import TablePage
-from echostep.operation.tape import Tape, load
+from echostep.operation.recorded.tape import Tape, load
 from echostep.page.server import Address
 from operation.teams import TOWER, Recording, ServedTeam, Team, place, whole_team
 from operation.test_command import header_of, socket_of

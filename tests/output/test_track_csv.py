@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.hypotheses import Hypothesis
+from echostep.localization.particles.places import Hypothesis
 from echostep.output.track_plot import write_track
 from page.frames import told
 

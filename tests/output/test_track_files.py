@@ -23,11 +23,11 @@ from echostep.output.track_files import export as write
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import load_plan
 from echostep.recording.clock import clock_of
-from echostep.recording.contents import info
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
+from echostep.recording.repair.contents import info
 from echostep.session.options import TrackingOptions
-from echostep.session.replay import tracker_of
+from echostep.session.runs.replay import tracker_of
 from walks import DEMO, walk_chunks
 
 

@@ -17,7 +17,7 @@ from board_runs import ROOT
 from echostep.foot.steps import Step
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.page.live import LivePage
 from echostep.page.server import Address
 from echostep.path import PathSegment

@@ -27,7 +27,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from board_runs import ROOT
-from echostep.commands.beacon_player import simulate_gateway
+from echostep.commands.actions.beacon_player import simulate_gateway
 from echostep.plan.model import load_plan
 from echostep.simulation.devices.board import PythonBoard, Sent
 from echostep.simulation.scenario import Scenario

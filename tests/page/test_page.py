@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echostep.localization.belief import BELIEVED, DOUBTED
 from echostep.localization.estimate import Estimate, digest
-from echostep.localization.map_filter import BELIEVED, DOUBTED
 from echostep.page import requests
 from echostep.page.live import LivePage
 from echostep.plan.model import Pose
-from echostep.ports.check_in import PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.people.check_in import PERSON, Call, CheckIn, Undo, parse_person
 from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
 from page.frames import LOCAL, PLAN, next_frame, opened_url

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from echostep.page import connections
 from echostep.page.server import PageServer
+from echostep.page.web import connections
 from page.frames import fetched, opened, scene, served
 from waiting import PATIENCE_S, until
 

@@ -23,8 +23,8 @@ from echostep.page.mailbox import SceneHistory
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.plan.model import Plan, Pose
 from echostep.plan.routing import RoutePlace
-from echostep.ports.check_in import CheckIn
 from echostep.ports.chunks import Chunk
+from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker
 from imported_plans import seven_floors
 from page.frames import PLAN, scene, told

@@ -18,8 +18,8 @@ from websockets.sync.client import ClientConnection
 from echostep.guidance.cues import Cue, CueKind
 from echostep.guidance.guided_run import GuidedRun
 from echostep.localization.estimate import Estimate
-from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.guidance import guidance_of_cue, remaining_path
+from echostep.page.elements.marks import BeaconMark
 from echostep.page.elements.scene import PageScene
 from echostep.page.live import LivePage
 from echostep.plan.routing import Route, RoutePlace, Stretch

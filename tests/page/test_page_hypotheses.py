@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.hypotheses import Hypothesis
-from echostep.localization.start import Start
+from echostep.localization.particles.places import Hypothesis
+from echostep.localization.particles.start import Start
 from echostep.page.elements.scene import status_text
 from page.browser import Walk, looking, picture, wait_for
 from page.frames import scene, served, told

@@ -23,7 +23,7 @@ from echostep.page.elements.scene import ParticleSample
 from echostep.page.guarded_socket import MOST_UNDRAWN
 from echostep.page.mailbox import MOST_CHECK_INS, Mailbox
 from echostep.page.server import MOST_PAGES, Address, PageServer
-from echostep.ports.check_in import CheckIn
+from echostep.ports.people.check_in import CheckIn
 from page.frames import PLAN, fetched, header, next_frame, opened, scene, served
 from waiting import PATIENCE_S, ends
 

@@ -16,8 +16,8 @@ import pytest
 from echostep.localization.estimate import Estimate, digest
 from echostep.page.live import LivePage
 from echostep.plan.model import Plan, Pose
-from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.people.check_in import PERSON
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker

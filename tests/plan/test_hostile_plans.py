@@ -14,8 +14,8 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
 from echostep.plan.importers import limited
-from echostep.plan.importers.archive import FREE_BYTES, MOST_RATIO, Archive
 from echostep.plan.importers.formats import import_plan
+from echostep.plan.importers.imdf.archive import FREE_BYTES, MOST_RATIO, Archive
 from echostep.plan.importers.limited import import_limited, open_limited
 from echostep.plan.json_fields import MOST_CORNERS
 from echostep.plan.model import load_plan

@@ -14,8 +14,8 @@ import pytest
 import command_line
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
-from echostep.plan.importers import archive
 from echostep.plan.importers.formats import Hints, import_plan
+from echostep.plan.importers.imdf import archive
 from echostep.plan.model import Plan
 
 LON, LAT = -2.978, 56.46

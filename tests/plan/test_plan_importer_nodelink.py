@@ -12,7 +12,7 @@ import command_line
 from echostep.errors import EchostepError
 from echostep.plan.importers.formats import import_plan
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 SMALL = {
     "core.txt": "byProgram\nfloor,2,0.jpg,1.jpg\nheight,4.5\nstart,1\nscale,0.5\nnode,node.txt\n",

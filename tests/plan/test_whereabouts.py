@@ -11,10 +11,10 @@ import pytest
 from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
-from echostep.plan.gaps import door_gaps
 from echostep.plan.model import Level, Plan, Pose, Room, load_plan
-from echostep.plan.standing import StandingGround, refuse_impossible
-from echostep.plan.whereabouts import Whereabouts
+from echostep.plan.places.gaps import door_gaps
+from echostep.plan.places.standing import StandingGround, refuse_impossible
+from echostep.plan.places.whereabouts import Whereabouts
 from imported_plans import seven_floors
 
 DEMO = load_plan(ROOT / "host/echostep/plans/demo.json")

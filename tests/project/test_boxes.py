@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import boxes
+from hardware import boxes
 from hardware.solids import Triangles, faults, picture, read_stl, volume
 
 needs_openscad = pytest.mark.skipif(

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
-import docs
 from board_runs import ROOT
 from command_line import echostep
+from docs import generate
+from docs.pages import commands, python, teams
 from echostep.cli import app
 from echostep.plan.model import load_plan
-from pages import commands, python, teams
 from team.team_broker import Broker, needs_broker
 
 MANUAL = sorted((ROOT / "host/docs").glob("*.md"))
@@ -60,7 +60,7 @@ def blocks(page: Path, language: str) -> list[str]:
 
 def test_the_generated_pages_are_fresh() -> None:
     """`make docs` after a command, a setting, a public docstring, a report or a derived message has changed."""
-    for path, text in docs.pages().items():
+    for path, text in generate.pages().items():
         assert path.read_text() == text, f"{path} is stale: make docs"
 
 
@@ -96,6 +96,7 @@ def test_a_code_flow_names_what_its_files_hold(flow: str) -> None:
         assert re.search(rf"\b{name}\b", source), name
 
 
+@pytest.mark.process
 def test_every_make_target_that_is_named_exists() -> None:
     listed = subprocess.run(["make", "-s", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     targets = {line.split()[0] for line in listed.splitlines()}

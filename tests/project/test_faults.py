@@ -6,12 +6,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import faults
 from board_runs import ROOT, Bench, needs_twin
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording.reading import open_recording
 from echostep.simulation.devices.board import PythonBoard
-from fault_outcomes import NORMAL_S, Outcome, judge_streams, table
+from reliability import faults
+from reliability.fault_outcomes import NORMAL_S, Outcome, judge_streams, table
 from twin.host_faults import kill, plug_mtx, unplug_mtx
 from twin.live_walk import HostFault, LiveWalk
 

@@ -10,9 +10,9 @@ from itertools import islice
 
 import pytest
 
-import fuzz_host
 from echostep.errors import EchostepError
-from fuzz_targets import TARGETS
+from reliability.fuzz import host as fuzz_host
+from reliability.fuzz.targets import TARGETS
 
 SLOW = {"dxf": 2, "ifc": 3, "osm": 3, "imdf": 5, "wrld": 5}  # inputs, where one takes tens of milliseconds
 
@@ -32,7 +32,7 @@ def test_mutated_inputs_are_no_fault(name: str) -> None:
 
 
 def test_inputs_that_once_were_faults_are_none() -> None:
-    kept = list(fuzz_host.kept())
+    kept = list(fuzz_host.kept_inputs())
     assert len(kept) >= 4
     for name, data in kept:
         assert fuzz_host.fault(name, data) == ""

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from board_runs import ROOT, needs_twin
 from command_line import echostep
+from docs.pages import hardware
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 from hardware.lanes import lanes
 from hardware.nets import problems
 from hardware.wiring import Board, Device, boards, pins
-from pages import hardware
 from players import twin_board
 
 FIRMWARE = ROOT / "firmware"

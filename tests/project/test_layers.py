@@ -15,7 +15,7 @@ from layers import ADVICE, LAYERS
 
 
 def test_a_test_of_the_quick_layer_starts_no_process() -> None:
-    """This one is of that layer, as every test without a mark."""
+    """A test without a mark, as the one here, is of that layer."""
     with pytest.raises(AssertionError, match=ADVICE):
         subprocess.run([sys.executable, "-c", ""], check=True)
     with pytest.raises(AssertionError, match=ADVICE):

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-import licences
 from board_runs import ROOT
+from release import licences
 
 SOURCES = {".py", ".c", ".h", ".js", ".css", ".html", ".svg", ".sh", ".toml", ".rules"}
 BUILT = {"__pycache__", "build", "dist", "node_modules"}
@@ -48,9 +48,10 @@ def test_a_module_keeps_its_docstring_below_the_licence() -> None:
 
 
 def test_the_licence_of_every_dependency_is_listed() -> None:
-    """Those of pyproject.toml, by import names of packages, and what they need in turn."""
-    listed = licences.needed("echostep")
+    """Those of pyproject.toml and of its extras, and what they need in turn."""
+    listed = licences.needed("echostep", ("all",))
     assert {"numpy", "numba", "llvmlite", "starlette", "anyio"} <= set(listed)
+    assert {"starlette", "scipy", "meshtastic"}.isdisjoint(licences.needed("echostep"))
     assert "pytest" not in listed
     for name, package in listed.items():
         assert licences.licence(package) != licences.UNKNOWN, name
@@ -64,6 +65,6 @@ def test_make_licences_prints_a_row_for_each(
     assert licences.main() == 0
     rows = capsys.readouterr().out.splitlines()[2:]
     assert len(rows) > len(licences.needed("echostep"))
-    assert re.fullmatch(
-        r"\| scipy \| [\d.]+ \| BSD.* \| to run \|", next(row for row in rows if row.startswith("| scipy "))
-    )
+    for name, use in (("numpy", "to run"), ("scipy", "by an extra"), ("distributed", "to develop, or by the studies")):
+        row = next(row for row in rows if row.startswith(f"| {name} "))
+        assert re.fullmatch(rf"\| {name} \| [\d.]+ \| .*BSD.* \| {use} \|", row)

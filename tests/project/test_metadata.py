@@ -16,8 +16,8 @@ from urllib.parse import urlparse
 import pytest
 import yaml
 
-import wheel as wheels
 from board_runs import ROOT
+from release import wheel as wheels
 
 PUBLIC = "https://example.org/owner/echostep"
 PROJECT = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]

@@ -3,24 +3,9 @@
 
 from __future__ import annotations
 
-import importlib.util
-from types import ModuleType
-
 import pytest
 
-from board_runs import ROOT
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    """tools/team_operation.py; tests/operation is a package of the same name."""
-    spec = importlib.util.spec_from_file_location("operation_tool", ROOT / "tools/team_operation.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
+from reliability.team_operation import judge
 
 ARRIVED = {"cue": "fallen is here", "kind": "arrived"}
 SENT = ["x: 5 of 5 reports sent, 0 overtaken by newer ones, 0 unsent, 0 heartbeats, connection broken 0 times"]
@@ -30,8 +15,8 @@ def members(*states: str) -> dict[str, list[dict[str, object]]]:
     return {"members": [{"name": f"n{k}", "state": state, "missed": 0} for k, state in enumerate(states)]}
 
 
-def test_an_operation_in_which_everything_happened(tool: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tool.judge(members("mayday", "lost", "tracking"), SENT, 31.0, ARRIVED, 3, 60.0)
+def test_an_operation_in_which_everything_happened(capsys: pytest.CaptureFixture[str]) -> None:
+    assert judge(members("mayday", "lost", "tracking"), SENT, 31.0, ARRIVED, 3, 60.0)
     assert "NOT" not in capsys.readouterr().out
 
 
@@ -47,8 +32,8 @@ def test_an_operation_in_which_everything_happened(tool: ModuleType, capsys: pyt
     ],
 )
 def test_what_did_not_happen_is_named(
-    tool: ModuleType, capsys: pytest.CaptureFixture[str], states: tuple[str, ...], told_s: float | None,
+    capsys: pytest.CaptureFixture[str], states: tuple[str, ...], told_s: float | None,
     arrived: dict[str, str], sent: list[str],
 ) -> None:  # fmt: skip
-    assert not tool.judge(members(*states), sent, told_s, arrived, 3, 60.0)
+    assert not judge(members(*states), sent, told_s, arrived, 3, 60.0)
     assert capsys.readouterr().out.count("NOT ") == 1

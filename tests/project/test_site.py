@@ -21,7 +21,7 @@ LOADED = re.compile(r"<(?:script|img|source|iframe|link(?! rel=\"canonical\"))\b
 
 def build(source: Path, out: Path, *more: str) -> subprocess.CompletedProcess[str]:
     """`make site` with other folders."""
-    options = ["-q", "-n", "-W", "--keep-going", "-c", str(ROOT / "tools/manual"), "-d", str(out.parent / "cache")]
+    options = ["-q", "-n", "-W", "--keep-going", "-c", str(ROOT / "tools/docs/manual"), "-d", str(out.parent / "cache")]
     command = [sys.executable, "-m", "sphinx", *options, *more, str(source), str(out)]
     return subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)
 
@@ -43,7 +43,7 @@ def pages(site: Path) -> list[Path]:
 
 def test_make_site_builds_as_this_test_does() -> None:
     recipe = (ROOT / "Makefile").read_text().partition("\nsite:")[2].partition("\n\n")[0]
-    assert "sphinx-build -q -n -W --keep-going -c tools/manual" in recipe
+    assert "sphinx-build -q -n -W --keep-going -c tools/docs/manual" in recipe
     assert " out/site" in recipe
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-import wheel as wheels
 from board_runs import ROOT
+from release import wheel as wheels
 
 
 @pytest.fixture(scope="module")

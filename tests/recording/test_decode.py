@@ -18,13 +18,13 @@ from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.recording.capture import Decoder, as_json, read_capture
 from echostep.recording.capture_summary import summary
-from echostep.simulation.devices.mtx_setup import pack
 from echostep.xsens import MTDATA, MTDATA2, MtMessage, MtSample, OutputFormat, encode_frame
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import BY_LENGTH, CONFIGURED, GIVEN, OutputFormats
+from echostep_studies.simulation.mtx_setup import pack
 from naive.mt_frames import valid_frames
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
 HALF = math.sqrt(0.5)

@@ -22,11 +22,11 @@ from mcap.writer import CompressionType, Writer
 from echostep.errors import EchostepError
 from echostep.output.derived import PRESSURE
 from echostep.ports.chunks import Chunk
-from echostep.recording.contents import info
-from echostep.recording.edit import cut, repair
 from echostep.recording.mcap_records import RAW_ENCODING
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import DerivedMessage, Recorder
+from echostep.recording.repair.contents import info
+from echostep.recording.repair.edit import cut, repair
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
 FIXTURE = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

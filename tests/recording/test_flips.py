@@ -13,14 +13,14 @@ import pytest
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.recording.contents import info
-from echostep.recording.edit import repair
 from echostep.recording.mcap_records import HEAD_SIZE
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
+from echostep.recording.repair.contents import info
+from echostep.recording.repair.edit import repair
 from echostep.session.skipped import skipped
 from echostep.tracker import Tracker
-from flip_recording import Replayed, arrival_offsets, compare, draw_flips, flip_once, replay
+from reliability.flip_recording import Replayed, arrival_offsets, compare, draw_flips, flip_once, replay
 from walks import DEMO, walk_chunks
 
 SECONDS = 8.0

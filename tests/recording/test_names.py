@@ -13,10 +13,10 @@ from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording import background_writer, names
-from echostep.recording.edit import cut, repair
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import DerivedMessage, Recorder, Topic
-from echostep.session.recording import start_recording
+from echostep.recording.repair.edit import cut, repair
+from echostep.session.runs.recording import start_recording
 from players import pseudo_terminal
 
 

@@ -20,7 +20,7 @@ from echostep.recording.mcap_records import RECORD_LIMIT, decompress_chunk, port
 from echostep.recording.message_runs import PORTION_BYTES
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
-from echostep.recording.recovery import Recovery
+from echostep.recording.repair.recovery import Recovery
 from waiting import PATIENCE_S, until
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]

@@ -17,7 +17,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import RAW_LIMIT, Recorder
-from kill_recorder import kill_once
+from reliability.kill_recorder import kill_once
 from waiting import PATIENCE_S, ends, until
 
 FULL_DISK = """
@@ -42,7 +42,7 @@ print(*recorder.notices, sep="\\n")
 
 
 def test_a_killed_recorder_has_lost_less_than_a_second_and_no_earlier_recording(tmp_path: Path) -> None:
-    """The small version of `tools/kill_recorder.py`."""
+    """The small version of `make kill`."""
     rng = random.Random(7)
     for _ in range(2):
         kill = kill_once(tmp_path / "walk.mcap", rng.uniform(0.1, 0.8))

@@ -13,7 +13,6 @@ import pytest
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.metrics import errors, load_truth
 from echostep.output.track_plot import write_track
 from echostep.plan.model import load_plan
 from echostep.ports.chunks import portion_of
@@ -23,6 +22,7 @@ from echostep.scorecard.csv_columns import read_csv
 from echostep.scorecard.definitions import METRICS
 from echostep.scorecard.matching import GAP_S
 from echostep.scorecard.track_columns import load_path
+from echostep.scorecard.truth import errors, load_truth
 from echostep.scorecard.zones import NO_ZONE, Zones
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario

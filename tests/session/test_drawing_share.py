@@ -13,21 +13,21 @@ import pytest
 
 from command_line import echostep
 from echostep.localization.estimate import Estimate
-from echostep.localization.metrics import Truth, errors
 from echostep.page.server import Address
 from echostep.plan.model import NO_PLAN, Plan, load_plan
 from echostep.ports.chunks import Chunk, Portion, portion_of
-from echostep.session import teammates_ear
+from echostep.scorecard.truth import Truth, errors
 from echostep.session.metadata import run_metadata
 from echostep.session.options import OutputOptions
-from echostep.session.recording import start_recording
+from echostep.session.runs.recording import start_recording
 from echostep.session.session import Session
+from echostep.session.team import teammates_ear
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
 from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.inbox import Receiver
-from echostep.team.mqtt import Listener
-from echostep.team.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
+from echostep.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
+from echostep.team.mqtt.publisher import Listener
 from echostep.team.wearer_plan import plan_file
 from echostep.tracker import Tracker
 from page.browser import PLAN, demo_walk

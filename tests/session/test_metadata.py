@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
-from echostep.localization.start import Air, Start
+from echostep.localization.particles.start import Air, Start
 from echostep.plan.model import NO_PLAN, Pose
 from echostep.session.metadata import recorded_start, run_metadata
 

@@ -9,7 +9,7 @@ from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.subscription import SUBSCRIBE
 from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.session.live import _with_subscription
+from echostep.session.runs.live import _with_subscription
 
 
 def test_the_board_is_asked_and_no_chunk_is_lost() -> None:

@@ -10,9 +10,9 @@ import pytest
 
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
-from echostep.ports.teammate import Teammate, parse_teammate
-from echostep.session import team_ear
-from echostep.session.team_ear import TeamEar
+from echostep.ports.people.teammate import Teammate, parse_teammate
+from echostep.session.team import team_ear
+from echostep.session.team.team_ear import TeamEar
 from echostep.team import outbox
 from echostep.team.endpoint import parse_outlet
 from team.network import box_to

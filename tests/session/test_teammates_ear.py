@@ -12,14 +12,14 @@ import pytest
 from echostep.page.live import LivePage
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import BOARD, Chunk
-from echostep.ports.meeting import MEETING, parse_meeting
-from echostep.ports.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
-from echostep.session import teammates_ear
+from echostep.ports.people.meeting import MEETING, parse_meeting
+from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.session.chunk_streams import with_teammates
-from echostep.session.teammates_ear import TeammatesEar
+from echostep.session.team import teammates_ear
+from echostep.session.team.teammates_ear import TeammatesEar
 from echostep.team import outbox
 from echostep.team.endpoint import parse_endpoint, parse_outlet
-from echostep.team.mqtt import Listener
+from echostep.team.mqtt.publisher import Listener
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, POSITION, report

@@ -8,6 +8,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 import shapely
@@ -15,14 +16,16 @@ import shapely
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Connector, ConnectorKind, Level, Plan, Pose
-from echostep_studies.anywhere import amcl, echo_changes, kidnaps, plan_changes, sites, walks
-from echostep_studies.anywhere.columns import run_row, summaries
-from echostep_studies.anywhere.filtering import Claim, FilterRun
-from echostep_studies.anywhere.judgement import JudgedRun, Truth, judge, true_levels
-from echostep_studies.anywhere.walks import SimulatedWalk
+from echostep_studies.anywhere import amcl, kidnaps, plan_changes
+from echostep_studies.bench import echo_changes, sites, walks
+from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries
+from echostep_studies.bench.filtering import Claim, FilterRun
+from echostep_studies.bench.judgement import JudgedRun, Truth, judge, true_levels
+from echostep_studies.bench.walks import SimulatedWalk
+from echostep_studies.frame.report import as_dict
 
 TRACKING, UNCERTAIN, LOST = TrackStatus.TRACKING, TrackStatus.UNCERTAIN, TrackStatus.LOST
 CODE = {TRACKING: 0.0, UNCERTAIN: 1.0, LOST: 2.0}
@@ -119,20 +122,21 @@ def test_a_summary_by_hand() -> None:
     truth = Truth(np.zeros((2, 2)), np.ones((2, 1), np.bool_))
     judged = [judge(run.claims, truth, walked) for run in (good, bad)]
     rows = [run_row("a", seed, j, run) for seed, (j, run) in enumerate(zip(judged, (good, bad), strict=True))]
-    assert json.loads(json.dumps(rows)) == rows
+    assert [msgspec.convert(json.loads(json.dumps(as_dict(row))), JudgedRow) for row in rows] == rows
     (row,) = summaries(rows)
     expected = {
         "runs": 2, "found": 0.5, "listed": 0.5, "found_m": 0.0, "mean_m": 0.2, "median_m": 2.15, "lost": 1, "false_tracking": 0.5, "false_lost": 0.0,
         "beyond_protection": 0.0, "alarm_s": 3600.0, "alarm_in_5s": 0.0, "false_alarms_h": 0.0, "named": 0.5, "tracking": 1.0,
         "most_particles": 300, "times_real_time": 100.0,
     }  # fmt: skip
-    assert {key: row[key] for key in expected} == expected
-    assert row["ce95_m"] == pytest.approx(0.29)
+    assert isinstance(row, JudgedSummary)
+    assert {key: value for key, value in as_dict(row).items() if key in expected} == expected
+    assert row.ce95_m == pytest.approx(0.29)
 
 
 def test_a_run_without_a_place_on_the_plan_has_a_verdict_only() -> None:
     (row,) = summaries([run_row("a", 1, None, FilterRun((claim(0.0, 0.0), claim(1.0, 0.0, LOST, 0.1)), 1, 1.0))])
-    assert (row["named"], row["tracking"], "found" in row) == (1.0, 0.5, False)
+    assert (row.named, row.tracking, "found" in as_dict(row)) == (1.0, 0.5, False)
 
 
 def test_a_hypothesis_on_the_right_floor_lists_the_place() -> None:

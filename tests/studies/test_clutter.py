@@ -18,17 +18,17 @@ from command_line import echostep
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
-from echostep_studies.anywhere.filtering import Claim, FilterRun
+from echostep_studies.bench.filtering import Claim, FilterRun
+from echostep_studies.bench.laser.building import building_of, walk_from
+from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, read_log
+from echostep_studies.bench.laser.odometry import odometry_of
+from echostep_studies.bench.laser.scan_pings import hear
+from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
 from echostep_studies.clutter import study
-from echostep_studies.clutter.building import building_of, walk_from
-from echostep_studies.clutter.carmen_log import CarmenLog, logs_in, read_log
-from echostep_studies.clutter.odometry import odometry_of
-from echostep_studies.clutter.scan_pings import hear
-from echostep_studies.clutter.wall_lines import straight_pieces, wall_segments
 
 
 @pytest.fixture(scope="module")
@@ -241,9 +241,9 @@ def test_unknown_starts_lie_where_the_log_goes_on(log_file: Path, monkeypatch: p
     monkeypatch.setattr(study, "UNKNOWN_M", 2.0)
     monkeypatch.setattr(study, "track", at_the_origin)
     rows = study.clutter_run((log_file,), 2, 10, 12)  # the second unknown start of the first log
-    assert [row["name"] for row in rows] == ["made/full/unknown", "made/walls/unknown"]
+    assert [row.name for row in rows] == ["made/full/unknown", "made/walls/unknown"]
     assert rows == json.loads(json.dumps(rows))
-    assert 8 <= len(rows[0]["error_m"]) <= 14  # scans of 0.25 m
+    assert 8 <= len(rows[0].error_m) <= 14  # scans of 0.25 m
     starts = {study._unknown_scan(building_of(log_file, 1), number) for number in range(200)}
     assert len(starts) > 50
     last = walk_from(building_of(log_file, 1), max(starts), 2.0)

@@ -17,14 +17,15 @@ import pytest
 
 from command_line import echostep
 from echostep.foot.ins import Noise
+from echostep_studies.bench.recordings.feet import SETS, FootRecording
+from echostep_studies.bench.recordings.foot_metrics import Figure, align, places, rmse
 from echostep_studies.feet import leave_one_out
-from echostep_studies.feet.datasets import SETS, FootRecording
-from echostep_studies.feet.metrics import Figure, align, places, rmse
+from echostep_studies.feet.rows import FigureRow
 from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import recordings_in
 from foot_walks import any_rotation
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 Row = dict[str, Any]
 needs_recordings = needs_data()
@@ -215,6 +216,6 @@ def test_a_set_that_is_left_out_has_no_say_in_the_choice(monkeypatch: pytest.Mon
     chosen = leave_one_out.leave_one_out([recording(group) for group in best], track_of)
     assert set(chosen) == set(best)
     assert chosen["a"].lever_m == 2.0 * Noise().lever_m  # its own best is the half
-    rows: list[Row] = [{"set": "a", "recording": "1", "metric": "error", "value": 1.0}]
-    leave_one_out.add_left_out(rows, {"a": [rows[0] | {"value": 2.0}]})
-    assert rows[0]["left_out"] == 2.0
+    row = FigureRow(set="a", recording="1", metric="error", value=1.0, distance_m=None, peer=None, peer_name=None)
+    (beside,) = leave_one_out.with_left_out([row], {"a": [replace(row, value=2.0)]})
+    assert beside.left_out == 2.0

@@ -97,8 +97,8 @@ def test_every_row_has_its_share_of_returns() -> None:
     assert len(set(names)) == len(names)
     assert {"pdr", "fischer2008", "default"} <= set(names)
     rows = one_batch(0, first=1, runs=1)
-    assert [row["name"] for row in rows] == names
-    assert all(row["runs"] == 1 for row in rows)
+    assert [row.name for row in rows] == names
+    assert all(row.runs == 1 for row in rows)
 
 
 def test_command_writes_rows_and_pictures(tmp_path: Path) -> None:

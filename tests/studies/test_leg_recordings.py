@@ -13,8 +13,8 @@ from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, StrideSettings
 from echostep.simulation.people.walker import Person, walk
+from echostep_studies.bench.recordings.legs import SETS, LegRecording, moves_of
 from echostep_studies.frame.recordings import read_sets
-from echostep_studies.legs.datasets import SETS, LegRecording, moves_of
 from echostep_studies.legs.recordings import (
     BOTH,
     LENGTHS,
@@ -27,7 +27,7 @@ from echostep_studies.legs.recordings import (
     strides_of,
 )
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +50,13 @@ def simulated() -> LegRecording:
 
 def test_rows_of_a_leg() -> None:
     rows = rows_of(simulated())
-    assert [row["known"] for row in rows] == ["nothing", "leg lengths", SCALE]
-    assert rows[0]["walked_m"] == pytest.approx(30.0, abs=0.1)
-    assert abs(rows[0]["error_percent"]) < 6.0
-    assert rows[2]["walked_m"] < 11.0
-    assert abs(rows[2]["error_percent"]) < 5.0
-    assert rows[0]["error_over_sd"] == pytest.approx(rows[0]["error_m"] / rows[0]["sd_m"], abs=0.02)
-    assert means(rows)[0]["error_m"] == abs(rows[0]["error_m"])
+    assert [row.known for row in rows] == ["nothing", "leg lengths", SCALE]
+    assert rows[0].walked_m == pytest.approx(30.0, abs=0.1)
+    assert abs(rows[0].error_percent) < 6.0
+    assert rows[2].walked_m < 11.0
+    assert abs(rows[2].error_percent) < 5.0
+    assert rows[0].error_over_sd == pytest.approx(rows[0].error_m / rows[0].sd_m, abs=0.02)
+    assert means(rows)[0].error_m == abs(rows[0].error_m)
 
 
 def test_both_legs_have_rows_of_their_own() -> None:
@@ -64,10 +64,10 @@ def test_both_legs_have_rows_of_their_own() -> None:
     left = replace(right, name="left")
     assert pairs([left, right]) == [(left, right)]
     rows = rows_of(left, right)
-    assert [row["known"] for row in rows] == [known + BOTH for known in (NOTHING, LENGTHS, SCALE)]
-    assert {row["recording"] for row in rows} == {"both"}
-    assert rows[0]["walked_m"] == pytest.approx(30.0, abs=0.1)
-    assert means(rows)[0]["known"] == NOTHING + BOTH
+    assert [row.known for row in rows] == [known + BOTH for known in (NOTHING, LENGTHS, SCALE)]
+    assert {row.recording for row in rows} == {"both"}
+    assert rows[0].walked_m == pytest.approx(30.0, abs=0.1)
+    assert means(rows)[0].known == NOTHING + BOTH
 
 
 def test_folders_without_recordings_are_named(tmp_path: Path) -> None:
@@ -102,10 +102,10 @@ def test_the_left_leg_that_was_lifted_before_the_walk(recordings: list[LegRecord
 
 @needs_data("legs_qmt")
 def test_a_scale_of_a_fast_walk_holds_in_a_slower_one(recordings: list[LegRecording]) -> None:
-    after = [row for r in recordings for row in rows_of(r) if row["known"] == SCALE]
+    after = [row for r in recordings for row in rows_of(r) if row.known == SCALE]
     assert len(after) == 2
-    assert np.mean([abs(row["error_percent"]) for row in after]) < 3.0
-    assert sum(row["stairs"] for row in after) == 0
+    assert np.mean([abs(row.error_percent) for row in after]) < 3.0
+    assert sum(row.stairs for row in after) == 0
 
 
 def test_the_way_of_an_ankle_is_from_stance_to_stance() -> None:

@@ -14,22 +14,23 @@ from board_runs import ROOT
 from carmen_logs import WALLS as WALLS_OF_LOG
 from carmen_logs import write_log
 from echostep.errors import EchostepError
-from echostep.mapping.graph import Closure
-from echostep.mapping.nodes import Nodes
+from echostep.mapping.graph.graph import Closure
+from echostep.mapping.graph.nodes import Nodes
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.check import check_plan
 from echostep.plan.model import Level, load_plan
 from echostep.simulation.scenario import DEMO_WAYPOINTS
-from echostep_studies.anywhere.sites import Site, plan_of
-from echostep_studies.anywhere.walks import SimulatedWalk
+from echostep_studies.bench.sites import Site, plan_of
+from echostep_studies.bench.walks import SimulatedWalk
 from echostep_studies.frame.study import StudyRequest
+from echostep_studies.noplan.columns import DrawnRun
 from echostep_studies.noplan.footslam import RADIUS_M, footslam, hexagon
 from echostep_studies.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
 from echostep_studies.noplan.real_clutter import walked_log, with_stated_drift
 from echostep_studies.noplan.sites import furnished, loop_walls
 from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 WALLS = np.array([[0.0, 0.0, 10.0, 0.0], [0.0, 3.0, 10.0, 3.0], [0.0, 6.0, 10.0, 6.0]])
 
@@ -44,19 +45,19 @@ def test_a_path_is_judged_from_its_known_start() -> None:
     """The true path, turned by 90 degrees and moved, has no error; one that is 1 % too long errs at its end."""
     truth = np.column_stack([np.linspace(0.0, 20.0, 41), np.zeros(41)])
     path = np.column_stack([-truth[:, 1] + 5.0, truth[:, 0] - 3.0])
-    assert path_columns(known_start(path, truth).to_map(path), truth)["max_m"] == pytest.approx(0.0, abs=1e-9)
+    assert path_columns(known_start(path, truth).to_map(path), truth).max_m == pytest.approx(0.0, abs=1e-9)
     longer = 1.01 * path
-    assert path_columns(known_start(longer, truth).to_map(longer), truth)["max_m"] == pytest.approx(0.2, abs=1e-6)
+    assert path_columns(known_start(longer, truth).to_map(longer), truth).max_m == pytest.approx(0.2, abs=1e-6)
 
 
 def test_walls_are_judged_by_those_in_sight() -> None:
     """Of the two walls of the corridor one and a half are drawn, 10 cm off; a third of what is drawn is in no place."""
     drawn = np.array([[0.0, 0.1, 10.0, 0.1], [0.0, 3.1, 5.0, 3.1], [0.0, 10.0, 7.5, 10.0]])
     row = wall_columns([drawn], along_the_corridor())
-    assert row["drawn"] == pytest.approx(0.77, abs=0.02), "the third wall is behind the second"
-    assert row["absent"] == pytest.approx(1.0 / 3.0, abs=0.01)
-    assert row["wall_median_m"] == pytest.approx(0.1, abs=1e-6)
-    assert wall_columns([drawn[:0]], along_the_corridor())["drawn"] == 0.0
+    assert row.drawn == pytest.approx(0.77, abs=0.02), "the third wall is behind the second"
+    assert row.absent == pytest.approx(1.0 / 3.0, abs=0.01)
+    assert row.wall_median_m == pytest.approx(0.1, abs=1e-6)
+    assert wall_columns([drawn[:0]], along_the_corridor()).drawn == 0.0
 
 
 def test_each_storey_is_judged_by_its_own_walls() -> None:
@@ -67,9 +68,9 @@ def test_each_storey_is_judged_by_its_own_walls() -> None:
     truth = np.column_stack([t, np.minimum(t, 20.0 - t), np.where(t < 10.0, 1.5, 4.5), 0.0 * t, z])
     walk = SimulatedWalk(replace(plan_of("two", WALLS), levels=levels), (), truth)
     right = wall_columns([WALLS[:1], WALLS[2:]], walk)
-    assert (right["drawn"], right["absent"]) == (1.0, 0.0)
+    assert (right.drawn, right.absent) == (1.0, 0.0)
     wrong = wall_columns([WALLS[2:], WALLS[:1]], walk)
-    assert (wrong["drawn"], wrong["absent"]) == (0.0, 1.0)
+    assert (wrong.drawn, wrong.absent) == (0.0, 1.0)
 
 
 def test_a_closure_is_wrong_along_what_it_claims_to_know() -> None:
@@ -79,7 +80,7 @@ def test_a_closure_is_wrong_along_what_it_claims_to_know() -> None:
     between = np.array([12.0, 0.1, 0.0])
     across, both = (Closure(0, 20, between, np.diag(d), 12.0) for d in ([0.0, 100.0, 0.0], [100.0, 100.0, 0.0]))
     row = closure_columns([across, both], truth, truth, frame)
-    assert (row["closures"], row["wrong"]) == (2, 1)
+    assert (row.closures, row.wrong) == (2, 1)
 
 
 def test_footslam_finds_its_way_round_a_block() -> None:
@@ -100,8 +101,8 @@ def test_footslam_finds_its_way_round_a_block() -> None:
     n = len(path) - 1
     nodes = Nodes(np.arange(n + 1.0), pose, np.full(n, 0.03), np.full(n, math.radians(0.7)), np.arange(n + 1.0))
     found = footslam(nodes, np.random.default_rng(1))
-    foot = path_columns(path, truth)["rmse_m"]
-    assert path_columns(found, truth)["rmse_m"] < 0.7 * foot
+    foot = path_columns(path, truth).rmse_m
+    assert path_columns(found, truth).rmse_m < 0.7 * foot
 
 
 def test_hexagons_are_where_their_middle_is_nearest() -> None:
@@ -125,10 +126,10 @@ def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
     """The demo's walk, drawn: better than the foot alone; a second person is tracked on the drawing."""
     site = Site(load_plan(ROOT / "host/echostep/plans/demo.json"), DEMO_WAYPOINTS)
     row, second = drawn_rows("office/demo", site, 2, tmp_path / "office.png")
-    assert row["rmse_m"] < 0.5
-    assert row["wrong"] == 0
-    assert row["absent"] < 0.1
-    assert second["mean_m"] < 1.0
+    assert row.rmse_m < 0.5
+    assert row.wrong == 0
+    assert row.absent < 0.1
+    assert second.mean_m < 1.0
     assert (tmp_path / "office.png").stat().st_size > 20_000
 
 
@@ -144,9 +145,10 @@ def test_a_real_foot_is_drawn(tmp_path: Path) -> None:
     """The surveyed hallway 34, with simulated echoes: nearly all that is drawn is there."""
     assert "feet/34" in names_of(DATA)
     (row,) = one_run(("feet/34",), DATA, tmp_path, 1, 1)
-    assert row["rmse_m"] < 0.5
-    assert row["absent"] < 0.05
-    assert row["rmse_m"] < row["footslam_rmse_m"]
+    assert isinstance(row, DrawnRun)
+    assert row.rmse_m < 0.5
+    assert row.absent < 0.05
+    assert row.rmse_m < row.footslam_rmse_m
 
 
 def test_a_log_states_how_its_heading_drifts() -> None:
@@ -173,8 +175,9 @@ def test_a_log_is_drawn(tmp_path: Path) -> None:
     write_log(tmp_path / "carmen" / "made.log", WALLS_OF_LOG)
     assert "clutter/made" in names_of(tmp_path)
     (row,) = one_run(("clutter/made",), tmp_path, tmp_path, 1, 1)
-    assert row["rmse_m"] < 0.5
-    assert row["storeys"] == 1
+    assert isinstance(row, DrawnRun)
+    assert row.rmse_m < 0.5
+    assert row.storeys == 1
 
 
 def test_rangers_with_whole_cones_look_abeam(tmp_path: Path) -> None:

@@ -71,14 +71,24 @@ def test_beacons_are_heard_from_when_they_are_dropped_on_their_floor_and_through
 
 
 def test_the_columns_are_those_of_all_wearers() -> None:
-    row = {"name": "office/tap", "seed": 1, "meetings": 2, "false_alone": 0.0, "false_together": 0.0}
     rows = [
-        row | {"wearer": k, "alone_m": a, "together_m": b, "again_m": a}
+        study.WearerRun(
+            name="office/tap",
+            wearer=k,
+            meetings=2,
+            alone_m=a,
+            false_alone=0.0,
+            together_m=b,
+            false_together=0.0,
+            again_m=a,
+            false_again=0.0,
+            seed=1,
+        )
         for k, a, b in ((0, 4.0, 1.0), (1, 0.5, 0.5), (2, 0.5, 0.55))
     ]
     found = study._summary(rows)
-    assert (found["ratio"], found["worst"], found["by_chance"]) == (0.41, 1.1, 1.0)
-    assert (found["first_alone_m"], found["others_together_m"]) == (4.0, 0.525)
+    assert (found.ratio, found.worst, found.by_chance) == (0.41, 1.1, 1.0)
+    assert (found.first_alone_m, found.others_together_m) == (4.0, 0.525)
 
 
 def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from echostep.simulation.people.walker import Walk
 from echostep.simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
 from echostep_studies.papers import fischer2008
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
-from echostep_studies.trails.study import summaries
+from echostep_studies.trails.study import TrailRun, summaries
 from echostep_studies.trails.walks import METHODS, RATES_HZ, JudgedTrack, judge, track
 
 BY_NAME = {trail.name: trail for trail in TRAILS}
@@ -204,11 +204,11 @@ def test_the_command_writes_rows_for_every_trail_method_and_rate_and_draws(tmp_p
 
 
 def test_a_summary_is_over_all_runs() -> None:
-    row = {
-        "name": "line/default", "profile": "default", "rate_hz": 100, "distance_m": 88.0, "distance_error_percent": 1.0,
-        "heading_error_deg": 2.0, "heading_max_deg": 5.0, "errors_m": [0.0, 1.0],
-    }  # fmt: skip
-    other = row | {"distance_error_percent": -3.0, "heading_max_deg": 9.0, "errors_m": [1.0, 4.0]}
+    row = TrailRun(
+        name="line/default", profile="default", rate_hz=100, distance_m=88.0, distance_error_percent=1.0,
+        heading_error_deg=2.0, heading_max_deg=5.0, errors_m=[0.0, 1.0],
+    )  # fmt: skip
+    other = replace(row, distance_error_percent=-3.0, heading_max_deg=9.0, errors_m=[1.0, 4.0])
     (found,) = summaries([row, other])
-    assert (found["distance_error_percent"], found["heading_max_deg"], found["ending_m"]) == (-1.0, 9.0, 2.5)
-    assert (found["distance_error_min_percent"], found["lost"], found["runs"]) == (-3.0, 1, 2)
+    assert (found.distance_error_percent, found.heading_max_deg, found.ending_m) == (-1.0, 9.0, 2.5)
+    assert (found.distance_error_min_percent, found.lost, found.runs) == (-3.0, 1, 2)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from echostep.team.report import Report, encode
+from echostep.team.messages.report import Report, encode
 from echostep.team.roster import Roster
 from team.team_reports import report
 

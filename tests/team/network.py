@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from echostep.team.endpoint import parse_endpoint
-from echostep.team.mqtt import MqttTransport
+from echostep.team.messages.report import Report
+from echostep.team.mqtt.publisher import MqttTransport
 from echostep.team.outbox import Outbox
-from echostep.team.report import Report
 from team.team_reports import POSITION, report
 
 

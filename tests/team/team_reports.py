@@ -10,7 +10,7 @@ from typing import Any
 
 from board_runs import ROOT
 from echostep.plan.model import load_plan
-from echostep.team.report import Motion, Position, Report, ReportedPlace, StreamReport, moment
+from echostep.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport, moment
 
 PLAN = Path(ROOT / "host/echostep/plans/demo.json")
 POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor", 0.98, 0.0, 0.1)

@@ -9,13 +9,13 @@ from xml.etree import ElementTree
 import pytest
 
 from echostep.plan.model import load_plan
-from echostep.ports.check_in import PERSON, Call
 from echostep.ports.chunks import Chunk
+from echostep.ports.people.check_in import PERSON, Call
 from echostep.team.commander import notes
 from echostep.team.cot import alarm_words, events
 from echostep.team.endpoint import Outlet
+from echostep.team.messages.report import BadReportError, ReportedAlarm, decode, encode
 from echostep.team.publish import Publishing
-from echostep.team.report import BadReportError, ReportedAlarm, decode, encode
 from echostep.team.roster import MemberState
 from echostep.tracker import Tracker
 from team.cot_schema import faults

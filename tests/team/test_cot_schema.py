@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.team.cot import HOW, event
-from echostep.team.report import Report, ReportedPlace
+from echostep.team.messages.report import Report, ReportedPlace
 from team.cot_schema import HOW_MACHINE, faults
 from team.team_reports import report
 

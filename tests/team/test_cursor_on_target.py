@@ -20,8 +20,8 @@ from echostep.errors import EchostepError
 from echostep.team import outbox
 from echostep.team.cot import StreamTransport, UdpTransport
 from echostep.team.endpoint import parse_endpoint
+from echostep.team.messages.report import Presence, encode
 from echostep.team.outbox import Outbox
-from echostep.team.report import Presence, encode
 from free_ports import free_port
 from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker

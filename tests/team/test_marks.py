@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
-from echostep.team.marks import MOST_MARKS, MOST_REMOVED, ROOT, Mark, MarkBoard, ack_message
-from echostep.team.report import BadReportError
+from echostep.team.messages.marks import MOST_MARKS, MOST_REMOVED, ROOT, Mark, MarkBoard, ack_message
+from echostep.team.messages.report import BadReportError
 from echostep.team.restorer import RETAINED_S, Restorer
 
 HAZARD = Mark(1, "0123abcd", "hazard", 3.0, 2.0, 1, "Ann", 1.8e9, "7" * 64)

@@ -19,14 +19,14 @@ from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
-from echostep.team import mesh
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
-from echostep.team.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
-from echostep.team.mesh_airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
-from echostep.team.mesh_report import Unpacker, pack
+from echostep.team.mesh import mesh
+from echostep.team.mesh.airtime import INTERVAL_S, MOST_USED, PRESETS, airtime_s, interval_s
+from echostep.team.mesh.mesh import POSITION_EVERY, MeshListener, MeshNode, MeshTransport
+from echostep.team.mesh.mesh_report import Unpacker, pack
+from echostep.team.messages.report import Report, ReportedAlarm, decode, encode
 from echostep.team.outbox import Outbox
-from echostep.team.report import Report, ReportedAlarm, decode, encode
 from team.mesh_node import Air
 from team.team_reports import PLAN, POSITION, report
 from waiting import until
@@ -314,7 +314,7 @@ def test_a_port_that_the_package_closes_under_a_write_is_an_os_error(air: Air) -
 
 def test_without_the_package_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "meshtastic", None)
-    with pytest.raises(EchostepError, match=r"mesh:///dev/ttyUSB0: .* pip install 'echostep\[mesh\]'"):
+    with pytest.raises(EchostepError, match=r"mesh:///dev/ttyUSB0 needs meshtastic, .* pip install 'echostep\[mesh\]'"):
         MeshTransport(parse_endpoint("mesh:///dev/ttyUSB0"), ("red", "kim"), print)
 
 

@@ -20,10 +20,10 @@ from echostep.team import outbox
 from echostep.team.cot import event, uid
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.georeference import GroundPlane
+from echostep.team.messages.report import BadReportError, Report, check_name, decode, encode
 from echostep.team.outbox import Outbox, aged, stamped
 from echostep.team.picture import draw_team
 from echostep.team.publish import ReportHistory
-from echostep.team.report import BadReportError, Report, check_name, decode, encode
 from team.letters import NOW, UNIX, heard, said
 from team.team_reports import PLACE, PLAN, POSITION, report
 from waiting import PATIENCE_S, ends, until

@@ -21,9 +21,9 @@ from echostep.plan.model import load_plan
 from echostep.team import inbox, wearer_plan
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import MOST_TRIES, Receiver
-from echostep.team.mqtt import Listener
-from echostep.team.report import WITHOUT_PLAN
-from echostep.team.shared_drawings import MOST_BYTES, MOST_STOREYS, MOST_WALLS, checked_drawing, drawing_topic
+from echostep.team.messages.report import WITHOUT_PLAN
+from echostep.team.messages.shared_drawings import MOST_BYTES, MOST_STOREYS, MOST_WALLS, checked_drawing, drawing_topic
+from echostep.team.mqtt.publisher import Listener
 from echostep.team.wearer_plan import drawing_wearer, plan_file
 from team.network import box_to
 from team.team_broker import Broker, needs_broker

@@ -18,7 +18,7 @@ from rich.console import Console
 from echostep.plan.model import load_plan
 from echostep.team.commander import as_tree, notes, table, update_roster
 from echostep.team.inbox import MESSAGES_PER_TOPIC, Inbox
-from echostep.team.report import BadReportError, Presence, check_name, decode, encode, schema
+from echostep.team.messages.report import BadReportError, Presence, check_name, decode, encode, schema
 from echostep.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
 from team.letters import NOW, UNIX, heard, said
 from team.team_reports import PLAN, POSITION, report

@@ -23,8 +23,8 @@ from echostep.team import outbox
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import parse_endpoint
 from echostep.team.inbox import Inbox, Receiver
-from echostep.team.mqtt import Listener, MqttTransport
-from echostep.team.report import encode
+from echostep.team.messages.report import encode
+from echostep.team.mqtt.publisher import Listener, MqttTransport
 from echostep.team.roster import Member, MemberState, Roster
 from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker

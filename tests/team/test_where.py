@@ -11,12 +11,12 @@ from rich.console import Console
 
 from echostep.operation.words import level_on
 from echostep.plan.model import NO_PLAN, load_plan
-from echostep.team import report as reports
 from echostep.team.commander import notes, table
 from echostep.team.cot import remarks
 from echostep.team.endpoint import Outlet
+from echostep.team.messages import report as reports
+from echostep.team.messages.report import BadReportError, Report, decode, encode
 from echostep.team.publish import Publishing
-from echostep.team.report import BadReportError, Report, decode, encode
 from echostep.team.roster import Roster
 from echostep.tracker import Tracker
 from page.frames import told

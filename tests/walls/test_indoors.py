@@ -12,7 +12,7 @@ from echostep.arrays import Floats
 from echostep.localization.building import Building
 from echostep.localization.estimate import OUTSIDE
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls

@@ -17,16 +17,17 @@ from shapely import Point, Polygon
 from echostep.arrays import Floats
 from echostep.board import messages as m
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.level_changes import (
+from echostep.localization.height.levels import (
     ClimbSettings,
     HeightArrays,
     HeightChange,
     change_levels,
     level_change_model,
 )
-from echostep.localization.particle_kernels import Move, ParticleArrays
-from echostep.localization.particles import Cloud, CloudSettings
-from echostep.localization.start import ANY_LEVEL, Start
+from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.start import ANY_LEVEL, Start
+from echostep.localization.settings import CloudSettings
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
@@ -47,7 +48,7 @@ from echostep.walls.level_sheet import (
 from echostep_studies.floors.storeys import judge, through
 from echostep_studies.simulation.tower import LIFT_AT, STOREY_M, tour, tower
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 0.0, 1.0)
 
@@ -303,10 +304,10 @@ def test_all_seven_floors_of_a_real_plan_are_walked() -> None:
     assert len(plan.levels) == 7
     way = through(plan, 3)
     scenario, estimates = tracked(plan, way, 3)
-    found = judge(plan, scenario.truth, estimates)
-    assert found["floors"] == 7
-    assert found["floor_right"] == 1.0
-    assert found["mean_m"] < 0.5
+    found = judge(plan, scenario.truth, estimates, "", 1)
+    assert found.floors == 7
+    assert found.floor_right == 1.0
+    assert found.mean_m < 0.5
 
 
 def test_floors_are_judged_by_what_is_nearest() -> None:
@@ -316,8 +317,8 @@ def test_floors_are_judged_by_what_is_nearest() -> None:
     def at(t_s: float, level: int) -> Estimate:
         return Estimate(t_s, 5.0, 1.5, 0.01, 0.0, 0.01, 0.0, 0.1, 1, TrackStatus.TRACKING, level)
 
-    found = judge(plan, truth, [at(1.0, 0), at(2.0, 1), at(3.0, 1), at(5.0, 0), at(12.6, 0), at(20.0, 2)])
-    assert found["floor_right"] == pytest.approx(4 / 6), "at 12.6 s he is 1.82 m high: both floors are as good"
-    assert found["strict_right"] == pytest.approx(3 / 6)
-    assert found["longest_wrong_s"] == pytest.approx(1.0)
-    assert found["floors"] == 3
+    found = judge(plan, truth, [at(1.0, 0), at(2.0, 1), at(3.0, 1), at(5.0, 0), at(12.6, 0), at(20.0, 2)], "", 1)
+    assert found.floor_right == pytest.approx(4 / 6), "at 12.6 s he is 1.82 m high: both floors are as good"
+    assert found.strict_right == pytest.approx(3 / 6)
+    assert found.longest_wrong_s == pytest.approx(1.0)
+    assert found.floors == 3

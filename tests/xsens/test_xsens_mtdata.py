@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.simulation.devices.mtx_setup import pack
 from echostep.xsens import (
     MTDATA,
     MTDATA2,
@@ -26,7 +25,8 @@ from echostep.xsens import (
     pack_mtdata,
 )
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
-from fuzz_mtx import fuzz
+from echostep_studies.simulation.mtx_setup import pack
+from reliability.fuzz.mtx import fuzz
 
 
 def sample(counter: int, gyro_x: float = 0.1) -> MtSample:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
 from echostep.xsens import PROJECT, MtxReader, OutputFormat, encode_frame
-from echostep.xsens.requests import project_requests, reset_heading, set_rate
-from echostep.xsens.setup import TIMEOUT_S, TRIES, MtxSetup, State
+from echostep.xsens.configuration.requests import project_requests, reset_heading, set_rate
+from echostep.xsens.configuration.setup import TIMEOUT_S, TRIES, MtxSetup, State
+from echostep_studies.simulation.mtx_setup import FACTORY, DeviceState, MtxDevice
 from mt_lines import SAMPLE, STEP_S, Line
 
 

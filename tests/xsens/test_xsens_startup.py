@@ -14,9 +14,9 @@ from board_runs import ROOT
 from command_line import echostep, interrupt_once_called, interrupt_when
 from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
-from echostep.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from echostep.xsens import PROJECT, MtxReader, OutputFormat
-from echostep.xsens.startup import MtxStart
+from echostep.xsens.configuration.startup import MtxStart
+from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
 from mt_lines import on_a_terminal
 from waiting import PATIENCE_S
 

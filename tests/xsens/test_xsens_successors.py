@@ -10,11 +10,11 @@ import struct
 import pytest
 
 from command_line import echostep
-from echostep.simulation.devices.mti_setup import MTI_1, MTI_3, MTI_630, Model, MtiDevice
 from echostep.xsens import MtxReader
-from echostep.xsens.products import force_range_g, product_text
-from echostep.xsens.requests import successor_requests
-from echostep.xsens.setup import State
+from echostep.xsens.configuration.products import force_range_g, product_text
+from echostep.xsens.configuration.requests import successor_requests
+from echostep.xsens.configuration.setup import State
+from echostep_studies.simulation.mti_setup import MTI_1, MTI_3, MTI_630, Model, MtiDevice
 from mt_lines import SAMPLE, Line, on_a_terminal
 from players import python_board
 

@@ -4,6 +4,6 @@
 In: these tables. Out: nets that are checked, wiring drawings, KiCad schematics, tables for the README; boxes checked and drawn. Owns nothing.
 """
 
-from pathlib import Path
+from places import ROOT
 
-HARDWARE = Path(__file__).resolve().parents[2] / "firmware" / "hardware"
+HARDWARE = ROOT / "firmware" / "hardware"

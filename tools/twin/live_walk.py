@@ -29,10 +29,10 @@ from echostep.ports.arrival_clock import now_ns
 from echostep.recording.reading import open_recording
 from echostep.simulation.scenario import demo_scenario
 from echostep.simulation.stimulus import BoardSensors
-from fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams
+from places import PLAN
+from reliability.fault_outcomes import NORMAL_S, Outcome, heard, judge_estimates, judge_streams
 from twin.run import PtyBoard, PtyMtx, playing, wait_for_opening
 
-PLAN = Path(__file__).resolve().parents[2] / "host/echostep/plans/demo.json"
 SEED = 1
 # Of the walk: the fault begins while the wearer walks in a corridor; the last second that is judged.
 BEGIN_S, END_S = 20.0, 50.0

@@ -7,18 +7,14 @@ The speed has no limit, for it is that of the computer.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
@@ -26,9 +22,9 @@ from echostep.board.subscription import SUBSCRIBE
 from echostep.simulation.devices.board import BoardProcess
 from echostep.simulation.kits import Kit
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
+from places import TWIN
+from reliability.campaign import options, report
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--elf", str(ROOT / "firmware/build/echostep.elf")]
 SETTLED_S = 2.0  # enumeration and start-up take less
 TICK_US = 0.5
 Figure = tuple[str, str, str, bool | None]  # what, measured, limit, passed (None: no limit)
@@ -193,23 +189,14 @@ def foot_figures(seconds: int) -> list[Figure]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--minutes", type=float, default=10.0, help="simulated minutes")
-    seconds = max(5, round(60 * parser.parse_args().minutes))
-    passed = True
+    seconds = max(5, round(60 * options(__doc__, minutes=(10.0, "simulated")).minutes))
     tables: dict[str, Callable[[], list[Figure]]] = {
         "parts of the papers": lambda: figures(seconds, Kit.PAPERS),
         "parts of 2026, not built yet": lambda: figures(seconds, Kit.OF_2026),
         "the foot board of 2026, not built yet": lambda: foot_figures(seconds),
     }
-    for parts, measure in tables.items():
-        title = f"The real firmware in the twin, {parts} (simulated hardware)"
-        table = Table("figure", "measured", "limit", "", title=title)
-        for what, measured, limit, good in measure():
-            table.add_row(what, measured, limit, {True: "PASS", False: "FAIL", None: ""}[good])
-            passed = passed and good is not False
-        Console().print(table)
-    return 0 if passed else 1
+    title = "The real firmware in the twin, {} (simulated hardware)"
+    return max([report(title.format(parts), measure()) for parts, measure in tables.items()])
 
 
 if __name__ == "__main__":

@@ -27,22 +27,21 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.commands.beacon_player import simulate_gateway
+from echostep.commands.actions.beacon_player import simulate_gateway
 from echostep.plan.model import Plan, load_plan
 from echostep.simulation.devices.beacon_gateway import SPACING_M
 from echostep.simulation.devices.board import Sent
 from echostep.simulation.devices.foot_board import FootBoardPort
-from echostep.simulation.devices.mtx_setup import MtxDevice
 from echostep.simulation.kits import Kit
-from echostep.simulation.poses import LyingParts
-from echostep.simulation.rehearsal import Act, Rehearsal
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
+from echostep_studies.simulation.mtx_setup import MtxDevice
+from echostep_studies.simulation.poses import LyingParts
+from echostep_studies.simulation.rehearsal import Act, Rehearsal
+from places import OUT, TWIN
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-TWIN = [str(ROOT / "tools/twin/build/echostep-twin"), "--pty", "--elf", str(ROOT / "firmware/build/echostep.elf")]
 BLOCK_MS, IDLE_MS = 10, 50
 FOOT_BOARD = 2  # seed of the one on the foot
 LATE_S = 0.5  # a delay behind real time that is reported
@@ -53,7 +52,7 @@ class PtyBoard:
 
     def __init__(self, seed: int = 1) -> None:
         """`seed`: which of all boards it is."""
-        command = [*TWIN, "--seed", str(seed)]
+        command = [*TWIN, "--pty", "--seed", str(seed)]
         self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         assert self._child.stdin
         assert self._child.stdout
@@ -294,7 +293,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--once", action="store_true", help="end after one walk")
-    parser.add_argument("--out", type=Path, default=ROOT / "out/twin", metavar="DIR")
+    parser.add_argument("--out", type=Path, default=OUT / "twin", metavar="DIR")
     parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
     parser.add_argument(
         "--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: a foot board too"

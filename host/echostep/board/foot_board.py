@@ -12,7 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.board.calibration import ImuSettings, foot_axes
-from echostep.board.findings import BoardReports
+from echostep.board.faults.findings import BoardReports
 from echostep.board.frames import BoardReader
 from echostep.board.messages import BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
 

@@ -37,6 +37,6 @@ def simulate(
     seed: Seed = 1,
 ) -> None:
     """Simulate beacons along a walk, and send what they measure as their gateway does, in real time."""
-    from echostep.commands.beacon_player import simulate_gateway
+    from echostep.commands.actions.beacon_player import simulate_gateway
 
     simulate_gateway(plan, truth, to, spacing, pace, seed)

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan
+from echostep.commands.options import LOCAL, Host, Port, Seconds, TeamPlan, needs, page_address
 
 app = typer.Typer()
 
@@ -34,28 +34,37 @@ def command(
     seconds: Seconds = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", metavar="FILE", help="Draw the team on its plan at the end: .png or .svg."),
+        typer.Option(
+            "--picture",
+            metavar="FILE",
+            help="Draw the team on its plan at the end: .png or .svg.",
+            callback=needs("matplotlib"),
+        ),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the roster as JSON at the end, instead of the table.")
     ] = False,
-    page: Annotated[bool, typer.Option("--page/--no-page", help="Serve the commander's page, or do not.")] = True,
+    page: Annotated[
+        bool | None,
+        typer.Option(
+            "--page/--no-page", help="Serve the commander's page (the default), or do not.", show_default=False
+        ),
+    ] = None,
     host: Host = LOCAL,
     port: Port = None,
 ) -> None:
     """Follow a team on one plan, lost and silent ones first, on a page and as a table, and record it; or show a recording again."""
     from echostep.operation import command as commander
     from echostep.operation.views import Views
-    from echostep.page.server import Address
 
-    views = Views(Address(host, port) if page else None, picture, as_json=as_json)
+    views = Views(page_address(page, host, port), picture, as_json=as_json)
     commander.command(_plan_file(plan, broker, team, out.parent), broker, team, seconds, views, out)
 
 
 def _plan_file(plan: Path, url: str, team: str | None, folder: Path) -> Path:
     """The file of `--plan`; that of wearer:NAME comes from the broker at `url`, of any team unless one is given."""
     from echostep.team.endpoint import BROKERS, parse_endpoint
-    from echostep.team.report import checked_name
+    from echostep.team.messages.report import checked_name
     from echostep.team.wearer_plan import drawing_wearer, plan_file
 
     if drawing_wearer(plan) is None:

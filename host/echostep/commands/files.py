@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep map`, `foot`, `legs`, `floors`, `score` and `decode`: commands that read files and write others.
+"""`echostep map`, `foot`, `legs`, `score` and `decode`: commands that read files and write others.
 
 In: the command's arguments and options. Out: files, text. Slow imports wait until a command runs.
 """
@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from echostep.commands.options import needs
+from echostep.extras import require
 
 app = typer.Typer()
 
@@ -25,11 +28,15 @@ def map_command(
         typer.Option("--plan", metavar="PARTIAL", help="A partial or old plan, which the walks complete and correct."),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw plan and path there (PNG, SVG).")
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", callback=needs("matplotlib"), help="Draw plan and path there (PNG, SVG)."
+        ),
     ] = None,
 ) -> None:
     """Draw the plan of a building from recorded walks."""
-    from echostep.commands import mapping
+    require("a drawing of walks", "scipy")
+    from echostep.commands.actions import mapping
 
     mapping.map_recordings(recordings, plan, out, picture)
 
@@ -44,10 +51,12 @@ def foot(
             "--profile", metavar="NAME", help="default, or fischer2008: that paper's dead reckoning (echostep-studies)."
         ),
     ] = "default",
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the track as PNG, beside the CSV.")] = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", callback=needs("matplotlib"), help="Draw the track as PNG, beside the CSV.")
+    ] = False,
 ) -> None:
     """Zero-velocity navigation of a recorded foot IMU."""
-    from echostep.commands import offline
+    from echostep.commands.actions import offline
 
     offline.foot(imu, out, profile, plot=plot)
 
@@ -77,35 +86,15 @@ def legs(
         float | None,
         typer.Option("--walked", metavar="M", help="The true length of this walk: print the wearer's scale."),
     ] = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw track and strides as PNG, beside the CSV.")] = False,
+    plot: Annotated[
+        bool,
+        typer.Option("--plot", callback=needs("matplotlib"), help="Draw track and strides as PNG, beside the CSV."),
+    ] = False,
 ) -> None:
     """Distance, strides and track from recorded leg gyros: on thigh and shank, and on the belt if there is one."""
-    from echostep.commands import offline
+    from echostep.commands.actions import offline
 
     offline.legs(samples, out, offline.LegOptions(thigh, shank, profile, scale, walked), plot=plot)
-
-
-@app.command()
-def floors(
-    pressure: Annotated[
-        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
-    ],
-    heights: Annotated[
-        str,
-        typer.Option(
-            "--heights", metavar="METRES", help="Heights of the floors, as 0,3.5,7; auto: from the recording."
-        ),
-    ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
-    start: Annotated[
-        int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
-    ] = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the floors as PNG, beside the CSV.")] = False,
-) -> None:
-    """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
-    from echostep.commands import floors as floor_run
-
-    floor_run.floors(pressure, heights, out, start, plot=plot)
 
 
 @app.command()
@@ -121,7 +110,10 @@ def score(
         Path | None, typer.Option("--plan", help="The building's plan, for floors by height, zones and the picture.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with the table and the pictures.")
+        Path | None,
+        typer.Option(
+            "--html", metavar="FILE", callback=needs("matplotlib"), help="Write a page with the table and the pictures."
+        ),
     ] = None,
     setup: Annotated[
         float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)
@@ -129,7 +121,7 @@ def score(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """Score tracks against the truth by ISO/IEC 18305 and EvAAL."""
-    from echostep.commands import score as scoring
+    from echostep.commands.actions import score as scoring
 
     scoring.score(tracks, truth, plan, html, setup, as_json=as_json)
 
@@ -153,6 +145,6 @@ def decode(
     ] = None,
 ) -> None:
     """Print captured bytes as JSON, one message a line; on stderr, what was found and rejected."""
-    from echostep.commands import offline
+    from echostep.commands.actions import offline
 
     offline.decode(file, output_mode, output_settings)

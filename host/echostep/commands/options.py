@@ -1,15 +1,49 @@
 # SPDX-License-Identifier: MIT
 """Options that several commands share: their names, help and types.
 
-In: nothing. Out: annotated types for the parameters of commands. Owns nothing.
+In: nothing. Out: annotated types for the parameters of commands; what several of them mean. Owns nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
+
+from echostep.extras import PAGE, lacks, require
+
+if TYPE_CHECKING:
+    from echostep.page.server import Address
+
+Value = TypeVar("Value")
+
+
+def needs(package: str) -> Callable[[typer.CallbackParam, Value], Value]:
+    """A callback of an option that needs a package when it is given."""
+
+    def checked(option: typer.CallbackParam, value: Value) -> Value:
+        if value:
+            require(option.opts[0], package)
+        return value
+
+    return checked
+
+
+def page_address(page: bool | None, host: str, port: int | None) -> Address | None:
+    """Where to serve the page; None: no page. One that cannot be served is an error where it was asked for, and said where it is the default."""
+    if page:
+        require("--page", *PAGE)
+    if page is False:
+        return None
+    if words := lacks("the page", *PAGE):
+        typer.echo(f"No page is served: {words}", err=True)
+        return None
+    from echostep.page.server import Address
+
+    return Address(host, port)
+
 
 LOCAL = "127.0.0.1"
 Plan = Annotated[Path, typer.Option("--plan", help="The building's plan (JSON, metres).")]
@@ -83,6 +117,7 @@ Foxglove = Annotated[
     typer.Option(
         "--foxglove",
         metavar="[HOST:]PORT",
+        callback=needs("foxglove"),
         help="Serve estimates, echoes and the scene to Foxglove, as 8765; on this computer alone unless a host is given.",
     ),
 ]

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echostep.commands.options import needs
 from echostep.errors import EchostepError
+from echostep.extras import PAGE, require
 
 if TYPE_CHECKING:
     from echostep.plan.model import Plan
@@ -59,8 +61,8 @@ def import_(
     ] = None,
 ) -> None:
     """Make a plan of a building that is drawn in another format."""
-    from echostep.plan.importers.assumed_doors import ASSUMED
     from echostep.plan.importers.formats import Hints
+    from echostep.plan.importers.imdf.assumed_doors import ASSUMED
     from echostep.plan.importers.limited import import_limited
     from echostep.plan.writer import save_plan
 
@@ -120,7 +122,10 @@ PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), o
 def check(
     file: PlanFile,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE", help="Draw what is wrong (.png, .svg).")
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", callback=needs("matplotlib"), help="Draw what is wrong (.png, .svg)."
+        ),
     ] = None,
 ) -> None:
     """Tell what is wrong with a plan: exit status 0 when nothing is, 1 when something is."""
@@ -156,6 +161,7 @@ def show(
     ] = None,
 ) -> None:
     """Draw a plan."""
+    require(str(out), "matplotlib")
     from echostep.plan.drawing import draw_plan
     from echostep.plan.importers.limited import open_limited
 
@@ -169,6 +175,7 @@ def overlay(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The overlay to write (.kmz).")],
 ) -> None:
     """Make a picture of each storey that lies on the map: in ATAK (GRG), Google Earth, QGIS."""
+    require(str(out), "matplotlib", "pyproj")
     from echostep.plan.importers.limited import open_limited
     from echostep.plan.overlay import write_overlays
 
@@ -188,6 +195,7 @@ def edit(
     headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
 ) -> None:
     """Draw and drag walls and doors on a page in the browser, until Ctrl-C."""
+    require("the plan editor", *PAGE)
     from echostep.page.editor import edit_plan
 
     edit_plan(file, picture, port, browser=not headless)

@@ -23,7 +23,7 @@ Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="The recor
 @app.command()
 def info(file: Recording) -> None:
     """Show what a recording holds, and whether it is whole."""
-    from echostep.recording import contents
+    from echostep.recording.repair import contents
 
     print("\n".join(contents.info(file)))
 
@@ -36,7 +36,7 @@ def cut(
     end_s: Annotated[float, typer.Option("--to", metavar="S", help="Seconds after the beginning.")] = math.inf,
 ) -> None:
     """Cut a piece out of a recording."""
-    from echostep.recording import edit
+    from echostep.recording.repair import edit
 
     print("\n".join(edit.cut(file, begin_s, end_s, out)))
 
@@ -60,7 +60,7 @@ def export(
     """Track a recording and write its track for other programs."""
     from echostep.output.track_files import export as export_track
     from echostep.session.options import TrackingOptions
-    from echostep.session.replay import tracker_of
+    from echostep.session.runs.replay import tracker_of
 
     tracking = TrackingOptions(plan, start, None, settings, seed)
     print(export_track(file, plan, out, lambda recording, on: tracker_of(recording, on, tracking)))
@@ -69,6 +69,6 @@ def export(
 @app.command()
 def repair(file: Recording, out: Out) -> None:
     """Write what is readable of a damaged recording to a new one."""
-    from echostep.recording import edit
+    from echostep.recording.repair import edit
 
     print("\n".join(edit.repair(file, out)))

@@ -36,6 +36,7 @@ from echostep.commands.options import (
     Start,
     StartSd,
     Team,
+    page_address,
 )
 from echostep.errors import EchostepError
 from echostep.simulation.kits import Kit
@@ -96,8 +97,8 @@ def demo(
     ] = True,
 ) -> None:
     """Track a simulated walk through a simulated building."""
-    from echostep.session import demo as demo_run
     from echostep.session.options import OutputOptions
+    from echostep.session.runs import demo as demo_run
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, browser and sys.stdout.isatty())
@@ -130,8 +131,8 @@ def live(
     foxglove: Foxglove = None,
 ) -> None:
     """Track a wearer live and record everything. With nothing on the foot the board's leg gyros are used."""
-    from echostep.session import live as live_run
     from echostep.session.options import OutputOptions, PortOptions, TrackingOptions
+    from echostep.session.runs import live as live_run
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(out, not headless, address, bool(page), outlet, foxglove=_foxglove(foxglove))
@@ -153,8 +154,8 @@ def record(
     keep: Keep = None,
 ) -> None:
     """Record the ports without tracking."""
-    from echostep.session import live as live_run
     from echostep.session.options import PortOptions
+    from echostep.session.runs import live as live_run
 
     board, mtx, foot = _ports(board, mtx, foot)
     live_run.record(PortOptions(board, mtx, beacons, seconds, keep, foot), out)
@@ -183,8 +184,8 @@ def replay(
     foxglove: Foxglove = None,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
-    from echostep.session import replay as replay_run
     from echostep.session.options import OutputOptions, TrackingOptions
+    from echostep.session.runs import replay as replay_run
 
     address, outlet = _page_address(headless, page, host, port), _outlet(publish, name, team)
     output = OutputOptions(
@@ -245,8 +246,6 @@ def _ports(board: str | None, mtx: str | None, foot: str | None) -> tuple[str, s
 
 def _page_address(headless: bool, page: bool | None, host: str, port: int | None) -> Address | None:
     """Where to serve the page; None: no page."""
-    from echostep.page.server import Address
-
     if headless and page:
         raise EchostepError("--headless excludes --page: give one of the two")
-    return None if headless or page is False else Address(host, port)
+    return None if headless else page_address(page, host, port)

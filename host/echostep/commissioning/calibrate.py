@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from echostep.board.calibration import GYROS
-from echostep.board.health import Severity, board_findings
+from echostep.board.faults.health import Severity, board_findings
 from echostep.commissioning.fitting import Fit, fit_compass, fit_gyros, fit_legs, fit_mounting
 from echostep.commissioning.listening_bar import listening_bar
 from echostep.commissioning.port_search import find_boards

@@ -9,25 +9,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from echostep.board.findings import part_in, part_text_of
-from echostep.board.health import (
+from echostep.board.faults.findings import part_in, part_text_of
+from echostep.board.faults.health import (
     NAMES,
     SELECTS,
     BoardReports,
     Finding,
     Severity,
     board_findings,
+    crash_text,
     expected_rates,
     gyro_celsius,
     rate_findings,
 )
 from echostep.board.messages import GYROS_INVALID, SCHEMA_HASH, Gyro, Healthy, Identity, Outcome, Part, Ranger, SelfTest
-from echostep.board.restart_findings import crash_text
 from echostep.board.subscription import knows_subscriptions
 from echostep.commissioning.probe import Drift, ProbeResult, drift_of
 from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import MtxTiming
-from echostep.xsens.products import force_range_g
+from echostep.xsens.configuration.products import force_range_g
 
 DRIFT_MAX_PPM = 200.0  # by reason: a crystal is within 50, a ceramic resonator within 5000
 ANSWER_MAX_S = 0.02

@@ -9,7 +9,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.text import Text
 
-from echostep.board.health import Finding, Severity
+from echostep.board.faults.health import Finding, Severity
 from echostep.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep.commissioning.foot_diagnosis import judge_foot_board
 from echostep.commissioning.listening_bar import listening_bar

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
-from echostep.board.device_faults import foot_celsius
-from echostep.board.findings import PART_NAMES, Finding, Severity
-from echostep.board.health import board_findings
+from echostep.board.faults.device_faults import foot_celsius
+from echostep.board.faults.findings import PART_NAMES, Finding, Severity
+from echostep.board.faults.health import board_findings
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, FootHealth, FootState, Part
 from echostep.commissioning.diagnosis import Diagnosis, board_lines, clock_diagnosis, silence, stale_firmware
 from echostep.commissioning.probe import ProbeResult

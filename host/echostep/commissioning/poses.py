@@ -15,7 +15,7 @@ from rich.console import Console
 
 from echostep.arrays import Bools, Floats
 from echostep.board.calibration import GYROS, ImuSettings, foot_axes, six_axes
-from echostep.board.device_faults import foot_celsius, gyro_celsius
+from echostep.board.faults.device_faults import foot_celsius, gyro_celsius
 from echostep.board.imu_errors import POSES, Pose, check_unlike, fit_errors, pose_of
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, ROWS, Foot, Gyro, Motion
 from echostep.commissioning.probe import SETTLED_S, TICKS_PER_S, ProbeResult

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echostep.board.faults.health import BoardReports
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
-from echostep.board.health import BoardReports
 from echostep.board.messages import (
     CheckGyros,
     ClockQuery,
@@ -38,8 +38,8 @@ from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.device import LISTENED_BYTES
 from echostep.timing.timeline import MtxTiming
 from echostep.xsens import MtxReader
+from echostep.xsens.configuration.startup import MtxStart
 from echostep.xsens.reader import warm_up
-from echostep.xsens.startup import MtxStart
 
 BAUD = {BOARD: 115200, MTX: 115200}
 TICKS_PER_S = 2_000_000

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
-from echostep.board.health import Finding, Severity
+from echostep.board.faults.health import Finding, Severity
 from echostep.ports.access import holders, is_url, refusal
 
 BOARD_NAME, MTX_NAME = Path("/dev/echostep"), Path("/dev/echostep-mtx")  # links made by the udev rules

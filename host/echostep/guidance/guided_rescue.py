@@ -16,7 +16,7 @@ from echostep.guidance.cues import Cue, CueKind, Guide
 from echostep.localization.estimate import Estimate
 from echostep.path import MeasuredSegment
 from echostep.plan.routing import Route, RoutePlace, Routes
-from echostep.ports.teammate import Teammate, parse_teammate
+from echostep.ports.people.teammate import Teammate, parse_teammate
 from echostep.tracker import Tracker
 
 # By reason:

@@ -3,12 +3,15 @@
 
 In: the grid of integrated rates, signs, moments at which the leg stands, begins and ends of strides. Out: angles between two grid indices. Owns the
 gyros' errors and the level.
+
+Gyros do not measure the angles at one moment: a Kalman filter of what is usual, `Level`, estimates them from the angles while standing and their mean
+over a stride.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,16 +19,51 @@ from echostep.arrays import Floats
 from echostep.legs.angle_grid import AngleGrid
 from echostep.legs.gyro_bias import GyroBias
 from echostep.legs.kinematics import knee_at
-from echostep.legs.level import MEAN_RAD, MEAN_SD_RAD, STANDING_RAD, Level
 from echostep.legs.swing_detection import GRID_HZ, heel_strike_index
 from echostep.legs.walking_bout import climbs
 
+# By reason, where no source is named.
+STANDING_RAD = (0.0, math.radians(-3.0))  # thigh, shank: the weight is in front of the ankles
+MEAN_RAD = (math.radians(7.0), math.radians(-14.2))  # over a stride, by the curves of `kinematics`
+STANDING_SD_RAD = math.radians(4.0)  # of people who stand; a foot is often a little ahead
+BRIEF_SD_RAD, BRIEF_S = math.radians(12.0), 1.0  # of a shorter rest: it may be one between two steps, legs apart
+MEAN_SD_RAD = math.radians(
+    8.0
+)  # of people's mean angles [offsets of sagittal angles: Kadaba 1990], which all strides share
+STRIDE_SD_RAD = math.radians(1.5)  # growth in a stride: soft tissue
+UNKNOWN_SD_RAD = math.radians(20.0)  # before anything is known
 Signs = tuple[float, float]
 # Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one; by reason.
 CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
 # Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)
 UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, by the curves of `kinematics`
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """`thigh`, `shank`: angles (rad, forward positive) at grid index `index`, both with this variance (rad2)."""
+
+    thigh: float = 0.0
+    shank: float = 0.0
+    index: int = 0
+    variance: float = UNKNOWN_SD_RAD**2
+
+    def moved(self, thigh: float, shank: float, index: int, drift: float) -> Level:
+        """The level at a later index, where integration finds these angles; `drift`: variance (rad2) of what the gyros' errors have added."""
+        return Level(thigh, shank, index, self.variance + STRIDE_SD_RAD**2 + drift)
+
+    def corrected(self, off: tuple[float, float], sd: float) -> Level:
+        """Kalman update by the differences `off` (thigh, shank) of the usual angles from those found, with this sd."""
+        gain = self.variance / (self.variance + sd * sd)
+        return Level(
+            self.thigh + gain * off[0], self.shank + gain * off[1], self.index, (1.0 - gain) * self.variance
+        )  # fmt: skip
+
+    def standing(self, rest_s: float) -> Level:
+        """The level after a rest of this duration."""
+        sd = STANDING_SD_RAD if rest_s > BRIEF_S else BRIEF_SD_RAD
+        return self.corrected((STANDING_RAD[0] - self.thigh, STANDING_RAD[1] - self.shank), sd)
 
 
 class StrideMean:

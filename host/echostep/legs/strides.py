@@ -20,13 +20,12 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.legs import swing_detection as leg_swings
 from echostep.legs.angle_grid import AngleGrid, Sample
-from echostep.legs.edges import SPEED_S, Swing, leaving_share, speed
 from echostep.legs.gyro_bias import GyroBias
 from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, Travel, travel
 from echostep.legs.leg_angles import LegAngles, knees
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
 from echostep.legs.swing_detection import GRID_HZ, Swings
-from echostep.legs.walking_bout import Bout, pace_flag, stairs_flag
+from echostep.legs.walking_bout import SPEED_S, Bout, Swing, leaving_share, pace_flag, speed, stairs_flag
 
 # The source of a value without a citation is not recorded.
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it

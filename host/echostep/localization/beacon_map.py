@@ -16,17 +16,17 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading
-from echostep.localization.beacon_beliefs import (
+from echostep.localization.beacons.beliefs import (
     BeaconBeliefs,
     BeaconMeasurement,
     empty_beliefs,
     moments,
     place_covariance,
 )
-from echostep.localization.beacon_model import BeaconSettings, beacon_model
-from echostep.localization.beacon_slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
-from echostep.localization.beacon_step import Beacons, Waiting, no_waiting, update_by_reading
-from echostep.localization.particles import Cloud
+from echostep.localization.beacons.model import BeaconSettings, beacon_model
+from echostep.localization.beacons.slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
+from echostep.localization.beacons.step import Beacons, Waiting, no_waiting, update_by_reading
+from echostep.localization.particles.cloud import Cloud
 from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall

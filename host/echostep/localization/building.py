@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from echostep.localization.background import Background, background
-from echostep.localization.coarse_field import CoarseField, coarse_field
-from echostep.localization.echo_likelihood import EchoModel
+from echostep.arrays import Floats
+from echostep.localization.echoes.likelihood import EchoModel
+from echostep.localization.echoes.range_table import CoarseField, coarse_field
+from echostep.localization.echoes.unplanned import Background, background
 from echostep.localization.estimate import Elsewhere
-from echostep.localization.upper_storeys import UpperStoreys
+from echostep.localization.height.levels import UpperStoreys
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
 from echostep.walls.indoors import indoors
@@ -39,6 +40,11 @@ class Building:
         """Whether there is anything that echoes could tell."""
         return len(self.walls.index.walls) > 0
 
+    @property
+    def levels(self) -> int:
+        """Number of levels of the plan."""
+        return 1 if self.sheet is None else len(self.sheet.height_m)
+
     def background(self, model: EchoModel) -> Background:
         """Density of the echoes of a wearer anywhere on the floor."""
         if model not in self._backgrounds:
@@ -50,6 +56,14 @@ class Building:
         if model not in self._fields:
             self._fields[model] = coarse_field(self.walls, self.floor, model)
         return self._fields[model]
+
+    def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
+        """What particles (n,) beside an upper storey lose in log-weight on this length of path; None where none does."""
+        return None if self.upper_storeys is None else self.upper_storeys.log_loss(x_m, y_m, path_m)
+
+    def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:
+        """Weight of particles (n,) outside of the building; 0 where walls enclose no floor."""
+        return 0.0 if self.indoors is None else float(weight @ ~self.indoors.holds(x_m, y_m))
 
 
 def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Elsewhere | None:

@@ -17,9 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.hypotheses import Hypothesis
-from echostep.localization.moments import Moments, moments
-from echostep.localization.particles import Cloud
+from echostep.jit import lean_kernel
+from echostep.localization.height.levels import SAME_LEVEL_M
+from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.places import Hypothesis
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
 TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter, by reason: a door, a room
@@ -35,6 +36,56 @@ UNFIT = 0.5  # probability of the plan below which it is said not to fit, by rea
 OUTSIDE = 0.5  # probability of being outside of the building above which it is said, by reason
 SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, by reason
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
+
+
+class Moments(NamedTuple):
+    """Weighted mean (m), covariance (m2), mean unit vector of the headings, and weight within two distances of the mean."""
+
+    x_m: float
+    y_m: float
+    xx_m2: float
+    xy_m2: float
+    yy_m2: float
+    east: float
+    north: float
+    near: float
+    about: float
+
+
+@lean_kernel
+def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_m: float, about_m: float) -> Moments:
+    """Of particles (n,) in the map."""
+    x, y, east, north = 0.0, 0.0, 0.0, 0.0
+    for i in range(len(weight)):
+        w = weight[i]
+        x += w * x_m[i]
+        y += w * y_m[i]
+        east += w * math.cos(heading_rad[i])
+        north += w * math.sin(heading_rad[i])
+    xx, xy, yy, near, about = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(weight)):
+        w, dx, dy = weight[i], x_m[i] - x, y_m[i] - y
+        square = dx * dx + dy * dy
+        xx += w * dx * dx
+        xy += w * dx * dy
+        yy += w * dy * dy
+        near += w if square < near_m * near_m else 0.0
+        about += w if square < about_m * about_m else 0.0
+    return Moments(x, y, xx, xy, yy, east, north, near, about)
+
+
+@lean_kernel
+def weight_about(
+    x_m: Floats, y_m: Floats, z_m: Floats, weight: Floats, place_m: tuple[float, float, float], limit_m: tuple[float, float]
+) -> tuple[float, float]:  # fmt: skip
+    """Weight of the particles (n,) within each of two distances of a place in the map, and within SAME_LEVEL_M of its height."""
+    near, about = 0.0, 0.0
+    for i in range(len(weight)):
+        if abs(z_m[i] - place_m[2]) < SAME_LEVEL_M:
+            distance = math.hypot(x_m[i] - place_m[0], y_m[i] - place_m[1])
+            near += weight[i] if distance < limit_m[0] else 0.0
+            about += weight[i] if distance < limit_m[1] else 0.0
+    return near, about
 
 
 class TrackStatus(StrEnum):

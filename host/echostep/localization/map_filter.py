@@ -15,49 +15,53 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.board.gateway import BeaconReading
-from echostep.localization.background import UnplannedDensities
 from echostep.localization.beacon_map import BeaconMap
+from echostep.localization.belief import (
+    AGREED,
+    BELIEVED,
+    DOUBTED,
+    ELSEWHERE,
+    FOUND,
+    GATHERED,
+    REFUTED,
+    STATED,
+    WIDE_DOUBTED,
+    Hypothetical,
+    PlanVerdict,
+    Plausibility,
+    away_m,
+    beyond_errors_that_stay,
+    right_against,
+)
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate
-from echostep.localization.filter_settings import FilterSettings, echo_models, with_plan_error
-from echostep.localization.gaps import Gap, Gaps
-from echostep.localization.hypothetical import Hypothetical
-from echostep.localization.level_changes import HeightChange
-from echostep.localization.meeting_model import FITS, WRONG, start_at, weigh
-from echostep.localization.meetings import CONTRADICTIONS, PLACE_M, MeetingEffect, MeetingMemory, moved_probability
-from echostep.localization.moments import weight_about
-from echostep.localization.moves import HEIGHT_SD_M, height_change, move_of
-from echostep.localization.particle_kernels import Move, PingBatch
-from echostep.localization.particles import Cloud, Evidence
-from echostep.localization.plan_verdict import EARLY_M, FOUND_WITHIN_M, PlanVerdict, away_m
-from echostep.localization.plausibility import STATED, Plausibility, beyond_errors_that_stay, probability_of
-from echostep.localization.recent_way import RecentWay
-from echostep.localization.relative_height import RelativeHeight
-from echostep.localization.riding_height import RidingHeight
-from echostep.localization.start import ANY_LEVEL, Air, Start
-from echostep.localization.usable_pings import UsablePings, judged_share
+from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.echoes.unplanned import UnplannedDensities, UsablePings, judged_share
+from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate, weight_about
+from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
+from echostep.localization.height.levels import HeightChange
+from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
+from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particles.cloud import Cloud, Evidence
+from echostep.localization.particles.start import ANY_LEVEL, Air, Start
+from echostep.localization.search import SearchProgress
+from echostep.localization.settings import FilterSettings, echo_models, with_plan_error
+from echostep.localization.team.meetings import (
+    FITS,
+    WRONG,
+    MeetingEffect,
+    MeetingMemory,
+    moved_by,
+    start_at,
+    weigh_by,
+)
+from echostep.localization.window import RecentWay
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
-from echostep.ports.meeting import Meeting
+from echostep.ports.people.meeting import Meeting
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, by reason
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
 HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
-# Probabilities that a cloud is right, by reason:
-DOUBTED = 0.5  # of the tracked one, below which a search begins
-AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
-BELIEVED = 0.99  # of the tracked one, above which the plan supports it
-GATHERED = 0.7  # of one that has just gathered anywhere, if the plan fits: it has yet to foretell echoes
-UNDECIDED = 0.8  # at most of the tracked one, while a search that has not gathered is of another mind: the true place dies in one of five by chance
-FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
-REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
-WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
-REFUTED = -5.0  # log-odds of a doubted cloud below which it was wrong, even if a search agrees with it later
-ALIKE_NATS = 8.0  # of evidence that a wrong place gains by being alike, before a search has found another
-JUDGED_M = 20.0  # path on which a search's place is judged before it counts against the tracked one
-ELSEWHERE = 0.05  # weight of a search about the tracked cloud, below which it is of another mind
-LEVEL_M = 20.0  # the same for each level more: storeys are often alike but for their doors
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
 
@@ -82,9 +86,7 @@ class MapFilter:
         prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
         self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
         self.search: Hypothetical | None = None
-        self._search_m = 0.0  # length of the path at which the search began
-        self._coarse_m = 0.0  # length of the path on which it was coarse
-        self._before_search = self.tracked.plausibility.log_odds  # that the tracked cloud was right, when it began
+        self._progress = SearchProgress(building.levels, self.tracked.plausibility.log_odds)
         self._is_refuted = False  # whether the tracked cloud was as good as wrong since it was doubted
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
@@ -146,22 +148,16 @@ class MapFilter:
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
         if refusal is not None:
             return refusal
-        is_beacon = meeting.beacon is not None
-        fits = [
-            each.weigh_range(meeting, area_m2) if is_beacon else weigh(each.cloud, meeting, area_m2)
-            for each in self._clouds()
-        ]
-        if is_beacon:
+        fits = [weigh_by(each, meeting, area_m2) for each in self._clouds()]
+        if meeting.beacon is not None:
             return MeetingEffect.USED if fits[0] >= FITS else MeetingEffect.CONTRADICTS
         plausibility, wrong = self.tracked.plausibility, WRONG[meeting.status]
         if fits[0] >= FITS:
             plausibility.raise_to(min(fits[0], 1.0 - wrong))
             self._met.agree()
             return MeetingEffect.USED
-        count = self._met.contradict(self._pings.path_m)
-        moved = moved_probability(plausibility.probability, meeting, count)
-        is_alone = count < CONTRADICTIONS and plausibility.probability >= DOUBTED
-        if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < FITS:
+        moved = moved_by(meeting, plausibility.probability, self._met.contradict(self._pings.path_m))
+        if moved is None:
             return MeetingEffect.CONTRADICTS
         self._met.agree()
         self._track_from(meeting, moved, search_fits=fits[-1] >= FITS)
@@ -186,17 +182,6 @@ class MapFilter:
     def _new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
         s, b = self._settings, self._building
         return Cloud(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor)
-
-    @property
-    def _searched_m(self) -> float:
-        """Length of the path since the last search began."""
-        return self._pings.path_m - self._search_m
-
-    @property
-    def _found_within_m(self) -> float:
-        """Path within which a search finds."""
-        sheet = self._building.sheet
-        return FOUND_WITHIN_M + (0.0 if sheet is None else LEVEL_M * (len(sheet.height_m) - 1))
 
     @property
     def plan_supports(self) -> bool:
@@ -250,17 +235,11 @@ class MapFilter:
         for each in self._clouds():
             self._follow_with(each, move, pings, unplanned, judged_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
-            if path_m > 0.0:
-                self._fall(each.cloud, path_m)
+            loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
+            if loss is not None:
+                each.cloud.reweight(loss)
         if self.search is None and self.tracked.has_contracted and self.tracked.plausibility.probability > BELIEVED:
             self._plan.confirm(path_m)
-
-    def _fall(self, cloud: Cloud, path_m: float) -> None:
-        """Take weight from particles in the air beside an upper storey."""
-        storeys = self._building.upper_storeys
-        loss = None if storeys is None else storeys.log_loss(cloud.x_m, cloud.y_m, path_m)
-        if loss is not None:
-            cloud.reweight(loss)
 
     def _follow_with(
         self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
@@ -321,17 +300,8 @@ class MapFilter:
         near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
         most = near
         if cloud.is_coarse or near <= ELSEWHERE:
-            most = max(near, self._against(self.search))
+            most = max(near, right_against(self.tracked, self.search, self._progress.log_odds_before))
         return Right(min(here, most), about)
-
-    def _against(self, search: Hypothetical) -> float:
-        """Probability that the tracked cloud is right where a search is of another mind, or of none yet."""
-        log_odds, alike = self.tracked.plausibility.log_odds, ALIKE_NATS
-        if search.judged_m > JUDGED_M:
-            return probability_of(log_odds - search.plausibility.log_odds)
-        if search.cloud.is_coarse:  # there is no rival yet: what the tracked one had before is its own
-            alike = min(max(log_odds - self._before_search, 0.0), ALIKE_NATS)
-        return min(probability_of(log_odds - alike), UNDECIDED)
 
     def _choose(self, right: float, walk_heading_rad: float) -> bool:
         """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found.
@@ -341,7 +311,7 @@ class MapFilter:
         tracked, search = self.tracked, self.search
         self._is_refuted = self._is_refuted or tracked.plausibility.log_odds < REFUTED
         self._note_coarse()
-        if self._is_astray(tracked.cloud):
+        if self._progress.is_astray(tracked.cloud, self._pings.path_m):
             self._plan.fail_search()
             self.tracked = self._new_search(Start(), walk_heading_rad)
         elif search is None:
@@ -350,7 +320,7 @@ class MapFilter:
             self._agree()
         elif search.plausibility.probability > FOUND and search.cloud.is_in_one_place and right < DOUBTED:
             self._follow_search(search)
-        elif self._has_failed(search):
+        elif self._progress.has_failed(search, self._pings.path_m):
             self._plan.fail_search()
             start = Start() if self._is_elsewhere else self._nearby(walk_heading_rad)
             self.search = self._new_search(start, walk_heading_rad)
@@ -361,7 +331,7 @@ class MapFilter:
     def _agree(self) -> None:
         """The search agrees with the tracked cloud: that was right, unless it was refuted, and has come by chance to where it is now."""
         if self._is_refuted:
-            self._plan.find(self._searched_m, math.inf)
+            self._plan.find(self._progress.length_m(self._pings.path_m), math.inf)
         else:
             self._plan.agree()
         self.search, self._is_elsewhere = None, False
@@ -370,20 +340,13 @@ class MapFilter:
         """Track from now on what a search has found."""
         was = self._believed(0.0)
         self.tracked, self.search, self._is_elsewhere = search, None, False
-        self._plan.find(self._searched_m, away_m(was, self._believed(0.0)))
+        self._plan.find(self._progress.length_m(self._pings.path_m), away_m(was, self._believed(0.0)))
 
     def _note_coarse(self) -> None:
         """Measure the path of a coarse search; count against the plan that no place is probable at the end of that within which one is found."""
         cloud = self._clouds()[-1].cloud
-        if not cloud.is_coarse:
-            return
-        before_m, self._coarse_m = self._coarse_m, self._searched_m
-        if before_m <= self._found_within_m < self._coarse_m and cloud.place_share < DOUBTED:
+        if cloud.is_coarse and self._progress.note_coarse(self._pings.path_m) and cloud.place_share < DOUBTED:
             self._plan.fail_search()
-
-    def _is_astray(self, cloud: Cloud) -> bool:
-        """Whether a cloud is still coarse after twice the path within which a place is found."""
-        return cloud.is_coarse and self._searched_m > 2.0 * self._found_within_m
 
     def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
@@ -393,7 +356,7 @@ class MapFilter:
         if tracked.is_stated:
             self._plan.reject_start(self._pings.path_m)
         else:
-            self._plan.reject_found(self._searched_m - self._found_within_m)
+            self._plan.reject_found(self._progress.length_m(self._pings.path_m) - self._progress.found_within_m)
         self._is_refuted = False
         self.search = self._new_search(self._nearby(walk_heading_rad), walk_heading_rad)
         return True
@@ -403,8 +366,7 @@ class MapFilter:
         return Start(near=self._believed(walk_heading_rad), near_z_m=float(self.cloud.weight @ self.cloud.z_m))
 
     def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
-        self._search_m, self._coarse_m = self._pings.path_m, 0.0
-        self._before_search = self.tracked.plausibility.log_odds
+        self._progress.begin(self._pings.path_m, self.tracked.plausibility.log_odds)
         self._met.forget_beacons()
         return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
 
@@ -415,16 +377,6 @@ class MapFilter:
         on = cloud.level == level
         x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
         return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)
-
-    def _has_failed(self, search: Hypothetical) -> bool:
-        """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing probable for long."""
-        if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
-            return True
-        if search.cloud.is_coarse:
-            return self._is_astray(search.cloud)
-        # Storeys that are alike stay several places, and no new search would tell them apart.
-        is_probable = search.has_contracted and search.plausibility.probability > FOUND
-        return not is_probable and self._searched_m > max(self._found_within_m, self._coarse_m + EARLY_M)
 
     def _estimate(self, segment: PathSegment, right: Right) -> Estimate:
         """The estimate at the end of a segment."""
@@ -437,9 +389,8 @@ class MapFilter:
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
         if self._height is not None:
             new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)
-        return replace(new, plan_fits=plan_fits, outside=self._outside())
-
-    def _outside(self) -> float:
-        """Weight of the tracked cloud outside of the building; 0 where walls enclose no floor."""
-        indoors, cloud = self._building.indoors, self.cloud
-        return 0.0 if indoors is None else float(cloud.weight @ ~indoors.holds(cloud.x_m, cloud.y_m))
+        return replace(
+            new,
+            plan_fits=plan_fits,
+            outside=self._building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
+        )

@@ -13,14 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.mapping.bias import find_bias, without_bias
-from echostep.mapping.directions import right_angles_off
-from echostep.mapping.drawing import draw
-from echostep.mapping.graph import Graph
+from echostep.mapping.graph.bias import find_bias, without_bias
+from echostep.mapping.graph.directions import right_angles_off
+from echostep.mapping.graph.graph import Graph
+from echostep.mapping.graph.nodes import Nodes, nodes_of
+from echostep.mapping.graph.storeys import find_storeys
 from echostep.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
-from echostep.mapping.nodes import Nodes, nodes_of
 from echostep.mapping.smoothed_heading import with_smoothed_headings
-from echostep.mapping.storeys import find_storeys
+from echostep.mapping.walls.drawing import draw
 from echostep.path import MeasuredSegment
 
 SAME_RAD = math.radians(3.0)  # of two findings: the map is turned as a whole, its shape stays

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from echostep.errors import EchostepError
-from echostep.mapping.graph import Closure
+from echostep.mapping.graph.graph import Closure
 from echostep.mapping.mapper import Mapped, Progress, close_loops, drawn, settle
 from echostep.mapping.merging import merged, merged_pings
 from echostep.mapping.placing import Place, find_place

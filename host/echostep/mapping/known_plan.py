@@ -11,11 +11,11 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.mapping.directions import RIGHT_RAD, Directions
-from echostep.mapping.fragments import SD_M, SD_RAD, Fragments
-from echostep.mapping.graph import Graph, Walls
+from echostep.mapping.graph.directions import RIGHT_RAD, Directions
+from echostep.mapping.graph.fragments import SD_M, SD_RAD, Fragments
+from echostep.mapping.graph.graph import Graph, Walls
+from echostep.mapping.graph.nodes import Nodes, Pings
 from echostep.mapping.mapper import Mapped
-from echostep.mapping.nodes import Nodes, Pings
 from echostep.plan.model import Level
 
 PIECE_M = 2.0  # of wall, seen from its middle

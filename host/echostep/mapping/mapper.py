@@ -13,18 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.mapping.association import KNOWN_M, associate
-from echostep.mapping.bias import find_bias, without_bias
-from echostep.mapping.closures import APART_M, STRETCH_M, find_closure
-from echostep.mapping.directions import LEAST_EVIDENCE, Directions
-from echostep.mapping.drawing import Drawing, draw
-from echostep.mapping.fragments import Fragments, find_fragments
-from echostep.mapping.graph import ROUNDS, Closure, Graph, Walls, contradicted
-from echostep.mapping.nodes import Nodes, Pings, nodes_of
-from echostep.mapping.relief import find_relief
+from echostep.mapping.graph.association import KNOWN_M, associate
+from echostep.mapping.graph.bias import find_bias, without_bias
+from echostep.mapping.graph.closures import APART_M, STRETCH_M, find_closure
+from echostep.mapping.graph.directions import LEAST_EVIDENCE, Directions
+from echostep.mapping.graph.fragments import Fragments, find_fragments
+from echostep.mapping.graph.graph import ROUNDS, Closure, Graph, Walls, contradicted
+from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
+from echostep.mapping.graph.relief import find_relief
+from echostep.mapping.graph.spots import with_spots
+from echostep.mapping.graph.storeys import STAIRS, find_storeys
 from echostep.mapping.smoothed_heading import with_smoothed_headings
-from echostep.mapping.spots import with_spots
-from echostep.mapping.storeys import STAIRS, find_storeys
+from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment
 
 LOCAL_ROUNDS, GLOBAL_ROUNDS = 2, 3  # of association and solution, before the closures and after them

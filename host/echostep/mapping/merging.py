@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.mapping.fragments import Fragments
-from echostep.mapping.graph import Closure, Graph, Walls
-from echostep.mapping.nodes import Nodes, Pings
+from echostep.mapping.graph.fragments import Fragments
+from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.nodes import Nodes, Pings
 from echostep.mapping.placing import Place
 
 UNKNOWN_M, UNKNOWN_RAD = 1000.0, 10.0  # standard deviations of what lies between two walks

@@ -16,7 +16,7 @@ from scipy import fft
 
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
-from echostep.mapping.graph import Graph
+from echostep.mapping.graph.graph import Graph
 
 CELL_M = 0.15
 SIDES = 4  # directions from which a wall is seen, a right angle apart

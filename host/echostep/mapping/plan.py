@@ -15,11 +15,11 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.mapping.directions import right_angles_off
+from echostep.mapping.graph.directions import right_angles_off
 from echostep.mapping.mapper import Mapped
 from echostep.mapping.stairs import connector, wells_of, with_wells
-from echostep.plan.gaps import door_gaps
 from echostep.plan.model import Door, Level, Plan, Pose
+from echostep.plan.places.gaps import door_gaps
 
 LEAST_M = 0.1  # a shorter piece is no wall
 ROUND = 3  # digits of a metre

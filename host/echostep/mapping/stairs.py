@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.mapping.storeys import Storeys
+from echostep.mapping.graph.storeys import Storeys
 from echostep.plan.model import Connector, Door, Level
 
 HALF_M = 0.6  # of a flight's width; by reason

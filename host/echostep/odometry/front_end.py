@@ -20,8 +20,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, Imus, RangerSettings, heights, ranges, six_axes
+from echostep.board.faults.health import BoardReports
 from echostep.board.frames import BoardReader, Frames, encode
-from echostep.board.health import BoardReports
 from echostep.board.messages import (
     BoardHealth,
     Configuration,
@@ -45,14 +45,14 @@ from echostep.odometry.foot_legs_handover import FootLegsHandover
 from echostep.odometry.foot_source import ICM20649_NOISE, FootSamples, FootSource
 from echostep.odometry.gyro_blocks import GyroBlocks
 from echostep.odometry.heading_fusion import HeadingFusion
+from echostep.odometry.incapacity.wearer_signs import WearerSigns
 from echostep.odometry.synchronizer import HEIGHT, PART, Synchronizer
-from echostep.odometry.wearer_signs import WearerSigns
 from echostep.path import Dropout, MeasuredSegment, PathSegment
-from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import BOARD, FOOT, GATEWAY, MTX, Chunk, Portion, portion_of
-from echostep.ports.meeting import MEETING
-from echostep.ports.team_beacons import TEAM_BEACONS
-from echostep.ports.teammate import TEAM
+from echostep.ports.people.check_in import PERSON
+from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.team_beacons import TEAM_BEACONS
+from echostep.ports.people.teammate import TEAM
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, Arrivals, MtxTiming, Timeline, Times
 from echostep.xsens import MTDATA, MtSample, encode_frame, pack_mtdata
 

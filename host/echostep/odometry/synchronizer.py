@@ -16,7 +16,7 @@ from echostep.arrays import Floats, Ints, record_dtype
 from echostep.jit import kernel
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 
-PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report; by reason: a cycle of both rangers takes 71 ms [board/health.py, PINGS_HZ]
+PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report; by reason: a cycle of both rangers takes 71 ms [faults/health.py, PINGS_HZ]
 SILENCE_S = 0.5  # a port that lags the other one by more is not waited for; by reason
 BLIND_S = 1.0  # time without any observation that makes a dropout; by reason: twice a standing segment [path.STANDING_PIECE_S]
 MAX_WAITING = 4096  # pings and heights that wait; beyond it the oldest are dropped and counted; by reason: nearly two minutes of both

@@ -14,8 +14,7 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.legs.clipping import repair_clipping
 from echostep.legs.heading import Heading
-from echostep.legs.leg_side import about_trunk
-from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
+from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings, about_trunk
 from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples
 

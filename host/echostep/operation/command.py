@@ -14,26 +14,28 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console, Group
 from rich.live import Live
 
 from echostep.errors import EchostepError
 from echostep.operation.operation import Operation
-from echostep.operation.page import TablePage
-from echostep.operation.record import OperationRecorder
-from echostep.operation.replay import replay
-from echostep.operation.tape import Keyframe, Tape
-from echostep.operation.views import Views, finish
-from echostep.page.guarded_socket import FRAME_S
+from echostep.operation.recorded.record import OperationRecorder
+from echostep.operation.recorded.replay import replay
+from echostep.operation.recorded.tape import Keyframe, Tape
+from echostep.operation.views import Views, finish, open_page
+from echostep.page.protocol import FRAME_S
 from echostep.plan.model import Plan, load_plan
 from echostep.team.commander import table
 from echostep.team.endpoint import Endpoint, parse_endpoint
 from echostep.team.inbox import Inbox, ReceivedMessage, Receiver
-from echostep.team.marks import ALL, is_shared
-from echostep.team.mqtt import Listener
-from echostep.team.report import checked_name
+from echostep.team.messages.marks import ALL, is_shared
+from echostep.team.messages.report import checked_name
 from echostep.team.restorer import Restorer
+
+if TYPE_CHECKING:
+    from echostep.operation.page import TablePage
 
 TABLE_S = 0.25  # between two drawings of the table, by reason
 
@@ -53,10 +55,7 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         recorder = OperationRecorder(out, operation.plan, str(endpoint))
         opened.callback(_end_recording, recorder, console)
         tape = Tape(recorder.path, grows=True)
-        page = TablePage(operation, "echostep command", views.page, tape) if views.page else None
-        if page:
-            opened.enter_context(page)
-            console.print(f"The page: {page.url}", highlight=False)
+        page = open_page(opened, operation, "echostep command", views, tape, console)
         console.print(f"Recording: {recorder.path}", highlight=False)
         receiver = _receiver(endpoint, checked, operation.plan, inbox, lambda text: console.print(text, markup=False))
         opened.callback(receiver.close)
@@ -115,10 +114,12 @@ def _receiver(
 ) -> Receiver:
     """A subscription to the reports of a team, or of all teams: at a broker, or over a Meshtastic node."""
     if endpoint.scheme == "mesh":
-        from echostep.team.mesh import MeshListener
+        from echostep.team.mesh.mesh import MeshListener
 
         listener = MeshListener(endpoint, team, plan, inbox.put)
         return Receiver(listener, lambda text: print_line(f"{endpoint}: {text}"))
+    from echostep.team.mqtt.publisher import Listener
+
     topics = [f"echostep/{team or '+'}/+/+", ALL]
     return Receiver(Listener(endpoint, topics, inbox.put), lambda text: print_line(f"{endpoint}: {text}"))
 

@@ -34,8 +34,8 @@ from echostep.page.elements.marks import ShownMark
 from echostep.plan.model import Plan
 from echostep.team.commander import rejected, take_messages
 from echostep.team.inbox import Inbox, ReceivedMessage
-from echostep.team.marks import Mark, MarkBoard, ack_message, is_shared
-from echostep.team.report import BadReportError
+from echostep.team.messages.marks import Mark, MarkBoard, ack_message, is_shared
+from echostep.team.messages.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
 
 LIST_S = 0.5  # between two versions of the list, by reason: words are read, not watched

@@ -14,11 +14,11 @@ from typing import Self
 from starlette.websockets import WebSocket
 
 from echostep.operation.operation import Operation, TableScene
+from echostep.operation.recorded.tape import Tape
 from echostep.operation.session import TableFeed, TableSession
-from echostep.operation.tape import Tape
-from echostep.page.faults import Faults
 from echostep.page.server import STATIC, Address, Site, SocketServer
 from echostep.page.shared import PageCounts
+from echostep.page.web.faults import Faults
 
 TABLE = Path(__file__).parent / "static"
 

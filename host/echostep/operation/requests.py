@@ -13,8 +13,8 @@ from msgspec import Meta
 
 from echostep.page.requests import FASTEST, MOST_REQUEST
 from echostep.plan.json_fields import LIMIT_M
-from echostep.team.marks import Identity, MarkKind, Person
-from echostep.team.report import is_printable
+from echostep.team.messages.marks import Identity, MarkKind, Person
+from echostep.team.messages.report import is_printable
 
 Number = Annotated[int, Meta(ge=0, lt=1 << 53)]
 Metres = Annotated[float, Meta(ge=-LIMIT_M, le=LIMIT_M)]

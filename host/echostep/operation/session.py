@@ -15,12 +15,12 @@ from starlette.websockets import WebSocket
 
 from echostep.operation import requests, wire
 from echostep.operation.operation import Operation, TableScene
-from echostep.operation.past import PastView
-from echostep.operation.tape import Tape
-from echostep.page.faults import Faults
-from echostep.page.guarded_socket import FRAME_S, MOST_UNDRAWN, GuardedSocket
-from echostep.page.protocol import Refused
+from echostep.operation.recorded.past import PastView
+from echostep.operation.recorded.tape import Tape
+from echostep.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
+from echostep.page.protocol import FRAME_S, Refused
 from echostep.page.shared import PageCounts
+from echostep.page.web.faults import Faults
 
 BAR_S = 0.5  # between two frames of one scene, by reason: the time bar grows
 PAST = "The page shows the past: return to now first."

@@ -12,7 +12,7 @@ from array import array
 from collections import deque
 from typing import NamedTuple
 
-from echostep.team.report import Position
+from echostep.team.messages.report import Position
 
 TRAIL_S = 180.0  # by reason: the way of some minutes shows where a wearer came from
 STEP_M = 0.7  # least distance between two points, by reason: about a step

@@ -1,20 +1,28 @@
 # SPDX-License-Identifier: MIT
 """Where a team is shown.
 
-In: options of the command. Out: `Views`; a picture, the roster as JSON. Owns nothing.
+In: options of the command. Out: `Views`; the page, a picture, the roster as JSON. Owns nothing.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
 
 from echostep.operation.operation import Operation
-from echostep.page.server import Address
+from echostep.operation.recorded.tape import Tape
 from echostep.team.commander import as_tree
 from echostep.team.picture import draw_team
+
+if TYPE_CHECKING:
+    from echostep.operation.page import TablePage
+    from echostep.page.server import Address
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +32,19 @@ class Views:
     page: Address | None = None
     picture: Path | None = None
     as_json: bool = False
+
+
+def open_page(
+    opened: ExitStack, operation: Operation, title: str, views: Views, tape: Tape, console: Console
+) -> TablePage | None:
+    """The page, served until `opened` is closed, and its address printed; None where there is none."""
+    if views.page is None:
+        return None
+    from echostep.operation.page import TablePage
+
+    page = opened.enter_context(TablePage(operation, title, views.page, tape))
+    console.print(f"The page: {page.url}", highlight=False)
+    return page
 
 
 def finish(operation: Operation, now_s: float, views: Views) -> None:

@@ -17,7 +17,7 @@ from typing import Literal
 import msgspec
 
 from echostep.operation.operation import TableScene
-from echostep.operation.past import ShownTime
+from echostep.operation.recorded.past import ShownTime
 from echostep.operation.words import ShownDetails, ShownWearer
 from echostep.page.elements.marks import ShownMark
 from echostep.page.protocol import PlanLabels, Refused, hello, packed

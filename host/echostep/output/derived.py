@@ -24,6 +24,7 @@ from echostep.board.messages import (
     Status,
 )
 from echostep.errors import EchostepError
+from echostep.extras import lacks
 from echostep.localization.estimate import Estimate
 from echostep.output.foxglove import (
     ELLIPSE,
@@ -103,7 +104,7 @@ class Derived:
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
         tracker.arrival_ns(0.0)  # compiles its kernel before the run starts
-        self._earth = earth_of(tracker.plan)
+        self._earth = None if lacks("/location", "pyproj") else earth_of(tracker.plan)
         # The board's bytes are decoded a second time here: `Tracker.take` cuts a portion at check-ins and beacon readings, and its front end
         # decodes the pieces one by one; the recorded messages are ordered by kind over the whole portion.
         self._board = BoardReader()

@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from echostep.errors import EchostepError
+from echostep.extras import require
 from echostep.output.derived import TOPICS
 from echostep.output.foxglove import FRAME, LOCATION, POSE, SCENE
 from echostep.recording.recorder import DerivedMessage, Topic
@@ -48,10 +49,9 @@ class FoxgloveServer:
 
     def __init__(self, address: FoxgloveAddress, title: str) -> None:
         """Raises EchostepError when foxglove-sdk is not installed, or when the address cannot be used."""
-        try:
-            import foxglove
-        except ImportError as error:
-            raise EchostepError("--foxglove needs Foxglove's SDK: pip install 'echostep[foxglove]'") from error
+        require("--foxglove", "foxglove")
+        import foxglove
+
         self._context = context = foxglove.Context()  # the server alone does not keep it
         self._channels = {topic.name: _channel(topic, context) for topic in ALL_TOPICS}
         self._drawn: dict[str, Any] = {}  # newest entity of the scene by its id

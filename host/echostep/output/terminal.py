@@ -22,7 +22,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from echostep.arrays import Octets
-from echostep.board.health import Finding, Severity
+from echostep.board.faults.health import Finding, Severity
 from echostep.localization.estimate import Estimate
 from echostep.plan.model import Level
 from echostep.tracker import Tracker

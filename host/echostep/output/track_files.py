@@ -23,6 +23,7 @@ from rich.progress import Progress
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.extras import require
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.output.derived import Derived, earth_of
 from echostep.plan.georeference import EarthTransform
@@ -49,6 +50,8 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
     """
     if out.suffix not in FORMATS:
         raise EchostepError(f"{out}: unknown kind of file: choose from {', '.join(FORMATS)}")
+    if out.suffix == ".parquet":
+        require(str(out), "pyarrow")
     recording, plan = open_recording(path), open_limited(plan_path)
     if earth_of(plan) is None and out.suffix in NEEDS_GEOREFERENCE:
         raise EchostepError(

@@ -18,9 +18,9 @@ from echostep.arrays import Floats
 from echostep.foot.steps import Track
 from echostep.localization.beacon_map import BeaconPlace, BeaconState
 from echostep.localization.estimate import Estimate
-from echostep.localization.metrics import Truth
 from echostep.plan.model import Level, Plan
 from echostep.plan.routing import Route
+from echostep.scorecard.truth import Truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,15 +17,18 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import IO, NamedTuple
+from typing import IO, TYPE_CHECKING, NamedTuple
 
+from echostep.extras import lacks
 from echostep.localization.estimate import Estimate
-from echostep.mapping.mapper import Mapped
 from echostep.page.elements.drawn_walls import ShownDrawing, WalkDrawing, shown_drawing, walk_drawing
 from echostep.page.shared_drawing import SharedDrawing
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Pose
 from echostep.plan.writer import plan_json
+
+if TYPE_CHECKING:
+    from echostep.mapping.mapper import Mapped
 
 STRETCH_M = 8.0  # of path, from which a new drawing is made: a few seconds
 LONGER = 0.02  # of the way so far, by which the stretches of a replay are longer
@@ -84,6 +87,9 @@ class DrawingProcess:
         self._thread.join(END_S)
 
     def _run(self) -> None:
+        if words := lacks("the drawing of walls", "scipy"):
+            self._fail(f"no walls are drawn: {words}")
+            return
         try:
             while (stretch := self._next()) is not None:
                 segments, estimate, trail_count = stretch

@@ -26,10 +26,10 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 
 from echostep.errors import EchostepError
-from echostep.page.access import AccessControl
-from echostep.page.connections import Connections
-from echostep.page.gated_server import GatedServer
 from echostep.page.server import STATIC, STOP_S, Address, open_listener
+from echostep.page.web.access import AccessControl
+from echostep.page.web.connections import Connections
+from echostep.page.web.gated_server import GatedServer
 from echostep.plan.model import Level, Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
 

@@ -14,10 +14,9 @@ from abc import ABC, abstractmethod
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from echostep.page import protocol
-from echostep.page.faults import Faults
 from echostep.page.shared import PageCounts
+from echostep.page.web.faults import Faults
 
-FRAME_S = 1.0 / 30.0  # shortest time between two frames
 MOST_UNDRAWN = 2  # frames that are sent but not reported as drawn
 MOST_REQUESTS_A_SECOND = 240  # a page that sends more is disconnected
 POLICY_VIOLATION, INTERNAL_ERROR = 1008, 1011  # WebSocket close codes [RFC 6455, 7.4.1]

@@ -17,15 +17,14 @@ from types import TracebackType
 from typing import Any, Self
 
 from echostep.guidance.cue_list import CueList
-from echostep.localization.echo_likelihood import echo_model
+from echostep.localization.echoes.likelihood import echo_model
 from echostep.localization.estimate import Estimate, unobserved
 from echostep.page.drawing_process import DrawingProcess
 from echostep.page.elements.alarm import shown_alarm
-from echostep.page.elements.beacon_marks import beacon_marks
 from echostep.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
 from echostep.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep.page.elements.lookahead import extrapolate
-from echostep.page.elements.marks import ShownMark
+from echostep.page.elements.marks import ShownMark, beacon_marks
 from echostep.page.elements.meetings import shown_meeting
 from echostep.page.elements.scene import MOST_SHOWN, PageScene, sample_of, status_text
 from echostep.page.elements.stream_rates import StreamRateMeter

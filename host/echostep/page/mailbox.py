@@ -19,7 +19,7 @@ from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
-from echostep.ports.check_in import Call, CheckIn, Undo
+from echostep.ports.people.check_in import Call, CheckIn, Undo
 
 MOST_CHECK_INS = (
     16  # in the queue to the tracker; further ones are refused. By reason: a person makes a few in a minute

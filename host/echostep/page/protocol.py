@@ -21,11 +21,10 @@ import msgspec
 import numpy as np
 
 from echostep.page.elements.alarm import ShownAlarm
-from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.drawn_walls import ShownDrawing
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
-from echostep.page.elements.marks import ShownMark
+from echostep.page.elements.marks import BeaconMark, ShownMark
 from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, ParticleSample
 from echostep.page.elements.stream_rates import StreamRates
@@ -36,6 +35,7 @@ from echostep.page.replay_cursor import PlayState
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 
+FRAME_S = 1.0 / 30.0  # shortest time between two frames
 GRID = 65535.0  # cells across the cloud: the greatest u16
 TRAIL_ROW_BYTES = 12  # float32 x, y, level
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.routing import RoutePlace
-from echostep.ports.check_in import MOST_LEVELS, Call, CheckIn, Undo, call_of, check_in_of, undo_of
+from echostep.ports.people.check_in import MOST_LEVELS, Call, CheckIn, Undo, call_of, check_in_of, undo_of
 
 MOST_REQUEST = 2048  # bytes
 MOST_NAME = 32  # characters of a wearer's name, as in reports

@@ -28,15 +28,15 @@ from starlette.websockets import WebSocket
 
 from echostep.errors import EchostepError
 from echostep.page import protocol
-from echostep.page.access import LOOPBACK, AccessControl
-from echostep.page.connections import Connections
-from echostep.page.faults import Faults
-from echostep.page.gated_server import GatedServer
-from echostep.page.log_budget import logged_to
 from echostep.page.mailbox import Mailbox
 from echostep.page.requests import MOST_REQUEST
 from echostep.page.session import PageSession
 from echostep.page.shared import PageCounts, Shared
+from echostep.page.web.access import LOOPBACK, AccessControl
+from echostep.page.web.connections import Connections
+from echostep.page.web.faults import Faults
+from echostep.page.web.gated_server import GatedServer
+from echostep.page.web.log_budget import logged_to
 from echostep.plan.model import Plan
 
 STATIC = Path(__file__).parent / "static"

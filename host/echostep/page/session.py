@@ -21,11 +21,12 @@ from echostep.page.elements.drawn_walls import NO_DRAWING, ShownDrawing
 from echostep.page.elements.guidance import Destination, ShownGuidance
 from echostep.page.elements.marks import ShownMark
 from echostep.page.elements.scene import PageScene, ParticleSample
-from echostep.page.guarded_socket import FRAME_S, MOST_UNDRAWN, GuardedSocket
+from echostep.page.guarded_socket import MOST_UNDRAWN, GuardedSocket
 from echostep.page.mailbox import Mailbox
+from echostep.page.protocol import FRAME_S
 from echostep.page.replay_cursor import ReplayCursor
 from echostep.page.shared import Shared
-from echostep.ports.check_in import Call, CheckIn, Undo
+from echostep.ports.people.check_in import Call, CheckIn, Undo
 
 
 class PageSession(GuardedSocket):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from echostep.page.elements.guidance import RouteFinder
 from echostep.page.elements.taps import Taps
-from echostep.page.faults import Faults
+from echostep.page.web.faults import Faults
 from echostep.plan.model import Plan
 
 

@@ -14,20 +14,12 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
-from echostep.plan.faces import (
-    JAMB_M,
-    OUTSIDE,
-    TOUCH_M,
-    Faces,
-    extend,
-    faces_under,
-    find_faces,
-)
 from echostep.plan.findings import Lines, PlanFinding
-from echostep.plan.leaks import narrowest_opening
 from echostep.plan.model import Level, Plan
-from echostep.plan.reachability import unreachable_rooms
-from echostep.plan.standing import StandingGround
+from echostep.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces
+from echostep.plan.places.leaks import narrowest_opening
+from echostep.plan.places.reachability import unreachable_rooms
+from echostep.plan.places.standing import StandingGround
 
 # Tolerances, by reason:
 NEAR_M = 0.1  # a wall's end that is nearer than this to a wall was meant to touch it

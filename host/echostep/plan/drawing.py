@@ -16,10 +16,10 @@ import numpy as np
 
 from echostep.errors import EchostepError
 from echostep.plan.cropping import Bounds, extent, within
-from echostep.plan.faces import find_faces
 from echostep.plan.labels import Label, draw_labels
 from echostep.plan.model import Connector, Level, Plan, Pose, Room
-from echostep.plan.spaces import MOST_WALLS
+from echostep.plan.places.faces import find_faces
+from echostep.plan.places.spaces import MOST_WALLS
 
 if TYPE_CHECKING:
     from echostep.plan.findings import PlanFinding

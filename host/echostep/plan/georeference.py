@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.extras import require
 from echostep.plan.model import Georeference
 
 
@@ -17,7 +18,8 @@ class EarthTransform:
     """Projection between a plan's map frame and the Earth, in both directions."""
 
     def __init__(self, georeference: Georeference) -> None:
-        """Raises ValueError when pyproj does not know the coordinate system, or when it is not in degrees."""
+        """Raises ValueError when pyproj does not know the coordinate system, or when it is not in degrees; EchostepError without pyproj."""
+        require("the plan's georeference", "pyproj")
         from pyproj import CRS, Transformer
         from pyproj.exceptions import CRSError
 

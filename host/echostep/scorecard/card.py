@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.error_statistics import ErrorStatistics, error_statistics, quantile
 from echostep.localization.estimate import CHI2_95
 from echostep.plan.model import Plan
+from echostep.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
 from echostep.scorecard.matching import Matched, is_surveyed, known, match
 from echostep.scorecard.track_columns import ScoredPath
 from echostep.scorecard.zones import NO_ZONE, Zones

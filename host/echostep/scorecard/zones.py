@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats, Ints
-from echostep.plan.faces import OUTSIDE
 from echostep.plan.model import Plan
-from echostep.plan.spaces import PlanSpaces, Spaces
+from echostep.plan.places.faces import OUTSIDE
+from echostep.plan.places.spaces import PlanSpaces, Spaces
 
 NO_ZONE = -1
 

@@ -13,18 +13,18 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from echostep.interruption import sleep
-from echostep.ports.check_in import PERSON
 from echostep.ports.chunks import Chunk, Portion, portion_of
-from echostep.ports.meeting import MEETING
-from echostep.ports.team_beacons import TEAM_BEACONS
-from echostep.ports.teammate import TEAM
+from echostep.ports.people.check_in import PERSON
+from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.team_beacons import TEAM_BEACONS
+from echostep.ports.people.teammate import TEAM
 from echostep.recording.recorder import Recorder
 from echostep.session.console import print_notices
 
 if TYPE_CHECKING:
     from echostep.page.live import LivePage
-    from echostep.session.team_ear import TeamEar
-    from echostep.session.teammates_ear import TeammatesEar
+    from echostep.session.team.team_ear import TeamEar
+    from echostep.session.team.teammates_ear import TeammatesEar
 
 LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
 

@@ -18,13 +18,13 @@ from serial.tools import list_ports
 
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.last_place import LastPlace, start_after
-from echostep.localization.level_changes import ClimbSettings
-from echostep.localization.start import Start
+from echostep.localization.height.levels import ClimbSettings
+from echostep.localization.particles.start import Start
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan
 from echostep.session.metadata import LAST, air_of, bounded
 from echostep.tracker import Tracker
+from echostep.tracker.last_place import LastPlace, start_after
 
 FILE = "last.json"
 KEPT_S = 5.0  # between two writes, by reason: a few strides

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 
+from echostep.localization.belief import DOUBTED
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.map_filter import DOUBTED
 from echostep.path import MeasuredSegment
 from echostep.tracker import Tracker
 from echostep.tracker.state import TrackerState

@@ -21,11 +21,11 @@ import numpy as np
 
 from echostep.board.messages import SCHEMA_HASH
 from echostep.errors import EchostepError
-from echostep.localization.start import ANY_LEVEL, Air, Start
+from echostep.localization.particles.start import ANY_LEVEL, Air, Start
 from echostep.plan.importers.limited import open_limited
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.ports.arrival_clock import now_ns
-from echostep.ports.check_in import MOST_SD_M
+from echostep.ports.people.check_in import MOST_SD_M
 from echostep.session.options import TrackingOptions
 
 ANYWHERE = "anywhere"  # value of the field `start`: the walk begins anywhere in the building, or in a room

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.extras import lacks
 from echostep.guidance.cue_list import CueList
 from echostep.localization.estimate import Estimate, digest
-from echostep.localization.metrics import Errors, Truth, errors
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Plan
-from echostep.plan.whereabouts import Whereabouts
+from echostep.plan.places.whereabouts import Whereabouts
+from echostep.scorecard.truth import Errors, Truth, errors
 from echostep.session.console import console
 from echostep.tracker import Tracker
 
@@ -50,16 +51,20 @@ def write_results(folder: Path, tracker: Tracker, guided: CueList | None, result
     failure = _write_tables(folder, guided, result)
     if result.estimates:
         _print_summary(result, tracker.plan, deviation)
-    failure = failure or _draw(folder, tracker, guided, result, deviation)
+    undrawn = lacks("a picture", "matplotlib")
+    if not undrawn:
+        failure = failure or _draw(folder, tracker, guided, result, deviation)
     if not result.estimates:
         console.print(
             "No estimate: the foot never stood still, or no bytes of its sensor came; without one, no stride was seen."
         )
         return
-    if not failure:
-        console.print(f"files: track.csv and track.png in {folder}")
     if failure:
         raise failure
+    drawn = "" if undrawn else " and track.png"
+    console.print(f"files: track.csv{drawn} in {folder}")
+    if undrawn:
+        console.print(f"track.png is left out: {undrawn}", markup=False)
 
 
 def _write_tables(folder: Path, guided: CueList | None, result: Result) -> EchostepError | None:

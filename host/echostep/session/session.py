@@ -16,12 +16,12 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from echostep.extras import lacks
 from echostep.guidance.cues import Cue, arrow_sign, describe_cue
 from echostep.guidance.guided_rescue import GuidedRescue
 from echostep.guidance.guided_run import guidance_of
 from echostep.interruption import holding_signals, raise_held
 from echostep.localization.estimate import Estimate
-from echostep.localization.metrics import Truth
 from echostep.output.derived import Derived
 from echostep.output.terminal import TerminalView
 from echostep.page.elements.true_position import TruePath
@@ -29,6 +29,7 @@ from echostep.ports.chunks import Portion
 from echostep.recording.clock import clock_of
 from echostep.recording.reading import Recording
 from echostep.recording.recorder import Recorder
+from echostep.scorecard.truth import Truth
 from echostep.session.browser import open_browser
 from echostep.session.console import console, print_notices
 from echostep.session.losses import Losses
@@ -41,9 +42,9 @@ if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
     from echostep.page.shared_drawing import SharedDrawing
-    from echostep.session.marks_ear import MarksEar
-    from echostep.session.team_ear import TeamEar
-    from echostep.session.teammates_ear import TeammatesEar
+    from echostep.session.team.marks_ear import MarksEar
+    from echostep.session.team.team_ear import TeamEar
+    from echostep.session.team.teammates_ear import TeammatesEar
     from echostep.team.endpoint import Endpoint
     from echostep.team.publish import Publishing, Source
 
@@ -102,7 +103,7 @@ class Session:
         """A live walk without a plan is drawn for the team, by the page or, without one, unseen."""
         if self.recorded is not None or self.tracker.plan.is_drawn or self._broker is None:
             return
-        from echostep.session.drawing_share import UnseenDrawing, shared_drawing
+        from echostep.session.team.drawing_share import UnseenDrawing, shared_drawing
 
         assert self.output.outlet
         name, say = self.output.outlet.name, partial(console.print, markup=False, highlight=False)
@@ -173,7 +174,7 @@ class Session:
         """A rescuer's live run listens to the other wearer; a replay has in its recording what was heard."""
         if self.recorded is not None or not isinstance(self.guided, GuidedRescue):
             return
-        from echostep.session.team_ear import TeamEar
+        from echostep.session.team.team_ear import TeamEar
 
         print_line = partial(console.print, markup=False, highlight=False)
         self.ear = TeamEar(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
@@ -184,8 +185,8 @@ class Session:
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
         if outlet is None or publishing is None or broker is None or self.recorded is not None:
             return
-        from echostep.session.marks_ear import MarksEar
-        from echostep.session.teammates_ear import TeammatesEar
+        from echostep.session.team.marks_ear import MarksEar
+        from echostep.session.team.teammates_ear import TeammatesEar
 
         print_line = partial(console.print, markup=False, highlight=False)
         self.teammates = TeammatesEar(broker, outlet, publishing.run, self.tracker.plan, print_line)
@@ -210,6 +211,8 @@ class Session:
             sink for sink in (recorder and recorder.write_derived, self._foxglove and self._foxglove.write) if sink
         ]
         derived = Derived(self.tracker) if sinks else None
+        if derived and self.tracker.plan.georeference and (words := lacks("/location", "pyproj")):
+            console.print(f"Longitude and latitude are left out: {words}", markup=False, highlight=False)
         shown = self.output.terminal and console.is_terminal
         view = TerminalView(self.tracker, self.title, progress, console) if shown else None
         with view or nullcontext(), holding_signals():

@@ -20,7 +20,7 @@ from rich.text import Text
 from echostep.plan.model import Plan
 from echostep.team.cot import alarm_words
 from echostep.team.inbox import Inbox, ReceivedMessage
-from echostep.team.report import WITHOUT_PLAN
+from echostep.team.messages.report import WITHOUT_PLAN
 from echostep.team.roster import CLOCK_OFF_S, STILL_S, Member, MemberState, Roster, nearest
 
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns

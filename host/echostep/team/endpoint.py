@@ -13,11 +13,17 @@ from pathlib import Path
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from echostep.errors import EchostepError
-from echostep.team.report import checked_name
+from echostep.extras import require
+from echostep.team.messages.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089, "mesh": 0}
 FILES = ("ca", "cert", "key")
 BROKERS = ("mqtt", "mqtts")  # schemes of brokers, which keep messages
+PACKAGES = dict.fromkeys(PORTS, "pyproj") | {
+    "mqtt": "paho",
+    "mqtts": "paho",
+    "mesh": "meshtastic",
+}  # that a scheme needs
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +58,8 @@ def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoin
         asked = parse_qs(parts.query, strict_parsing=True) if parts.query else {}
     except ValueError as error:
         raise EchostepError(f"{shown}: not an address: {error}") from error
+    if parts.scheme in schemes:
+        require(shown, PACKAGES[parts.scheme])
     if parts.scheme == "mesh" and "mesh" in schemes:
         return _mesh(shown, parts.netloc + parts.path, asked)
     if parts.scheme not in schemes:

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Plan
-from echostep.team.report import ReportedPlace
+from echostep.team.messages.report import ReportedPlace
 
 
 class GroundPlane:

@@ -13,8 +13,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+from echostep.team.messages.report import MAX_PAYLOAD
 from echostep.team.outbox import RETRY_PAUSES_S
-from echostep.team.report import MAX_PAYLOAD
 
 MESSAGES_PER_TOPIC = 8  # kept until the next look; by reason: trackers send about two a second
 MAX_TOPICS = 1024

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from echostep.localization.estimate import RISK, WALKER_M_S, ellipse95, trust
-from echostep.team.report import Position, Report, moment
+from echostep.team.messages.report import Position, Report, moment
 
 HEARTBEAT_S = (
     2.0  # after so long without a new estimate the last one is sent again, with its age and a larger covariance

@@ -13,7 +13,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.localization.estimate import ellipse95
 from echostep.plan.model import Plan
-from echostep.team.report import Position
+from echostep.team.messages.report import Position
 from echostep.team.roster import Member, MemberState
 
 LABEL_DISTANCE_M = 1.5  # labels of members closer than this are stacked

@@ -21,13 +21,11 @@ from typing import Literal, Self
 from echostep.errors import EchostepError
 from echostep.localization.estimate import CHI2_95, Estimate, TrackStatus
 from echostep.plan.model import Level, Plan
-from echostep.plan.whereabouts import Whereabouts
+from echostep.plan.places.whereabouts import Whereabouts
 from echostep.team.cot import StreamTransport, UdpTransport
 from echostep.team.endpoint import Endpoint, Outlet
 from echostep.team.georeference import GroundPlane
-from echostep.team.mqtt import MqttTransport
-from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
-from echostep.team.report import (
+from echostep.team.messages.report import (
     WITHOUT_PLAN,
     Motion,
     Position,
@@ -37,6 +35,7 @@ from echostep.team.report import (
     moment,
     printable,
 )
+from echostep.team.outbox import HEARTBEAT_S, Outbox, Transport
 from echostep.tracker import Tracker
 
 Source = Literal["live", "replay", "simulated"]
@@ -240,10 +239,12 @@ def _transport(
     endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str, print_line: Callable[[str], None]
 ) -> Transport:
     if endpoint.scheme == "mesh":
-        from echostep.team.mesh import MeshTransport
+        from echostep.team.mesh.mesh import MeshTransport
 
         return MeshTransport(endpoint, (outlet.team, outlet.name), print_line)
     if endpoint.scheme in ("mqtt", "mqtts"):
+        from echostep.team.mqtt.publisher import MqttTransport
+
         return MqttTransport(endpoint, outlet.team, outlet.name, run)
     if plan.georeference is None:
         raise EchostepError(

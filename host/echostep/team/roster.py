@@ -14,9 +14,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from echostep.team.messages.report import (
+    BadReportError,
+    Position,
+    Presence,
+    Report,
+    check_name,
+    decode,
+    decode_presence,
+)
+from echostep.team.messages.shared_beacons import BEACONS, decode_beacons
 from echostep.team.outbox import aged
-from echostep.team.report import BadReportError, Position, Presence, Report, check_name, decode, decode_presence
-from echostep.team.shared_beacons import BEACONS, decode_beacons
 
 MAX_MEMBERS = 256
 MAX_REASONS = 64

@@ -17,9 +17,8 @@ from echostep.errors import EchostepError
 from echostep.plan.model import Plan
 from echostep.team.endpoint import Endpoint
 from echostep.team.inbox import Receiver
-from echostep.team.mqtt import Listener
-from echostep.team.report import checked_name
-from echostep.team.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
+from echostep.team.messages.report import checked_name
+from echostep.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
 
 PREFIX = "wearer:"
 WAIT_S = 60.0  # for a drawing, by reason: the other wearer may just have set out
@@ -60,6 +59,8 @@ def plan_file(
 
 def _fetched(broker: Endpoint, topic: str, print_line: PrintLine) -> bytes | None:
     """The first payload on a topic that is not empty; None after WAIT_S."""
+    from echostep.team.mqtt.publisher import Listener
+
     heard = queue.SimpleQueue[bytes]()
     listener = Listener(broker, [topic], lambda _topic, payload, _retained: heard.put(payload), MOST_BYTES + 1024)
     receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))

@@ -9,17 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from echostep.arrays import Floats, Ints
-from echostep.board.findings import BoardReports, Finding
+from echostep.board.faults.findings import BoardReports, Finding
+from echostep.board.faults.health import board_findings
 from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
-from echostep.board.health import board_findings
 from echostep.board.messages import Identity, Status
 from echostep.localization.estimate import Estimate
-from echostep.localization.meetings import MeetingNews
-from echostep.odometry.alarm import Alarm
+from echostep.localization.team.meetings import MeetingNews
 from echostep.odometry.front_end import FrontEndCounts
+from echostep.odometry.incapacity.alarm import Alarm
 from echostep.path import PathSegment
-from echostep.ports.team_beacons import SharedBeacon
+from echostep.ports.people.team_beacons import SharedBeacon
 from echostep.xsens.reader import MtxCounts
 
 

@@ -18,29 +18,28 @@ from echostep.angles import wrap
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.errors import EchostepError
 from echostep.localization.beacon_map import BeaconPlace
-from echostep.localization.before_check_in import BeforeCheckIn
+from echostep.localization.belief import STATED
 from echostep.localization.building import Building
+from echostep.localization.echoes.rangers import echo_of
 from echostep.localization.estimate import Estimate, Right, TrackStatus, estimate, unobserved
-from echostep.localization.filter_settings import FilterSettings
-from echostep.localization.last_place import LastPlace, last_place
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.meeting_model import carries_position, on_the_way, start_at
-from echostep.localization.meetings import MeetingEffect, MeetingQueue
-from echostep.localization.particle_kernels import systematic
-from echostep.localization.plausibility import STATED
-from echostep.localization.ranger_models import echo_of
-from echostep.localization.start import Start
-from echostep.localization.team_beacons import TeamBeaconMap, shared_beacons
-from echostep.odometry.alarm import WearerAlarm
+from echostep.localization.particles.kernels import systematic
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import FilterSettings
+from echostep.localization.team.meetings import MeetingEffect, MeetingQueue, carries_position, on_the_way, start_at
+from echostep.localization.team.shared_beacons import TeamBeaconMap, shared_beacons
 from echostep.odometry.front_end import FrontEnd
+from echostep.odometry.incapacity.alarm import WearerAlarm
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
-from echostep.ports.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
-from echostep.ports.meeting import MEETING
-from echostep.ports.team_beacons import TEAM_BEACONS, SharedBeacon
-from echostep.ports.teammate import TEAM
+from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
+from echostep.ports.people.meeting import MEETING
+from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
+from echostep.ports.people.teammate import TEAM
 from echostep.settings import Settings
+from echostep.tracker.before_check_in import BeforeCheckIn
+from echostep.tracker.last_place import LastPlace, last_place
 from echostep.tracker.state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 

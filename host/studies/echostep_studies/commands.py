@@ -1,24 +1,194 @@
 # SPDX-License-Identifier: MIT
-"""`echostep evaluate ...`: one command a study. Heavy imports wait until a command runs."""
+"""`echostep evaluate ...`: one table of commands, one row a study. Heavy imports wait until a command runs.
+
+In: nothing. Out: `app`, the commands. Owns the names of the studies, their options and defaults.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from inspect import Parameter, Signature
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+if TYPE_CHECKING:
+    from echostep_studies.frame.study import Study, StudyRequest
+
 app = typer.Typer(no_args_is_help=True, help="The papers' experiments and ours, with figures and plots.")
 
-Seed = Annotated[int, typer.Option("--seed", help="Seed of the first run; run k has this plus k.", min=0)]
-Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the rows there.")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for plots, journal and Parquet.")]
-Scheduler = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster, not on this machine.")
-]
-WestportData = Annotated[
-    Path | None, typer.Option("--data", metavar="DIR", help="Folder of the public recordings, for westport-house.")
-]
+Options = tuple[Parameter, ...]
+Given = dict[str, Any]  # values of the options by name
+
+
+def _option(
+    name: str, kind: Any, default: Any, words: str, metavar: str | None = None, least: int | None = None
+) -> Parameter:
+    declared = typer.Option(f"--{name.replace('_', '-')}", help=words, metavar=metavar, min=least)
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, declared])
+
+
+def _runs(default: int, words: str) -> Parameter:
+    return _option("runs", int, default, words, least=1)
+
+
+def _data(words: str, default: Any = None) -> Parameter:
+    return _option("data", Path | None if default is None else Path, default, words, "DIR")
+
+
+def _rows(example: str) -> Parameter:
+    return _option("rows", str, "*", f"Only rows of such a name: '{example}'.", "PATTERN")
+
+
+def _out(name: str) -> Parameter:
+    return _option("out", Path, Path("out") / name, "Folder for plots, journal and Parquet.", "DIR")
+
+
+SEED = _option("seed", int, 1, "Seed of the first run; run k has this plus k.", least=0)
+JSON = _option("json", Path | None, None, "Write the rows there.", "FILE")
+SCHEDULER = _option("scheduler", str | None, None, "Run on this Dask cluster, not on this machine.", "ADDRESS")
+WESTPORT = _data("Folder of the public recordings, for westport-house.")
+
+
+def _usual(name: str, runs: int, words: str, *own: Parameter) -> Options:
+    """The options of a study of seeded runs, with its own ones in between."""
+    return _runs(runs, words), SEED, *own, JSON, _out(name), SCHEDULER
+
+
+@dataclass(frozen=True, slots=True)
+class StudyCommand:
+    """One row: `help`, the options in the order of --help, and what imports the study and makes it of a request and the options given."""
+
+    name: str
+    help: str
+    options: Options
+    study: Callable[[StudyRequest, Given], Study[Any, Any]]
+
+
+def _of(module: str) -> Any:
+    """A module of the studies, imported when a command runs."""
+    return import_module(f"echostep_studies.{module}")
+
+
+STUDIES = (
+    StudyCommand(
+        "girard2011",
+        "The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated).",
+        _usual("girard2011", 200, "Walks to simulate."),
+        lambda _request, _given: _of("girard2011.study").STUDY,
+    ),
+    StudyCommand(
+        "kits",
+        "The 52 steps of Girard et al. 2011 with each kind of ranger and of foot (simulated; only SRF02 and MTx were ever worn).",
+        _usual("kits", 100, "Walks to simulate."),
+        lambda _request, _given: _of("girard2011.kits").STUDY,
+    ),
+    StudyCommand(
+        "echoes",
+        "What simulated rangers hear, and how well the tracker's likelihood expects it.",
+        (SEED, JSON, _out("echoes"), _option("fit", bool, False, "Fit the likelihood's settings to simulated pings (minutes).")),
+        lambda _request, given: _of("echoes.study").echoes_study(fit=given["fit"]),
+    ),
+    StudyCommand(
+        "incapacity",
+        "How soon a wearer who cannot move is told, and how often one who can (simulated; recordings where they are).",
+        (
+            _runs(1000, "Wearers who cannot move."), _option("days", int, 5, "Working days of eight hours.", least=0), SEED, JSON,
+            _data("Folder of the public recordings; without it $ECHOSTEP_DATA, or ../shared/data."),
+        ),
+        lambda request, given: _of("incapacity.study").incapacity_study(given["days"], given["data"], request.seed),
+    ),
+    StudyCommand(
+        "lee2010",
+        "The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated).",
+        _usual("lee2010", 100, "People to simulate."),
+        lambda _request, _given: _of("lee2010.study").STUDY,
+    ),
+    StudyCommand(
+        "trails",
+        "The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated).",
+        _usual("trails", 10, "Walks of each trail, each by another person."),
+        lambda _request, _given: _of("trails.study").STUDY,
+    ),
+    StudyCommand(
+        "legs",
+        "Walks of 5 m by many simulated people, and what each fault of the sensors does; with --data, real legs against the feet.",
+        _usual("legs", 100, "People to simulate.", _data("Real legs instead: folder of the public recordings.")),
+        lambda _request, given: (
+            _of("legs.recordings").recordings_study(given["data"]) if given["data"] else _of("legs.people").STUDY
+        ),
+    ),
+    StudyCommand(
+        "gaits",
+        "Walking, hurrying, crawling, sidestepping, stairs and ladders, by the foot alone and by one leg alone (simulated).",
+        _usual("gaits", 20, "Courses in each manner."),
+        lambda _request, _given: _of("gaits.study").STUDY,
+    ),
+    StudyCommand(
+        "floors",
+        "Floors by pressure under weather, doors and fans, by stairs and lift (simulated).",
+        _usual("floors", 50, "Runs of 20 minutes."),
+        lambda _request, _given: _of("floors.study").STUDY,
+    ),
+    StudyCommand(
+        "storeys",
+        "Walks through all floors of a building by stairs and lift (simulated).",
+        _usual("storeys", 10, "Walks through each building.", WESTPORT),
+        lambda _request, given: _of("floors.storeys").storeys_study(given["data"]),
+    ),
+    StudyCommand(
+        "feet",
+        "The foot on real recordings, one setting for all, beside the peers' figures.",
+        (
+            _data("Folder of the public recordings.", Parameter.empty), JSON,
+            _option("out", Path | None, None, "Draw the tracks there.", "DIR"),
+            _option("leave_one_out", bool, False, "Also with the constants that the other sets would choose (minutes)."),
+        ),
+        lambda _request, given: _of("feet.study").feet_study(given["data"], given["out"], left_out=given["leave_one_out"]),
+    ),
+    StudyCommand(
+        "fischer2008",
+        "The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated).",
+        _usual("fischer2008", 1000, "Guided returns to simulate."),
+        lambda request, _given: _of("fischer2008.study").fischer2008_study(request.runs, request.seed),
+    ),
+    StudyCommand(
+        "anywhere",
+        "Wrong and unknown starts, kidnappings, wrong plans, poor echoes: found or not, and what is claimed (simulated).",
+        _usual("anywhere", 200, "Walks of each row.", WESTPORT, _rows("kidnap/*")),
+        lambda _request, given: _of("anywhere.study").anywhere_study(given["data"], given["rows"]),
+    ),
+    StudyCommand(
+        "operation",
+        "Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated).",
+        _usual("operation", 10, "Operations of twenty minutes."),
+        lambda _request, _given: _of("operation.study").operation_study(),
+    ),
+    StudyCommand(
+        "team",
+        "Five wearers, one at a wrong start, each alone and told of its meetings by tap or radio range (simulated).",
+        _usual("team", 10, "Teams of five wearers.", _rows("*/tap")),
+        lambda _request, given: _of("team.study").team_study(given["rows"]),
+    ),
+    StudyCommand(
+        "clutter",
+        "Laser scans of real buildings as pings: furniture, people and doors that the plan does not have.",
+        (
+            _data("Folder of CARMEN logs: *.log, *.log.gz.", Parameter.empty),
+            _option("starts", int, 50, "Unknown starts of each log.", least=0), SEED, JSON, _out("clutter"), SCHEDULER,
+        ),
+        lambda request, given: _of("clutter.study").clutter_study(given["data"], given["starts"], request.seed),
+    ),
+    StudyCommand(
+        "noplan",
+        "Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated).",
+        _usual("noplan", 50, "Walks of each row.", WESTPORT, _rows("*/10min")),
+        lambda request, given: _of("noplan.study").noplan_study(given["data"], given["rows"], request),
+    ),
+)  # fmt: skip
 
 
 @app.callback()
@@ -26,278 +196,21 @@ def evaluate() -> None:
     """The papers' experiments and ours, with figures and plots."""
 
 
-@app.command()
-def girard2011(
-    runs: Annotated[int, typer.Option("--runs", help="Walks to simulate.", min=1)] = 200,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/girard2011"),
-    scheduler: Scheduler = None,
-) -> None:
-    """The 52 steps of Girard et al. 2011, their systems and ours, and what they could not handle (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.girard2011.study import STUDY
+def _add(row: StudyCommand) -> None:
+    """Make the command of a row."""
 
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
+    def command(**given: Any) -> None:
+        from echostep_studies.frame.study import StudyRequest, run_study
 
+        out = given.get("out") or Path("out") / row.name
+        request = StudyRequest(given.get("runs", 1), given.get("seed", 0), given["json"], out, given.get("scheduler"))
+        run_study(row.study(request, given), request)
 
-@app.command()
-def kits(
-    runs: Annotated[int, typer.Option("--runs", help="Walks to simulate.", min=1)] = 100,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/kits"),
-    scheduler: Scheduler = None,
-) -> None:
-    """The 52 steps of Girard et al. 2011 with each kind of ranger and of foot (simulated; only SRF02 and MTx were ever worn)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.girard2011.kits import STUDY
-
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
+    command.__signature__ = Signature(row.options)  # type: ignore[attr-defined]  # typer reads the options there
+    command.__annotations__ = {option.name: option.annotation for option in row.options}
+    command.__doc__ = row.help
+    app.command(row.name)(command)
 
 
-@app.command()
-def echoes(
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/echoes"),
-    fit: Annotated[
-        bool, typer.Option("--fit", help="Fit the likelihood's settings to simulated pings (minutes).")
-    ] = False,
-) -> None:
-    """What simulated rangers hear, and how well the tracker's likelihood expects it."""
-    from echostep_studies.echoes.study import echoes_study
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    run_study(echoes_study(fit=fit), StudyRequest(1, seed, json, out))
-
-
-@app.command()
-def incapacity(
-    runs: Annotated[int, typer.Option("--runs", help="Wearers who cannot move.", min=1)] = 1000,
-    days: Annotated[int, typer.Option("--days", help="Working days of eight hours.", min=0)] = 5,
-    seed: Seed = 1,
-    json: Json = None,
-    data: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")] = Path(
-        "../shared/data"
-    ),
-) -> None:
-    """How soon a wearer who cannot move is told, and how often one who can (simulated; recordings where they are)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.incapacity.study import incapacity_study
-
-    run_study(incapacity_study(days, data, seed), StudyRequest(runs, seed, json, Path("out/incapacity")))
-
-
-@app.command()
-def lee2010(
-    runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/lee2010"),
-    scheduler: Scheduler = None,
-) -> None:
-    """The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.lee2010.study import STUDY
-
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command()
-def trails(
-    runs: Annotated[int, typer.Option("--runs", help="Walks of each trail, each by another person.", min=1)] = 10,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/trails"),
-    scheduler: Scheduler = None,
-) -> None:
-    """The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.trails.study import STUDY
-
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("legs")
-def legs_command(
-    runs: Annotated[int, typer.Option("--runs", help="People to simulate.", min=1)] = 100,
-    seed: Seed = 1,
-    folder: Annotated[
-        Path | None, typer.Option("--data", metavar="DIR", help="Real legs instead: folder of the public recordings.")
-    ] = None,
-    json: Json = None,
-    out: Out = Path("out/legs"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Walks of 5 m by many simulated people, and what each fault of the sensors does; with --data, real legs against the feet."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.legs.people import STUDY
-    from echostep_studies.legs.recordings import recordings_study
-
-    study = STUDY if folder is None else recordings_study(folder)
-    run_study(study, StudyRequest(runs if folder is None else 1, seed, json, out, scheduler))
-
-
-@app.command()
-def gaits(
-    runs: Annotated[int, typer.Option("--runs", help="Courses in each manner.", min=1)] = 20,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/gaits"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Walking, hurrying, crawling, sidestepping, stairs and ladders, by the foot alone and by one leg alone (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.gaits.study import STUDY
-
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("floors")
-def floors_command(
-    runs: Annotated[int, typer.Option("--runs", help="Runs of 20 minutes.", min=1)] = 50,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/floors"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Floors by pressure under weather, doors and fans, by stairs and lift (simulated)."""
-    from echostep_studies.floors.study import STUDY
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    run_study(STUDY, StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("storeys")
-def storeys_command(
-    runs: Annotated[int, typer.Option("--runs", help="Walks through each building.", min=1)] = 10,
-    seed: Seed = 1,
-    folder: WestportData = None,
-    json: Json = None,
-    out: Out = Path("out/storeys"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Walks through all floors of a building by stairs and lift (simulated)."""
-    from echostep_studies.floors.storeys import storeys_study
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    run_study(storeys_study(folder), StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("feet")
-def feet_command(
-    folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of the public recordings.")],
-    json: Json = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Draw the tracks there.")] = None,
-    left_out: Annotated[
-        bool,
-        typer.Option("--leave-one-out", help="Also with the constants that the other sets would choose (minutes)."),
-    ] = False,
-) -> None:
-    """The foot on real recordings, one setting for all, beside the peers' figures."""
-    from echostep_studies.feet.datasets import SETS
-    from echostep_studies.feet.study import feet_study
-    from echostep_studies.frame.recordings import recordings_in
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    recordings = recordings_in(folder, SETS)
-    run_study(feet_study(recordings, out, left_out=left_out), StudyRequest(len(recordings), 0, json, out or Path()))
-
-
-@app.command()
-def fischer2008(
-    runs: Annotated[int, typer.Option("--runs", help="Guided returns to simulate.", min=1)] = 1000,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/fischer2008"),
-    scheduler: Scheduler = None,
-) -> None:
-    """The guided returns of Fischer et al. 2008: dead reckoning, their fusion and ours, and every sweep (simulated)."""
-    from echostep_studies.fischer2008.study import fischer2008_study
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    run_study(fischer2008_study(runs, seed), StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("anywhere")
-def anywhere_command(
-    runs: Annotated[int, typer.Option("--runs", help="Walks of each row.", min=1)] = 200,
-    seed: Seed = 1,
-    folder: WestportData = None,
-    rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: 'kidnap/*'.")] = "*",
-    json: Json = None,
-    out: Out = Path("out/anywhere"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Wrong and unknown starts, kidnappings, wrong plans, poor echoes: found or not, and what is claimed (simulated)."""
-    from echostep_studies.anywhere.study import anywhere_study
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    run_study(anywhere_study(folder, rows), StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("operation")
-def operation_command(
-    runs: Annotated[int, typer.Option("--runs", help="Operations of twenty minutes.", min=1)] = 10,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/operation"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Three storeys in every manner of moving, a battery changed on the way, scored by ISO/IEC 18305 (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.operation.study import operation_study
-
-    run_study(operation_study(), StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("team")
-def team_command(
-    runs: Annotated[int, typer.Option("--runs", help="Teams of five wearers.", min=1)] = 10,
-    seed: Seed = 1,
-    rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: '*/tap'.")] = "*",
-    json: Json = None,
-    out: Out = Path("out/team"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Five wearers, one at a wrong start, each alone and told of its meetings by tap or radio range (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.team.study import team_study
-
-    run_study(team_study(rows), StudyRequest(runs, seed, json, out, scheduler))
-
-
-@app.command("clutter")
-def clutter_command(
-    folder: Annotated[Path, typer.Option("--data", metavar="DIR", help="Folder of CARMEN logs: *.log, *.log.gz.")],
-    starts: Annotated[int, typer.Option("--starts", help="Unknown starts of each log.", min=0)] = 50,
-    seed: Seed = 1,
-    json: Json = None,
-    out: Out = Path("out/clutter"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Laser scans of real buildings as pings: furniture, people and doors that the plan does not have."""
-    from echostep_studies.clutter.study import clutter_study
-    from echostep_studies.frame.study import StudyRequest, run_study
-
-    study = clutter_study(folder, starts, seed)
-    run_study(study, StudyRequest(len(study.seeds or ()), seed, json, out, scheduler))
-
-
-@app.command("noplan")
-def noplan_command(
-    runs: Annotated[int, typer.Option("--runs", help="Walks of each row.", min=1)] = 50,
-    seed: Seed = 1,
-    folder: WestportData = None,
-    rows: Annotated[str, typer.Option("--rows", metavar="PATTERN", help="Only rows of such a name: '*/10min'.")] = "*",
-    json: Json = None,
-    out: Out = Path("out/noplan"),
-    scheduler: Scheduler = None,
-) -> None:
-    """Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated)."""
-    from echostep_studies.frame.study import StudyRequest, run_study
-    from echostep_studies.noplan.study import noplan_study
-
-    request = StudyRequest(runs, seed, json, out, scheduler)
-    run_study(noplan_study(folder, rows, request), request)
+for _row in STUDIES:
+    _add(_row)

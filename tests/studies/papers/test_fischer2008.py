@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from echostep.arrays import Floats
 from echostep.cli import app
-from echostep.commands.offline import foot as run_foot
+from echostep.commands.actions.offline import foot as run_foot
 from echostep.errors import EchostepError
 from echostep.foot import steps as foot
 from echostep.simulation.devices import onboard_filter as onboard
@@ -24,7 +24,7 @@ from echostep_studies.papers import fischer2008
 from echostep_studies.papers.fischer2008 import Fischer2008
 from foot_walks import MANNERS, any_rotation, course, felt
 from needs_data import needs_data
-from recordings import DATA
+from places import DATA
 
 needs_recordings = needs_data("xsens_mtw_voisard")
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echostep.odometry.alarm import AlarmKind, AlarmReason
+from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason
 from echostep.tracker import Tracker
 
 AGAIN_S = 5.0  # between two times that a sentence is spoken, by reason

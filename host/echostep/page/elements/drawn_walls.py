@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate
-from echostep.mapping.mapper import Mapped
-from echostep.mapping.storeys import STAIRS
+from echostep.mapping.graph.storeys import STAIRS
+
+if TYPE_CHECKING:
+    from echostep.mapping.mapper import Mapped
 
 MOST_WALLS, MOST_POINTS = 2000, 4000  # in a message; of more walls those nearest to the wearer. By reason: 72 KB
 

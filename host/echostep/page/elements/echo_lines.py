@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.jit import kernel
-from echostep.localization.echo_likelihood import EchoModel, detection
+from echostep.localization.echoes.likelihood import EchoModel, detection
 from echostep.localization.estimate import Estimate
 from echostep.path import MeasuredSegment
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources

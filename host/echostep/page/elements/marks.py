@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Marks that commanders set, as pages show them: a cleared room, a hazard, a meeting point.
+"""Marks as a page draws them: beacons, and what commanders set (a cleared room, a hazard, a meeting point).
 
-In: nothing. Out: the type. Owns nothing.
+In: a tracker, in its thread. Out: `BeaconMark`s that any thread may read. Owns nothing.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import islice
+
+from echostep.localization.beacon_map import BeaconState
+from echostep.localization.estimate import CHI2_95, ellipse95
+from echostep.ports.people.team_beacons import MOST_SHARED
+from echostep.tracker import Tracker
+
+HEARD_S = 1.5  # a beacon counts as heard this long after its last reading. By reason: longer than a step, at whose end readings are used
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,3 +28,42 @@ class ShownMark:
     y_m: float
     level: int
     by: str
+
+
+@dataclass(frozen=True, slots=True)
+class BeaconMark:
+    """A beacon by its number, at the mean of its position over the particles. The field names are keys of the frame's JSON.
+
+    `radius95_m`: radius of a circle with the beacon's spread, scaled as a 95 % ellipse. `state`: value of a `BeaconState`.
+    `heard`: whether a reading came within the last `HEARD_S`. `by`: the teammate who has placed it; None: this wearer.
+    """
+
+    number: int
+    x_m: float
+    y_m: float
+    radius95_m: float
+    level: int
+    state: str
+    heard: bool
+    by: str | None = None
+
+
+def beacon_marks(tracker: Tracker, t_s: float) -> tuple[BeaconMark, ...]:
+    """Marks of all beacons with a known position at time `t_s`: the wearer's own, and teammates' that are not among these."""
+    state = tracker.state
+    numbers = state.beacon_numbers
+    own = tuple(
+        BeaconMark(
+            numbers[b.slot], b.x_m, b.y_m, math.sqrt(CHI2_95) * b.sd_m, b.level, b.state.value,
+            t_s - b.heard_s < HEARD_S,
+        )
+        for b in tracker.beacon_places(t_s)
+    )  # fmt: skip
+    known = {mark.number for mark in own}
+    told = {b.number: (name, b) for name, beacons in state.team_beacons.items() for b in beacons}
+    return own + tuple(
+        BeaconMark(
+            number, b.x_m, b.y_m, ellipse95(b.xx_m2, b.xy_m2, b.yy_m2).major_m, b.level, BeaconState.WELL.value, heard=False, by=name
+        )
+        for number, (name, b) in islice(told.items(), MOST_SHARED) if number not in known
+    )  # fmt: skip

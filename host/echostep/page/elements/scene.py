@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from echostep.arrays import Octets
 from echostep.localization.estimate import OUTSIDE, UNFIT, Estimate, TrackStatus
 from echostep.page.elements.alarm import ShownAlarm
-from echostep.page.elements.beacon_marks import BeaconMark
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.elements.guidance import ShownGuidance
+from echostep.page.elements.marks import BeaconMark
 from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.true_position import TruePosition

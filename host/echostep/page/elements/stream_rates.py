@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from echostep.board.health import Severity
+from echostep.board.faults.health import Severity
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState
 

@@ -14,10 +14,10 @@ from typing import Literal
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.page.elements.scene import KNOWN_HEADING_RAD, PageScene, format_metres
 from echostep.plan.model import Plan
-from echostep.plan.spaces import PlanSpaces
-from echostep.plan.standing import StandingGround
-from echostep.plan.whereabouts import Whereabouts
-from echostep.ports.check_in import CheckIn
+from echostep.plan.places.spaces import PlanSpaces
+from echostep.plan.places.standing import StandingGround
+from echostep.plan.places.whereabouts import Whereabouts
+from echostep.ports.people.check_in import CheckIn
 
 ASIDE_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted, by reason
 

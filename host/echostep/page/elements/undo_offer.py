@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from echostep.localization.map_filter import BELIEVED, DOUBTED
+from echostep.localization.belief import BELIEVED, DOUBTED
 from echostep.tracker.state import TrackerState
 
 UNDO_NS = 10_000_000_000  # for so long the page offers to undo a check-in, and again once echoes contradict it

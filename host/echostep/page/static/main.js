@@ -3,12 +3,12 @@
 
 import { Gestures } from './gestures.js';
 import { Link } from './link.js';
-import { Painter } from './paint.js';
-import { Panel } from './panel.js';
+import { Painter } from './live/paint.js';
+import { Panel } from './live/panel.js';
 import { PlanView } from './plan.js';
-import { Replay } from './replay.js';
-import { Speech } from './speech.js';
-import { Taps } from './taps.js';
+import { Replay } from './live/replay.js';
+import { Speech } from './live/speech.js';
+import { Taps } from './live/taps.js';
 import { startTheme } from './theme.js';
 import { View } from './view.js';
 

@@ -76,7 +76,7 @@ def _imported(path: Path, hints: Hints, above: Sequence[Path]) -> Plan:
 
         return import_ifc(path)
     if _is_imdf(path):
-        from echostep.plan.importers.imdf import import_imdf
+        from echostep.plan.importers.imdf.venue import import_imdf
 
         return import_imdf(path, hints.storey_height_m, hints.doors_m)
     if path.name == "core.txt" or (path / "core.txt").exists():

@@ -20,6 +20,7 @@ from shapely.geometry import MultiPoint, Polygon
 
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
+from echostep.extras import require
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, opening, room
 from echostep.plan.importers.parsing import read_bytes
@@ -85,10 +86,8 @@ def import_ifc(path: Path) -> Plan:
 
 
 def _open(path: Path) -> Any:
-    try:
-        ifcopenshell: Any = import_module("ifcopenshell")
-    except ImportError as error:
-        raise EchostepError(f"{path}: IFC needs ifcopenshell: pip install 'echostep[ifc]'") from error
+    require(f"{path}: IFC", "ifcopenshell")
+    ifcopenshell: Any = import_module("ifcopenshell")
     start = read_bytes(path)[:2000]
     if b"ISO-10303-21" not in start:
         raise EchostepError(f"{path}: not an IFC file (no ISO-10303-21 at its beginning): export it as IFC (STEP)")

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.signal import lfilter
 
 from echostep.arrays import Floats, Ints
 from echostep.simulation.world.magnetic_field import EARTH, MagneticField
@@ -68,6 +67,8 @@ class WornGyro:
 
 def _correlated(n: int, sd: float, over: float, rng: np.random.Generator) -> Floats:
     """A Gauss-Markov series (n,) of a standard deviation, correlated over so many samples."""
+    from scipy.signal import lfilter
+
     kept = math.exp(-1.0 / over)
     drawn = sd * math.sqrt(1.0 - kept * kept) * rng.standard_normal(n)
     drawn[0] = sd * rng.standard_normal()

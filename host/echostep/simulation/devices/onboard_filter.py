@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.extras import require
 from echostep.jit import kernel
 
 GRAVITY_M_S2 = 9.81
@@ -72,6 +73,7 @@ def orientations(
     Over a gap the attitude stays. Without a magnetometer, x is the first horizontal direction of the sensor's x axis, and the heading drifts with
     the gyros.
     """
+    require("the model of the MTx's filter", "scipy")  # numba multiplies matrices with its BLAS
     settings = settings or OnBoardFilter()
     field = np.zeros((len(t_s), 3)) if mag is None else np.nan_to_num(mag, nan=0.0, posinf=0.0, neginf=0.0)
     matrices = np.empty((len(t_s), 3, 3))

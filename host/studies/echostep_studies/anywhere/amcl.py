@@ -15,9 +15,9 @@ from statistics import median
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.level_changes import (
+from echostep.localization.height.levels import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
     HeightArrays,
@@ -25,24 +25,17 @@ from echostep.localization.level_changes import (
     change_levels,
     level_change_model,
 )
-from echostep.localization.particle_kernels import (
-    NOISE_BEND,
-    Move,
-    ParticleArrays,
-    Piece,
-    effective_size,
-    propagate,
-    systematic,
-)
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start, draw_poses
+from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.localization.particles.kernels import NOISE_BEND, Piece, effective_size, propagate, systematic
+from echostep.localization.particles.start import Start, draw_poses
+from echostep.localization.settings import CloudSettings
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Plan
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import walkable_floor
 from echostep.walls.level_sheet import LevelSheet, lay_out_levels, level_of
 from echostep_studies.anywhere.amcl_kernels import weight_by_ping
-from echostep_studies.anywhere.filtering import WARM_UP, Claim, FilterRun
+from echostep_studies.bench.filtering import WARM_UP, Claim, FilterRun
 
 SIZE = 20_000
 ALPHA_SLOW, ALPHA_FAST = (

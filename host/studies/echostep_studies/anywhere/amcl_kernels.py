@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from echostep.jit import kernel
-from echostep.localization.echo_likelihood import EchoModel, echo_density
-from echostep.localization.particle_kernels import ParticleArrays
+from echostep.localization.echoes.likelihood import EchoModel, echo_density
+from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex
 

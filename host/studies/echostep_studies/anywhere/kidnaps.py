@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.path import MeasuredSegment, PathSegment
-from echostep_studies.anywhere.walks import SimulatedWalk, T, Z
+from echostep_studies.bench.walks import SimulatedWalk, T, Z
 
 RIDES_M = 1e-4  # change of height between two rows of the truth in a moving lift
 DOORS_S = 3.0  # for which the wearer stands in the lift before and after the ride

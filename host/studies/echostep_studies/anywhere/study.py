@@ -15,19 +15,18 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.output.table import Table
 from echostep_studies.anywhere.amcl import track_by_amcl
-from echostep_studies.anywhere.columns import run_row, summaries, tables
-from echostep_studies.anywhere.filtering import FilterRun, track
-from echostep_studies.anywhere.judgement import SEARCH_M, JudgedRun, Truth, judge, true_levels
-from echostep_studies.anywhere.pictures import draw_stanford
 from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
-from echostep_studies.anywhere.walks import T, X, Y, Z
-from echostep_studies.frame.report import Row
+from echostep_studies.bench.columns import ClaimsRow, ClaimsSummary, JudgedRow, run_row, summaries, tables
+from echostep_studies.bench.filtering import FilterRun, track
+from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, Truth, judge, true_levels
+from echostep_studies.bench.stanford import draw_stanford
+from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.frame.study import Study, StudyRequest
 
 PEER = "/amcl"  # ending of the rows of augmented MCL
 
 
-def one_run(names: tuple[str, ...], data: Path | None, seed: int) -> list[Row]:
+def one_run(names: tuple[str, ...], data: Path | None, seed: int) -> list[ClaimsRow]:
     """The trials of these names with the walks of this seed."""
     walks, rows = Walks(seed, data), []
     for name in names:
@@ -48,7 +47,7 @@ def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
     return judge(claims, Truth(place, true_levels(place, z, trial.plan)), walked_m)
 
 
-def anywhere_study(data: Path | None, rows: str = "*") -> Study:
+def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, ClaimsSummary]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings, without which westport-house is left out."""
     if data is not None and not (data / "maps" / "westport-house").is_dir():
         raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its row is left out")
@@ -56,7 +55,9 @@ def anywhere_study(data: Path | None, rows: str = "*") -> Study:
     names = tuple(name for name in every if fnmatch(name, rows))
     if not names:
         raise EchostepError(f"--rows {rows}: no row is named so; there are: {', '.join(every)}")
-    return Study("anywhere", partial(one_run, names, data), summaries, _tables, draw_runs=draw_stanford)
+    return Study(
+        "anywhere", (ClaimsRow, JudgedRow), partial(one_run, names, data), summaries, _tables, draw_runs=draw_stanford
+    )
 
 
 def _methods(trial: str) -> list[str]:
@@ -64,6 +65,6 @@ def _methods(trial: str) -> list[str]:
     return [trial, trial + PEER] if trial in PEERED else [trial]
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[ClaimsSummary], request: StudyRequest) -> list[Table]:
     title = f"Found from nowhere, found again, and the radius: {request.runs} simulated walks a row"
     return tables(title, rows, SEARCH_M)

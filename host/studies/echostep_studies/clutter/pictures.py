@@ -10,7 +10,7 @@ from pathlib import Path
 
 from matplotlib.collections import LineCollection
 
-from echostep_studies.clutter.building import Building
+from echostep_studies.bench.laser.building import Building
 from echostep_studies.frame.pictures import BLACK, BLUE, axes_of, save
 
 

@@ -7,22 +7,23 @@ In: a folder of CARMEN logs. Out: the table, JSON, Parquet, a picture of each pl
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from echostep.localization.particles import CloudSettings
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import CloudSettings
 from echostep.output.table import Table
-from echostep_studies.anywhere.columns import run_row, summaries, tables
-from echostep_studies.anywhere.filtering import FilterRun, track
-from echostep_studies.anywhere.judgement import JudgedRun, Truth, judge
-from echostep_studies.anywhere.pictures import draw_stanford
-from echostep_studies.clutter.building import Building, LogWalk, building_of, walk_from
-from echostep_studies.clutter.carmen_log import logs_in, read_log
+from echostep_studies.bench.columns import JudgedRow, JudgedSummary, run_row, summaries, tables
+from echostep_studies.bench.filtering import FilterRun, track
+from echostep_studies.bench.judgement import JudgedRun, Truth, judge
+from echostep_studies.bench.laser.building import Building, LogWalk, building_of, walk_from
+from echostep_studies.bench.laser.carmen_log import logs_in, read_log
+from echostep_studies.bench.stanford import draw_stanford
 from echostep_studies.clutter.pictures import draw_plans
-from echostep_studies.frame.report import Row
+from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 
 UNKNOWN_M = 60.0  # length of the walks from unknown starts
@@ -31,7 +32,21 @@ NOTES = (
 )
 
 
-def clutter_run(logs: tuple[Path, ...], starts: int, first_seed: int, number: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogRow(JudgedRow):
+    """A run on one plan of a log; `source`: where the path is from."""
+
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogSummary(JudgedSummary):
+    """All runs on one plan of a log."""
+
+    source: str
+
+
+def clutter_run(logs: tuple[Path, ...], starts: int, first_seed: int, number: int) -> list[LogRow]:
     """Run `number` on both plans of its log: the first run of a log is from its true start, each of the others from one of `starts` unknown ones."""
     log, start = divmod(number - first_seed, starts + 1)
     building = building_of(logs[log], first_seed)
@@ -49,12 +64,12 @@ def _unknown_scan(building: Building, number: int) -> int:
     return int(np.random.default_rng([number, 62]).integers(max(int((left_m >= UNKNOWN_M).sum()), 1)))
 
 
-def _row(building: Building, plan: str, what: str, walk: LogWalk, start: Start, seed: int) -> Row:
+def _row(building: Building, plan: str, what: str, walk: LogWalk, start: Start, seed: int) -> LogRow:
     cloud = CloudSettings(start_veer_sd_deg=building.odometry.veer_sd_deg)
     run = track(walk.segments, building.plans[plan], start, seed, cloud)
     at_scans = FilterRun(tuple(run.claims[k] for k in walk.at_scan), run.most_particles, run.cpu_s)
     row = run_row(f"{building.log.name}/{plan}/{what}", seed, _judged(walk, at_scans), at_scans)
-    return row | {"source": building.odometry.source}
+    return LogRow(**as_dict(row), source=building.odometry.source)
 
 
 def _judged(walk: LogWalk, run: FilterRun) -> JudgedRun:
@@ -62,24 +77,24 @@ def _judged(walk: LogWalk, run: FilterRun) -> JudgedRun:
     return judge(run.claims, truth, walk.walked_m, UNKNOWN_M)
 
 
-def _summaries(rows: list[Row]) -> list[Row]:
-    source = {row["name"]: row["source"] for row in rows}
-    return [row | {"source": source[row["name"]]} for row in summaries(rows)]
+def _summaries(rows: list[LogRow]) -> list[LogSummary]:
+    source = {row.name: row.source for row in rows}
+    return [LogSummary(**as_dict(row), source=source[row.name]) for row in summaries(rows)]
 
 
-def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
-    sources = {row["name"].split("/")[0]: row["source"] for row in rows}
+def _tables(rows: list[LogSummary], _request: StudyRequest) -> list[Table]:
+    sources = {row.name.split("/")[0]: row.source for row in rows}
     paths = "Path by: " + "; ".join(f"{name}: {source}" for name, source in sources.items()) + "."
     return tables("Real clutter: pings from laser scans of real buildings", rows, UNKNOWN_M, (*NOTES, paths))
 
 
-def _draw(logs: tuple[Path, ...], seed: int, folder: Path, rows: Sequence[Row]) -> None:
+def _draw(logs: tuple[Path, ...], seed: int, folder: Path, rows: Sequence[LogRow]) -> None:
     draw_stanford(folder, rows)
     for path in logs:
         draw_plans(folder, building_of(path, seed))
 
 
-def clutter_study(data: Path, starts: int, seed: int) -> Study:
+def clutter_study(data: Path, starts: int, seed: int) -> Study[LogRow, LogSummary]:
     """The study of all logs of a folder, with so many unknown starts each; raises EchostepError that names log and line."""
     logs = tuple(logs_in(data))
     for path in logs:
@@ -87,9 +102,11 @@ def clutter_study(data: Path, starts: int, seed: int) -> Study:
     runs = range(seed, seed + len(logs) * (starts + 1))
     return Study(
         "clutter",
+        (LogRow,),
         partial(clutter_run, logs, starts, seed),
         _summaries,
         _tables,
+        runs=len(runs),
         seeds=runs,
         draw_runs=partial(_draw, logs, seed),
     )

@@ -7,15 +7,14 @@ In: poses and ranges. Out: log-densities; fitted settings. Owns nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.localization.echo_likelihood import EchoModel, EchoSettings, echo_model, log_echo
+from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, echo_model, log_echo
 from echostep.output.table import console
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
-from echostep_studies.frame.report import Row
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
 from echostep_studies.simulation.sites import angled, otb, thousand
 
@@ -32,7 +31,16 @@ def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model
     return np.array([log_echo(0.0 if math.isnan(z) else z, count, away, off, kind, model) for z in ranges_m.tolist()])
 
 
-def fitted(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SettingRow:
+    """A setting as it is, and as simulated pings would choose it."""
+
+    name: str
+    set: float
+    fitted: float
+
+
+def fitted(seed: int) -> list[SettingRow]:
     """The settings that explain pings at true poses best, beside those in use: maximum likelihood over three simulated buildings."""
     from scipy.optimize import minimize
 
@@ -48,11 +56,10 @@ def fitted(seed: int) -> list[Row]:
 
     found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
     console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-found.fun:.3f} fitted")
-    rows: list[Row] = [
-        {"name": f"fit: {name}", "set": getattr(EchoSettings(), name), "fitted": round(value, 4)}
+    return [
+        SettingRow(name=f"fit: {name}", set=getattr(EchoSettings(), name), fitted=round(value, 4))
         for name, value in zip(FITTED, np.exp(found.x).tolist(), strict=True)
     ]
-    return rows
 
 
 def _at_true_poses(seed: int) -> list[tuple[float, int, Floats, Floats, Floats]]:

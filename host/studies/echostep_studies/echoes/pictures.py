@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.simulation.world.acoustics import SRF02, directivity_db
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.effects import Effect, pipe_range_m

@@ -8,20 +8,22 @@ nothing but the plan: one computes levels of sound from mirror images, the other
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 
-from echostep.localization.echo_likelihood import EchoSettings, echo_model
+from echostep.localization.echoes.likelihood import EchoSettings, echo_model
 from echostep.output.table import Table, console
 from echostep.simulation.world.acoustics import SRF02, directivity_db
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.effects import Effect, pipe_range_m, simulated_effects
 from echostep_studies.echoes.findings import FINDINGS
-from echostep_studies.echoes.likelihood import fitted, log_p
+from echostep_studies.echoes.likelihood import SettingRow, fitted, log_p
 from echostep_studies.echoes.pictures import draw_effects
-from echostep_studies.frame.report import Row
+from echostep_studies.frame.report import as_dicts
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
 from echostep_studies.simulation.sites import otb
@@ -33,61 +35,83 @@ COLUMNS = {
 SETTINGS_COLUMNS = {"name": "setting", "set": "as set", "fitted": "fitted"}
 
 
-def echoes_study(*, fit: bool) -> Study:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EchoRow:
+    """Pings that show one thing: how many, the share that was heard, how well they were expected; and what they show."""
+
+    name: str
+    pings: int | UnsetType = UNSET
+    heard: float | UnsetType = UNSET
+    log_p: float | UnsetType = UNSET
+    uniform: float | UnsetType = UNSET
+    finding: str
+
+
+EchoesRow = EchoRow | SettingRow
+
+
+def echoes_study(*, fit: bool) -> Study[EchoesRow, EchoesRow]:
     """The study, which has one run; `fit`: also fit the likelihood's settings to simulated pings, which takes minutes."""
     return Study(
-        "echoes", partial(one_run, fit=fit), lambda rows: rows, _tables, draw_figures, journal=False, parquet=None
+        "echoes",
+        (EchoRow, SettingRow),
+        partial(one_run, fit=fit),
+        lambda rows: rows,
+        _tables,
+        draw_figures,
+        journal=False,
+        parquet=None,
     )
 
 
-def one_run(seed: int, *, fit: bool) -> list[Row]:
+def one_run(seed: int, *, fit: bool) -> list[EchoesRow]:
     """Rows of the effects, of the angular response, of the schedules, and of the fitted settings."""
-    rows = [_row(effect) for effect in simulated_effects(seed)] + [_cone()] + _schedules(seed)
-    return rows + fitted(seed) if fit else rows
+    rows = [*(_row(effect) for effect in simulated_effects(seed)), _cone(), *_schedules(seed)]
+    return [*rows, *fitted(seed)] if fit else [*rows]
 
 
-def draw_figures(folder: Path, seed: int, _rows: list[Row]) -> None:
+def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
     """The picture of all effects."""
     path = folder / "figures1-5.png"
     draw_effects(path, simulated_effects(seed))
     console.print(f"{path}")
 
 
-def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
-    found = [row for row in rows if "set" not in row]
-    settings = [row for row in rows if "set" in row]
+def _tables(rows: list[EchoesRow], _request: StudyRequest) -> list[Table]:
+    found = as_dicts(row for row in rows if isinstance(row, EchoRow))
+    settings = as_dicts(row for row in rows if isinstance(row, SettingRow))
     tables = [Table("Simulated pings, and how the likelihood expects them", found, COLUMNS)]
     return [*tables, Table("Echo settings", settings, SETTINGS_COLUMNS)] if settings else tables
 
 
-def _row(effect: Effect) -> Row:
+def _row(effect: Effect) -> EchoRow:
     plan, model = Walls(effect.plan), echo_model(EchoSettings())
     explained = np.concatenate([log_p(plan, h.pose, h.range_m, model) for h in effect.heard])
     ranges = np.concatenate([h.range_m for h in effect.heard])
-    return {
-        "name": effect.name,
-        "pings": len(ranges),
-        "heard": round(float(np.mean(~np.isnan(ranges))), 3),
-        "log_p": round(float(explained.mean()), 3),
-        "uniform": round(UNIFORM, 3),
-        "finding": FINDINGS[effect.name](effect),
-    }
+    return EchoRow(
+        name=effect.name,
+        pings=len(ranges),
+        heard=round(float(np.mean(~np.isnan(ranges))), 3),
+        log_p=round(float(explained.mean()), 3),
+        uniform=round(UNIFORM, 3),
+        finding=FINDINGS[effect.name](effect),
+    )
 
 
-def _cone() -> Row:
+def _cone() -> EchoRow:
     angles = np.radians(np.arange(0.0, 50.0, 0.1))
     level = np.array([directivity_db(float(a), SRF02.size) for a in angles])
     six = math.degrees(float(angles[int(np.argmax(level < -6.0))]))
     finding = f"-6 dB at {six:.1f} degrees; the pipe is heard to {pipe_range_m(0.0):.1f} m ahead, {pipe_range_m(math.radians(25.0)):.1f} m at 25"
-    return {"name": "angular response", "finding": finding}
+    return EchoRow(name="angular response", finding=finding)
 
 
-def _schedules(seed: int) -> list[Row]:
+def _schedules(seed: int) -> list[EchoRow]:
     """Pings answered by the other ranger's sound, in the paper's building, by schedule."""
     site, rows = otb(), []
     for name, offset_s in (("both at once", 0.0), ("concurrent", 0.033), ("sequential", 0.07)):
         pings = walk_markers(lay_markers(site.route), site.built, seed, offset_s=offset_s).pings
         share = float(np.mean(pings.cross))
         finding = f"{100 * share:.1f} % are the other ranger's sound; {len(pings.t_s) / pings.t_s[-1]:.0f} pings/s"
-        rows.append({"name": f"schedule: {name}", "pings": len(pings.t_s), "finding": finding})
+        rows.append(EchoRow(name=f"schedule: {name}", pings=len(pings.t_s), finding=finding))
     return rows

@@ -11,8 +11,8 @@ from time import process_time
 import numpy as np
 
 from echostep.foot.steps import Foot, Step
-from echostep_studies.feet.datasets import FootRecording
-from echostep_studies.frame.report import Row
+from echostep_studies.bench.recordings.feet import FootRecording
+from echostep_studies.feet.rows import FigureRow
 
 LIVE_HZ = 200.0
 LIVE = "live"  # the `set` of these rows
@@ -30,7 +30,7 @@ def pace(recording: FootRecording) -> tuple[list[float], float]:
     return late, (process_time() - began) / len(t_s)
 
 
-def pace_rows(recordings: list[FootRecording]) -> list[Row]:
+def pace_rows(recordings: list[FootRecording]) -> list[FigureRow]:
     """Latency and cost over all recordings; the values are seconds and a share, as the metrics say."""
     pace(recordings[0])  # not counted: kernels compile
     found = [pace(recording) for recording in recordings]
@@ -42,14 +42,8 @@ def pace_rows(recordings: list[FootRecording]) -> list[Row]:
         f"share of a core at {LIVE_HZ:.0f} Hz, sample by sample": cost * LIVE_HZ,
     }
     return [
-        {
-            "set": LIVE,
-            "recording": "all",
-            "metric": metric,
-            "value": round(value, 4),
-            "distance_m": None,
-            "peer": None,
-            "peer_name": None,
-        }
+        FigureRow(
+            set=LIVE, recording="all", metric=metric, value=round(value, 4), distance_m=None, peer=None, peer_name=None
+        )
         for metric, value in figures.items()
     ]

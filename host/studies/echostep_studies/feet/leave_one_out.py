@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from statistics import fmean
 
 from rich.progress import track as progress
@@ -17,8 +18,8 @@ from rich.progress import track as progress
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track
 from echostep.output.table import console
-from echostep_studies.feet.datasets import FootRecording
-from echostep_studies.frame.report import Row
+from echostep_studies.bench.recordings.feet import FootRecording
+from echostep_studies.feet.rows import FigureRow
 
 CONSTANTS = ("accel", "gyro_share", "change_share", "lever_m")
 FACTORS = (0.5, 1.0, 2.0)
@@ -43,11 +44,10 @@ def describe(noise: Noise) -> str:
     return ", ".join(f"{name} {getattr(noise, name):g}" for name in CONSTANTS)
 
 
-def add_left_out(rows: list[Row], chosen: dict[str, list[Row]]) -> None:
-    """Put each figure under the other sets' choice beside the figure of the one setting, as `left_out`."""
-    found = {(r["set"], r["recording"], r["metric"]): r["value"] for part in chosen.values() for r in part}
-    for row in rows:
-        row["left_out"] = found.get((row["set"], row["recording"], row["metric"]))
+def with_left_out(rows: list[FigureRow], chosen: dict[str, list[FigureRow]]) -> list[FigureRow]:
+    """Each figure under the other sets' choice beside the figure of the one setting, as `left_out`."""
+    found = {(r.set, r.recording, r.metric): r.value for part in chosen.values() for r in part}
+    return [replace(row, left_out=found.get((row.set, row.recording, row.metric))) for row in rows]
 
 
 def _scaled(factors: tuple[float, ...]) -> Noise:

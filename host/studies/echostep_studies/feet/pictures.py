@@ -11,8 +11,8 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
 from echostep.output.table import console
-from echostep_studies.feet.datasets import FootRecording
-from echostep_studies.feet.metrics import align, places
+from echostep_studies.bench.recordings.feet import FootRecording
+from echostep_studies.bench.recordings.foot_metrics import align, places
 
 
 def draw_tracks(path: Path, recordings: list[FootRecording], tracks: list[Track]) -> None:

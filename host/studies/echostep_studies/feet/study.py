@@ -9,16 +9,21 @@ from __future__ import annotations
 
 from pathlib import Path
 from statistics import median
+from typing import Any
+
+from msgspec import UNSET
 
 from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
 from echostep.output.table import Table, console
-from echostep_studies.feet.datasets import FootRecording
+from echostep_studies.bench.recordings.feet import SETS, FootRecording
+from echostep_studies.bench.recordings.foot_metrics import Figure, way
 from echostep_studies.feet.latency import LIVE, pace_rows
-from echostep_studies.feet.leave_one_out import add_left_out, describe, leave_one_out
-from echostep_studies.feet.metrics import Figure, way
+from echostep_studies.feet.leave_one_out import describe, leave_one_out, with_left_out
 from echostep_studies.feet.pictures import draw_tracks
-from echostep_studies.frame.report import Row
+from echostep_studies.feet.rows import FigureRow
+from echostep_studies.frame.recordings import recordings_in
+from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
 
 COLUMNS = {
@@ -31,42 +36,48 @@ COLUMNS = {
 }
 
 
-def feet_study(recordings: list[FootRecording], out: Path | None, *, left_out: bool) -> Study:
-    """The study of these recordings; `out`: folder of the picture, if one is wanted; `left_out`: also leave one set out."""
+def feet_study(folder: Path, out: Path | None, *, left_out: bool) -> Study[FigureRow, FigureRow]:
+    """The study of the recordings in this folder; `out`: folder of the picture, if one is wanted; `left_out`: also leave one set out.
+
+    Raises EchostepError without any recording.
+    """
+    recordings = recordings_in(folder, SETS)
     tracks = [track_of(recording) for recording in recordings]
     return Study(
         "feet",
+        (FigureRow,),
         lambda _seed: _rows_of_all(recordings, tracks, left_out=left_out),
         lambda rows: rows,
         _tables,
         None if out is None else lambda folder, _seed, _rows: draw_tracks(folder / "feet.png", recordings, tracks),
+        runs=len(recordings),
         seeds=range(1),
         journal=False,
         parquet=None,
     )
 
 
-def _rows_of_all(recordings: list[FootRecording], tracks: list[Track], *, left_out: bool) -> list[Row]:
+def _rows_of_all(recordings: list[FootRecording], tracks: list[Track], *, left_out: bool) -> list[FigureRow]:
     """Rows of the recordings, the medians of the sets, and the rows of the live foot."""
     rows = [row for recording, track in zip(recordings, tracks, strict=True) for row in rows_of(recording, track)]
     rows += medians(rows)
     if left_out:
         choices = leave_one_out(recordings, track_of)
-        add_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
+        rows = with_left_out(rows, {group: _rows_under(recordings, group, noise) for group, noise in choices.items()})
         for group, noise in choices.items():
             console.print(f"{group} left out, the others choose: {describe(noise)}")
     return rows + pace_rows(recordings)
 
 
-def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
+def _tables(rows: list[FigureRow], _request: StudyRequest) -> list[Table]:
     """The figures of the recordings; below, those of the live foot."""
-    live = [f"{row['metric']}: {row['value']:.4f}" for row in rows if row["set"] == LIVE]
-    figures = [row for row in rows if row["set"] != LIVE]
-    columns = COLUMNS | {"left_out": "left out, m"} if any("left_out" in row for row in figures) else COLUMNS
+    live = [f"{row.metric}: {row.value:.4f}" for row in rows if row.set == LIVE]
+    figures = [row for row in rows if row.set != LIVE]
+    columns = COLUMNS | {"left_out": "left out, m"} if any(row.left_out is not UNSET for row in figures) else COLUMNS
     return [Table("The foot on real recordings, one setting", [_printed(row) for row in figures], columns, live)]
 
 
-def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> list[Row]:
+def _rows_under(recordings: list[FootRecording], group: str, noise: Noise) -> list[FigureRow]:
     """The rows of one set with other constants."""
     rows = [row for r in recordings if r.group == group for row in rows_of(r, track_of(r, noise))]
     return rows + medians(rows)
@@ -77,37 +88,45 @@ def track_of(recording: FootRecording, noise: Noise | None = None) -> Track:
     return walk_track(recording.t_s, recording.accel, recording.gyro, noise=noise)
 
 
-def rows_of(recording: FootRecording, track: Track) -> list[Row]:
+def rows_of(recording: FootRecording, track: Track) -> list[FigureRow]:
     """One row for each figure of a recording."""
     return [_row(recording.group, recording.name, figure, way(track)) for figure in recording.judge(track)]
 
 
-def medians(rows: list[Row]) -> list[Row]:
+def medians(rows: list[FigureRow]) -> list[FigureRow]:
     """The median of each metric of a set that has several recordings; of its size where it has a sign."""
     found = []
-    for group, metric in dict.fromkeys((row["set"], row["metric"]) for row in rows if row["set"] != "stairs"):
-        same = [row for row in rows if (row["set"], row["metric"]) == (group, metric)]
+    for group, metric in dict.fromkeys((row.set, row.metric) for row in rows if row.set != "stairs"):
+        same = [row for row in rows if (row.set, row.metric) == (group, metric)]
         if len(same) > 1:
-            middle = Figure(metric, median(abs(row["value"]) for row in same))
-            found.append(_row(group, f"median of {len(same)}", middle, median(row["distance_m"] for row in same)))
+            middle = Figure(metric, median(abs(row.value) for row in same))
+            found.append(
+                _row(
+                    group,
+                    f"median of {len(same)}",
+                    middle,
+                    median(row.distance_m for row in same if row.distance_m is not None),
+                )
+            )
     return found
 
 
-def _row(group: str, name: str, figure: Figure, way_m: float) -> Row:
+def _row(group: str, name: str, figure: Figure, way_m: float) -> FigureRow:
     peer_name, peer = figure.peer or (None, None)
-    return {
-        "set": group,
-        "recording": name,
-        "metric": figure.metric,
-        "value": round(figure.value, 4),
-        "distance_m": round(way_m, 2),
-        "peer": peer,
-        "peer_name": peer_name,
-    }
+    return FigureRow(
+        set=group,
+        recording=name,
+        metric=figure.metric,
+        value=round(figure.value, 4),
+        distance_m=round(way_m, 2),
+        peer=peer,
+        peer_name=peer_name,
+    )
 
 
-def _printed(row: Row) -> Row:
+def _printed(row: FigureRow) -> dict[str, Any]:
     """With three digits, and the peer's name beside its figure."""
-    peer = "" if row["peer"] is None else f"{row['peer']:.3f} {row['peer_name']}"
-    digits = {key: f"{row[key]:.3f}" for key in ("value", "left_out") if row.get(key) is not None}
-    return row | digits | {"peer": peer}
+    columns = as_dict(row)
+    peer = "" if row.peer is None else f"{row.peer:.3f} {row.peer_name}"
+    digits = {key: f"{columns[key]:.3f}" for key in ("value", "left_out") if columns.get(key) is not None}
+    return columns | digits | {"peer": peer}

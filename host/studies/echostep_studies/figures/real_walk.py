@@ -22,16 +22,24 @@ from rich.console import Console
 from echostep.arrays import Floats
 from echostep.foot.steps import Step, walk_track
 from echostep.localization.estimate import Estimate, digest
-from echostep.localization.metrics import load_truth
 from echostep.output.track_plot import draw_track, write_track
 from echostep.plan.model import Pose, load_plan
 from echostep.recording.reading import open_recording
-from echostep.session.recording import start_recording
+from echostep.scorecard.truth import load_truth
+from echostep.session.runs.recording import start_recording
 from echostep.settings import parse_settings
 from echostep.tracker import Tracker
-from echostep_studies.feet.metrics import align, rmse
+from echostep_studies.bench.recordings.foot_metrics import align, rmse
+from echostep_studies.bench.recordings.hallways import (
+    LONG_STEP_M,
+    SETTINGS,
+    START_S,
+    Hallway,
+    chunks,
+    names_in,
+    read_hallway,
+)
 from echostep_studies.frame.recordings import DATA
-from echostep_studies.noplan.real_feet import LONG_STEP_M, SETTINGS, START_S, Hallway, chunks, names_in, read_hallway
 
 NAME = "GX5 33"
 NOTE = "foot real (GX5 33, surveyed footprints); plan drawn around the surveyed path, echoes simulated from it at the true positions"

@@ -20,11 +20,11 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate
-from echostep.localization.metrics import Truth
 from echostep.output.track_plot import TRACK_COLOUR, TRUTH_COLOUR
 from echostep.path import MeasuredSegment
 from echostep.plan.model import Plan, load_plan
 from echostep.ports.chunks import portion_of
+from echostep.scorecard.truth import Truth
 from echostep.simulation.devices.board import Board, BoardProcess, PythonBoard
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep.tracker import Tracker

@@ -16,18 +16,13 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
-from echostep.localization.beacon_beliefs import BeaconMeasurement, empty_beliefs, resample_beliefs, set_beliefs
-from echostep.localization.beacon_model import BeaconModel, BeaconSettings, beacon_model
-from echostep.localization.beacon_slam import initial_health, propose_heading_jumps
-from echostep.localization.beacon_step import Beacons, no_waiting, update_by_reading
-from echostep.localization.particle_kernels import (
-    Move,
-    ParticleArrays,
-    keep_chosen,
-    propagate_without_walls,
-    systematic,
-)
-from echostep.localization.particles import CloudSettings
+from echostep.localization.beacons.beliefs import BeaconMeasurement, empty_beliefs, resample_beliefs, set_beliefs
+from echostep.localization.beacons.model import BeaconModel, BeaconSettings, beacon_model
+from echostep.localization.beacons.slam import initial_health, propose_heading_jumps
+from echostep.localization.beacons.step import Beacons, no_waiting, update_by_reading
+from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.localization.particles.kernels import keep_chosen, propagate_without_walls, systematic
+from echostep.localization.settings import CloudSettings
 from echostep.simulation.world.beacon_ground import BeaconGround, is_in_reach, measure
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex

@@ -16,7 +16,7 @@ from echostep.guidance.contact import Contact, allowed_silence, update_contact
 from echostep.guidance.cues import GuidanceSettings
 from echostep.guidance.target import turn_ahead
 from echostep.jit import kernel
-from echostep.localization.beacon_step import mean_place
+from echostep.localization.beacons.step import mean_place
 from echostep.plan.polyline import nearest
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud
 from echostep_studies.fischer2008.learnt_trail import believed_trail, span_near_heard

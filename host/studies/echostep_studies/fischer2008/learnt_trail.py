@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.jit import kernel
-from echostep.localization.beacon_beliefs import X, Y
+from echostep.localization.beacons.beliefs import X, Y
 from echostep.plan.polyline import along, way_m
 from echostep.simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud, update_by_ultrasound

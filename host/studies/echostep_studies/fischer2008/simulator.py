@@ -16,7 +16,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.guidance.contact import CONTACT, Contact, start_contact
 from echostep.jit import kernel
-from echostep.localization.beacon_model import BeaconSettings
+from echostep.localization.beacons.model import BeaconSettings
 from echostep.plan.polyline import along, way_m
 from echostep.simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud, new_cloud, set_beacons, update_by_ultrasound

@@ -21,7 +21,7 @@ from echostep.output.table import Table
 from echostep.simulation.world.beacon_ground import GroundSettings, ground
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, Knowledge, guided_return
 from echostep_studies.fischer2008.walker import EXACT, Obedience
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.report import as_dict, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 
 BATCH = 50  # returns a task
@@ -58,6 +58,26 @@ class Case:
     every: int = 1
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatchRun:
+    """So many returns of a row, and how many of them reached the exit."""
+
+    name: str
+    runs: int
+    out: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReturnSummary:
+    """The share of the returns that reached the exit, with its 95 % interval."""
+
+    name: str
+    success: float
+    low95: float
+    high95: float
+    runs: int
+
+
 def cases() -> Iterator[Case]:
     """All rows of the study."""
     for name, system in SYSTEMS.items():
@@ -86,10 +106,11 @@ def _with(parameter: str, value: float) -> GroundSettings:
     return replace(NOMINAL, **changed)
 
 
-def fischer2008_study(runs: int, seed: int) -> Study:
+def fischer2008_study(runs: int, seed: int) -> Study[BatchRun, ReturnSummary]:
     """The study of `runs` returns from `seed` on. Its runs are batches of returns: the seed of a run is the batch's index."""
     return Study(
         "fischer2008",
+        (BatchRun,),
         partial(one_batch, first=seed, runs=runs),
         lambda rows: [_summary(group) for group in rows_by_name(rows)],
         _tables,
@@ -99,25 +120,24 @@ def fischer2008_study(runs: int, seed: int) -> Study:
     )
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[ReturnSummary], request: StudyRequest) -> list[Table]:
     """Success rates with 95 % intervals, in percent."""
     printed = [
-        r | {"percent": 100 * r["success"], "low_percent": 100 * r["low95"], "high_percent": 100 * r["high95"]}
+        as_dict(r) | {"percent": 100 * r.success, "low_percent": 100 * r.low95, "high_percent": 100 * r.high95}
         for r in rows
     ]
     return [Table(f"People guided back to the exit in time, {request.runs} simulated returns", printed, COLUMNS)]
 
 
-def one_batch(batch: int, first: int, runs: int) -> list[Row]:
+def one_batch(batch: int, first: int, runs: int) -> list[BatchRun]:
     """The returns [batch * BATCH, ...) of all rows: their number, and the number of those that reached the exit."""
     returns = range(batch * BATCH, min((batch + 1) * BATCH, runs))
     rows = []
     for case in cases():
         chosen = [k for k in returns if k % case.every == 0]
         if chosen:
-            rows.append(
-                {"name": case.name, "runs": len(chosen), "out": sum(one_return(case, first + k) for k in chosen)}
-            )
+            out = sum(one_return(case, first + k) for k in chosen)
+            rows.append(BatchRun(name=case.name, runs=len(chosen), out=out))
     return rows
 
 
@@ -128,11 +148,11 @@ def one_return(case: Case, seed: int) -> bool:
     return guided_return(world, case.system, seed, case.period_s, case.obedience, knowledge).arrived
 
 
-def _summary(batches: list[Row]) -> Row:
+def _summary(batches: list[BatchRun]) -> ReturnSummary:
     """The batches of one row added up: the success rate and its 95 % interval."""
-    runs, out = sum(b["runs"] for b in batches), sum(b["out"] for b in batches)
+    runs, out = sum(b.runs for b in batches), sum(b.out for b in batches)
     low, high = wilson95(out, runs)
-    return {"name": batches[0]["name"], "success": out / runs, "low95": low, "high95": high, "runs": runs}
+    return ReturnSummary(name=batches[0].name, success=out / runs, low95=low, high95=high, runs=runs)
 
 
 def wilson95(successes: int, runs: int) -> tuple[float, float]:
@@ -144,7 +164,7 @@ def wilson95(successes: int, runs: int) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-def draw(out: Path, _seed: int, rows: list[Row]) -> None:
+def draw(out: Path, _seed: int, rows: list[ReturnSummary]) -> None:
     """The paper's Figures 9 and 10, the same return by the particle filter, and the sweeps."""
     from echostep_studies.fischer2008.pictures import draw_returns, draw_sweeps
 
@@ -152,6 +172,6 @@ def draw(out: Path, _seed: int, rows: list[Row]) -> None:
     world = ground(NOMINAL, np.random.default_rng(9), trail)
     returns = {name: guided_return(world, system, 9) for name, system in SYSTEMS.items()}
     draw_returns(out / "figures9-10.png", world, returns)
-    by_name = {r["name"]: r for r in rows}
+    by_name = {r.name: as_dict(r) for r in rows}
     nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
     draw_sweeps(out / "sweeps.png", SWEEPS, nominal, by_name)

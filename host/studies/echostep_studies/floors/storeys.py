@@ -10,7 +10,7 @@ both are right (`floor_right`); `strict_right` gives nothing away.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,20 +19,20 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.error_statistics import error_statistics
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.start import ANY_LEVEL
+from echostep.localization.particles.start import ANY_LEVEL
 from echostep.output.table import Table
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Connector, Plan, Pose
 from echostep.plan.routing import RoutePlace, Routes
 from echostep.ports.chunks import MTX, portion_of
+from echostep.scorecard.error_statistics import error_statistics
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.tours import tour as tour_of
 from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
-from echostep_studies.frame.report import LOST_M, Row, rows_by_name
+from echostep_studies.frame.report import LOST_M, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tour, tower
 
@@ -58,7 +58,49 @@ class BuildingScene:
 SCENES = {"": BuildingScene(), "-legs": BuildingScene(foot=False), "-any": BuildingScene(known=False)}
 
 
-def one_run(real: Path | None, seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoreysRun:
+    """The errors of one walk, and how often its floor was right."""
+
+    name: str
+    profile: str
+    seed: int
+    mean_m: float
+    sd_m: float
+    max_m: float
+    min_m: float
+    ending_m: float
+    ce95_m: float
+    coverage95: float
+    lost: int
+    said_lost: float
+    floor_right: float
+    strict_right: float
+    longest_wrong_s: float
+    floors: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoreysSummary:
+    """All walks of a scene: means, the greatest errors, the walks that end lost."""
+
+    name: str
+    profile: str
+    runs: int
+    mean_m: float
+    sd_m: float
+    ending_m: float
+    ce95_m: float
+    coverage95: float
+    floor_right: float
+    strict_right: float
+    max_m: float
+    min_m: float
+    lost: int
+    longest_wrong_s: float
+
+
+def one_run(real: Path | None, seed: int) -> list[StoreysRun]:
     """Every scene with the person of this seed."""
     rows = [_row(f"storeys/tower{name}", scene, tower(STOREYS), tour(STOREYS), seed) for name, scene in SCENES.items()]
     if real is not None:
@@ -86,7 +128,7 @@ def through(plan: Plan, seed: int) -> list[Waypoint]:
     return tour_of(plan, [*places, places[0]])
 
 
-def _row(name: str, scene: BuildingScene, plan: Plan, way: Sequence[Waypoint], seed: int) -> Row:
+def _row(name: str, scene: BuildingScene, plan: Plan, way: Sequence[Waypoint], seed: int) -> StoreysRun:
     scenario = Scenario(plan, way, seed, PythonBoard(seed), Person(corner_m=0.3))
     chunks = [c for c in scenario.chunks() if scene.foot or c.port != MTX]
     start = scenario.start
@@ -94,10 +136,10 @@ def _row(name: str, scene: BuildingScene, plan: Plan, way: Sequence[Waypoint], s
         plan, Pose(start.x_m, start.y_m, start.heading_rad, start.level if scene.known else ANY_LEVEL), seed=seed
     )
     estimates = [e for k in range(0, len(chunks), PORTION) for e in tracker.take(portion_of(chunks[k : k + PORTION]))]
-    return {"name": name, "profile": "default", "seed": seed, **judge(plan, scenario.truth, estimates)}
+    return judge(plan, scenario.truth, estimates, name, seed)
 
 
-def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate]) -> Row:
+def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate], name: str, seed: int) -> StoreysRun:
     """Errors of a walk; `truth` (n, 5): t_s, x, y, heading, height."""
     t_s = np.array([e.t_s for e in estimates])
     x, y, z = (np.interp(t_s, truth[:, 0], truth[:, k]) for k in (1, 2, 4))
@@ -110,14 +152,14 @@ def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate]) -> Row:
         since = None if good else t if since is None else since
         wrong_s = max(wrong_s, 0.0 if since is None else t - since)
     found = error_statistics(error)
-    return {
-        "mean_m": found.mean_m, "sd_m": found.sd_m, "max_m": found.max_m, "min_m": found.min_m,
-        "ending_m": found.ending_m, "ce95_m": found.p95_m,
-        "coverage95": float(np.mean([e.holds(px, py) for e, px, py, _ in places])),
-        "lost": int(error[-1] > LOST_M), "said_lost": float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
-        "floor_right": float(right.mean()), "strict_right": float(strict.mean()), "longest_wrong_s": wrong_s,
-        "floors": len({e.level for e in estimates}),
-    }  # fmt: skip
+    return StoreysRun(
+        name=name, profile="default", seed=seed, mean_m=found.mean_m, sd_m=found.sd_m, max_m=found.max_m,
+        min_m=found.min_m, ending_m=found.ending_m, ce95_m=found.p95_m,
+        coverage95=float(np.mean([e.holds(px, py) for e, px, py, _ in places])),
+        lost=int(error[-1] > LOST_M), said_lost=float(np.mean([e.status is TrackStatus.LOST for e in estimates])),
+        floor_right=float(right.mean()), strict_right=float(strict.mean()), longest_wrong_s=wrong_s,
+        floors=len({e.level for e in estimates}),
+    )  # fmt: skip
 
 
 def _right(plan: Plan, e: Estimate, at_m: tuple[float, float, float], tie_m: float) -> bool:
@@ -134,33 +176,37 @@ def _holds(connector: Connector, x: float, y: float) -> bool:
     return bool(Polygon(connector.outline_m).buffer(0.3).contains(Point(x, y)))
 
 
-def _summary(rows: Sequence[Row]) -> Row:
-    def over(key: str, how: Callable[[list[float]], float]) -> float:
-        return round(how([row[key] for row in rows]), 4)
+def _summary(rows: Sequence[StoreysRun]) -> StoreysSummary:
+    def mean(key: str) -> float:
+        return round(sum(getattr(row, key) for row in rows) / len(rows), 4)
 
-    def mean(values: list[float]) -> float:
-        return sum(values) / len(values)
-
-    found: Row = {"name": rows[0]["name"], "profile": "default", "runs": len(rows)}
-    found |= {
-        k: over(k, mean) for k in ("mean_m", "sd_m", "ending_m", "ce95_m", "coverage95", "floor_right", "strict_right")
-    }
-    found |= {"max_m": over("max_m", max), "min_m": over("min_m", min), "lost": sum(row["lost"] for row in rows)}
-    return found | {"longest_wrong_s": over("longest_wrong_s", max)}
+    return StoreysSummary(
+        name=rows[0].name, profile="default", runs=len(rows), mean_m=mean("mean_m"), sd_m=mean("sd_m"), ending_m=mean("ending_m"),
+        ce95_m=mean("ce95_m"), coverage95=mean("coverage95"), floor_right=mean("floor_right"), strict_right=mean("strict_right"),
+        max_m=round(max(row.max_m for row in rows), 4), min_m=round(min(row.min_m for row in rows), 4),
+        lost=sum(row.lost for row in rows), longest_wrong_s=round(max(row.longest_wrong_s for row in rows), 4),
+    )  # fmt: skip
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    shown = [{k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()} for row in rows]
-    real = any(row["name"] == WESTPORT for row in rows)
+def _tables(rows: list[StoreysSummary], request: StudyRequest) -> list[Table]:
+    shown = [
+        {k: 100.0 * v if k.endswith("right") or k == "coverage95" else v for k, v in row.items()}
+        for row in as_dicts(rows)
+    ]
+    real = any(row.name == WESTPORT for row in rows)
     notes = () if real else ("Without --data westport-house is left out.",)
     return [Table(f"All floors of a building, {request.runs} simulated walks", shown, COLUMNS, notes)]
 
 
-def storeys_study(data: Path | None) -> Study:
+def storeys_study(data: Path | None) -> Study[StoreysRun, StoreysSummary]:
     """The study; `data`: folder of the public recordings, which holds the plan of westport-house."""
     westport = None if data is None else data / "maps" / "westport-house"
     if westport is not None and not westport.is_dir():
         raise EchostepError(f"{westport}: not there: the tower alone can do without --data")
     return Study(
-        "storeys", partial(one_run, westport), lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables
+        "storeys",
+        (StoreysRun,),
+        partial(one_run, westport),
+        lambda rows: [_summary(group) for group in rows_by_name(rows)],
+        _tables,
     )

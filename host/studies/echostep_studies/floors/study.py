@@ -11,19 +11,19 @@ a metre of the middle both count as right (`floor_right`), because landings lie 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, spans
-from echostep.barometer import vertical_model as vertical
-from echostep.barometer.altitude import BarometerSettings, Pressures
-from echostep.barometer.floor_filter import FloorFilter, Floors
 from echostep.output.table import Table
 from echostep.simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.barometer import vertical_model as vertical
+from echostep_studies.barometer.altitude import BarometerSettings, Pressures
+from echostep_studies.barometer.floor_filter import FloorFilter, Floors
+from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import VerticalMove, climb
@@ -69,12 +69,38 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def one_run(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloorRun:
+    """One run: shares of right floors, with ties and strict, the longest time without a right one, changes of the true floor."""
+
+    name: str
+    seed: int
+    floor_right: float
+    strict_right: float
+    longest_wrong_s: float
+    changes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloorSummary:
+    """All runs of a scene: means, the worst run, runs with more than 10 s on a wrong floor."""
+
+    name: str
+    runs: int
+    floor_right: float
+    strict_right: float
+    worst_right: float
+    longest_wrong_s: float
+    late_runs: int
+    changes: int
+
+
+def one_run(seed: int) -> list[FloorRun]:
     """Every scene with the person and the weather of this seed."""
     return [_row(name, scene, seed) for name, scene in SCENES.items()]
 
 
-def _row(name: str, scene: FloorScene, seed: int) -> Row:
+def _row(name: str, scene: FloorScene, seed: int) -> FloorRun:
     rng = np.random.default_rng([seed, 50])
     way = climb(STOREYS_M, RUN_S, rng, scene.ways)
     sign = float(rng.choice((-1.0, 1.0)))
@@ -86,7 +112,7 @@ def _row(name: str, scene: FloorScene, seed: int) -> Row:
     prior = np.eye(len(heights))[true[0]] if scene.known_start else None
     filter_ = FloorFilter(heights, BarometerSettings(PRESSURE_NOISE_PA[scene.mode]), prior)
     found = filter_.smooth(samples) if scene.whole else filter_.feed(samples)
-    return {"name": name, "seed": seed, **judge(found, away)}
+    return judge(found, away, name, seed)
 
 
 def _measured(
@@ -102,18 +128,16 @@ def _measured(
     return at, Pressures(way.t_s[at], COUNTS_PA * np.rint(noisy / COUNTS_PA), np.rint(20.0 * device[at]) / 20.0, gait)
 
 
-def judge(found: Floors, away_m: Floats) -> Row:
-    """Share of right floors with ties and strict, the longest time without one, changes of the true floor; `away_m`: (n, k) from each storey."""
+def judge(found: Floors, away_m: Floats, name: str, seed: int) -> FloorRun:
+    """The row of a run; `away_m`: (n, k) from each storey."""
     n = np.arange(len(found.floor))
     ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * TIE_M
     wrong = ~ties[n, found.floor]
     true = away_m.argmin(axis=1)
-    return {
-        "floor_right": float(1.0 - wrong.mean()),
-        "strict_right": float((found.floor == true).mean()),
-        "longest_wrong_s": longest_s(found.t_s, wrong),
-        "changes": int(np.count_nonzero(np.diff(true))),
-    }
+    return FloorRun(
+        name=name, seed=seed, floor_right=float(1.0 - wrong.mean()), strict_right=float((found.floor == true).mean()),
+        longest_wrong_s=longest_s(found.t_s, wrong), changes=int(np.count_nonzero(np.diff(true))),
+    )  # fmt: skip
 
 
 def longest_s(t_s: Floats, wrong: Bools) -> float:
@@ -121,26 +145,20 @@ def longest_s(t_s: Floats, wrong: Bools) -> float:
     return max((float(t_s[min(b, len(t_s) - 1)] - t_s[a]) for a, b in spans(wrong).tolist()), default=0.0)
 
 
-def _summary(rows: Sequence[Row]) -> Row:
-    def over(key: str, how: Callable[[list[float]], float]) -> float:
-        return round(how([row[key] for row in rows]), 5)
-
-    return {
-        "name": rows[0]["name"],
-        "runs": len(rows),
-        "floor_right": over("floor_right", lambda v: sum(v) / len(v)),
-        "strict_right": over("strict_right", lambda v: sum(v) / len(v)),
-        "worst_right": over("floor_right", min),
-        "longest_wrong_s": over("longest_wrong_s", max),
-        "late_runs": sum(row["longest_wrong_s"] > 10.0 for row in rows),
-        "changes": sum(row["changes"] for row in rows),
-    }
+def _summary(rows: Sequence[FloorRun]) -> FloorSummary:
+    right, strict = [row.floor_right for row in rows], [row.strict_right for row in rows]
+    return FloorSummary(
+        name=rows[0].name, runs=len(rows), floor_right=round(sum(right) / len(right), 5),
+        strict_right=round(sum(strict) / len(strict), 5), worst_right=round(min(right), 5),
+        longest_wrong_s=round(max(row.longest_wrong_s for row in rows), 5),
+        late_runs=sum(row.longest_wrong_s > 10.0 for row in rows), changes=sum(row.changes for row in rows),
+    )  # fmt: skip
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in rows]
+def _tables(rows: list[FloorSummary], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.endswith("right") else v for k, v in row.items()} for row in as_dicts(rows)]
     title = f"Floors by pressure, {request.runs} simulated runs of 20 minutes, weather of 1 hPa/h"
     return [Table(title, shown, COLUMNS)]
 
 
-STUDY = Study("floors", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)
+STUDY = Study("floors", (FloorRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

@@ -1,51 +1,98 @@
 # SPDX-License-Identifier: MIT
-"""What a study puts out: summary rows, JSON and Parquet files.
+"""What a study puts out: rows as dictionaries, JSON and Parquet files.
 
-In: rows, which are dictionaries with the same keys in every run. Out: files. Owns nothing.
+In: rows, which are dataclasses: their fields are the columns, in this order; a field that is UNSET is a column that the row lacks. Out: files.
+Owns the conversion of rows to dictionaries.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
+
+from msgspec import UNSET
 
 from echostep.errors import EchostepError
-from echostep.localization.error_statistics import error_statistics
+from echostep.scorecard.error_statistics import error_statistics
 
-Row = dict[str, Any]
+Row = dict[str, Any]  # the columns of a row by name
 
 LOST_M = 3.0  # error at the end of a run above which it counts as lost: a definition
 
 
-def rows_by_name(rows: Sequence[Row]) -> list[list[Row]]:
+class Named(Protocol):
+    """A row with a name."""
+
+    @property
+    def name(self) -> str: ...
+
+
+NamedRow = TypeVar("NamedRow", bound=Named)
+
+
+def as_dict(row: Any) -> Row:
+    """The columns that a row has."""
+    values = ((field.name, getattr(row, field.name)) for field in fields(row))
+    return {key: value for key, value in values if value is not UNSET}
+
+
+def as_dicts(rows: Iterable[Any]) -> list[Row]:
+    """The columns of each row."""
+    return [as_dict(row) for row in rows]
+
+
+def rows_by_name(rows: Iterable[NamedRow]) -> list[list[NamedRow]]:
     """The rows of all runs grouped by their `name`, names in the order of their first row."""
-    groups: dict[str, list[Row]] = {}
+    groups: dict[str, list[NamedRow]] = {}
     for row in rows:
-        groups.setdefault(row["name"], []).append(row)
+        groups.setdefault(row.name, []).append(row)
     return list(groups.values())
 
 
-def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]) -> Row:
-    """A row in the form of [Girard 2011, Table 1] from the errors at the steps of each run, (runs, steps).
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorSummary:
+    """A row in the form of [Girard 2011, Table 1].
 
     `mean_m`, `sd_m`, `max_m`, `min_m`, `ending_m` are computed for each run, then averaged over the runs; `worst_m` is the greatest error of all,
     `ce50_m` and `ce95_m` are percentiles of all errors [ISO/IEC 18305:2016, 8.9].
-    `coverage95`: share of all steps with the truth inside the 95 % ellipse, None without `inside95`.
-    `lost`: number of runs that end more than `LOST_M` off.
+    `coverage95`: share of all steps with the truth inside the 95 % ellipse. `lost`: number of runs that end more than `LOST_M` off.
     """
+
+    name: str
+    profile: str
+    runs: int
+    mean_m: float
+    sd_m: float
+    max_m: float
+    min_m: float
+    ending_m: float
+    ce50_m: float
+    ce95_m: float
+    worst_m: float
+    coverage95: float | None
+    lost: int
+
+
+def summary(
+    name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]
+) -> ErrorSummary:
+    """The summary row of the errors at the steps of each run, (runs, steps); without `inside95` no coverage is stated."""
     each = [error_statistics(errors) for errors in errors_m]
-    row: Row = {"name": name, "profile": profile, "runs": len(each)}
-    for key in ("mean_m", "sd_m", "max_m", "min_m", "ending_m"):
-        row[key] = round(sum(getattr(run, key) for run in each) / len(each), 4)
     whole = error_statistics([error for errors in errors_m for error in errors])
-    row |= {"ce50_m": round(whole.median_m, 4), "ce95_m": round(whole.p95_m, 4)}
-    row["worst_m"] = round(whole.max_m, 4)
     steps = [bool(x) for run in inside95 for x in run]
-    row["coverage95"] = round(sum(steps) / len(steps), 4) if steps else None
-    row["lost"] = sum(errors[-1] > LOST_M for errors in errors_m)
-    return row
+
+    def mean(key: str) -> float:
+        return round(sum(getattr(run, key) for run in each) / len(each), 4)
+
+    return ErrorSummary(
+        name=name, profile=profile, runs=len(each), mean_m=mean("mean_m"), sd_m=mean("sd_m"), max_m=mean("max_m"),
+        min_m=mean("min_m"), ending_m=mean("ending_m"), ce50_m=round(whole.median_m, 4), ce95_m=round(whole.p95_m, 4),
+        worst_m=round(whole.max_m, 4), coverage95=round(sum(steps) / len(steps), 4) if steps else None,
+        lost=sum(errors[-1] > LOST_M for errors in errors_m),
+    )  # fmt: skip
 
 
 def write_json(path: Path, study: str, runs: int, seed: int, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -11,40 +11,44 @@ import json
 import multiprocessing
 import os
 import re
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
+import msgspec
 from rich.progress import track
 
 from echostep.errors import EchostepError
 from echostep.output.table import console
-from echostep_studies.frame.report import Row
+from echostep_studies.frame.report import as_dict
 
-Run = Callable[[int], list[Row]]  # seed -> rows
+RunRow = TypeVar("RunRow")
 
 PROGRESS_LINES = 10  # lines about the progress of a study where the output is no terminal
 SCHEDULER_TIMEOUT = "10s"  # for the connection to a Dask scheduler
 
 
 @dataclass(frozen=True, slots=True)
-class SeededRuns:
+class SeededRuns(Generic[RunRow]):
     """Runs of one experiment; run k has the seed `seed + k`.
 
     `run`: importable and picklable; returns the rows of the run of a seed, the same rows for the same seed. `folder`: of the journal.
+    `kinds`: the dataclasses of the rows.
     `scheduler`: address of a Dask scheduler; None: the cores of this machine.
     """
 
     name: str
     runs: int
     seed: int
-    run: Run
+    run: Callable[[int], Iterable[RunRow]]
     folder: Path
+    kinds: tuple[type[RunRow], ...]
     scheduler: str | None = None
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[RunRow]:
         """Rows of all runs in order of their seeds. Runs that the journal holds are not run again."""
         journal = self._open_journal()
         seeds = range(self.seed, self.seed + self.runs)
@@ -54,14 +58,14 @@ class SeededRuns:
         self._run_missing(missing, journal)
         return [row for seed in seeds for row in journal.runs[seed]]
 
-    def _open_journal(self) -> Journal:
+    def _open_journal(self) -> Journal[RunRow]:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            return Journal(self.folder / f"{self.name}.{self._fingerprint()}.journal.jsonl")
+            return Journal(self.folder / f"{self.name}.{self._fingerprint()}.journal.jsonl", self.kinds)
         except OSError as error:
             raise EchostepError(f"{self.folder}: cannot write there: {error.strerror}") from error
 
-    def _run_missing(self, seeds: Sequence[int], journal: Journal) -> None:
+    def _run_missing(self, seeds: Sequence[int], journal: Journal[RunRow]) -> None:
         """Run these seeds and write the rows of each run to the journal as soon as it ends."""
         finished = _on_cluster(self.run, seeds, self.scheduler) if self.scheduler else _on_cores(self.run, seeds)
         try:
@@ -82,36 +86,44 @@ class SeededRuns:
         return sha.hexdigest()[:16]
 
 
-class Journal:
+class Journal(Generic[RunRow]):
     """Rows of the finished runs of a study: a JSON file with one line per run, readable after a kill at any moment.
 
-    Its name has the fingerprint, so journals of other code, rows or data stay beside it.
+    A line has the seed, and for each row the name of its dataclass and its columns.
+
+    The file's name has the fingerprint, so journals of other code, rows or data stay beside it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kinds: tuple[type[RunRow], ...]) -> None:
         self.path = path
-        self.runs: dict[int, list[Row]] = {}
+        self.runs: dict[int, list[RunRow]] = {}
+        self._kinds = {kind.__name__: kind for kind in kinds}
         path.touch()
         lines = path.read_text(errors="replace").splitlines(keepends=True)
         for line in lines:
             try:
-                run = json.loads(line)
-                self.runs[run["seed"]] = run["rows"]
+                self._keep(json.loads(line))
             except (ValueError, KeyError, TypeError):
                 continue  # the last line before a kill may be incomplete
         if lines and not lines[-1].endswith("\n"):
             with path.open("a") as file:
                 file.write("\n")
 
-    def add(self, seed: int, rows: list[Row]) -> None:
-        """Write the rows of a run to the file, then keep them as JSON returns them (tuples become lists)."""
-        line = json.dumps({"seed": seed, "rows": rows})
+    def add(self, seed: int, rows: Iterable[RunRow]) -> None:
+        """Write the rows of a run to the file, then keep them as JSON returns them."""
+        line = json.dumps({"seed": seed, "rows": [(type(row).__name__, as_dict(row)) for row in rows]})
         with self.path.open("a") as file:
             file.write(line + "\n")
-        self.runs[seed] = json.loads(line)["rows"]
+        self._keep(json.loads(line))
+
+    def _keep(self, run: dict[str, Any]) -> None:
+        """The rows of a line of the file; raises ValueError, KeyError or TypeError where it is not a whole one."""
+        self.runs[run["seed"]] = [msgspec.convert(columns, self._kinds[kind]) for kind, columns in run["rows"]]
 
 
-def _on_cores(run: Run, seeds: Sequence[int]) -> Generator[tuple[int, list[Row]], None, None]:
+def _on_cores(
+    run: Callable[[int], Iterable[RunRow]], seeds: Sequence[int]
+) -> Generator[tuple[int, Iterable[RunRow]], None, None]:
     if len(seeds) < 2:
         for seed in seeds:
             yield seed, run(seed)
@@ -130,7 +142,9 @@ def _on_cores(run: Run, seeds: Sequence[int]) -> Generator[tuple[int, list[Row]]
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _on_cluster(run: Run, seeds: Sequence[int], address: str) -> Generator[tuple[int, list[Row]], None, None]:
+def _on_cluster(
+    run: Callable[[int], Iterable[RunRow]], seeds: Sequence[int], address: str
+) -> Generator[tuple[int, Iterable[RunRow]], None, None]:
     try:
         import distributed
     except ImportError as error:

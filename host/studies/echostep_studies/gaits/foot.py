@@ -8,12 +8,12 @@ lacks. The gyro bends off at a soft limit; noise and biases are an MTx's.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import walk_track
-from echostep_studies.frame.report import Row
 from echostep_studies.simulation.rolling_foot import MANNERS, Course, Manner, course, samples
 
 STEPS, RATE_HZ = 40, 200
@@ -35,12 +35,25 @@ MORE = {
 }
 
 
-def foot_rows(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FootRun:
+    """One manner by a foot: the true way and its error, errors of the end in the plane and in height, steps found of those that were."""
+
+    name: str
+    seed: int
+    way_m: float
+    way_percent: float
+    ending_m: float
+    height_m: float
+    steps_percent: float
+
+
+def foot_rows(seed: int) -> list[FootRun]:
     """One row for each manner."""
     return [foot_row(name, manner, seed) for name, manner in (MANNERS | MORE).items()]
 
 
-def foot_row(name: str, manner: Manner, seed: int) -> Row:
+def foot_row(name: str, manner: Manner, seed: int) -> FootRun:
     """40 steps of one manner, no two alike."""
     rng = np.random.default_rng([seed, 70])
     walked = course(manner, STEPS, rng)
@@ -49,10 +62,10 @@ def foot_row(name: str, manner: Manner, seed: int) -> Row:
     way = float(np.linalg.norm(np.diff(walked.prints_m, axis=0), axis=1).sum())
     found = float(sum(np.linalg.norm(step.move_m) for step in track.steps))
     off = track.position_m[-1] - _end(walked)
-    return {
-        "name": f"foot/{name}", "seed": seed, "way_m": way, "way_percent": 100.0 * (found / way - 1.0),
-        "ending_m": float(np.hypot(off[0], off[1])), "height_m": abs(float(off[2])), "steps_percent": 100.0 * len(track.steps) / STEPS,
-    }  # fmt: skip
+    return FootRun(
+        name=f"foot/{name}", seed=seed, way_m=way, way_percent=100.0 * (found / way - 1.0),
+        ending_m=float(np.hypot(off[0], off[1])), height_m=abs(float(off[2])), steps_percent=100.0 * len(track.steps) / STEPS,
+    )  # fmt: skip
 
 
 def soft_limited(gyro: Floats) -> Floats:

@@ -18,7 +18,6 @@ from echostep.legs.kinematics import LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings, distance_sd_m
 from echostep.legs.strides import StrideEstimator
 from echostep.simulation.people.leg_angles import stair_angles
-from echostep_studies.frame.report import Row
 
 CYCLES, RATE_HZ, STAND_S, EASE_S = 15, 100.0, 2.0, 0.8
 AMPLITUDE_SD, TIME_SD = 0.08, 0.05  # of a person against the curves
@@ -70,24 +69,40 @@ MANNERS = {
 }
 
 
-def leg_rows(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegRun:
+    """One manner by a leg: the true way forward and what the strides say of it, the same upward, and how the strides are flagged."""
+
+    name: str
+    seed: int
+    forward_m: float
+    found_m: float
+    sd_m: float
+    error_over_sd: float
+    up_m: float
+    rise_m: float
+    stairs_percent: float
+    blind_percent: float
+
+
+def leg_rows(seed: int) -> list[LegRun]:
     """One row for each manner."""
     return [leg_row(name, manner, seed) for name, manner in MANNERS.items()]
 
 
-def leg_row(name: str, manner: LegManner, seed: int) -> Row:
+def leg_row(name: str, manner: LegManner, seed: int) -> LegRun:
     """CYCLES of one manner by one person, from standing to standing."""
     rng = np.random.default_rng([seed, 71])
     strides = _strides(manner, rng)
     moved = [s for s in strides if Flag.STANDING not in s.flags]
     forward = CYCLES * manner.forward_m
     found, sd = sum(s.length_m for s in strides), distance_sd_m(strides)
-    return {
-        "name": f"legs/{name}", "seed": seed, "forward_m": forward, "found_m": found, "sd_m": sd,
-        "error_over_sd": (found - forward) / sd if sd > 0.0 else math.nan,
-        "up_m": CYCLES * manner.up_m, "rise_m": sum(s.rise_m for s in strides),
-        "stairs_percent": _share(moved, STAIRS), "blind_percent": _share(moved, BLIND),
-    }  # fmt: skip
+    return LegRun(
+        name=f"legs/{name}", seed=seed, forward_m=forward, found_m=found, sd_m=sd,
+        error_over_sd=(found - forward) / sd if sd > 0.0 else math.nan,
+        up_m=CYCLES * manner.up_m, rise_m=sum(s.rise_m for s in strides),
+        stairs_percent=_share(moved, STAIRS), blind_percent=_share(moved, BLIND),
+    )  # fmt: skip
 
 
 def _strides(manner: LegManner, rng: np.random.Generator) -> list[Stride]:

@@ -7,7 +7,7 @@ and limits of the data sheets, steps smoother than real ones; the firmware has n
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from echostep.odometry.foot_source import ICM20649_NOISE
 from echostep.simulation.devices.foot_board import measure_foot
 from echostep.simulation.devices.mtx import MtxModel, measure
 from echostep.simulation.people.walker import RATE_HZ, Person, Walk, walk
-from echostep_studies.frame.report import Row
 from echostep_studies.simulation.sites import otb
 
 PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; by reason
@@ -30,15 +29,25 @@ POSE_MS = 2500  # as in `echostep calibrate accelerometers`
 Samples = tuple[Floats, Floats, Floats]  # t_s (n,), accel, gyro (n, 3)
 
 
-def rows(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KitRun:
+    """A kit on a walk: its errors after each step, and whether its ellipses held the truth, if it states any."""
+
+    name: str
+    seed: int
+    errors_m: list[float]
+    inside95: list[bool]
+
+
+def rows(seed: int) -> list[KitRun]:
     """Each device at each pace, on the same steps."""
-    found: list[Row] = []
+    found: list[KitRun] = []
     waypoints = tuple((float(x), float(y)) for x, y in otb().route)
     for pace, person in PACES.items():
         walked = walk(waypoints, person, np.random.default_rng([seed, 11]))
         for name, (samples, noise) in devices(walked, seed).items():
             errors = errors_m(walked, samples, noise)
-            found.append({"name": f"foot alone, {pace}, {name}", "seed": seed, "errors_m": errors, "inside95": []})
+            found.append(KitRun(name=f"foot alone, {pace}, {name}", seed=seed, errors_m=errors, inside95=[]))
     return found
 
 

@@ -12,14 +12,15 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from echostep.board.messages import Part, Schedule
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.ranger_models import ECHO_OF
+from echostep.localization.echoes.likelihood import EchoSettings
+from echostep.localization.echoes.rangers import ECHO_OF
 from echostep.output.table import Table
 from echostep.simulation.devices.srf02 import HALF_US
 from echostep.simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics
-from echostep_studies.frame.report import Row, rows_by_name, summary
+from echostep_studies.frame.report import ErrorSummary, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.girard2011 import kit_feet
+from echostep_studies.girard2011.kit_feet import KitRun
 from echostep_studies.girard2011.study import COLUMNS, MethodOutput, default, girard
 from echostep_studies.papers.girard2011 import GirardSettings
 from echostep_studies.simulation.marker_walk import MarkerWalk, lay_markers, walk_markers
@@ -55,9 +56,9 @@ def kinds() -> dict[str, RangerKind]:
     }
 
 
-def one_run(seed: int) -> list[Row]:
+def one_run(seed: int) -> list[KitRun]:
     """Both filters with each kind of ranger on the paper's site, and the default filter among furniture."""
-    rows: list[Row] = []
+    rows: list[KitRun] = []
     for name, kind in kinds().items():
         site = otb()
         walk = _walk(site, seed, kind)
@@ -73,21 +74,21 @@ def _walk(site: SimulatedSite, seed: int, kind: RangerKind) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers, None, kind.acoustics, kind.half_s)
 
 
-def _row(name: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> Row:
+def _row(name: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> KitRun:
     errors = [
         math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
     ]
     inside = [s.inside for s in seen if s.inside is not None]
-    return {"name": name, "seed": seed, "errors_m": errors, "inside95": inside}
+    return KitRun(name=name, seed=seed, errors_m=errors, inside95=inside)
 
 
-def _summary(runs: list[Row]) -> Row:
-    return summary(runs[0]["name"], "kits", [r["errors_m"] for r in runs], [r["inside95"] for r in runs])
+def _summary(runs: list[KitRun]) -> ErrorSummary:
+    return summary(runs[0].name, "kits", [r.errors_m for r in runs], [r.inside95 for r in runs])
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[ErrorSummary], request: StudyRequest) -> list[Table]:
     title = f"Position error in metres by kind of ranger, and of the foot alone, {request.runs} simulated runs; only SRF02 and MTx were ever worn"
-    return [Table(title, sorted(rows, key=lambda row: row["name"].split(", ")[:-1]), COLUMNS)]
+    return [Table(title, as_dicts(sorted(rows, key=lambda row: row.name.split(", ")[:-1])), COLUMNS)]
 
 
-STUDY = Study("kits", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)
+STUDY = Study("kits", (KitRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)

@@ -11,20 +11,21 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization.building import Building
-from echostep.localization.echo_likelihood import EchoSettings
-from echostep.localization.filter_settings import FilterSettings
+from echostep.localization.echoes.likelihood import EchoSettings
 from echostep.localization.map_filter import MapFilter
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.localization.settings import FilterSettings
 from echostep.output.table import Table
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.walls.echo_sources import Walls
-from echostep_studies.frame.report import Row, rows_by_name, summary
+from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.papers.girard2011 import Girard, GirardSettings
 from echostep_studies.simulation.marker_walk import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
@@ -56,7 +57,7 @@ SITES: dict[str, Callable[[int], SimulatedSite]] = {
     "angles": lambda _: angled(),
     "thousand": lambda _: thousand(),
 }
-PAPER: tuple[Row, ...] = (  # [Girard 2011, Table 1]
+PAPER: tuple[dict[str, Any], ...] = (  # [Girard 2011, Table 1]
     {"name": "imu", "mean_m": 0.59, "sd_m": 0.35, "max_m": 1.47, "min_m": 0.01, "ending_m": 1.47},
     {"name": "model", "mean_m": 0.47, "sd_m": 0.30, "max_m": 1.06, "min_m": 0.01, "ending_m": 1.06},
     {"name": "ranging", "mean_m": 0.13, "sd_m": 0.07, "max_m": 0.40, "min_m": 0.03, "ending_m": 0.18},
@@ -76,7 +77,36 @@ class MethodOutput:
     cloud: Floats
 
 
-def draw(folder: Path, seed: int, _rows: list[Row]) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodRun:
+    """A method on a walk: its errors after each step, and whether its ellipses held the truth."""
+
+    name: str
+    profile: str
+    seed: int
+    errors_m: list[float]
+    inside95: list[bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HallRun(MethodRun):
+    """The same through a hall: how the errors grow in there, against dead reckoning, and the greatest one from AFTER_HALL_S after it on."""
+
+    hall_growth_m: float
+    foot_growth_m: float
+    after_10s_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HallSummary(ErrorSummary):
+    """The row of a hall, with the means of what a `HallRun` has more."""
+
+    hall_growth_m: float
+    foot_growth_m: float
+    after_10s_m: float
+
+
+def draw(folder: Path, seed: int, _rows: list[ErrorSummary]) -> None:
     """The clouds after 9, 21 and 52 steps: without the plan, with it, with ranging, and the default filter [Girard 2011, Figures 10-13]."""
     from echostep_studies.frame.pictures import draw_clouds
 
@@ -96,7 +126,7 @@ def draw(folder: Path, seed: int, _rows: list[Row]) -> None:
     draw_clouds(folder / "figures10-13.png", site.plan, walk.trunk_m, clouds, tracks)
 
 
-def one_run(seed: int) -> list[Row]:
+def one_run(seed: int) -> list[MethodRun]:
     """All systems on the walk of this seed, and the default filter on every other site."""
     site = otb()
     walk = _walk(site, seed)
@@ -105,9 +135,8 @@ def one_run(seed: int) -> list[Row]:
     for name, build in SITES.items():
         site = build(seed)
         walk = _walk(site, seed)
-        rows.append(_row(f"default/{name}", "default", seed, walk, list(default(site, walk, seed))))
-        if name == "hall":
-            rows[-1] |= _in_hall(walk, rows[-1]["errors_m"])
+        row = _row(f"default/{name}", "default", seed, walk, list(default(site, walk, seed)))
+        rows.append(_in_hall(walk, row) if name == "hall" else row)
     return rows
 
 
@@ -184,42 +213,55 @@ def _walk(site: SimulatedSite, seed: int) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers)
 
 
-def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> Row:
+def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> MethodRun:
     errors = [
         math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
     ]
     inside = [s.inside for s in seen if s.inside is not None]
-    return {"name": name, "profile": profile, "seed": seed, "errors_m": errors, "inside95": inside}
+    return MethodRun(name=name, profile=profile, seed=seed, errors_m=errors, inside95=inside)
 
 
-def _in_hall(walk: MarkerWalk, errors_m: list[float]) -> Row:
+def _in_hall(walk: MarkerWalk, run: MethodRun) -> HallRun:
     """How the error grows where no wall is in range, against dead reckoning from the same step on, and when it is over."""
-    x = walk.trunk_m[1:, 0]
+    x, errors_m = walk.trunk_m[1:, 0], run.errors_m
     inside = np.flatnonzero(x > HALL_X_M)
     first, last = int(inside[0]), int(inside[-1])
     imu = np.array([s.at_m for s in dead_reckoned(hall(), walk, 0)]) - walk.trunk_m[1:]
     foot = np.hypot(*(imu - imu[first])[first : last + 1].T)
     after = walk.t_s[1:] >= walk.t_s[1 + last] + AFTER_HALL_S
-    return {
-        "hall_growth_m": max(errors_m[first : last + 1]) - errors_m[first],
-        "foot_growth_m": float(foot.max()),
-        "after_10s_m": max(e for e, late in zip(errors_m, after.tolist(), strict=True) if late),
-    }
+    return HallRun(
+        **as_dict(run),
+        hall_growth_m=max(errors_m[first : last + 1]) - errors_m[first],
+        foot_growth_m=float(foot.max()),
+        after_10s_m=max(e for e, late in zip(errors_m, after.tolist(), strict=True) if late),
+    )
 
 
-def _summary(runs: list[Row]) -> Row:
-    row = summary(runs[0]["name"], runs[0]["profile"], [r["errors_m"] for r in runs], [r["inside95"] for r in runs])
-    for key in ("hall_growth_m", "foot_growth_m", "after_10s_m"):
-        if key in runs[0]:
-            row[key] = round(sum(r[key] for r in runs) / len(runs), 4)
-    return row
+def _summary(runs: list[MethodRun]) -> ErrorSummary:
+    row = summary(runs[0].name, runs[0].profile, [r.errors_m for r in runs], [r.inside95 for r in runs])
+    halls = [r for r in runs if isinstance(r, HallRun)]
+    if not halls:
+        return row
+    return HallSummary(
+        **as_dict(row),
+        hall_growth_m=round(sum(r.hall_growth_m for r in halls) / len(halls), 4),
+        foot_growth_m=round(sum(r.foot_growth_m for r in halls) / len(halls), 4),
+        after_10s_m=round(sum(r.after_10s_m for r in halls) / len(halls), 4),
+    )
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[ErrorSummary], request: StudyRequest) -> list[Table]:
     """The table, with the paper's rows at its end."""
     printed = [row | {"name": f"{row['name']}, the paper"} for row in PAPER]
     title = f"Position error in metres, {request.runs} simulated runs; below, the paper's one real run"
-    return [Table(title, [*rows, *printed], COLUMNS)]
+    return [Table(title, [*as_dicts(rows), *printed], COLUMNS)]
 
 
-STUDY = Study("girard2011", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, draw)
+STUDY = Study(
+    "girard2011",
+    (MethodRun, HallRun),
+    one_run,
+    lambda rows: [_summary(group) for group in rows_by_name(rows)],
+    _tables,
+    draw,
+)

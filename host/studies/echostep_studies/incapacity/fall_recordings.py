@@ -15,20 +15,19 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, Step
 from echostep.foot.trunk_path import GaitSettings, TrunkPath
-from echostep.odometry.falls import STRIDE_M, Fall
-from echostep.odometry.wearer_signs import WearerSigns
+from echostep.odometry.incapacity.falls import STRIDE_M, Fall
+from echostep.odometry.incapacity.wearer_signs import WearerSigns
 from echostep.path import PathSegment
-from echostep_studies.feet.datasets import SETS as FEET
+from echostep_studies.bench.recordings.feet import SETS as FEET
 from echostep_studies.frame.recordings import Sets, read_sets
-from echostep_studies.frame.report import Row
-from echostep_studies.incapacity.falls import MESSAGES_HZ, message_index
+from echostep_studies.incapacity.falls import MESSAGES_HZ, NoFallRun, message_index
 
 MOVING_M_S2 = 2.0  # of a walking chest, sum of the axes' standard deviations in a second
 
 
-def recorded(folder: Path) -> list[Row]:
+def recorded(folder: Path) -> list[NoFallRun]:
     """Every recording of feet and trunks, through the detection: how many falls it claims. There is none in them."""
-    rows: list[Row] = []
+    rows: list[NoFallRun] = []
     for foot in read_sets(folder, FEET)[0]:
         rows.append(_of_foot("recorded: feet", np.asarray(foot.t_s, np.float64), foot.accel, foot.gyro))
     for trunk in read_sets(folder, TRUNKS)[0]:
@@ -78,18 +77,18 @@ TRUNKS: Sets[TrunkRecording] = (
 )
 
 
-def _of_foot(name: str, t_s: Floats, accel: Floats, gyro: Floats) -> Row:
+def _of_foot(name: str, t_s: Floats, accel: Floats, gyro: Floats) -> NoFallRun:
     signs = WearerSigns()
     _add_strides(signs, _foot_strides(t_s, accel, gyro))
     signs.add_foot(t_s, gyro, accel, message_index(t_s))
     return _counted(name, signs, t_s)
 
 
-def _counted(name: str, signs: WearerSigns, t_s: Floats) -> Row:
+def _counted(name: str, signs: WearerSigns, t_s: Floats) -> NoFallRun:
     signs.settle()
     claimed = sum(isinstance(sign, Fall) for sign in signs.pop())
     hours = float(t_s[-1] - t_s[0]) / 3600.0
-    return {"name": name, "seed": 0, "fell": 0, "hours": hours, "claimed": claimed}
+    return NoFallRun(name=name, seed=0, hours=hours, claimed=claimed)
 
 
 def _add_strides(signs: WearerSigns, strides: list[tuple[float, PathSegment]]) -> None:

@@ -8,21 +8,67 @@ them on it is the tracker's own code. The wearer rests without a movement after 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats, Ints
-from echostep.odometry.alarm import AlarmKind, AlarmReason, WearerAlarm
-from echostep.odometry.falls import Fall
-from echostep.odometry.wearer_signs import Sign, WearerSigns
+from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason, WearerAlarm
+from echostep.odometry.incapacity.falls import Fall
+from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep.output.table import Table
 from echostep.path import PathSegment
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.simulation.body_motion import ICM20649, MTX, Part
 from echostep_studies.simulation.falling import FALLS, NO_FALLS, STRIDE_M, BodySamples, walk_then
 
 KITS = ("belt", "foot board alone", "MTx alone")
 MESSAGES_HZ = 1e4  # indices of messages, in order of time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FallRun:
+    """A fall: how soon after it began the wearer was asked, and others were called; `early`: falls claimed before it."""
+
+    name: str
+    seed: int
+    early: int
+    asked_s: float | None
+    mayday_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoFallRun:
+    """What is no fall: how many were claimed; `hours` of a recording."""
+
+    name: str
+    seed: int
+    hours: float | UnsetType = UNSET
+    claimed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FallSummary:
+    """All falls of a kit and a manner; without a time where none was told."""
+
+    name: str
+    runs: int
+    told: int
+    early: int
+    median_s: float | UnsetType
+    longest_s: float | UnsetType
+    mayday_s: float | UnsetType
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoFallSummary:
+    """All runs of a kit and a manner, or all recordings."""
+
+    name: str
+    runs: int
+    claimed: int
+    watched_h: float | UnsetType
 
 
 def signs_of(samples: BodySamples, *, belt: bool) -> list[Sign]:
@@ -44,7 +90,7 @@ def message_index(t_s: Floats) -> Ints:
     return np.floor(t_s * MESSAGES_HZ).astype(np.int64)
 
 
-def fallen(seed: int) -> Row:
+def fallen(seed: int) -> FallRun:
     """A wearer who falls and stays: whether it is told, how soon after the fall began, and whether the walk before it was taken for one."""
     kit, manner = _drawn(seed, list(FALLS))
     samples = walk_then(FALLS[manner], _foot(kit), np.random.default_rng([seed, 3]))
@@ -57,16 +103,16 @@ def fallen(seed: int) -> Row:
         if change and change.reason is AlarmReason.FALL
     }
     early = sum(isinstance(sign, Fall) and sign.told_s <= samples.event_s for sign in signs)
-    times = {"asked_s": began.get(AlarmKind.ASKING), "mayday_s": began.get(AlarmKind.MAYDAY)}
-    return {"name": f"{kit}: {manner}", "seed": seed, "fell": 1, "early": early, **times}
+    asked_s, mayday_s = began.get(AlarmKind.ASKING), began.get(AlarmKind.MAYDAY)
+    return FallRun(name=f"{kit}: {manner}", seed=seed, early=early, asked_s=asked_s, mayday_s=mayday_s)
 
 
-def not_fallen(seed: int) -> Row:
+def not_fallen(seed: int) -> NoFallRun:
     """A wearer who does something else that is sudden, and then rests: whether a fall was claimed."""
     kit, manner = _drawn(seed, list(NO_FALLS))
     samples = walk_then(NO_FALLS[manner], _foot(kit), np.random.default_rng([seed, 4]))
     claimed = sum(isinstance(sign, Fall) for sign in signs_of(samples, belt=kit == "belt"))
-    return {"name": f"{kit}: {manner}", "seed": seed, "fell": 0, "claimed": claimed}
+    return NoFallRun(name=f"{kit}: {manner}", seed=seed, claimed=claimed)
 
 
 def _drawn(seed: int, manners: list[str]) -> tuple[str, str]:
@@ -77,24 +123,32 @@ def _foot(kit: str) -> Part:
     return MTX if kit == "MTx alone" else ICM20649
 
 
-def summarize(rows: Sequence[Row]) -> list[Row]:
+def summarize(rows: Sequence[FallRun | NoFallRun]) -> list[FallSummary | NoFallSummary]:
     """One row for each kit and manner, in order of the kits; recordings last."""
-    made: list[Row] = []
+    made: list[FallSummary | NoFallSummary] = []
     for group in rows_by_name(rows):
-        row: Row = {"name": group[0]["name"], "runs": len(group)}
-        if group[0].get("fell"):
-            asked, maydays = ([r[key] for r in group if r[key] is not None] for key in ("asked_s", "mayday_s"))
-            row |= {"told": len(asked), "early": sum(r["early"] for r in group)}
-            row |= {"median_s": float(np.median(asked)), "longest_s": max(asked)} if asked else {}
-            row |= {"mayday_s": max(maydays)} if maydays else {}
-        else:
-            row |= {"claimed": sum(r["claimed"] for r in group)}
-            row |= {"watched_h": sum(r["hours"] for r in group)} if "hours" in group[0] else {}
-        made.append(row)
-    return sorted(made, key=lambda row: [*KITS, "recorded"].index(row["name"].split(":")[0]))
+        falls = [row for row in group if isinstance(row, FallRun)]
+        made.append(_told(falls) if falls else _claimed([row for row in group if isinstance(row, NoFallRun)]))
+    return sorted(made, key=lambda row: [*KITS, "recorded"].index(row.name.split(":")[0]))
 
 
-def tables(rows: Sequence[Row]) -> list[Table]:
+def _told(group: Sequence[FallRun]) -> FallSummary:
+    asked = [row.asked_s for row in group if row.asked_s is not None]
+    maydays = [row.mayday_s for row in group if row.mayday_s is not None]
+    return FallSummary(
+        name=group[0].name, runs=len(group), told=len(asked), early=sum(row.early for row in group),
+        median_s=float(np.median(asked)) if asked else UNSET, longest_s=max(asked, default=UNSET),
+        mayday_s=max(maydays, default=UNSET),
+    )  # fmt: skip
+
+
+def _claimed(group: Sequence[NoFallRun]) -> NoFallSummary:
+    hours = [row.hours for row in group if row.hours is not UNSET]
+    claimed = sum(row.claimed for row in group)
+    return NoFallSummary(name=group[0].name, runs=len(group), claimed=claimed, watched_h=sum(hours) if hours else UNSET)
+
+
+def tables(rows: Sequence[FallSummary | NoFallSummary]) -> list[Table]:
     """Tables of the rows of `summarize`."""
     fell = {
         "name": "", "runs": "falls", "told": "told as a fall", "early": "claims before", "median_s": "asked after, median s",
@@ -102,6 +156,10 @@ def tables(rows: Sequence[Row]) -> list[Table]:
     }  # fmt: skip
     rest = {"name": "", "runs": "runs", "watched_h": "hours", "claimed": "falls claimed"}
     return [
-        Table("Falls (simulated)", [row for row in rows if "told" in row], fell),
-        Table("What is no fall (simulated, recordings real)", [row for row in rows if "claimed" in row], rest),
+        Table("Falls (simulated)", as_dicts(row for row in rows if isinstance(row, FallSummary)), fell),
+        Table(
+            "What is no fall (simulated, recordings real)",
+            as_dicts(row for row in rows if isinstance(row, NoFallSummary)),
+            rest,
+        ),
     ]

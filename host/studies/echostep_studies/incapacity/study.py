@@ -17,16 +17,15 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
-from echostep.odometry.alarm import AlarmKind, WearerAlarm
-from echostep.odometry.stillness import WINDOW_S, Stillness, Window
-from echostep.odometry.wearer_signs import StepTaken
-from echostep.output.table import Table
-from echostep_studies.feet.datasets import SETS as FEET
-from echostep_studies.frame.recordings import read_sets
-from echostep_studies.frame.report import Row, rows_by_name
-from echostep_studies.frame.study import Study, StudyRequest
+from echostep.odometry.incapacity.alarm import AlarmKind, WearerAlarm
+from echostep.odometry.incapacity.stillness import WINDOW_S, Stillness, Window
+from echostep.odometry.incapacity.wearer_signs import StepTaken
+from echostep_studies.bench.recordings.feet import SETS as FEET
+from echostep_studies.bench.recordings.legs import SETS as LEGS
+from echostep_studies.frame.recordings import DATA, read_sets
+from echostep_studies.frame.study import Study
 from echostep_studies.incapacity import fall_recordings, falls
-from echostep_studies.legs.datasets import SETS as LEGS
+from echostep_studies.incapacity.columns import TOLD_S, DayRun, LyingRun, RunRow, SummaryRow, summarize, tables
 
 RATE_HZ = 100.0
 GYRO_NOISE, ACCEL_NOISE = math.radians(0.1) * 10.0, 0.04  # rad/s, m/s2: an MTx at 100 Hz, by its manual
@@ -46,7 +45,6 @@ TWITCH_PAUSE_S, TWITCH_S, TWITCH_RAD_S = (
     (0.02, 0.08),
 )  # of every second wearer who cannot move, by reason
 PORTION_S = 0.25  # that comes at once
-TOLD_S = 35.0  # within which a wearer who cannot move is told
 DAY_S = 8.0 * 3600.0
 PAUSES_S = {
     "walk": 0.55,
@@ -116,7 +114,7 @@ class SimulatedWearer:
         return self.alarm.alarm.kind if self.alarm.alarm else None
 
 
-def incapacitated(seed: int) -> Row:
+def incapacitated(seed: int) -> LyingRun:
     """Walking, crouching or standing, a fall within 2 s, then no motion but breathing; in half of the seeds twitches."""
     rng = np.random.default_rng([seed, 1])
     wearer = SimulatedWearer(rng, legs=bool(seed % 2))
@@ -127,10 +125,10 @@ def incapacitated(seed: int) -> Row:
     while wearer.kind is not AlarmKind.MAYDAY and wearer.t_s - began_s < 60.0:
         wearer.live(PORTION_S, [], lies=True, twitches=bool(seed // 2 % 2))
     told_s = wearer.t_s - began_s if wearer.kind is AlarmKind.MAYDAY else math.inf
-    return {"name": "cannot move", "seed": seed, "told_s": told_s, "told": float(told_s <= TOLD_S)}
+    return LyingRun(name="cannot move", seed=seed, told_s=told_s, told=float(told_s <= TOLD_S))
 
 
-def work_day(pauses: float, answered: float, legs: bool, name: str, seed: int) -> Row:
+def work_day(pauses: float, answered: float, legs: bool, name: str, seed: int) -> DayRun:
     """Eight hours of walking, crawling, crouching and waiting; movements `pauses` times as seldom as assumed. `legs`: with leg gyros."""
     rng = np.random.default_rng([seed, 2])
     wearer = SimulatedWearer(rng, legs=legs)
@@ -156,12 +154,12 @@ def work_day(pauses: float, answered: float, legs: bool, name: str, seed: int) -
                     wearer.alarm.answer(wearer.t_s, ends_help=True)
             wearer.live(0.6, [0.3])
     hours = wearer.t_s / 3600.0
-    return {"name": name, "seed": seed, "hours": hours, "asked": asked, "maydays": maydays}
+    return DayRun(name=name, seed=seed, hours=hours, asked=asked, maydays=maydays)
 
 
-def recorded(folder: Path) -> list[Row]:
+def recorded(folder: Path) -> list[DayRun]:
     """Every recording of feet and legs: how often the alarm asked and called. They are walks, not work: half an hour in all."""
-    rows: list[Row] = []
+    rows: list[DayRun] = []
     for foot in read_sets(folder, FEET)[0]:
         windows = Stillness().add_foot(np.asarray(foot.t_s, np.float64), foot.gyro, foot.accel)
         rows.append(_of_recording("recorded feet", [window for _, window in windows], foot.t_s))
@@ -172,16 +170,16 @@ def recorded(folder: Path) -> list[Row]:
     return rows
 
 
-def _of_recording(name: str, windows: Sequence[Window], t_s: Floats) -> Row:
+def _of_recording(name: str, windows: Sequence[Window], t_s: Floats) -> DayRun:
     alarm = WearerAlarm()
     alarm.add([StepTaken(float(k)) for k in range(3)])  # on from the first sample, also before the walk
     alarm.add(windows)
     kinds = [change.kind for _, change in alarm.changes if change]
-    counts = {"asked": kinds.count(AlarmKind.ASKING), "maydays": kinds.count(AlarmKind.MAYDAY)}
-    return {"name": name, "seed": 0, "hours": float(t_s[-1] - t_s[0]) / 3600.0, **counts}
+    asked, maydays = kinds.count(AlarmKind.ASKING), kinds.count(AlarmKind.MAYDAY)
+    return DayRun(name=name, seed=0, hours=float(t_s[-1] - t_s[0]) / 3600.0, asked=asked, maydays=maydays)
 
 
-DAYS: dict[str, Callable[[int], Row]] = {
+DAYS: dict[str, Callable[[int], DayRun]] = {
     name: partial(work_day, pauses, answered, legs, name)
     for name, pauses, answered, legs in (
         ("day, each question answered", 1.0, 1.0, True),
@@ -193,50 +191,25 @@ DAYS: dict[str, Callable[[int], Row]] = {
 }
 
 
-def one_run(days: int, data: Path, first: int, seed: int) -> list[Row]:
+def one_run(days: int, data: Path, first: int, seed: int) -> list[RunRow]:
     """A wearer who cannot move, one who falls, one who does not; with the first `days` seeds also working days, with the first one the recordings."""
-    rows = [incapacitated(seed), falls.fallen(seed), falls.not_fallen(seed)]
+    rows: list[RunRow] = [incapacitated(seed), falls.fallen(seed), falls.not_fallen(seed)]
     if seed - first < days:
         rows += [day(seed) for day in DAYS.values()]
-    return rows + (recorded(data) + fall_recordings.recorded(data) if seed == first and data.is_dir() else [])
+    if seed == first and data.is_dir():
+        rows += [*recorded(data), *fall_recordings.recorded(data)]
+    return rows
 
 
-def summarize(rows: Sequence[Row]) -> list[Row]:
-    """One row for each name; those of falls last."""
-    made: list[Row] = []
-    for group in rows_by_name([row for row in rows if "fell" not in row]):
-        row: Row = {"name": group[0]["name"], "runs": len(group)}
-        if "told_s" in group[0]:
-            told = [r["told_s"] for r in group]
-            row |= {"told": sum(r["told"] for r in group), "median_s": float(np.median(told)), "longest_s": max(told)}
-        else:
-            hours = sum(r["hours"] for r in group)
-            counts = {key: sum(r[key] for r in group) for key in ("asked", "maydays")}
-            row |= {"hours": hours, **counts, "per_8h": 8.0 * counts["maydays"] / hours}
-        made.append(row)
-    return made + falls.summarize([row for row in rows if "fell" in row])
-
-
-def _tables(rows: Sequence[Row], _: StudyRequest) -> list[Table]:
-    told = f"told within {TOLD_S:.0f} s"
-    lying = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
-    days = {
-        "name": "",
-        "runs": "runs",
-        "hours": "hours",
-        "asked": "asked",
-        "maydays": "maydays",
-        "per_8h": "in 8 hours",
-    }
-    return [
-        Table(
-            "Wearers who cannot move (simulated)", [row for row in rows if "told" in row and "early" not in row], lying
-        ),
-        Table("Wearers who can (days simulated, recordings real)", [row for row in rows if "hours" in row], days),
-        *falls.tables([row for row in rows if "early" in row or "claimed" in row]),
-    ]
-
-
-def incapacity_study(days: int, data: Path, first: int) -> Study:
-    """`runs` of a request: wearers who cannot move; `first`: its seed."""
-    return Study("incapacity", partial(one_run, days, data, first), summarize, _tables, journal=False, parquet=None)
+def incapacity_study(days: int, data: Path | None, first: int) -> Study[RunRow, SummaryRow]:
+    """`runs` of a request: wearers who cannot move; `first`: its seed; `data`: folder of the public recordings; None: DATA."""
+    kinds = (LyingRun, DayRun, falls.FallRun, falls.NoFallRun)
+    return Study(
+        "incapacity",
+        kinds,
+        partial(one_run, days, data or DATA, first),
+        summarize,
+        tables,
+        journal=False,
+        parquet=None,
+    )

@@ -11,27 +11,58 @@ is calibrated by a walk of 10 m before.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Floats
 from echostep.output.table import Table
 from echostep.simulation.people.walker import Walk
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, with_plan
 from echostep_studies.lee2010.pictures import draw
 from echostep_studies.lee2010.walks import STOREY_M, chunks_of, descent_of, lap_of, lap_plan, measure, start_of, storeys
 
-PRINTED: tuple[Row, ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
+PRINTED: tuple[dict[str, Any], ...] = ({"name": "lap, the paper", "ending_m": 8.0},)
 COLUMNS = {
     "name": "", "ending_m": "ending", "ending_max_m": "worst", "mean_m": "mean", "distance_error_percent": "way %", "floor_right": "floor right",
 }  # fmt: skip
 LEGEND = "ending, mean: error of the place at the end and on the way; way: error of the distance walked. Simulated."
 
 
-def one_run(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PersonRun:
+    """One method with one person: errors at the end and on the way; the row `floors` has no distance, those of the lap no floors."""
+
+    name: str
+    profile: str
+    seed: int
+    ending_m: float
+    mean_m: float
+    distance_error_percent: float | UnsetType = UNSET
+    floor_right: float | UnsetType = UNSET
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeopleSummary:
+    """One method with all people: means, and the worst ending."""
+
+    name: str
+    profile: str
+    runs: int
+    ending_m: float
+    mean_m: float
+    distance_error_percent: float | UnsetType
+    floor_right: float | UnsetType
+    ending_max_m: float
+
+
+def one_run(seed: int) -> list[PersonRun]:
     """All rows of one person."""
     lap, plan = lap_of(seed), lap_plan()
     chunks = chunks_of(lap, plan.levels, seed)
@@ -41,22 +72,33 @@ def one_run(seed: int) -> list[Row]:
     descent = descent_of(seed)
     measured = measure(chunks_of(descent, storeys(), seed), seed)
     floors = floors_of(measured.pressure)
-    right = {"floor_right": floor_right(floors, descent)}
+    right = floor_right(floors, descent)
     for name, method in METHODS.items():
         shown = "storeys" if name == "lee2010" else f"storeys/{name}"
-        rows.append(_row(shown, name, seed, descent, method(measured, start_of(descent))) | right)
-    rows.append({"name": "floors", "profile": "lee2010", "seed": seed, **right, **_heights_off(floors, descent)})
+        row = _row(shown, name, seed, descent, method(measured, start_of(descent)))
+        rows.append(replace(row, floor_right=right))
+    off = _heights_off_m(floors, descent)
+    rows.append(
+        PersonRun(
+            name="floors",
+            profile="lee2010",
+            seed=seed,
+            ending_m=float(off[-1]),
+            mean_m=float(off.mean()),
+            floor_right=right,
+        )
+    )
     return rows
 
 
-def _row(name: str, profile: str, seed: int, walked: Walk, found: MethodTrack) -> Row:
+def _row(name: str, profile: str, seed: int, walked: Walk, found: MethodTrack) -> PersonRun:
     truth = np.column_stack([np.interp(found.track[:, 0], walked.t_s, walked.trunk_m[:, k]) for k in (0, 1)])
     off = np.hypot(*(found.track[:, 1:] - truth).T)
     way = float(np.hypot(*np.diff(walked.foot_m[::50, :2], axis=0).T).sum())
-    return {
-        "name": name, "profile": profile, "seed": seed, "ending_m": float(off[-1]), "mean_m": float(off.mean()),
-        "distance_error_percent": 100.0 * (found.distance_m / way - 1.0),
-    }  # fmt: skip
+    return PersonRun(
+        name=name, profile=profile, seed=seed, ending_m=float(off[-1]), mean_m=float(off.mean()),
+        distance_error_percent=100.0 * (found.distance_m / way - 1.0),
+    )  # fmt: skip
 
 
 def floor_right(floors: Floats, walked: Walk) -> float:
@@ -64,33 +106,41 @@ def floor_right(floors: Floats, walked: Walk) -> float:
     return float((floors[:, 1] == np.rint(_height_at(floors[:, 0], walked) / STOREY_M)).mean())
 
 
-def _heights_off(floors: Floats, walked: Walk) -> Row:
-    """Error of the height that is put out, which is the floor's own, at the end and on the way."""
-    off = np.abs(floors[:, 1] * STOREY_M - _height_at(floors[:, 0], walked))
-    return {"ending_m": float(off[-1]), "mean_m": float(off.mean())}
+def _heights_off_m(floors: Floats, walked: Walk) -> Floats:
+    """Errors of the height that is put out, which is the floor's own, on the way."""
+    off: Floats = np.abs(floors[:, 1] * STOREY_M - _height_at(floors[:, 0], walked))
+    return off
 
 
 def _height_at(t_s: Floats, walked: Walk) -> Floats:
     return np.interp(t_s, walked.t_s, walked.height_m)
 
 
-def _summary(rows: list[Row]) -> Row:
-    """Means over the runs, and the worst ending."""
-    found: Row = {"name": rows[0]["name"], "profile": rows[0]["profile"], "runs": len(rows)}
-    for key in ("ending_m", "mean_m", "distance_error_percent", "floor_right"):
-        if key in rows[0]:
-            found[key] = round(sum(row[key] for row in rows) / len(rows), 4)
-    found["ending_max_m"] = round(max(row["ending_m"] for row in rows), 4)
-    return found
+def _summary(rows: list[PersonRun]) -> PeopleSummary:
+    endings = [row.ending_m for row in rows]
+    return PeopleSummary(
+        name=rows[0].name, profile=rows[0].profile, runs=len(rows), ending_m=round(sum(endings) / len(rows), 4),
+        mean_m=round(sum(row.mean_m for row in rows) / len(rows), 4),
+        distance_error_percent=_mean(row.distance_error_percent for row in rows),
+        floor_right=_mean(row.floor_right for row in rows), ending_max_m=round(max(endings), 4),
+    )  # fmt: skip
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+def _mean(values: Iterable[float | UnsetType]) -> float | UnsetType:
+    """The mean of a column that some rows lack."""
+    stated = [value for value in values if value is not UNSET]
+    return round(sum(stated) / len(stated), 4) if stated else UNSET
+
+
+def _tables(rows: list[PeopleSummary], request: StudyRequest) -> list[Table]:
     title = f"Lee and Lee 2010: {request.runs} simulated runs, metres; last, the paper's one real lap"
-    return [Table(title, [*rows, *PRINTED], COLUMNS, (LEGEND,))]
+    return [Table(title, [*as_dicts(rows), *PRINTED], COLUMNS, (LEGEND,))]
 
 
-def _draw(folder: Path, seed: int, _rows: list[Row]) -> None:
+def _draw(folder: Path, seed: int, _rows: list[PeopleSummary]) -> None:
     draw(folder, seed)
 
 
-STUDY = Study("lee2010", one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, _draw)
+STUDY = Study(
+    "lee2010", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables, _draw
+)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
 
@@ -21,10 +22,10 @@ from echostep.offline.leg_csv import LegSamples
 from echostep.offline.leg_pair import track_pair
 from echostep.offline.leg_track import track_default
 from echostep.output.table import Table
+from echostep_studies.bench.recordings.legs import SETS, LegRecording
 from echostep_studies.frame.recordings import recordings_in
-from echostep_studies.frame.report import Row
+from echostep_studies.frame.report import as_dicts
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.legs.datasets import SETS, LegRecording
 
 NOTHING, LENGTHS, SCALE = "nothing", "leg lengths", "first 20 m"
 LEFT, RIGHT = "left", "right"  # ends of the names of recordings
@@ -37,14 +38,48 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def recordings_study(folder: Path) -> Study:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegRow:
+    """One method by a leg, or by both, against the way of both feet."""
+
+    set: str
+    recording: str
+    known: str
+    walked_m: float
+    found_m: float
+    error_m: float
+    error_percent: float
+    sd_m: float
+    error_over_sd: float | None
+    stairs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegMeans:
+    """Of a method: mean absolute errors, the rms of error / sd, all strides that were read as stairs."""
+
+    set: str
+    recording: str
+    known: str
+    walked_m: float
+    error_m: float
+    error_percent: float
+    error_over_sd: float | None
+    found_m: None = None
+    sd_m: None = None
+    stairs: int
+
+
+def recordings_study(folder: Path) -> Study[LegRow, LegRow | LegMeans]:
     """The study of the recordings in this folder; raises EchostepError without any."""
     recordings = recordings_in(folder, SETS)
     return Study(
         "legs-recordings",
+        (LegRow,),
         lambda _seed: [row for legs in (*((r,) for r in recordings), *pairs(recordings)) for row in rows_of(*legs)],
-        lambda rows: rows + means(rows),
+        lambda rows: [*rows, *means(rows)],
         _tables,
+        runs=1,
         seeds=range(1),
         journal=False,
         parquet=None,
@@ -58,7 +93,7 @@ def pairs(recordings: Sequence[LegRecording]) -> list[tuple[LegRecording, LegRec
     return [(left, by_name[right]) for left, right in wanted if right in by_name]
 
 
-def rows_of(*legs: LegRecording) -> list[Row]:
+def rows_of(*legs: LegRecording) -> list[LegRow]:
     """One row for each method that this leg allows, or both legs of a person."""
     first, words = legs[0], "" if len(legs) == 1 else BOTH
     begin_s, end_s = first.walk_s()
@@ -75,7 +110,7 @@ def rows_of(*legs: LegRecording) -> list[Row]:
         scaled = strides_of(legs, StrideSettings(LegLengths(scale=scale), calibrated=True))
         rows.append(_row(first, SCALE + words, scaled, known_s, end_s))
     if len(legs) > 1:
-        rows = [row | {"recording": first.name.removesuffix(LEFT) + "both"} for row in rows]
+        rows = [replace(row, recording=first.name.removesuffix(LEFT) + "both") for row in rows]
     return rows
 
 
@@ -103,41 +138,47 @@ def _share(stride: Stride, begin_s: float, end_s: float) -> float:
     return max(inside, 0.0) / max(stride.t_end_s - stride.t_start_s, 1e-9)
 
 
-def _row(recording: LegRecording, known: str, strides: tuple[Stride, ...], begin_s: float, end_s: float) -> Row:
+def _row(recording: LegRecording, known: str, strides: tuple[Stride, ...], begin_s: float, end_s: float) -> LegRow:
     inside = [s for s in strides if _share(s, begin_s, end_s) > 0.5]
     walked, found, sd = recording.walked_m(begin_s, end_s), found_m(strides, begin_s, end_s), distance_sd_m(inside)
     error = found - walked
-    return {
-        "set": recording.group,
-        "recording": recording.name,
-        "known": known,
-        "walked_m": round(walked, 3),
-        "found_m": round(found, 3),
-        "error_m": round(error, 3),
-        "error_percent": round(100.0 * error / walked, 2),
-        "sd_m": round(sd, 3),
-        "error_over_sd": round(error / sd, 2) if sd > 0.0 else None,
-        "stairs": sum(bool(s.flags & (Flag.STAIRS_UP | Flag.STAIRS_DOWN)) for s in inside),
-    }
+    return LegRow(
+        set=recording.group,
+        recording=recording.name,
+        known=known,
+        walked_m=round(walked, 3),
+        found_m=round(found, 3),
+        error_m=round(error, 3),
+        error_percent=round(100.0 * error / walked, 2),
+        sd_m=round(sd, 3),
+        error_over_sd=round(error / sd, 2) if sd > 0.0 else None,
+        stairs=sum(bool(s.flags & (Flag.STAIRS_UP | Flag.STAIRS_DOWN)) for s in inside),
+    )
 
 
-def means(rows: list[Row]) -> list[Row]:
-    """Of each method: mean absolute errors, the rms of error / sd, all strides that were read as stairs."""
-    found: list[Row] = []
+def means(rows: list[LegRow]) -> list[LegMeans]:
+    """The means of each method."""
+    found = []
     for known in (known + words for words in ("", BOTH) for known in (NOTHING, LENGTHS, SCALE)):
-        same = [row for row in rows if row["known"] == known]
+        same = [row for row in rows if row.known == known]
         if not same:
             continue
-        ratios = [row["error_over_sd"] for row in same if row["error_over_sd"] is not None]
+        ratios = [row.error_over_sd for row in same if row.error_over_sd is not None]
         found.append(
-            {"set": "all", "recording": f"mean absolute of {len(same)}, rms of error / sd", "known": known}
-            | {key: round(fmean(abs(row[key]) for row in same), 3) for key in ("walked_m", "error_m", "error_percent")}
-            | {"error_over_sd": round(math.sqrt(fmean(r * r for r in ratios)), 2) if ratios else None}
-            | {"found_m": None, "sd_m": None, "stairs": sum(row["stairs"] for row in same)}
+            LegMeans(
+                set="all",
+                recording=f"mean absolute of {len(same)}, rms of error / sd",
+                known=known,
+                walked_m=round(fmean(abs(row.walked_m) for row in same), 3),
+                error_m=round(fmean(abs(row.error_m) for row in same), 3),
+                error_percent=round(fmean(abs(row.error_percent) for row in same), 3),
+                error_over_sd=round(math.sqrt(fmean(r * r for r in ratios)), 2) if ratios else None,
+                stairs=sum(row.stairs for row in same),
+            )
         )
     return found
 
 
-def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
+def _tables(rows: list[LegRow | LegMeans], _request: StudyRequest) -> list[Table]:
     note = "Real legs, one setting for all. known: what was known of the wearer; after the first 20 m only the rest is judged."
-    return [Table("Legs on real recordings against the way of both feet", rows, COLUMNS, (note,))]
+    return [Table("Legs on real recordings against the way of both feet", as_dicts(rows), COLUMNS, (note,))]

@@ -6,21 +6,63 @@ In: sites, walks, a seed. Out: rows. Owns nothing. The second walk is judged in 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from echostep.errors import EchostepError
 from echostep.mapping.joining import join_walks
 from echostep.mapping.mapper import solve_walk
 from echostep.plan.routing import RoutePlace
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.tours import random_tour
-from echostep_studies.anywhere.walks import SimulatedWalk
-from echostep_studies.frame.report import Row
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.tours import random_tour
+from echostep_studies.bench.walks import SimulatedWalk
+from echostep_studies.frame.report import as_dict
 from echostep_studies.noplan.judgement import closure_columns, known_start, path_columns, true_path, wall_columns
 from echostep_studies.noplan.walks import walked
 
 OTHER_PERSON = 700_000  # added to the seed
 MISPLACED_M = 2.0  # RMSE from which the second walk lies at a wrong place
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairRun:
+    """Two walks: whether they were joined, and at a wrong place."""
+
+    name: str
+    seed: int
+    joined: int
+    misplaced: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JoinedRun(PairRun):
+    """Two walks that were joined: the second path in the frame of the first, what is drawn of its walls, and closures."""
+
+    joined_rmse_m: float
+    common_m: float
+    drawn: float
+    wall_median_m: float
+    closures: int
+    wrong: int
+    nodes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairSummary:
+    """Counts of all pairs, and means over those that were joined rightly, if any."""
+
+    name: str
+    runs: int
+    joined: int
+    misplaced: int
+    closures: int
+    wrong: int
+    joined_rmse_m: float | UnsetType = UNSET
+    worst_rmse_m: float | UnsetType = UNSET
+    drawn_pc: float | UnsetType = UNSET
 
 
 def again(site: Site, length_m: float, seed: int) -> Site:
@@ -35,50 +77,47 @@ def walked_pair(first: Site, second: Site, seed: int) -> tuple[SimulatedWalk, Si
     return walked(first, seed), walked(second, seed + OTHER_PERSON)
 
 
-def joined_row(name: str, walks: tuple[SimulatedWalk, SimulatedWalk], seed: int) -> Row:
+def joined_row(name: str, walks: tuple[SimulatedWalk, SimulatedWalk], seed: int) -> PairRun:
     """Two walks of one building: whether they were joined, rightly, and the errors of the second path in the frame of the first."""
-    row: Row = {"name": name, "seed": seed, "joined": 0, "misplaced": 0}
     solved = [(f"walk {k + 1}", solve_walk(walk.segments)) for k, walk in enumerate(walks)]
     try:
         mapped, joins = join_walks(solved)
     except EchostepError:
-        return row
+        return PairRun(name=name, seed=seed, joined=0, misplaced=0)
     graph, second = mapped.graph, mapped.graph.nodes.begins[1]
     parts = np.split(graph.nodes.t_s, [second])
     truth = np.concatenate([true_path(walk, t_s) for walk, t_s in zip(walks, parts, strict=True)])
     pose = graph.pose[:, :2]
     frame = known_start(pose[:second], truth[:second])
-    error = path_columns(frame.to_map(pose[second:]), truth[second:])["rmse_m"]
+    error = path_columns(frame.to_map(pose[second:]), truth[second:]).rmse_m
     walls = frame.to_map(mapped.drawing.walls.reshape(-1, 2)).reshape(-1, 4)
     drawn = wall_columns([walls], walks[1])
-    row |= {
-        "joined": 1,
-        "misplaced": int(error > MISPLACED_M),
-        "joined_rmse_m": error,
-        "common_m": joins[0].place.common_m,
-    }
-    row |= {"drawn": drawn["drawn"], "wall_median_m": drawn.get("wall_median_m", np.nan)}
-    return row | closure_columns(graph.closures, graph.pose, truth, frame)
+    return JoinedRun(
+        name=name, seed=seed, joined=1, misplaced=int(error > MISPLACED_M), joined_rmse_m=error,
+        common_m=joins[0].place.common_m, drawn=drawn.drawn,
+        wall_median_m=np.nan if drawn.wall_median_m is UNSET else drawn.wall_median_m,
+        **as_dict(closure_columns(graph.closures, graph.pose, truth, frame)),
+    )  # fmt: skip
 
 
-def strangers_row(name: str, walks: tuple[SimulatedWalk, SimulatedWalk], seed: int) -> Row:
+def strangers_row(name: str, walks: tuple[SimulatedWalk, SimulatedWalk], seed: int) -> PairRun:
     """Two walks of different buildings: `joined` counts those that were taken for one."""
     solved = [(f"walk {k + 1}", solve_walk(walk.segments)) for k, walk in enumerate(walks)]
     try:
         join_walks(solved)
     except EchostepError:
-        return {"name": name, "seed": seed, "joined": 0, "misplaced": 0}
-    return {"name": name, "seed": seed, "joined": 1, "misplaced": 1}
+        return PairRun(name=name, seed=seed, joined=0, misplaced=0)
+    return PairRun(name=name, seed=seed, joined=1, misplaced=1)
 
 
-def joined_summary(group: list[Row]) -> Row:
-    """Counts, and means over the walks that were joined rightly."""
-    right = [row for row in group if row["joined"] and not row["misplaced"] and "joined_rmse_m" in row]
-    summary: Row = {"name": group[0]["name"], "runs": len(group)}
-    summary |= {key: sum(row[key] for row in group) for key in ("joined", "misplaced")}
-    summary |= {key: sum(row.get(key, 0) for row in group) for key in ("closures", "wrong")}
-    if right:
-        rmse = [row["joined_rmse_m"] for row in right]
-        summary |= {"joined_rmse_m": float(np.mean(rmse)), "worst_rmse_m": max(rmse)}
-        summary["drawn_pc"] = 100.0 * float(np.mean([row["drawn"] for row in right]))
-    return summary
+def joined_summary(group: Sequence[PairRun]) -> PairSummary:
+    """The summary row of all pairs of a name."""
+    joined = [row for row in group if isinstance(row, JoinedRun)]
+    right = [row for row in joined if not row.misplaced]
+    rmse = [row.joined_rmse_m for row in right]
+    return PairSummary(
+        name=group[0].name, runs=len(group), joined=sum(row.joined for row in group), misplaced=sum(row.misplaced for row in group),
+        closures=sum(row.closures for row in joined), wrong=sum(row.wrong for row in joined),
+        joined_rmse_m=float(np.mean(rmse)) if right else UNSET, worst_rmse_m=max(rmse, default=UNSET),
+        drawn_pc=100.0 * float(np.mean([row.drawn for row in right])) if right else UNSET,
+    )  # fmt: skip

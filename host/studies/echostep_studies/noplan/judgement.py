@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Bools, Floats
-from echostep.mapping.graph import Closure
+from echostep.mapping.graph.graph import Closure
+from echostep.mapping.graph.storeys import STAIRS
 from echostep.mapping.mapper import Mapped
-from echostep.mapping.storeys import STAIRS
-from echostep_studies.anywhere.walks import SimulatedWalk, T, X, Y, Z
-from echostep_studies.frame.report import Row
+from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, Z
 
 COURSE_M = 15.0  # the trunk's place over the foot errs by 4 cm, 0.2 degrees of it
 SAMPLE_M = 0.05  # along walls
@@ -45,6 +45,43 @@ class Frame:
         return found
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathColumns:
+    """RMSE and greatest error of a path in the map."""
+
+    rmse_m: float
+    max_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoreyColumns:
+    """Share of the nodes on a level that are drawn on another one, and how many storeys are drawn of how many walked."""
+
+    wrong_storey: float
+    storeys: int
+    storeys_walked: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WallColumns:
+    """Errors of the drawn walls, if there are any, which of the walls that were passed are drawn, and what is drawn where nothing is."""
+
+    wall_median_m: float | UnsetType = UNSET
+    wall95_m: float | UnsetType = UNSET
+    drawn: float
+    absent: float
+    drawn_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClosureColumns:
+    """Closures, those that are wrong, and nodes."""
+
+    closures: int
+    wrong: int
+    nodes: int
+
+
 def true_path(walk: SimulatedWalk, t_s: Floats) -> Floats:
     """True places (n, 2) at times (n,)."""
     return np.column_stack([np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y)])
@@ -60,10 +97,10 @@ def known_start(path: Floats, truth: Floats) -> Frame:
     return Frame(turned, truth[0] - turned @ path[0])
 
 
-def path_columns(path: Floats, truth: Floats) -> Row:
+def path_columns(path: Floats, truth: Floats) -> PathColumns:
     """RMSE and greatest error of a path in the map."""
     error = np.hypot(*(path - truth).T)
-    return {"rmse_m": float(np.sqrt(np.mean(error**2))), "max_m": float(error.max())}
+    return PathColumns(rmse_m=float(np.sqrt(np.mean(error**2))), max_m=float(error.max()))
 
 
 def heights_m(walk: SimulatedWalk, t_s: Floats) -> Floats:
@@ -79,22 +116,20 @@ def levels_of(mapped: Mapped, walk: SimulatedWalk) -> list[int]:
     return [int(np.argmin(np.abs(true - start - height))) for height in above]
 
 
-def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> Row:
-    """Share of the nodes on a level that are drawn on another one, and how many storeys are drawn of how many walked."""
+def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> StoreyColumns:
+    """The storeys of a drawing."""
     z = heights_m(walk, mapped.graph.nodes.t_s)
     on = np.array([np.abs(z - level.height_m) < LEVEL_M for level in walk.built.levels])
     storey = mapped.graph.storey_of(np.arange(len(z)))
     level = np.array(levels_of(mapped, walk))[np.maximum(storey, 0)]
     wrong = on.any(0) & (storey != STAIRS) & ~on[level, np.arange(len(z))]
-    return {
-        "wrong_storey": float(wrong.mean()),
-        "storeys": len(mapped.drawings),
-        "storeys_walked": int(on.any(1).sum()),
-    }
+    return StoreyColumns(
+        wrong_storey=float(wrong.mean()), storeys=len(mapped.drawings), storeys_walked=int(on.any(1).sum())
+    )
 
 
-def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> Row:
-    """Errors of the drawn walls (n, 4) of each level in the map, and which of the walls that were passed are drawn."""
+def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> WallColumns:
+    """The drawn walls (n, 4) of each level in the map."""
     t_s = np.arange(walk.truth[0, T], walk.truth[-1, T], LOOK_S)
     looks, z = true_path(walk, t_s), heights_m(walk, t_s)
     away, missed = [], []
@@ -105,20 +140,20 @@ def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> Row:
         missed.append(distances(passed, walls))
     away_m, missed_m = np.concatenate(away), np.concatenate(missed)
     if not len(away_m):
-        return {"drawn": 0.0, "absent": 0.0, "drawn_m": 0.0}
-    return {
-        "wall_median_m": float(np.median(away_m)),
-        "wall95_m": float(np.quantile(away_m, 0.95)),
-        "drawn": float(np.mean(missed_m < DRAWN_M)),
-        "absent": float(np.mean(away_m > ABSENT_M)),
-        "drawn_m": len(away_m) * SAMPLE_M,
-    }
+        return WallColumns(drawn=0.0, absent=0.0, drawn_m=0.0)
+    return WallColumns(
+        wall_median_m=float(np.median(away_m)),
+        wall95_m=float(np.quantile(away_m, 0.95)),
+        drawn=float(np.mean(missed_m < DRAWN_M)),
+        absent=float(np.mean(away_m > ABSENT_M)),
+        drawn_m=len(away_m) * SAMPLE_M,
+    )
 
 
-def closure_columns(closures: list[Closure], pose: Floats, truth: Floats, frame: Frame) -> Row:
+def closure_columns(closures: list[Closure], pose: Floats, truth: Floats, frame: Frame) -> ClosureColumns:
     """Closures right and wrong: along each direction that one claims to know, within WRONG_M of the truth."""
     wrong = sum(_is_wrong(closure, truth, frame) for closure in closures)
-    return {"closures": len(closures), "wrong": wrong, "nodes": len(pose)}
+    return ClosureColumns(closures=len(closures), wrong=wrong, nodes=len(pose))
 
 
 def _is_wrong(closure: Closure, truth: Floats, frame: Frame) -> bool:

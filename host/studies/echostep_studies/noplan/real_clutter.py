@@ -19,10 +19,10 @@ from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
 from echostep.simulation.world.acoustics import SRF02
 from echostep.simulation.world.echoes import ranger_bias_m
-from echostep_studies.anywhere.walks import SimulatedWalk
-from echostep_studies.clutter.building import building_of, walk_from
-from echostep_studies.clutter.carmen_log import CarmenLog, logs_in, name_of
-from echostep_studies.clutter.scan_pings import HALF_CONE_RAD, nearest_return
+from echostep_studies.bench.laser.building import building_of, walk_from
+from echostep_studies.bench.laser.carmen_log import CarmenLog, logs_in, name_of
+from echostep_studies.bench.laser.scan_pings import HALF_CONE_RAD, nearest_return
+from echostep_studies.bench.walks import SimulatedWalk
 
 FOLDER = "carmen"
 # Of path, from one to the other of which the growth of the heading's error is stated; scans are 0.5 to 1 m apart

@@ -14,12 +14,12 @@ import numpy as np
 import shapely
 
 from echostep.arrays import Floats
-from echostep.plan.gaps import door_gaps
 from echostep.plan.importers.formats import open_plan
 from echostep.plan.model import Level, Plan, load_plan
+from echostep.plan.places.gaps import door_gaps
 from echostep.plan.routing import RoutePlace
-from echostep_studies.anywhere.sites import OFFICE_DOOR, OFFICE_PLAN, Site, level_alone, plan_of
-from echostep_studies.anywhere.tours import random_tour
+from echostep_studies.bench.sites import OFFICE_DOOR, OFFICE_PLAN, Site, level_alone, plan_of
+from echostep_studies.bench.tours import random_tour
 
 # The loop: corridors 2 m wide about a block of 30 x 14 m, with rooms of 5 x 5 m or so on the outside.
 WIDE_M, DEEP_M, DOOR_M = 2.0, 5.0, 0.9

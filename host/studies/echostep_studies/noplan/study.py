@@ -17,22 +17,30 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
+from echostep.mapping.graph.nodes import nodes_of
 from echostep.mapping.mapper import map_walk
-from echostep.mapping.nodes import nodes_of
 from echostep.mapping.picture import draw_picture
 from echostep.mapping.plan import plan_in
-from echostep.output.table import Table
 from echostep.plan.model import Plan
-from echostep_studies.anywhere.filtering import track
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.walks import SimulatedWalk
-from echostep_studies.feet.metrics import rmse
-from echostep_studies.frame.report import LOST_M, Row, rows_by_name
+from echostep_studies.bench.filtering import track
+from echostep_studies.bench.recordings import hallways
+from echostep_studies.bench.recordings.foot_metrics import rmse
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.walks import SimulatedWalk
+from echostep_studies.frame.report import as_dict
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.noplan import real_clutter, real_feet, sites
+from echostep_studies.noplan import real_clutter, sites
+from echostep_studies.noplan.columns import DrawnRun, RunRow, SecondRun, SummaryRow, summaries, tables
 from echostep_studies.noplan.footslam import footslam
-from echostep_studies.noplan.joined import again, joined_row, joined_summary, strangers_row, walked_pair
+from echostep_studies.noplan.joined import (
+    JoinedRun,
+    PairRun,
+    again,
+    joined_row,
+    strangers_row,
+    walked_pair,
+)
 from echostep_studies.noplan.judgement import (
     closure_columns,
     known_start,
@@ -51,16 +59,6 @@ SITES = ("office", "corridors", "westport", "storeys")
 REAL = ("westport", "storeys")  # of the public recordings
 JOINED_MIN = 5  # of each of two walks
 STRANGERS = {"office": "corridors", "corridors": "westport", "westport": "office"}  # another building
-COLUMNS = {
-    "name": "row", "rmse_m": "RMSE m", "worst_rmse_m": "worst", "shape_m": "shape m", "foot_rmse_m": "foot alone",
-    "footslam_rmse_m": "FootSLAM", "wall_median_m": "walls m", "wall95_m": "95 %", "drawn_pc": "drawn %", "absent_pc": "not there %",
-    "closures": "closures", "wrong": "wrong", "map_s": "s",
-}  # fmt: skip
-JOINED_COLUMNS = {
-    "name": "row", "joined": "joined", "misplaced": "misplaced", "runs": "runs", "joined_rmse_m": "RMSE m", "worst_rmse_m": "worst",
-    "drawn_pc": "drawn %", "closures": "closures", "wrong": "wrong",
-}  # fmt: skip
-SECOND_COLUMNS = {"name": "row", "mean_m": "mean m", "worst_m": "worst mean m", "lost": "lost", "runs": "runs"}
 
 
 def names_of(data: Path | None) -> list[str]:
@@ -76,13 +74,13 @@ def _real_names(data: Path | None) -> list[str]:
     """Rows of real feet, and of real clutter."""
     if data is None:
         return []
-    known = {"feet": real_feet.names_in(data), "clutter": real_clutter.names_in(data)}
+    known = {"feet": hallways.names_in(data), "clutter": real_clutter.names_in(data)}
     return [f"{kind}/{name}" for kind, names in known.items() for name in names]
 
 
-def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: int, seed: int) -> list[Row]:
+def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: int, seed: int) -> list[RunRow]:
     """The rows of these names for the walk of this seed; pictures for the first seed."""
-    rows = []
+    rows: list[RunRow] = []
     for name in names:
         kind, minutes = name.split("/")
         picture = pictures / f"{name.replace('/', '-')}.png" if seed == first else None
@@ -97,17 +95,17 @@ def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: in
     return rows
 
 
-def _real_row(name: str, seed: int, data: Path, picture: Path | None) -> Row:
+def _real_row(name: str, seed: int, data: Path, picture: Path | None) -> DrawnRun:
     """A recording with the echoes of this seed; a foot is judged at its footprints."""
     kind, recording = name.split("/")
     if kind == "clutter":
         return drawn_row(name, real_clutter.walked_log(real_clutter.names_in(data)[recording], seed), seed, picture)[0]
-    hallway = real_feet.read_hallway(real_feet.names_in(data)[recording])
-    walk = real_feet.walked_hallway(hallway, seed)
-    return drawn_row(name, walk, seed, picture, real_feet.START_S + hallway.print_t_s)[0]
+    hallway = hallways.read_hallway(hallways.names_in(data)[recording])
+    walk = hallways.walked_hallway(hallway, seed)
+    return drawn_row(name, walk, seed, picture, hallways.START_S + hallway.print_t_s)[0]
 
 
-def _pair_row(name: str, seed: int, data: Path | None) -> Row:
+def _pair_row(name: str, seed: int, data: Path | None) -> PairRun:
     """Two walks of JOINED_MIN through one building, or through two."""
     pairing, kind = name.split("/")
     length_m = 60.0 * SPEED_M_S * JOINED_MIN
@@ -124,15 +122,15 @@ def _site(kind: str, seed: int, length_m: float, data: Path | None) -> Site:
     return sites.office(seed, length_m) if kind == "office" else sites.corridors(seed, length_m)
 
 
-def drawn_rows(name: str, site: Site, seed: int, picture: Path | None) -> list[Row]:
+def drawn_rows(name: str, site: Site, seed: int, picture: Path | None) -> tuple[DrawnRun, SecondRun]:
     """One walk drawn and judged; its drawing tried by a second person."""
     row, plan, levels = drawn_row(name, walked(site, seed), seed, picture)
-    return [row, {"name": f"second/{name}", "seed": seed} | _second(site, plan, levels, seed)]
+    return row, _second(f"second/{name}", site, plan, levels, seed)
 
 
 def drawn_row(
     name: str, walk: SimulatedWalk, seed: int, picture: Path | None, at_s: Floats | None = None
-) -> tuple[Row, Plan, list[int]]:
+) -> tuple[DrawnRun, Plan, list[int]]:
     """One walk drawn and judged, its path at times `at_s` (k,), or at every node; its plan in the map, and the true level of each drawn one."""
     begin_s = time.process_time()
     mapped = map_walk(walk.segments)
@@ -144,17 +142,18 @@ def drawn_row(
     for level, drawing in zip(levels, mapped.drawings, strict=True):
         walls = frame.to_map(drawing.walls.reshape(-1, 2)).reshape(-1, 4)
         drawn[level] = np.concatenate([drawn[level], walls])
-    row: Row = {"name": name, "seed": seed, "map_s": map_s}
-    row |= wall_columns(drawn, walk) | storey_columns(mapped, walk)
-    row |= closure_columns(mapped.graph.closures, pose, truth, frame)
-    row["shape_m"] = rmse(pose[:, :2], truth)
+    judged = (
+        wall_columns(drawn, walk), storey_columns(mapped, walk), closure_columns(mapped.graph.closures, pose, truth, frame),
+    )  # fmt: skip
+    columns = {key: value for part in judged for key, value in as_dict(part).items()}
     at_s = nodes.t_s if at_s is None else at_s
     foot, _ = nodes_of(walk.segments)  # by foot and belt live: the mapper smooths, and takes a bias out of it
     paths = {"": pose, "foot_": foot.pose, "footslam_": footslam(foot, np.random.default_rng([seed, 85]))}
     for of, path in paths.items():
         placed = known_start(path[:, :2], truth).to_map(path[:, :2])
         at = np.column_stack([np.interp(at_s, nodes.t_s, placed[:, k]) for k in (0, 1)])
-        row |= {of + key: value for key, value in path_columns(at, true_path(walk, at_s)).items()}
+        columns |= {of + key: value for key, value in as_dict(path_columns(at, true_path(walk, at_s))).items()}
+    row = DrawnRun(name=name, seed=seed, map_s=map_s, shape_m=rmse(pose[:, :2], truth), **columns)
     plan, walked_m = plan_in(mapped, frame.to_map, walk.pose_at(float(nodes.t_s[0])), name)
     if picture is not None:
         picture.parent.mkdir(parents=True, exist_ok=True)
@@ -162,7 +161,7 @@ def drawn_row(
     return row, plan, levels
 
 
-def _second(site: Site, drawn: Plan, levels: list[int], seed: int) -> Row:
+def _second(name: str, site: Site, drawn: Plan, levels: list[int], seed: int) -> SecondRun:
     """Another person on the drawing, from a known start, the other way round along the first one's tour.
 
     `levels`: the true level of each drawn one.
@@ -178,61 +177,10 @@ def _second(site: Site, drawn: Plan, levels: list[int], seed: int) -> Row:
     run = track(walk.segments, drawn, Start(replace(begin, level=levels.index(begin.level))), seed)
     places = np.array([(c.x_m, c.y_m) for c in run.claims])
     error = np.hypot(*(places - true_path(walk, np.array([c.t_s for c in run.claims]))).T)
-    return {"mean_m": float(error.mean()), "end_m": float(error[-1])}
+    return SecondRun(name=name, seed=seed, mean_m=float(error.mean()), end_m=float(error[-1]))
 
 
-def _summaries(rows: list[Row]) -> list[Row]:
-    """Means over the runs; of the errors also the worst."""
-    return [SUMMARIES.get(group[0]["name"].split("/")[0], _summary)(group) for group in rows_by_name(rows)]
-
-
-def _summary(group: list[Row]) -> Row:
-    def mean(key: str) -> float:
-        return float(np.mean([row[key] for row in group if key in row]))
-
-    row: Row = {"name": group[0]["name"], "runs": len(group)}
-    row |= {
-        key: mean(key)
-        for key in ("rmse_m", "shape_m", "foot_rmse_m", "footslam_rmse_m", "wall_median_m", "wall95_m", "map_s")
-    }
-    row |= {
-        "worst_rmse_m": max(r["rmse_m"] for r in group),
-        "drawn_pc": 100.0 * mean("drawn"),
-        "absent_pc": 100.0 * mean("absent"),
-        "wrong_storey_pc": 100.0 * mean("wrong_storey"),
-    }
-    return row | {key: sum(r[key] for r in group) for key in ("closures", "wrong")}
-
-
-def _second_summary(group: list[Row]) -> Row:
-    means = [row["mean_m"] for row in group]
-    lost = sum(row["end_m"] > LOST_M for row in group)
-    return {
-        "name": group[0]["name"],
-        "runs": len(group),
-        "mean_m": float(np.mean(means)),
-        "worst_m": max(means),
-        "lost": lost,
-    }
-
-
-SUMMARIES = {"second": _second_summary, "joined": joined_summary, "strangers": joined_summary}
-
-
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    first = [row for row in rows if "rmse_m" in row]
-    second = [row for row in rows if "mean_m" in row]
-    pairs = [row for row in rows if "joined" in row]
-    title = f"Drawn without a plan: {request.runs} simulated walks a row"
-    tables = [
-        Table(title, first, COLUMNS),
-        Table("Another person, tracked on the drawing", second, SECOND_COLUMNS),
-        Table("Two walks of unknown start, of one building and of two", pairs, JOINED_COLUMNS),
-    ]
-    return [table for table in tables if table.rows]
-
-
-def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study:
+def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, SummaryRow]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings."""
     if data is not None and not (data / "maps" / "westport-house").is_dir():
         raise EchostepError(f"{data / 'maps' / 'westport-house'}: not there: without --data its rows are left out")
@@ -240,4 +188,5 @@ def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Stud
     names = tuple(name for name in every if fnmatch(name, pattern))
     if not names:
         raise EchostepError(f"--rows {pattern}: no row is named so; there are: {', '.join(every)}")
-    return Study("noplan", partial(one_run, names, data, request.out, request.seed), _summaries, _tables)
+    kinds = (DrawnRun, SecondRun, PairRun, JoinedRun)
+    return Study("noplan", kinds, partial(one_run, names, data, request.out, request.seed), summaries, tables)

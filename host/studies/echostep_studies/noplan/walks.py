@@ -16,9 +16,9 @@ import numpy as np
 from echostep.legs.trunk_path import rotated_segment
 from echostep.simulation.devices.board_sensors import WornGyro
 from echostep.simulation.devices.mtx import MtxModel
-from echostep_studies.anywhere.echo_changes import with_people
-from echostep_studies.anywhere.sites import Site
-from echostep_studies.anywhere.walks import SimulatedWalk, simulate
+from echostep_studies.bench.echo_changes import with_people
+from echostep_studies.bench.sites import Site
+from echostep_studies.bench.walks import SimulatedWalk, simulate
 
 # Random walk of the heading per square root of a metre: the worst of the hallways, with the simulated foot's own.
 DRIFT_RAD = math.radians(0.5)

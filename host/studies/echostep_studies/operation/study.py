@@ -4,7 +4,7 @@
 In: seeds. Out: a row of all points, and one of each part. Simulated. The scores are those of `echostep score`, over the points of all runs together.
 
 `floor`: share of the points on the nearest floor; `floor_tied`: the same, where both floors are right within TIE_M of the middle between them, as in
-the study `anywhere` (`judgement.true_levels`). Estimates that say lost count in both, but not in the row `not lost`, of the points that availability
+`bench.judgement.true_levels`. Estimates that say lost count in both, but not in the row `not lost`, of the points that availability
 counts too. `search_s`: from the change of the battery on, until the new tracker says `tracking`. The rows `resumed` have the estimates of the tracker
 that begins where the first one ended, the others those of the one that knows nothing.
 """
@@ -12,19 +12,20 @@ that begins where the first one ended, the others those of the one that knows no
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.error_statistics import error_statistics, quantile
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.output.table import Table
 from echostep.scorecard.card import FLOOR_PENALTY_M, score
-from echostep_studies.anywhere.judgement import true_levels
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep.scorecard.error_statistics import error_statistics, quantile
+from echostep_studies.bench.judgement import true_levels
+from echostep_studies.frame.report import as_dict, as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.operation.own_tracks import track_of, truth_of
 from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
@@ -39,13 +40,61 @@ COLUMNS = {
 PERCENT = ("floor", "floor_tied")
 
 
-def one_run(half_m: float, seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartRun:
+    """The points of one part of an operation."""
+
+    name: str
+    seed: int
+    error_m: list[float]
+    above_m: list[float]
+    floors_off: list[float]
+    tied_right: list[bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeRun(PartRun):
+    """All points of an operation, with what the scorecard says of the whole."""
+
+    zone: float | None
+    available: float | None
+    search_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartSummary:
+    """A part of all operations, without a point in it."""
+
+    name: str
+    runs: int
+    points: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScoredSummary(PartSummary):
+    """A part of all operations, with the scores of its points."""
+
+    mean_m: float
+    ce50_m: float
+    ce95_m: float
+    max_m: float
+    ve95_m: float
+    se95_m: float
+    evaal_m: float
+    floor: float
+    floor_tied: float
+    zone: float | None
+    available: float | None
+    search_s: float | None
+
+
+def one_run(half_m: float, seed: int) -> list[PartRun]:
     """Rows of one operation: its points, all of them and by part."""
     walk = operation(seed, half_m)
     return _rows(walk, walk.after, seed, _parts) + _rows(walk, walk.resumed, seed, _resumed_parts)
 
 
-def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Parts) -> list[Row]:
+def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Parts) -> list[PartRun]:
     """Rows of the parts of one operation, with the estimates of one of the trackers after the change of the battery."""
     estimates = [*walk.before, *after]
     scored = score(track_of(estimates), truth_of(walk.truth, walk.plan), walk.plan)
@@ -55,22 +104,22 @@ def _rows(walk: OperationWalk, after: Sequence[Estimate], seed: int, parts: Part
     assert at.height_m is not None
     assert at.true_height_m is not None
     right = true_levels(at.true_xy_m, at.true_height_m, walk.plan)
-    points = {
-        "error_m": at.error_m,
-        "above_m": at.height_m - at.true_height_m,
-        "floors_off": np.abs(at.level - at.true_level),
-        "tied_right": right[np.arange(len(at.level)), at.level.astype(np.int64)],
-    }
+    above_m, floors_off = at.height_m - at.true_height_m, np.abs(at.level - at.true_level)
+    tied_right = right[np.arange(len(at.level)), at.level.astype(np.int64)]
     found = [e.t_s for e in after if e.status is TrackStatus.TRACKING]
-    whole: Row = {
-        "zone": scored.card.zone_probability, "available": scored.card.availability,
-        "search_s": found[0] - walk.restart_s if found else None,
-    }  # fmt: skip
     rows = []
     says = np.array([e.status.value for e in estimates])[at.row]
     for name, chosen in parts(walk, at.t_s, says).items():
-        row: Row = {"name": name, "seed": seed} | {key: values[chosen].tolist() for key, values in points.items()}
-        rows.append(row | (whole if name in (ALL, RESUMED) else {}))
+        row = PartRun(
+            name=name, seed=seed, error_m=at.error_m[chosen].tolist(), above_m=above_m[chosen].tolist(),
+            floors_off=floors_off[chosen].tolist(), tied_right=tied_right[chosen].tolist(),
+        )  # fmt: skip
+        if name in (ALL, RESUMED):
+            row = WholeRun(
+                **as_dict(row), zone=scored.card.zone_probability, available=scored.card.availability,
+                search_s=found[0] - walk.restart_s if found else None,
+            )  # fmt: skip
+        rows.append(row)
     return rows
 
 
@@ -94,44 +143,49 @@ def _resumed_parts(walk: OperationWalk, t_s: Floats, says: Any) -> dict[str, Boo
     }  # fmt: skip
 
 
-def _summary(rows: Sequence[Row]) -> Row:
+def _summary(rows: Sequence[PartRun]) -> PartSummary:
     """Scores of the points of all runs together."""
     error, above, off, right = (
-        np.concatenate([np.asarray(row[key]) for row in rows])
+        np.concatenate([np.asarray(getattr(row, key)) for row in rows])
         for key in ("error_m", "above_m", "floors_off", "tied_right")
     )
-    found: Row = {"name": rows[0]["name"], "runs": len(rows), "points": len(error)}
+    found = PartSummary(name=rows[0].name, runs=len(rows), points=len(error))
     if not len(error):
         return found
     statistics = error_statistics(error)
-    found |= {
+    whole = [row for row in rows if isinstance(row, WholeRun)]
+    scores = {
         "mean_m": statistics.mean_m, "ce50_m": statistics.median_m, "ce95_m": statistics.p95_m,
         "max_m": statistics.max_m, "ve95_m": quantile(np.abs(above), 0.95), "se95_m": quantile(np.hypot(error, above), 0.95),
         "evaal_m": quantile(error + FLOOR_PENALTY_M * off, 0.75), "floor": float((off == 0.0).mean()),
-        "floor_tied": float(right.mean()),
+        "floor_tied": float(right.mean()), "zone": _over(np.mean, (row.zone for row in whole)),
+        "available": _over(np.mean, (row.available for row in whole)), "search_s": _over(np.max, (row.search_s for row in whole)),
     }  # fmt: skip
-    for key, how in (("zone", np.mean), ("available", np.mean), ("search_s", np.max)):
-        values = [row[key] for row in rows if row.get(key) is not None]
-        found[key] = float(how(values)) if values else None
-    return {key: round(value, 4) if isinstance(value, float) else value for key, value in found.items()}
+    rounded: dict[str, Any] = {key: None if value is None else round(value, 4) for key, value in scores.items()}
+    return ScoredSummary(**as_dict(found), **rounded)
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    shown = [
-        {key: 100.0 * value if key in PERCENT and value is not None else value for key, value in row.items()}
-        for row in rows
-    ]
-    told = [_told(row) for row in rows if row["name"] in (ALL, RESUMED)]
+def _over(how: Callable[[list[float]], Any], values: Iterable[float | None]) -> float | None:
+    """A mean, or the greatest, of the values that there are."""
+    stated = [value for value in values if value is not None]
+    return float(how(stated)) if stated else None
+
+
+def _tables(rows: list[PartSummary], request: StudyRequest) -> list[Table]:
+    shown = [{key: 100.0 * value if key in PERCENT else value for key, value in row.items()} for row in as_dicts(rows)]
+    told = [_told(row) for row in rows if isinstance(row, ScoredSummary) and row.name in (ALL, RESUMED)]
     return [Table(f"Operations of twenty minutes on three storeys, {request.runs} simulated", shown, COLUMNS, told)]
 
 
-def _told(row: Row) -> str:
+def _told(row: ScoredSummary) -> str:
     """What was asked for and is met, of a row of all points."""
+    assert row.zone is not None
+    assert row.available is not None
     return (
-        f"{row['name']}: asked were CE95 at most {ASKED_CE95_M} m: {_met(row['ce95_m'] <= ASKED_CE95_M)}; "
-        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(row['floor'] >= ASKED_FLOOR)} by the nearest floor, "
-        f"{_met(row['floor_tied'] >= ASKED_FLOOR)} with both at a tie. Zone detection {100 * row['zone']:.1f} %, "
-        f"availability {100 * row['available']:.1f} %, search after the change at most {row['search_s'] or math.inf:.0f} s. Simulated."
+        f"{row.name}: asked were CE95 at most {ASKED_CE95_M} m: {_met(row.ce95_m <= ASKED_CE95_M)}; "
+        f"floor at least {100 * ASKED_FLOOR:g} %: {_met(row.floor >= ASKED_FLOOR)} by the nearest floor, "
+        f"{_met(row.floor_tied >= ASKED_FLOOR)} with both at a tie. Zone detection {100 * row.zone:.1f} %, "
+        f"availability {100 * row.available:.1f} %, search after the change at most {row.search_s or math.inf:.0f} s. Simulated."
     )
 
 
@@ -139,8 +193,12 @@ def _met(is_met: bool) -> str:
     return "met" if is_met else "not met"
 
 
-def operation_study(half_m: float = HALF_M) -> Study:
+def operation_study(half_m: float = HALF_M) -> Study[PartRun, PartSummary]:
     """The study; `half_m`: length of the way before the change of the battery, and after it."""
     return Study(
-        "operation", partial(one_run, half_m), lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables
+        "operation",
+        (PartRun, WholeRun),
+        partial(one_run, half_m),
+        lambda rows: [_summary(group) for group in rows_by_name(rows)],
+        _tables,
     )

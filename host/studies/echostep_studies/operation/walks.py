@@ -18,8 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats, spans
 from echostep.localization.estimate import Estimate
-from echostep.localization.last_place import start_after
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk, portion_of
@@ -27,8 +26,9 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Manner, Person, Waypoint
 from echostep.simulation.scenario import START_NS, Scenario
 from echostep.tracker import Tracker
-from echostep_studies.anywhere.sites import LOBBY
-from echostep_studies.anywhere.tours import random_tour
+from echostep.tracker.last_place import start_after
+from echostep_studies.bench.sites import LOBBY
+from echostep_studies.bench.tours import random_tour
 from echostep_studies.simulation.tower import STOREY_M, tower
 
 STOREYS = 3

@@ -15,7 +15,7 @@ from echostep.path import MeasuredSegment
 from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.plan.writer import plan_json
 from echostep.ports.chunks import portion_of
-from echostep.team.shared_drawings import checked_drawing
+from echostep.team.messages.shared_drawings import checked_drawing
 from echostep.tracker import Tracker
 from echostep_studies.team.tracking import PORTION
 from echostep_studies.team.walks import TeamWalks

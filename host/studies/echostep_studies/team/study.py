@@ -14,7 +14,8 @@ random numbers, over those alone: how much of `worst` means nothing. An error on
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from functools import partial
 
@@ -23,15 +24,15 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate, TrackStatus
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.output.table import Table
 from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
-from echostep_studies.anywhere import judgement, sites
-from echostep_studies.anywhere.judgement import FALSE_TRACKING_M, Truth, true_levels
-from echostep_studies.anywhere.tours import random_tour
-from echostep_studies.anywhere.walks import T, X, Y, Z
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.bench import judgement, sites
+from echostep_studies.bench.judgement import FALSE_TRACKING_M, Truth, true_levels
+from echostep_studies.bench.tours import random_tour
+from echostep_studies.bench.walks import T, X, Y, Z
+from echostep_studies.frame.report import as_dicts, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.tower import tower
 from echostep_studies.team.beacons import with_dropped_beacons
@@ -74,9 +75,45 @@ DRAWING = "office/drawing"  # of one storey: a drawing's storeys are not those o
 ROWS = (*(f"{building}/{how}" for building in BUILDINGS for how in HOWS), DRAWING)
 
 
-def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WearerRun:
+    """A wearer's tracker alone, together, and alone with other random numbers: mean errors, shares of false tracking."""
+
+    name: str
+    wearer: int
+    meetings: int
+    alone_m: float
+    false_alone: float
+    together_m: float
+    false_together: float
+    again_m: float
+    false_again: float
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeamSummary:
+    """All runs of a name."""
+
+    name: str
+    runs: int
+    meetings: float
+    alone_m: float
+    together_m: float
+    first_alone_m: float | None
+    first_together_m: float | None
+    others_alone_m: float
+    others_together_m: float
+    ratio: float
+    worst: float
+    by_chance: float
+    false_alone: float
+    false_together: float
+
+
+def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[WearerRun]:
     """The rows of these names for the teams of one seed."""
-    rows: list[Row] = []
+    rows: list[WearerRun] = []
     for building, make in BUILDINGS.items():
         hows = [name.split("/")[1] for name in names if name.startswith(f"{building}/") and name != DRAWING]
         if not hows:
@@ -93,19 +130,19 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[Row]:
             if kind not in alone:
                 alone[kind] = track_team(walks, told, None, seed), track_team(walks, told, None, seed + OTHER_DRAWS)
             together = track_team(walks, told, HOWS[how], seed)
-            rows += [_row(f"{building}/{how}", walks, k, [alone[kind][0][k], together[k], alone[kind][1][k]]) | {"seed": seed}
+            rows += [_row(f"{building}/{how}", walks, k, [alone[kind][0][k], together[k], alone[kind][1][k]], seed)
                      for k in range(WEARERS) if not (how == "liar" and k == LIAR)]  # fmt: skip
     return rows + (_drawing_rows(length_m, seed) if DRAWING in names else [])
 
 
-def _drawing_rows(length_m: float, seed: int) -> list[Row]:
+def _drawing_rows(length_m: float, seed: int) -> list[WearerRun]:
     """The row DRAWING of the team of one seed."""
     walks = team_walks(*_office(), length_m, seed, at_door=True)
     drawn, rows = drawing_by(walks, FIRST), []
     for who in range(FIRST + 1, WEARERS):
         alone, again = (track_on(NO_PLAN, walks, who, seed + more) for more in (0, OTHER_DRAWS))
         runs = [alone, track_on(drawn, walks, who, seed), again]
-        rows.append(_row(DRAWING, walks, who, runs) | {"seed": seed, "meetings": 0})
+        rows.append(replace(_row(DRAWING, walks, who, runs, seed), meetings=0))
     return rows
 
 
@@ -123,14 +160,18 @@ def _told(walks: TeamWalks, begin: RoutePlace, kind: str, seed: int) -> Pose | S
     raise EchostepError(f"plan {walks.plan.name}: no place is {WRONG_M:g} m from the start")
 
 
-def _row(name: str, walks: TeamWalks, who: int, runs: Sequence[Sequence[Estimate]]) -> Row:
+def _row(name: str, walks: TeamWalks, who: int, runs: Sequence[Sequence[Estimate]], seed: int) -> WearerRun:
     """Errors of one wearer's tracker alone, together, and alone with other random numbers."""
-    row: Row = {"name": name, "wearer": who, "meetings": sum(who in e.who for e in walks.encounters)}
-    for key, estimates in zip(("alone", "together", "again"), runs, strict=True):
+    errors, false = [], []
+    for estimates in runs:
         error = errors_m(walks, who, estimates)
         sure = np.array([e.status is TrackStatus.TRACKING for e in estimates])
-        row |= {f"{key}_m": float(error.mean()), f"false_{key}": float((sure & (error > FALSE_TRACKING_M)).mean())}
-    return row
+        errors.append(float(error.mean()))
+        false.append(float((sure & (error > FALSE_TRACKING_M)).mean()))
+    return WearerRun(
+        name=name, wearer=who, meetings=sum(who in e.who for e in walks.encounters), alone_m=errors[0], false_alone=false[0],
+        together_m=errors[1], false_together=false[1], again_m=errors[2], false_again=false[2], seed=seed,
+    )  # fmt: skip
 
 
 def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Floats:
@@ -144,43 +185,48 @@ def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Float
     return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 
 
-def _summary(rows: Sequence[Row]) -> Row:
+def _summary(rows: Sequence[WearerRun]) -> TeamSummary:
     """One row of all runs of a name."""
-    first, others = ([r for r in rows if (r["wearer"] == FIRST) is is_first] for is_first in (True, False))
-    found: Row = {"name": rows[0]["name"], "runs": len({r["seed"] for r in rows})}
-    found["meetings"] = float(np.mean([r["meetings"] for r in rows]))
-    for prefix, group in (("", rows), ("first_", first), ("others_", others)):
-        for key in ("alone_m", "together_m"):
-            found[prefix + key] = float(np.mean([r[key] for r in group])) if group else None
-    found["ratio"] = found["together_m"] / found["alone_m"]
-    found["worst"] = max(r["together_m"] / r["alone_m"] for r in others)
-    found["by_chance"] = max(r["again_m"] / r["alone_m"] for r in others)
-    for key in ("false_alone", "false_together"):
-        found[key] = float(np.mean([r[key] for r in rows]))
-    return {key: round(value, 4) if isinstance(value, float) else value for key, value in found.items()}
+    first, others = ([r for r in rows if (r.wearer == FIRST) is is_first] for is_first in (True, False))
+    alone_m, together_m = _mean(r.alone_m for r in rows), _mean(r.together_m for r in rows)
+    return TeamSummary(
+        name=rows[0].name, runs=len({r.seed for r in rows}), meetings=round(_mean(r.meetings for r in rows), 4),
+        alone_m=round(alone_m, 4), together_m=round(together_m, 4),
+        first_alone_m=round(_mean(r.alone_m for r in first), 4) if first else None,
+        first_together_m=round(_mean(r.together_m for r in first), 4) if first else None,
+        others_alone_m=round(_mean(r.alone_m for r in others), 4), others_together_m=round(_mean(r.together_m for r in others), 4),
+        ratio=round(together_m / alone_m, 4), worst=round(max(r.together_m / r.alone_m for r in others), 4),
+        by_chance=round(max(r.again_m / r.alone_m for r in others), 4),
+        false_alone=round(_mean(r.false_alone for r in rows), 4), false_together=round(_mean(r.false_together for r in rows), 4),
+    )  # fmt: skip
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
-    shown = [{k: 100.0 * v if k.startswith("false") else v for k, v in row.items()} for row in rows]
+def _mean(values: Iterable[float]) -> float:
+    return float(np.mean(list(values)))
+
+
+def _tables(rows: list[TeamSummary], request: StudyRequest) -> list[Table]:
+    shown = [{k: 100.0 * v if k.startswith("false") else v for k, v in row.items()} for row in as_dicts(rows)]
     notes = [
         f"Asked: ratio at most {ASKED_RATIO} where one start is wrong, worst at most {ASKED_WORST}: "
-        + ", ".join(f"{row['name']} {_met(row)}" for row in rows if not row["name"].endswith("liar")) + ".",
+        + ", ".join(f"{row.name} {_met(row)}" for row in rows if not row.name.endswith("liar")) + ".",
         "meetings: of each wearer. first: the wearer whose start is wrong or unknown. worst: of the others, in one run. Simulated.",
     ]  # fmt: skip
     return [Table(f"Five wearers, each alone and with meetings: {request.runs} teams a row", shown, COLUMNS, notes)]
 
 
-def _met(row: Row) -> str:
-    return "met" if row["ratio"] <= ASKED_RATIO and row["worst"] <= ASKED_WORST else "not met"
+def _met(row: TeamSummary) -> str:
+    return "met" if row.ratio <= ASKED_RATIO and row.worst <= ASKED_WORST else "not met"
 
 
-def team_study(rows: str = "*", length_m: float = LENGTH_M) -> Study:
+def team_study(rows: str = "*", length_m: float = LENGTH_M) -> Study[WearerRun, TeamSummary]:
     """The study of the rows whose names match a pattern."""
     names = tuple(name for name in ROWS if fnmatch(name, rows))
     if not names:
         raise EchostepError(f"--rows {rows}: no row is named so; there are: {', '.join(ROWS)}")
     return Study(
         "team",
+        (WearerRun,),
         partial(one_run, names, length_m),
         lambda rows: [_summary(group) for group in rows_by_name(rows)],
         _tables,

@@ -16,18 +16,18 @@ from enum import StrEnum
 import numpy as np
 
 from echostep.localization.estimate import Estimate
-from echostep.localization.start import Start
+from echostep.localization.particles.start import Start
 from echostep.plan.model import Pose
 from echostep.ports.chunks import Chunk, portion_of
-from echostep.ports.meeting import MEETING, Meeting
-from echostep.ports.team_beacons import TEAM_BEACONS, TeamBeacons
+from echostep.ports.people.meeting import MEETING, Meeting
+from echostep.ports.people.team_beacons import TEAM_BEACONS, TeamBeacons
 from echostep.simulation.scenario import START_NS
-from echostep.team.meeting import meeting_with
+from echostep.team.messages.meeting import meeting_with
+from echostep.team.messages.shared_beacons import SHARE_S
 from echostep.team.outbox import aged
 from echostep.team.publish import position_of
-from echostep.team.shared_beacons import SHARE_S
 from echostep.tracker import Tracker
-from echostep_studies.anywhere.walks import T
+from echostep_studies.bench.walks import T
 from echostep_studies.team.walks import Encounter, TeamWalks
 
 TAP_S = 1.0  # from the encounter to the tap, at most, by reason

@@ -22,8 +22,8 @@ from echostep.ports.chunks import Chunk
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import Scenario
-from echostep_studies.anywhere.tours import random_tour
-from echostep_studies.anywhere.walks import T, X, Y, Z
+from echostep_studies.bench.tours import random_tour
+from echostep_studies.bench.walks import T, X, Y, Z
 
 WEARERS = 5
 CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs

@@ -7,12 +7,14 @@ paper's errors were used to set the model of the MTx's filter (`xsens.onboard_fi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from echostep.output.table import Table
-from echostep_studies.frame.report import Row, rows_by_name, summary
+from echostep_studies.frame.report import ErrorSummary, as_dict, as_dicts, rows_by_name, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
 from echostep_studies.trails.pictures import draw_trails
@@ -33,7 +35,50 @@ LEGEND = (
 )
 
 
-def one_run(seed: int) -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrailRun:
+    """One method on one walk of a trail."""
+
+    name: str
+    profile: str
+    rate_hz: int
+    distance_m: float
+    distance_error_percent: float
+    heading_error_deg: float
+    heading_max_deg: float
+    errors_m: list[float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintedRun(TrailRun):
+    """The same by the paper's method, with what the paper says of the trail."""
+
+    printed: str
+    printed_distance_error_percent: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrailSummary(ErrorSummary):
+    """One method on all walks of a trail."""
+
+    rate_hz: int
+    distance_m: float
+    distance_error_percent: float
+    distance_error_min_percent: float
+    distance_error_max_percent: float
+    heading_error_deg: float
+    heading_max_deg: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintedSummary(TrailSummary):
+    """The same by the paper's method, with what the paper says of the trail."""
+
+    printed: str
+    printed_distance_error_percent: float | None
+
+
+def one_run(seed: int) -> list[TrailRun]:
     """Rows of one run: every trail, rate and method."""
     rows = []
     for trail in TRAILS:
@@ -44,71 +89,73 @@ def one_run(seed: int) -> list[Row]:
     return rows
 
 
-def _row(trail: Trail, rate_hz: int, profile: str, walked: JudgedTrack) -> Row:
+def _row(trail: Trail, rate_hz: int, profile: str, walked: JudgedTrack) -> TrailRun:
     degrees = np.degrees(walked.heading_errors_rad)
-    row: Row = {
-        "name": f"{trail.name}/{profile}" + ("" if rate_hz == RATES_HZ[0] else f"/{rate_hz}Hz"),
-        "profile": profile,
-        "rate_hz": rate_hz,
-        "distance_m": walked.distance_m,
-        "distance_error_percent": 100.0 * (walked.distance_m / walked.true_distance_m - 1.0),
-        "heading_error_deg": float(np.sqrt((degrees**2).mean())),
-        "heading_max_deg": float(degrees.max()),
-        "errors_m": walked.errors_m.round(4).tolist(),
-    }
-    if profile == "fischer2008":
-        row |= {"printed": trail.printed, "printed_distance_error_percent": trail.printed_percent}
-    return row
+    row = TrailRun(
+        name=f"{trail.name}/{profile}" + ("" if rate_hz == RATES_HZ[0] else f"/{rate_hz}Hz"),
+        profile=profile,
+        rate_hz=rate_hz,
+        distance_m=walked.distance_m,
+        distance_error_percent=100.0 * (walked.distance_m / walked.true_distance_m - 1.0),
+        heading_error_deg=float(np.sqrt((degrees**2).mean())),
+        heading_max_deg=float(degrees.max()),
+        errors_m=walked.errors_m.round(4).tolist(),
+    )
+    if profile != "fischer2008":
+        return row
+    return PrintedRun(**as_dict(row), printed=trail.printed, printed_distance_error_percent=trail.printed_percent)
 
 
-def summaries(rows: list[Row]) -> list[Row]:
+def summaries(rows: Sequence[TrailRun]) -> list[TrailSummary]:
     """One row for each trail, method and rate, over all runs."""
     return [_summary(group) for group in rows_by_name(rows)]
 
 
-def _summary(rows: list[Row]) -> Row:
+def _summary(rows: list[TrailRun]) -> TrailSummary:
     first = rows[0]
-    off = [row["distance_error_percent"] for row in rows]
-    found = summary(first["name"], first["profile"], [row["errors_m"] for row in rows], [])
-    found |= {
-        "rate_hz": first["rate_hz"],
-        "distance_m": round(sum(row["distance_m"] for row in rows) / len(rows), 2),
-        "distance_error_percent": round(sum(off) / len(off), 2),
-        "distance_error_min_percent": round(min(off), 2),
-        "distance_error_max_percent": round(max(off), 2),
-        "heading_error_deg": round(sum(row["heading_error_deg"] for row in rows) / len(rows), 2),
-        "heading_max_deg": round(max(row["heading_max_deg"] for row in rows), 2),
-    }
-    printed = {key: first[key] for key in ("printed", "printed_distance_error_percent") if key in first}
-    return found | printed
+    off = [row.distance_error_percent for row in rows]
+    found = TrailSummary(
+        **as_dict(summary(first.name, first.profile, [row.errors_m for row in rows], [])),
+        rate_hz=first.rate_hz,
+        distance_m=round(sum(row.distance_m for row in rows) / len(rows), 2),
+        distance_error_percent=round(sum(off) / len(off), 2),
+        distance_error_min_percent=round(min(off), 2),
+        distance_error_max_percent=round(max(off), 2),
+        heading_error_deg=round(sum(row.heading_error_deg for row in rows) / len(rows), 2),
+        heading_max_deg=round(max(row.heading_max_deg for row in rows), 2),
+    )
+    if not isinstance(first, PrintedRun):
+        return found
+    percent = first.printed_distance_error_percent
+    return PrintedSummary(**as_dict(found), printed=first.printed, printed_distance_error_percent=percent)
 
 
-def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+def _tables(rows: list[TrailSummary], request: StudyRequest) -> list[Table]:
     """One table for each rate; below the last one the printed and simulated errors of the way."""
     tables = []
     for rate_hz in RATES_HZ:
-        shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in rows if row["rate_hz"] == rate_hz]
+        shown = [replace(row, name=row.name.removesuffix(f"/{rate_hz}Hz")) for row in rows if row.rate_hz == rate_hz]
         notes = (
             ("Printed and simulated error of the way: " + "; ".join(_ranges(rows)), LEGEND)
             if rate_hz == RATES_HZ[-1]
             else ()
         )
         title = f"Trails of Fischer et al. 2008, simulated: {request.runs} runs at {rate_hz} Hz"
-        tables.append(Table(title, shown, COLUMNS, notes))
+        tables.append(Table(title, as_dicts(shown), COLUMNS, notes))
     return tables
 
 
-def _ranges(rows: list[Row]) -> list[str]:
+def _ranges(rows: list[TrailSummary]) -> list[str]:
     """The printed distance errors, each with the range of the simulated walkers."""
     return [
-        f"{row['name']} {row['printed']}, {row['distance_error_min_percent']:+.1f} to {row['distance_error_max_percent']:+.1f} %"
+        f"{row.name} {row.printed}, {row.distance_error_min_percent:+.1f} to {row.distance_error_max_percent:+.1f} %"
         for row in rows
-        if row.get("printed_distance_error_percent") is not None
+        if isinstance(row, PrintedSummary) and row.printed_distance_error_percent is not None
     ]
 
 
-def _draw(folder: Path, seed: int, _rows: list[Row]) -> None:
+def _draw(folder: Path, seed: int, _rows: list[TrailSummary]) -> None:
     draw_trails(folder, seed)
 
 
-STUDY = Study("trails", one_run, summaries, _tables, _draw, parquet=None)
+STUDY = Study("trails", (TrailRun, PrintedRun), one_run, summaries, _tables, _draw, parquet=None)

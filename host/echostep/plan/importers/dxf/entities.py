@@ -18,6 +18,7 @@ import shapely
 from shapely.geometry import LineString
 
 from echostep.errors import EchostepError
+from echostep.extras import require
 from echostep.plan.importers.parsing import read_bytes
 from echostep.plan.json_fields import LIMIT_M
 
@@ -80,6 +81,7 @@ class DrawingFrame:
 
 def read_drawing(file: Path) -> Any:
     """Read a drawing, repaired where ezdxf can; raises EchostepError when the file is not a drawing."""
+    require(f"{file}: DXF", "ezdxf")
     from ezdxf import recover
     from ezdxf.lldxf.const import DXFError
 

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""A table of the range to expect at every place of the floor and in every direction, for a cloud that is spread over the building.
+
+In: walls, their floor. Out: `CoarseField`, and `reweight_coarsely`, which looks a ping up instead of tracing it. Owns nothing.
+
+A cell of the floor has one row, a sector of the ranger's axis one column. A ranger's cone is wide, so its range changes little within a sector of 15
+degrees; within a cell of 25 cm it changes by as much as the cell is wide, and COARSE_SD_M says so. An entry is an expected range and the probability
+that an echo is heard at all, for walls at a grazing angle or far away seldom are. A look-up takes a tenth of a trace's time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats, Int32s
+from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
+from echostep.localization.echoes.likelihood import SILENT, EchoModel, detection, hidden_density
+from echostep.localization.particle_arrays import ParticleArrays, PingBatch
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.floor import CELL_M, Floor
+from echostep.walls.index import WallIndex
+
+# All by reason.
+SECTORS = 24  # of 15 degrees
+UNIT_M = 0.025  # of a range in the table, one byte
+COARSE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
+FAR_SHARE, FAR_FACTOR = (
+    0.2,
+    3.0,
+)  # of the expected ranges are off by so many times as much: edges, corners, the next wall
+LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
+CHANCES = 8  # steps of the probability that an echo is heard
+RANGES = 256  # steps of the expected range
+OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
+# The ping before, of the same ranger: silence goes on where nothing answers, and where an entry is wrong
+AFTER_ECHO, AFTER_SILENCE = 0, 1
+# Shares after an echo, and after silence: of echoes heard by the entry that are none all the same; of "no echo" where none is heard (the others are
+# second reflections and things that no plan shows); of views that are hidden; of "no echo" in these
+MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
+AROUND = 2  # cells about the floor, at its walls, that share the nearest row
+UNKNOWN = -1  # no row: outside the building
+USED_M = 0.25  # path between two pings of one ranger that are used, by reason: a cell of the table
+INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
+
+
+class CoarseField(NamedTuple):
+    """`row` (rows, columns): row of `expected` by cell of the grid from (x0_m, y0_m) on, or UNKNOWN.
+
+    `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability that an echo is heard, of CHANCES.
+    """
+
+    x0_m: float
+    y0_m: float
+    row: Int32s
+    expected: np.ndarray[tuple[int, int], np.dtype[np.uint16]]
+
+
+class CoarsePing(NamedTuple):
+    """One ping: axis in the walk frame, range (0: none), power, odds that a silent one missed its echo (else 0), AFTER_ECHO or AFTER_SILENCE."""
+
+    axis_rad: float
+    range_m: float
+    power: float
+    missed: float
+    after: int
+
+
+def coarse_field(walls: Walls, floor: Floor, model: EchoModel) -> CoarseField:
+    """The table of a floor; seconds for a building of thousands of square metres."""
+    if not len(floor.x_m):
+        return CoarseField(0.0, 0.0, np.full((1, 1), UNKNOWN, np.int32), np.zeros((1, SECTORS), np.uint16))
+    x0, y0 = float(floor.x_m.min()) - (AROUND + 0.5) * CELL_M, float(floor.y_m.min()) - (AROUND + 0.5) * CELL_M
+    column, line = ((floor.x_m - x0) / CELL_M).astype(np.int64), ((floor.y_m - y0) / CELL_M).astype(np.int64)
+    row = np.full((int(line.max()) + AROUND + 1, int(column.max()) + AROUND + 1), UNKNOWN, np.int32)
+    row[line, column] = np.arange(len(line))
+    for _ in range(AROUND):
+        row = _grown(row)
+    expected = _expected(floor.x_m, floor.y_m, walls.near(floor.x_m, floor.y_m), model)
+    return CoarseField(x0, y0, row, expected)
+
+
+@lean_kernel
+def reweight_coarsely(
+    particles: ParticleArrays, ping: CoarsePing, field: CoarseField, model: EchoModel, table: Floats
+) -> None:
+    """Add each particle's log-likelihood of a ping, by the table, to the ping's power, and make the greatest log-weight 0.
+
+    `table` (OUTSIDE + 1,): room for the log-density by entry.
+    """
+    x, y, turn, _, log_weight = particles
+    log_densities(ping, model, table)
+    top = -np.inf
+    for i in range(len(x)):
+        log_weight[i] += table[_entry(x[i], y[i], ping.axis_rad + turn[i], field)]
+        top = max(top, log_weight[i])
+    for i in range(len(x)):
+        log_weight[i] -= top
+
+
+@inline_kernel
+def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
+    """The entry of the table at a place and in a direction; OUTSIDE outside."""
+    rows, columns = field.row.shape
+    c, r = (x - field.x0_m) / CELL_M, (y - field.y0_m) / CELL_M
+    if not (0.0 <= c < columns and 0.0 <= r < rows):
+        return OUTSIDE
+    cell = field.row[int(r), int(c)]
+    if cell < 0:
+        return OUTSIDE
+    turns = axis_rad * (0.5 / math.pi)
+    return int(field.expected[cell, min(int((turns - math.floor(turns)) * SECTORS), SECTORS - 1)])
+
+
+@lean_kernel
+def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
+    """Log-density per metre of a range by the entry, to the ping's power; range 0: of no echo.
+
+    With the entry's probability the echo is that of the expected range, else as where none is expected; so is the last entry, outside.
+    """
+    range_m, missed, quiet = ping.range_m, MISSED[ping.after], QUIET[ping.after]
+    hidden_share, hidden_quiet = HIDDEN[ping.after], HIDDEN_QUIET[ping.after]
+    is_echo = range_m > 0.0
+    unlikely = (1.0 - quiet) / (model.maximum_m - model.minimum_m) if is_echo else quiet
+    of_hidden = (1.0 - hidden_quiet) / (1.0 - SILENT) if is_echo else hidden_quiet / SILENT
+    for k in range(RANGES):
+        hidden = of_hidden * hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
+        likely = missed
+        if is_echo:
+            z = (range_m - k * UNIT_M) / COARSE_SD_M
+            near = math.exp(-0.5 * z * z)
+            far = math.exp(-0.5 * z * z / (FAR_FACTOR * FAR_FACTOR)) / FAR_FACTOR
+            likely = (1.0 - FAR_SHARE) * near + FAR_SHARE * far
+            likely *= (1.0 - missed) / (COARSE_SD_M * math.sqrt(2.0 * math.pi))
+        for c in range(CHANCES):
+            chance = (c + 0.5) / CHANCES if k > 0 else 0.0
+            planned = chance * likely + (1.0 - chance) * unlikely
+            table[c * RANGES + k] = ping.power * math.log(
+                (1.0 - hidden_share) * planned + hidden_share * hidden + ping.missed
+            )
+    table[OUTSIDE] = table[0]
+
+
+@kernel
+def _expected(
+    x: Floats, y: Floats, walls: WallIndex, model: EchoModel
+) -> np.ndarray[tuple[int, int], np.dtype[np.uint16]]:
+    """The entries by cell and sector: the range up to which sources are detected with probability LIKELY, and the probability that any is."""
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    expected = np.zeros((len(x), SECTORS), np.uint16)
+    for i in range(len(x)):
+        for s in range(SECTORS):
+            axis = 2.0 * math.pi * (s + 0.5) / SECTORS
+            count = echo_sources(x[i], y[i], axis, walls, distance_m, off_axis_rad, kind)
+            missed, entry = 1.0, 0
+            for k in range(count):
+                missed *= 1.0 - detection(distance_m[k], off_axis_rad[k], kind[k], model)
+                if entry == 0 and missed < 1.0 - LIKELY:
+                    entry = max(min(int(distance_m[k] / UNIT_M + 0.5), RANGES - 1), 1)
+            if entry > 0:
+                expected[i, s] = entry + RANGES * min(int((1.0 - missed) * CHANCES), CHANCES - 1)
+    return expected
+
+
+@allocating_kernel
+def _grown(row: Int32s) -> Int32s:
+    """The grid with each unknown cell that has a known neighbour given that neighbour's row."""
+    rows, columns = row.shape
+    grown = row.copy()
+    for r in range(rows):
+        for c in range(columns):
+            if row[r, c] != UNKNOWN:
+                continue
+            for d in range(4):
+                j, i = r + (d == 0) - (d == 1), c + (d == 2) - (d == 3)
+                if 0 <= j < rows and 0 <= i < columns and row[j, i] != UNKNOWN:
+                    grown[r, c] = row[j, i]
+    return grown
+
+
+class CoarsePings:
+    """The memory of both rangers since the cloud began."""
+
+    def __init__(self) -> None:
+        self.path_m = 0.0
+        self._used_at_m = [-math.inf, -math.inf]  # path at the last ping of each ranger
+        self._after = [AFTER_SILENCE, AFTER_SILENCE]  # what that was
+
+    def take(self, pings: PingBatch, k: int, way_m: float) -> CoarsePing | None:
+        """The k-th ping, `way_m` after `path_m`; None if it comes too soon after the last one of its ranger."""
+        ranger, at_m = int(pings.ranger[k]), self.path_m + way_m
+        travel_m, after = at_m - self._used_at_m[ranger], self._after[ranger]
+        if travel_m < USED_M:
+            return None
+        axis_rad, range_m, missed = (float(v[k]) for v in (pings.axis_rad, pings.range_m, pings.missed))
+        self._used_at_m[ranger], self._after[ranger] = at_m, AFTER_ECHO if range_m > 0.0 else AFTER_SILENCE
+        return CoarsePing(axis_rad, range_m, min(travel_m / INDEPENDENT_M, 1.0), missed, after)

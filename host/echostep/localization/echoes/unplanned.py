@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Which pings count, and their density if nothing is known of the pose: what a wearer anywhere in the building
+receives, or what the last echoes predict.
+
+In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
+densities without a plan. Owns the views of both rangers, each a line in the walk frame that was heard last, or nothing, and the length of the path.
+
+A cloud that explains the echoes no better than this is wrong, or the plan is. So it has to be as good as can be done without a plan: a wall that goes
+on is predicted as well as by the plan, and only where a view changes does the plan know more. A smooth wall answers from the foot of the
+perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and direction of
+the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.angles import wrap
+from echostep.arrays import Floats, Ints
+from echostep.jit import kernel
+from echostep.localization.echoes.likelihood import EchoModel, EchoSettings, MissedEchoes, echo_density, normal
+from echostep.localization.particle_arrays import PingBatch
+from echostep.path import MeasuredSegment
+from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.floor import Floor
+from echostep.walls.index import WallIndex
+
+# All by reason.
+AXIS_SD_RAD = math.radians(
+    20.0
+)  # of a new wall's normal about the ranger's axis: half of the angle at which walls answer
+SEEN_RAD = math.radians(50.0)  # of the normal from the axis: the angle at which near walls answer, and the axis' error
+TURN_SD_RAD = 0.05  # change of the normal on a metre of path
+VIEW_M = 2.5  # mean length of the path between two changes of a view, by reason: walls, doors, corners
+POSES = 400  # drawn on the floor, by reason: their mean is then good to 5 %
+BIN_M = 0.05  # width of a bin of ranges
+LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
+# Turns on a segment at which its pings count half, by reason: headings between its ends are interpolated
+TURNING_RAD = math.radians(45.0)  # as weights of particles
+JUDGING_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
+
+
+class LastWall:
+    """`distance_m`, `normal_rad`: the line seen from where the last echo was received; their covariance."""
+
+    def __init__(self, range_m: float, axis_rad: float, sd_m: float, slant_m: float) -> None:
+        """From a first echo. Standard deviation of a range: `sd_m`, and `slant_m` per radian off the axis."""
+        self._sd_m, self._slant_m = sd_m, slant_m
+        self.distance_m, self.normal_rad = range_m, axis_rad
+        self._var_m2, self._covariance_m, self._var_rad2 = sd_m**2, 0.0, AXIS_SD_RAD**2
+
+    def move(self, dx_m: float, dy_m: float) -> None:
+        """Predict the line as seen after this way in the walk frame."""
+        c, s = math.cos(self.normal_rad), math.sin(self.normal_rad)
+        self.distance_m -= c * dx_m + s * dy_m
+        across = s * dx_m - c * dy_m  # change of the distance with the normal
+        self._var_m2 += across * (2.0 * self._covariance_m + across * self._var_rad2)
+        self._covariance_m += across * self._var_rad2
+        self._var_rad2 += TURN_SD_RAD**2 * math.hypot(dx_m, dy_m)
+
+    def density(self, range_m: float, axis_rad: float) -> float:
+        """Density (1/m) of an echo of this wall; 0 when it is out of the ranger's sight."""
+        if abs(wrap(self.normal_rad - axis_rad)) > SEEN_RAD:
+            return 0.0
+        return normal(range_m - self.distance_m, math.sqrt(self._var_m2 + self._error_m(axis_rad) ** 2))
+
+    def update(self, range_m: float, axis_rad: float, power: float) -> None:
+        """Correct the line by an echo, whose error counts by `power`: those of successive echoes are alike."""
+        total = self._var_m2 + self._error_m(axis_rad) ** 2 / power
+        gain_m, gain_rad = self._var_m2 / total, self._covariance_m / total
+        difference = range_m - self.distance_m
+        self.distance_m += gain_m * difference
+        self.normal_rad += gain_rad * difference
+        self._var_rad2 -= gain_rad * self._covariance_m
+        self._covariance_m -= gain_m * self._covariance_m
+        self._var_m2 -= gain_m * self._var_m2
+
+    def _error_m(self, axis_rad: float) -> float:
+        """Standard deviation of a range."""
+        return self._sd_m + self._slant_m * abs(wrap(self.normal_rad - axis_rad))
+
+
+class View:
+    """`density` before `update` for each ping, after `move`."""
+
+    def __init__(self, echo: EchoSettings) -> None:
+        self._echo = echo
+        self._wall: LastWall | None = None  # None: nothing was heard
+        self._x_m, self._y_m = math.nan, math.nan
+
+    def move(self, x_m: float, y_m: float) -> float:
+        """Go on to the place of the next ping; returns the length of the way (m), infinite to the first one."""
+        dx_m, dy_m = x_m - self._x_m, y_m - self._y_m
+        self._x_m, self._y_m = x_m, y_m
+        if math.isnan(dx_m):
+            return math.inf
+        if self._wall is not None:
+            self._wall.move(dx_m, dy_m)
+        return math.hypot(dx_m, dy_m)
+
+    def density(self, range_m: float, axis_rad: float) -> float:
+        """Density (1/m) of a range if the view goes on; range 0: the probability of no echo."""
+        if range_m <= 0.0:
+            return 1.0 if self._wall is None else 0.0
+        return 0.0 if self._wall is None else self._wall.density(range_m, axis_rad)
+
+    def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
+        """Take a ping in; `goes_on`: whether the view goes on, by the densities."""
+        if range_m <= 0.0:
+            if not goes_on:  # otherwise it is likelier that an echo was missed
+                self._wall = None
+        elif goes_on and self._wall is not None:
+            self._wall.update(range_m, axis_rad, power)
+        else:
+            self._wall = LastWall(range_m, axis_rad, self._echo.sd_m, self._echo.slant_m)
+
+
+class Background(NamedTuple):
+    """`log_density` (bins + 1,): log of the density (1/m) in each bin of BIN_M; the last entry: log-probability of no echo."""
+
+    log_density: Floats
+
+    def of(self, range_m: Floats) -> Floats:
+        """Log-densities of ranges (k,); 0: no echo."""
+        last = len(self.log_density) - 1
+        k = np.minimum((range_m / BIN_M).astype(np.int64), last - 1)
+        return self.log_density[np.where(range_m > 0.0, k, last)]
+
+
+def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
+    """The mean of the echo density over poses evenly on the floor; of a plan without a floor: even over all ranges."""
+    bins = math.ceil(model.maximum_m / BIN_M) + 1
+    if not len(floor.x_m):
+        return Background(np.full(bins + 1, -math.log(model.maximum_m)))
+    rng = np.random.default_rng(0)
+    x, y = floor.draw(POSES, rng)
+    density = _mean_density(x, y, 2.0 * math.pi * rng.random(POSES), walls.near(x, y), model, bins)
+    return Background(np.log(density))
+
+
+class PlacedPings(NamedTuple):
+    """Pings (k,): `ranger`; place and axis in the walk frame; `range_m`, 0: no echo; `power`."""
+
+    ranger: Ints
+    x_m: Floats
+    y_m: Floats
+    axis_rad: Floats
+    range_m: Floats
+    power: Floats
+
+
+class UnplannedDensities(NamedTuple):
+    """Of pings (k,): `missed`, odds that a silent one missed its echo, 0 for an echo; `alike`, the density if like the one before, without those.
+
+    Logs of densities to the pings' power, with them: `anywhere` in the building, `either` that or like the one before.
+    """
+
+    missed: Floats
+    alike: Floats
+    anywhere: Floats
+    either: Floats
+
+
+class RangeMemory:
+    """The density of echoes without any plan: the view of the same ranger goes on, or it has changed to any in the building."""
+
+    def __init__(self, background: Background, echo: EchoSettings) -> None:
+        self._background, self._echo = background, echo
+        self._missed = MissedEchoes()
+        self._views = [View(echo), View(echo)]
+
+    def densities(self, pings: PlacedPings) -> UnplannedDensities:
+        """For pings (k,) in order of time."""
+        log_anywhere = self._background.of(pings.range_m)
+        anywhere = np.exp(log_anywhere)
+        missed, alike, changed = (np.zeros(len(anywhere)) for _ in range(3))
+        for k, which in enumerate(pings.ranger.tolist()):
+            view, range_m = self._views[which], float(pings.range_m[k])
+            missed[k] = self._missed.odds(which) if range_m <= 0.0 else 0.0
+            self._missed.update(which, range_m)
+            travel_m = view.move(float(pings.x_m[k]), float(pings.y_m[k]))
+            changed[k] = 1.0 - (1.0 - self._echo.outlier) * math.exp(-travel_m / VIEW_M)
+            alike[k] = view.density(range_m, float(pings.axis_rad[k]))
+            goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
+            view.update(range_m, float(pings.axis_rad[k]), float(pings.power[k]), goes_on)
+        either = changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (alike + missed) ** pings.power
+        return UnplannedDensities(missed, alike, pings.power * np.log(anywhere + missed), np.log(either))
+
+
+@kernel
+def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: EchoModel, bins: int) -> Floats:
+    """Mean over the poses of the density in the middle of each bin, and of the probability of no echo."""
+    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    mean = np.zeros(bins + 1)
+    for i in range(len(x)):
+        count = echo_sources(x[i], y[i], axis[i], walls, distance_m, off_axis_rad, kind)
+        for k in range(bins):
+            mean[k] += echo_density((k + 0.5) * BIN_M, count, distance_m, off_axis_rad, kind, model)
+        mean[bins] += echo_density(0.0, count, distance_m, off_axis_rad, kind, model)
+    return mean / len(x)
+
+
+def judged_share(turn_rad: float) -> float:
+    """Share of the information of a turning segment's pings that tells whether the cloud is right."""
+    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, JUDGING_RAD)
+
+
+def _loss(turn_rad: float, half_rad: float) -> float:
+    """By what the information of a ping is divided on a segment that turns; 2 where it turns by `half_rad`."""
+    return 1.0 + (turn_rad / half_rad) ** 2
+
+
+class UsablePings:
+    """Pings from nearly one place repeat each other's errors: each counts by the path since the one before, up to `own` after `correlation_m`."""
+
+    def __init__(self, background: Background, echo: EchoSettings) -> None:
+        self.path_m = 0.0  # length of the path so far
+        self.hear_by(background, echo)
+        self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
+        self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
+
+    def hear_by(self, background: Background, echo: EchoSettings) -> None:
+        """From now on the pings are those of rangers with these settings."""
+        self._correlation_m, self._own = echo.correlation_m, echo.own
+        self._ranges = RangeMemory(background, echo)
+
+    @property
+    def silent_m(self) -> float:
+        """Length of the path since the last ping."""
+        return self.path_m - max(self._last_ping_m)
+
+    def take(self, measured: MeasuredSegment) -> tuple[PingBatch, UnplannedDensities]:
+        """The pings that bring information, with their share of the segment and their axis in the walk frame, and their densities without a plan."""
+        segment = measured.segment
+        length, span_s = math.hypot(segment.dx_m, segment.dy_m), segment.t1_s - segment.t0_s
+        share = np.ones(len(measured.t_s))
+        if span_s > 0.0:
+            share = np.clip((measured.t_s - segment.t0_s) / span_s, 0.0, 1.0)
+        axis = segment.heading0_rad + share * segment.turn_rad + measured.off_heading_rad
+        range_m = np.where(np.isnan(measured.range_m), 0.0, measured.range_m)
+        travel_m = self._travels(measured.ranger, self.path_m + share * length)
+        power = self._own * np.minimum(travel_m / self._correlation_m, 1.0) / _loss(segment.turn_rad, TURNING_RAD)
+        self.path_m += length
+        used = power > LEAST_POWER
+        way_x_m, way_y_m = segment.way_m(share)
+        x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m
+        self._x_m, self._y_m = self._x_m + segment.dx_m, self._y_m + segment.dy_m
+        pings = PlacedPings(measured.ranger[used], x_m[used], y_m[used], axis[used], range_m[used], power[used])
+        unplanned = self._ranges.densities(pings)
+        return PingBatch(
+            share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used],
+            unplanned.missed, unplanned.alike, np.exp(unplanned.either),
+        ), unplanned  # fmt: skip
+
+    def _travels(self, ranger: Ints, path_m: Floats) -> Floats:
+        """Length of the path (k,) between each ping and the one before it of the same ranger."""
+        travel_m = np.zeros(len(path_m))
+        for which in (0, 1):
+            own = np.flatnonzero(ranger == which)
+            if len(own):
+                travel = path_m[own]
+                last_m, self._last_ping_m[which] = self._last_ping_m[which], float(travel[-1])
+                travel[1:] -= travel[:-1].copy()
+                travel[0] -= last_m
+                travel_m[own] = travel
+        return travel_m

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""Height and level of each particle, from the rise that the foot measured and the height by air pressure.
+
+In: particles after a move, and the `HeightChange` over it. Out: heights, log-weights, and levels (the level shows in x on the sheet). Owns nothing.
+
+On a level a particle has the height of that level, and a rise of the foot is unlikely. Only in a connector the height changes: on stairs and ramps
+by the foot's rise, or by pressure without a foot; in a lift by pressure. It ends at the lowest and the highest level that the connector serves: a
+rise beyond is as unlikely as one on a level. A particle that leaves a connector must have the height of the level it enters. Weather slowly shifts
+the height by pressure, so each particle estimates this offset, `lag`: a Kalman filter of one state, whose variance is the same for all particles
+[Schoen et al. 2005, the linear part of a marginalised particle filter].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.jit import kernel, lean_kernel
+from echostep.localization.particle_arrays import Move, ParticleArrays
+from echostep.walls.floor import Floor
+from echostep.walls.indoors import inside_grid
+from echostep.walls.level_sheet import (
+    LIFT,
+    LevelSheet,
+    connector_at,
+    end_of_connector,
+    level_of,
+    level_on_sheet,
+    nearest_level,
+)
+
+PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
+UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
+SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
+WEATHER_M_S = 1e-3  # standard deviation of the height by pressure's speed, by reason: a front changes the pressure by 0.4 hPa in an hour
+LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
+# By reason:
+ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is none of an upper storey
+FALL_PER_M = 1.0  # log-weight lost on a metre of path: a corner that the plan lacks is passed
+
+
+@dataclass(frozen=True, slots=True)
+class ClimbSettings:
+    """Standard deviations in metres, and a limit.
+
+    `flat_sd_m`: rise of the foot after a stride on a level, with door sills. `landing_sd_m`: between a particle's height and the level it enters.
+    `drift_m`: random walk of the height by pressure in a second, from weather, doors and fans. `unlikely`: most log-weight that each of the three
+    can cost.
+    """
+
+    flat_sd_m: float = 0.06
+    landing_sd_m: float = 0.35
+    drift_m: float = 0.02
+    unlikely: float = 8.0
+
+
+def drift_m(climbing: ClimbSettings, pause_s: float) -> float:
+    """Standard deviation of the drift of the height by pressure while nothing was measured for so long."""
+    return math.hypot(climbing.drift_m * math.sqrt(pause_s), WEATHER_M_S * pause_s)
+
+
+class HeightChange(NamedTuple):
+    """What is known of the height over a path segment of duration `span_s`.
+
+    `felt_m`: rise by the foot, with its standard deviation (infinite: no foot). `height_m`: height by pressure on the segment, with its standard
+    deviation (infinite: no pressure). `riding_m`: the same at the segment's end, where the height changes (`riding_height`).
+    """
+
+    felt_m: float
+    felt_sd_m: float
+    height_m: float
+    height_sd_m: float
+    riding_m: float
+    span_s: float
+
+
+class LevelChangeModel(NamedTuple):
+    """`ClimbSettings` as the kernel takes them."""
+
+    flat_sd_m: float
+    landing_sd_m: float
+    unlikely: float
+
+
+def level_change_model(s: ClimbSettings) -> LevelChangeModel:
+    """The settings in the kernel's form."""
+    return LevelChangeModel(s.flat_sd_m, s.landing_sd_m, s.unlikely)
+
+
+class HeightArrays(NamedTuple):
+    """Of n particles, each (n,) in metres: height in the plan, and offset of the height by pressure."""
+
+    z_m: Floats
+    lag_m: Floats
+
+
+@lean_kernel
+def change_levels(
+    particles: ParticleArrays, heights: HeightArrays, move: Move, noise: Floats, change: HeightChange,
+    lag_variance: float, model: LevelChangeModel, sheet: LevelSheet,
+) -> float:  # fmt: skip
+    """Update heights, levels and log-weights after a move that led to the particles' present places; `noise` (n,) is standard normal.
+
+    Returns the variance of `lag` afterwards; the greatest log-weight is 0 again.
+    """
+    x, y, turn, scale, log_weight = particles
+    z, lag = heights
+    has_foot, has_pressure = math.isfinite(change.felt_sd_m), math.isfinite(change.height_sd_m)
+    variance = lag_variance + change.height_sd_m**2 if has_pressure else np.inf
+    gain = lag_variance / variance if has_pressure else 0.0
+    knows_lag = has_pressure and lag_variance < UNKNOWN_LAG_M2
+    flat_sd, top = math.hypot(model.flat_sd_m, change.felt_sd_m), -np.inf
+    for i in range(len(x)):
+        level = level_on_sheet(x[i], sheet)
+        inside = connector_at(x[i] - level * sheet.pitch_m, y[i], level, sheet)
+        connector, height = inside, change.height_m
+        if inside < 0:
+            dx = scale[i] * (math.cos(turn[i]) * move.dx_m - math.sin(turn[i]) * move.dy_m)
+            dy = scale[i] * (math.sin(turn[i]) * move.dx_m + math.cos(turn[i]) * move.dy_m)
+            connector = _connector_left(x[i], y[i], dx, dy, level, sheet)
+        if connector >= 0:
+            if sheet.kind[connector] != LIFT and has_foot:
+                z[i] += change.felt_m + change.felt_sd_m * noise[i]
+                beyond = z[i] - end_of_connector(z[i], connector, model.landing_sd_m, sheet)
+                log_weight[i] -= min(0.5 * (beyond / flat_sd) ** 2, model.unlikely)
+                z[i] -= beyond
+            elif knows_lag:
+                height = change.riding_m
+                z[i] = end_of_connector(height - lag[i], connector, model.landing_sd_m, sheet)
+            new_level = nearest_level(z[i], connector, sheet)
+            x[i] += (new_level - level) * sheet.pitch_m
+            level = new_level
+        elif has_foot:
+            log_weight[i] -= min(0.5 * (change.felt_m / flat_sd) ** 2, model.unlikely)
+        if inside < 0:
+            log_weight[i] -= min(0.5 * ((z[i] - sheet.height_m[level]) / model.landing_sd_m) ** 2, model.unlikely)
+            z[i] = sheet.height_m[level]
+        if has_pressure:
+            innovation = height - z[i] - lag[i]
+            log_weight[i] -= min(2.0 * math.log1p(innovation * innovation / (PRESSURE_TAIL * variance)), model.unlikely)
+            if innovation * innovation < LAG_GATE * variance:
+                lag[i] += gain * innovation
+        top = max(top, log_weight[i])
+    for i in range(len(x)):
+        log_weight[i] -= top
+    return (1.0 - gain) * lag_variance
+
+
+@kernel
+def _connector_left(x: float, y: float, dx: float, dy: float, level: int, sheet: LevelSheet) -> int:
+    """The connector that held the middle of a move (dx, dy) to (x, y) on the sheet, else the one that held its start; -1: none."""
+    shift = level * sheet.pitch_m
+    connector = connector_at(x - 0.5 * dx - shift, y - 0.5 * dy, level, sheet)
+    return connector if connector >= 0 else connector_at(x - dx - shift, y - dy, level, sheet)
+
+
+@kernel
+def set_levels_by_pressure(x: Floats, heights: HeightArrays, height_m: float, sheet: LevelSheet) -> None:
+    """Put each particle on the level nearest to the height by pressure, after an unobserved move."""
+    z, lag = heights
+    for i in range(len(x)):
+        level = level_on_sheet(x[i], sheet)
+        new_level = int(np.argmin(np.abs(sheet.height_m - (height_m - lag[i]))))
+        x[i] += (new_level - level) * sheet.pitch_m
+        z[i] = sheet.height_m[new_level]
+
+
+class UpperStoreys:
+    """The floor of a building, and which of its levels are above the ground."""
+
+    def __init__(self, floor: Floor, sheet: LevelSheet) -> None:
+        self._sheet = sheet
+        self._grid = inside_grid(floor.x_m, floor.y_m)
+        self._is_above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + ABOVE_M
+
+    def log_loss(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
+        """What places (n,) on the sheet lose in log-weight on this length of path; None if none is in the air."""
+        is_above = self._is_above[level_of(x_m, self._sheet)]
+        if not is_above.any():
+            return None
+        in_air = is_above & ~self._grid.holds(x_m, y_m)
+        return np.where(in_air, -FALL_PER_M * path_m, 0.0) if in_air.any() else None

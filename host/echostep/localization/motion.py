@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""What a measured segment of the path does to a cloud: its move, its change of height, and gaps after which the wearer may be elsewhere.
+
+In: `MeasuredSegment`s in order of time. Out: `Move`, `HeightChange`, the kind of gap that ends with a segment. Owns the errors of the path that the
+segment does not state, and the times of the last segment and of the last ping.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum, auto
+from statistics import median
+
+from echostep.localization.height.levels import HeightChange
+from echostep.localization.particle_arrays import Move
+from echostep.path import MeasuredSegment, PathSegment
+
+BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
+HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
+HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
+AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce, by reason: draughts
+# All by reason.
+PAUSE_S = 1.0  # between two segments: nothing was received
+LONG_S = 5.0  # of an unobserved segment: a walk out of the room
+MUTE_S = 10.0  # of standing without a ping, where there were pings before: rangers measure whatever the wearer does
+STANDING_M = 0.5  # path that still counts as standing
+
+
+def move_of(segment: PathSegment) -> Move:
+    """The segment's way; when the wearer turns, the trunk goes round the foot that was measured."""
+    sd_m = math.hypot(segment.sd_m, 2.0 * math.sin(0.5 * abs(segment.turn_rad)) * BESIDE_M)
+    return Move(segment.dx_m, segment.dy_m, sd_m, segment.turn_sd_rad, segment.scale_sd, *segment.bend_m)
+
+
+def height_change(measured: MeasuredSegment, riding_m: float) -> HeightChange:
+    """The foot's rise, and the median of the last heights by pressure: a slammed door moves a mean, but not a median."""
+    segment, last = measured.segment, measured.height_m[-HEIGHT_SAMPLES:].tolist()
+    span_s = segment.t1_s - segment.t0_s
+    if not last:
+        return HeightChange(segment.rise_m, segment.rise_sd_m, 0.0, math.inf, 0.0, span_s)
+    height_sd_m = math.hypot(AIR_SD_M, HEIGHT_SD_M / math.sqrt(len(last)))
+    return HeightChange(segment.rise_m, segment.rise_sd_m, median(last), height_sd_m, riding_m, span_s)
+
+
+class Gap(Enum):
+    """`PAUSE`: nothing came; `UNOBSERVED`: the foot was silent for long; `MUTE`: the foot stood and no ranger measured."""
+
+    PAUSE = auto()
+    UNOBSERVED = auto()
+    MUTE = auto()
+
+
+class Gaps:
+    """Watches the segments of one walk."""
+
+    def __init__(self) -> None:
+        self.pause_s = 0.0  # between the last two segments
+        self._end_s = math.inf  # of the last segment
+        self._ping_s = math.inf  # of the last ping
+        self._path_m = 0.0  # since that ping
+
+    def ended(self, measured: MeasuredSegment) -> Gap | None:
+        """The gap that this segment ends, or that is known by its end."""
+        segment = measured.segment
+        self.pause_s = max(segment.t0_s - self._end_s, 0.0)
+        self._end_s = segment.t1_s
+        is_mute = self._is_mute(measured)
+        if segment.unobserved:
+            return Gap.UNOBSERVED if segment.t1_s - segment.t0_s > LONG_S else None
+        if self.pause_s > PAUSE_S:
+            return Gap.PAUSE
+        return Gap.MUTE if is_mute else None
+
+    def _is_mute(self, measured: MeasuredSegment) -> bool:
+        """Whether the foot has stood for MUTE_S without a ping, once until the next one."""
+        segment = measured.segment
+        if len(measured.t_s):
+            is_mute = self._path_m < STANDING_M and measured.t_s[0] - self._ping_s > MUTE_S
+            self._ping_s, self._path_m = float(measured.t_s[-1]), 0.0
+            return is_mute
+        self._path_m += math.hypot(segment.dx_m, segment.dy_m)
+        is_mute = self._path_m < STANDING_M and segment.t1_s - self._ping_s > MUTE_S
+        if is_mute:
+            self._ping_s = math.inf
+        return is_mute

@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: MIT
+"""The cloud: the trunk's position as weighted particles on the plan.
+
+In: moves of the trunk in the walk frame, with the pings on them. Out: a `Cloud` whose moments are the estimate. Owns the particles; draws from the
+generator that it is given. Only the filter's kernels go from the walk frame to the map.
+
+A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length, `veer` = turn of the path on a
+metre that the wearer has not made. In a building of several levels
+it also has a height `z` and an offset `lag` of the height by pressure. Weights are logarithms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep.localization.beacons.beliefs import empty_beliefs
+from echostep.localization.echoes.likelihood import EchoModel
+from echostep.localization.echoes.range_table import OUTSIDE, CoarseField, CoarsePings, reweight_coarsely
+from echostep.localization.height.levels import (
+    UNKNOWN_LAG_M2,
+    ClimbSettings,
+    HeightArrays,
+    HeightChange,
+    change_levels,
+    drift_m,
+    level_change_model,
+    set_levels_by_pressure,
+)
+from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particles.kernels import (
+    NOISE_BEND,
+    NOISE_TURN,
+    CloudModel,
+    EchoMemory,
+    MoveProgress,
+    effective_size,
+    piece_of,
+    propagate,
+    propagate_and_reweight,
+    systematic,
+)
+from echostep.localization.particles.particles import GATHERED_REST, Particles
+from echostep.localization.particles.sampling import heaviest, kld_size, log_mode_weight, spread_evenly
+from echostep.localization.particles.start import ANY_LEVEL, Air, Start, draw_poses, near_count
+from echostep.localization.settings import CloudSettings
+from echostep.path import bend_of
+from echostep.walls.echo_sources import Walls
+from echostep.walls.floor import NO_FLOOR, Floor
+from echostep.walls.level_sheet import LevelSheet
+
+SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by reason: a gathered one is never so large
+SMALL = 2  # times the least size, by reason: a cloud has contracted
+# Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
+COARSE_BEND = bend_of(math.radians(45.0))
+COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
+START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
+WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
+COARSE_WALL_COST = (
+    5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
+)
+# The same where there are several levels, after so many metres, by reason: only exact likelihoods tell storeys apart that are alike
+LEVELS_REST, LEVELS_M = 0.1, 10.0
+COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
+LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, by reason
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much; by reason
+PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
+# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle; by reason: people turn on the spot, and walk
+# round the end of a wall more sharply than an arc
+BENDS = (-1.0, 3.0)
+
+
+class Evidence(NamedTuple):
+    """How well a cloud foretold a segment: of each ping (k,) the log of its mean likelihood before it, and the log of the weight that walls left."""
+
+    log_pings: Floats
+    log_path: float
+
+
+class Cloud(Particles):
+    """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0."""
+
+    def __init__(
+        self, settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator,
+        sheet: LevelSheet | None = None, climbing: ClimbSettings | None = None, floor: Floor = NO_FLOOR,
+    ) -> None:  # fmt: skip
+        """`walk_heading_rad`: the trunk's heading in the walk frame while it stands at `start`; without `sheet` there is one level.
+
+        `floor`: for a start that is anywhere.
+        """
+        self.sheet = sheet if sheet is not None and len(sheet.height_m) > 1 else None
+        self._climbing = climbing or ClimbSettings()
+        self._level_changes = level_change_model(self._climbing)
+        self._lag_variance = UNKNOWN_LAG_M2 if start.air is None else start.air.sd_m**2
+        self._settings = settings
+        self._rng = rng
+        self._coarse_pings = CoarsePings()
+        self.rescues = 0
+        self.is_gathered = False
+        self.is_on_any_level = (
+            self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
+        )
+        self.is_coarse = start.pose is None or start.sd_m > WIDE_M
+        self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
+        wanted = max(self._wanted_size(), START_SIZE)
+        if wanted < settings.largest:
+            self.is_coarse = False
+            self.keep(np.arange(min(wanted, len(self.x_m))))
+        if not self.is_coarse:
+            self.draw_veer()
+
+    def _draw(self, start: Start, count: int, walk_heading_rad: float, floor: Floor) -> None:
+        """Draw so many particles from the start."""
+        self.x_m, self.y_m, heading = draw_poses(start, count, floor, self.sheet, self._rng)
+        self.turn_rad: Floats = heading - walk_heading_rad
+        self.scale: Floats = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
+        self.veer_rad_m: Floats = np.zeros(count)
+        self.lag_m: Floats = np.full(count, 0.0 if start.air is None else start.air.zero_m)
+        self.log_weight: Floats = np.zeros(count)
+        self.hidden: Floats = np.zeros((2, count))
+        self.bend: Floats = np.zeros(count)
+        self.beliefs = empty_beliefs(count, 0)
+        self.z_m: Floats = self.sheet.height_m[self.level] if self.sheet else np.zeros(count)
+        if start.near_z_m is not None:
+            self.z_m[: near_count(count)] = start.near_z_m
+
+    def draw_veer(self) -> None:
+        """Draw each particle's veer; not while the cloud is coarse, for its few particles about a place would differ in one thing more."""
+        sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
+        if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
+            self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
+
+    @property
+    def is_scattered(self) -> bool:
+        """Whether the cloud is so large that it has not gathered yet."""
+        return len(self.x_m) > SCATTERED * self._least_size
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the cloud has contracted to about its least size."""
+        return len(self.x_m) <= SMALL * self._least_size
+
+    @property
+    def _least_size(self) -> int:
+        """Least number of particles: on each level that may be the true one, for few particles make one of them likelier by chance."""
+        if self.sheet is None:
+            return self._settings.size
+        return self._settings.size * int(np.count_nonzero(self.level_shares > LEAST_LEVEL))
+
+    def propagate_and_reweight(self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls) -> Evidence:
+        """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
+
+        A particle that crosses a wall loses its weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns
+        how well the cloud foretold the pings and the path.
+        """
+        log_evidence, log_passed = np.zeros(len(pings.share)), 0.0
+        self._draw_bends(move)
+        progress, settings = MoveProgress(0.0, 0), self._settings
+        cloud_model = CloudModel(settings.wall_cost, settings.resample_below, model)
+        while progress.share < 1.0 or progress.ping < len(log_evidence):
+            rest = 1.0 - progress.share
+            noise = self._noise(move, rest)
+            index = walls.near(
+                self.x_m, self.y_m, rest * math.hypot(move.dx_m, move.dy_m, move.bend_x_m, move.bend_y_m)
+            )
+            progress, lowest, passed = propagate_and_reweight(
+                self.arrays, move, noise, progress, pings, cloud_model, index, EchoMemory(self.hidden, log_evidence)
+            )
+            log_passed += passed
+            if lowest < -0.5 * settings.wall_cost:
+                self._widen()
+            self.resample_if_needed()
+        return Evidence(log_evidence, log_passed)
+
+    def propagate_and_reweight_coarsely(
+        self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
+    ) -> None:
+        """The same for a coarse cloud: the pings that `CoarsePings` takes, looked up in the table, and none in a turn."""
+        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE + 1), 0.0
+        is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
+        noise, used = self._noise(move, 1.0), self._coarse_pings
+        for k, share in enumerate([*pings.share.tolist(), 1.0]):
+            is_end = k == len(pings.share)
+            ping = None if is_end or is_turning else used.take(pings, k, share * length)
+            if ping is None and not is_end:
+                continue
+            if share > done:
+                noise = noise if noise.shape[1] == len(self.x_m) else self._noise(move, 1.0)
+                piece = piece_of(move, done, share)
+                propagate(self.arrays, piece, share - done, noise, COARSE_WALL_COST, walls.index)
+                done = share
+            if ping is not None:
+                reweight_coarsely(self.arrays, ping, field, model, table)
+            self.resample_if_needed()
+        used.path_m += length
+
+    def change_levels(self, move: Move, change: HeightChange) -> None:
+        """Update heights and levels after a move, reweight by them, and resample when too few particles carry the weight."""
+        if self.sheet is None:
+            return
+        if math.isfinite(change.height_sd_m):
+            self._lag_variance += self._climbing.drift_m**2 * change.span_s
+        noise = self._rng.standard_normal(len(self.x_m))
+        heights = HeightArrays(self.z_m, self.lag_m)
+        self._lag_variance = change_levels(
+            self.arrays, heights, move, noise, change, self._lag_variance, self._level_changes, self.sheet
+        )
+        self.resample_if_needed()
+
+    @contextmanager
+    def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:
+        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level, for a second pass with few particles."""
+        settings = self._settings
+        self._settings = replace(settings, largest=min(PASSING, settings.largest))
+        levels = len(self.sheet.height_m) if self.sheet else 1
+        log_weight, chosen = self.log_weight, spread_evenly(len(self.x_m), max(PASSING // levels, 1))
+        self.keep(chosen)
+        self.log_weight = log_weight[chosen]
+        self._roughen(*PASSING_ROUGH)
+        c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
+        self.x_m, self.y_m = self.x_m - (c * dx_m - s * dy_m), self.y_m - (s * dx_m + c * dy_m)
+        self.hidden = np.zeros((2, len(self.x_m)))
+        if self.sheet:
+            self._lay_on_each_level(self.sheet)
+        try:
+            yield
+        finally:
+            self._settings = settings
+
+    def _lay_on_each_level(self, sheet: LevelSheet) -> None:
+        """Copy every particle to each level; nothing is known of the lag then."""
+        levels, log_weight = len(sheet.height_m), self.log_weight
+        level = np.tile(np.arange(levels), len(self.x_m))
+        self.keep(np.repeat(np.arange(len(self.x_m)), levels))
+        self.log_weight = np.repeat(log_weight, levels)
+        self.x_m = self.map_x_m + level * sheet.pitch_m
+        self.z_m = sheet.height_m[level]
+        self.forget_lag()
+
+    def forget_lag(self) -> None:
+        """The height by pressure may have begun anew: nothing is known of its lag."""
+        self._lag_variance = UNKNOWN_LAG_M2
+
+    def let_lag_drift(self, pause_s: float) -> None:
+        """Nothing was measured for so long."""
+        drifted_m2 = self._lag_variance + drift_m(self._climbing, pause_s) ** 2
+        self._lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
+
+    @property
+    def air(self) -> Air | None:
+        """Mean and standard deviation of the lag of the height by pressure; None where nothing is known of it."""
+        if self.sheet is None or self._lag_variance >= UNKNOWN_LAG_M2:
+            return None
+        weight = self.weight
+        mean = float(weight @ self.lag_m)
+        return Air(mean, math.sqrt(self._lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
+
+    def scatter(self, move: Move, change: HeightChange | None = None) -> None:
+        """Spread by an unobserved move: no wall is asked, the path to its end is not known. The level is that of the height by pressure, if any."""
+        self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
+        self.is_gathered = False
+        noise = self._rng.standard_normal((3, len(self.x_m)))
+        self.turn_rad += move.turn_sd_rad * noise[2]
+        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
+        self.x_m += c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
+        self.y_m += s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
+        if self.sheet and change and math.isfinite(change.height_sd_m):
+            set_levels_by_pressure(self.x_m, HeightArrays(self.z_m, self.lag_m), change.height_m, self.sheet)
+
+    def reweight(self, log_factor: Floats) -> None:
+        """Multiply the weights by factors, given as logarithms (n,), and resample when too few particles carry the weight."""
+        self.log_weight = self.log_weight + log_factor
+        self.log_weight -= self.log_weight.max()
+        self.resample_if_needed()
+
+    def resample_if_needed(self) -> None:
+        """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.
+
+        Until the cloud has gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
+        alone would lose the lighter of two modes by chance.
+        """
+        weight_after = (
+            np.zeros(len(self.x_m))
+            if self.is_gathered
+            else 0.5 * log_mode_weight(self.x_m, self.y_m, self.turn_rad, self.weight)
+        )
+        wanted_weight = self.log_weight - weight_after
+        if effective_size(wanted_weight) >= self._settings.resample_below * len(self.x_m):
+            return
+        self._resample(wanted_weight, weight_after, len(self.x_m))
+        wanted = self._wanted_size()
+        self.is_coarse = self.is_coarse and wanted > self._settings.largest and self.place_share <= 1.0 - self._rest
+        count = self._settings.searching if self.is_coarse else min(wanted, self._settings.largest)
+        if count != len(self.x_m):
+            self._resample(np.zeros(len(self.x_m)), self.log_weight, count)
+        self.is_gathered = self.is_gathered or self.far_weight(self.x_m) < GATHERED_REST
+        if self.is_coarse:
+            self._roughen(*COARSE_ROUGH)
+        elif self.is_scattered:
+            self._roughen(self._settings.rough_m, math.radians(self._settings.rough_deg))
+
+    @property
+    def _rest(self) -> float:
+        """Weight outside of one place with which a coarse cloud has gathered."""
+        return COARSE_REST if self.sheet is None or self._coarse_pings.path_m < LEVELS_M else LEVELS_REST
+
+    def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
+        """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
+        chosen = systematic(np.exp(log_wanted - log_wanted.max()), float(self._rng.random()), count)
+        kept = log_weight[chosen]
+        self.keep(chosen)
+        self.log_weight = kept - kept.max()
+
+    @property
+    def is_in_one_place(self) -> bool:
+        """Whether the cloud has gathered, on whatever level."""
+        return self.is_gathered or self.far_weight(self.map_x_m) < GATHERED_REST
+
+    def _noise(self, move: Move, share: float) -> Floats:
+        """Noise of this share of a move in x, y, turn and scale of each particle, and of its bend, (5, n)."""
+        s, length = self._settings, math.hypot(move.dx_m, move.dy_m)
+        sd = math.hypot(move.sd_m, s.step_sd * math.sqrt(length))
+        turn_sd = math.hypot(move.turn_sd_rad, math.radians(s.turn_sd_deg) * math.sqrt(length))
+        noise = np.empty((5, len(self.x_m)))
+        noise[:NOISE_BEND] = self._rng.standard_normal((NOISE_BEND, len(self.x_m)))
+        scale_sd = math.hypot(move.scale_sd, s.scale_sd * math.sqrt(length))
+        noise[:NOISE_BEND] *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
+        noise[NOISE_TURN] += share * length * self.veer_rad_m
+        noise[NOISE_BEND] = self.bend
+        return noise
+
+    def _draw_bends(self, move: Move) -> None:
+        """How much more than BENT of an arc each particle's way is on a move."""
+        turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
+        self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
+
+    def _widen(self) -> None:
+        """Widen the places after every particle has crossed a wall."""
+        self.rescues += 1
+        self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
+        self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
+
+    def _roughen(self, rough_m: float, rough_rad: float) -> None:
+        """Add noise to a scattered cloud, so that copies of one particle try places between the few that fit [Gordon et al. 1993]."""
+        noise = self._rng.standard_normal((3, len(self.x_m)))
+        self.x_m += rough_m * noise[0]
+        self.y_m += rough_m * noise[1]
+        self.turn_rad += rough_rad * noise[2]
+
+    def _wanted_size(self) -> int:
+        """Size for the present spread; the lightest of a coarse cloud, COARSE_REST of its weight, do not count."""
+        kept = heaviest(self.weight, 1.0 - COARSE_REST) if self.is_coarse else slice(None)
+        size = kld_size(self.x_m[kept], self.y_m[kept], self.turn_rad[kept], self._settings)
+        return max(size, self._least_size)

@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: MIT
+"""What meetings with other wearers do to the clouds of a filter.
+
+In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it; which meetings count. Owns the model
+and its constants, when each teammate was met, and the meetings that wait.
+
+The cloud is that of the begin of a segment, the meeting was at a moment of it, up to a stride later: `PreparedMeeting` carries the way until then,
+and each particle is weighed at the place to which it leads.
+
+If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
+range_sd_m^2); the teammate's own covariance is added to both. With probability `wrong` (another name was tapped, the teammate is sure of a wrong
+place, the range is a reflection) the meeting says nothing: then the teammate is anywhere on the floor.
+
+The teammate's errors may be this wearer's own: both use one plan, and positions may have gone round the team in earlier meetings. The correlation is
+not known, so the two are fused by covariance intersection [Julier and Uhlmann 1997, A Non-divergent Estimation Algorithm in the Presence of Unknown
+Correlations], which is consistent for any: the inverse covariance becomes omega A + (1 - omega) B, A of the cloud, B of the meeting. Particles carry
+the prior already, so their weights are multiplied by (meeting / prior)^(1 - omega), the prior taken as a normal distribution. omega minimises the
+determinant; a cloud that knows every direction better than the meeting has omega = 1 and does not change, by a bit. A coarse cloud, which is spread
+over the building, knows nothing that could be the teammate's: there the meeting is a likelihood, and the cloud is weighed even if it fits badly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from enum import StrEnum
+
+import msgspec
+import numpy as np
+
+from echostep.arrays import Bools, Floats
+from echostep.localization.belief import DOUBTED, Hypothetical
+from echostep.localization.estimate import LOST_M, TAIL, ellipse95
+from echostep.localization.height.levels import SAME_LEVEL_M
+from echostep.localization.particles.cloud import Cloud
+from echostep.path import PathSegment
+from echostep.ports.people.check_in import MOST_SD_M, CheckIn
+from echostep.ports.people.meeting import Meeting, parse_meeting
+
+# All by reason.
+SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
+MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
+WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which it tells no more than the building does
+LEAST_SD_M = 0.1  # of a radio range: what bodies and antennas add
+WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by what the teammate's tracker says
+MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong
+LEAST_WRONG = 1e-6  # probability that a range is wrong, at least, in a ratio
+LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
+FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
+FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
+LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
+# By reason: in so much of the path a wearer's own echoes, or drift, have renewed what the filter knows.
+RENEWED_M = 10.0
+CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
+PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, as after a tap; reflections are longer, hardly ever shorter
+MOST_NAMES = 4096  # teammates and beacons that are remembered: the most of a team's beacons that a tracker keeps
+MOST_WAITING = 64  # meetings that wait for their segment
+
+TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is not known
+
+
+class PreparedMeeting(Meeting, frozen=True):
+    """A meeting after a way (m, walk frame) since the moment of the cloud; `share`: one by the number of teammates who tell of one measurement."""
+
+    way_x_m: float = 0.0
+    way_y_m: float = 0.0
+    share: float = 1.0
+
+
+def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
+    """The meeting of this time with the way since the begin of its segment; of a segment that is a guess, as it is."""
+    span_s = segment.t1_s - segment.t0_s
+    if segment.unobserved or span_s <= 0.0:
+        return meeting
+    share = min(max((t_s - segment.t0_s) / span_s, 0.0), 1.0)
+    way = {"way_x_m": share * segment.dx_m, "way_y_m": share * segment.dy_m}
+    return PreparedMeeting(**(msgspec.structs.asdict(meeting) | way))
+
+
+def carries_position(meeting: Meeting) -> bool:
+    """Whether the teammate knows its place: its tracker does not say lost, its 95 % radius is below LOST_M, and the report is not too old."""
+    radius_m = ellipse95(meeting.xx_m2, meeting.xy_m2, meeting.yy_m2).major_m
+    (xx, xy), (_, yy) = covariance(meeting).tolist()
+    return meeting.status in WRONG and radius_m <= LOST_M and ellipse95(xx, xy, yy).major_m <= WIDEST_M
+
+
+def covariance(meeting: Meeting) -> Floats:
+    """Covariance (2, 2) of the wearer's place given the meeting (m2): the teammate's with heavier tails, its way since the report, the offset."""
+    own = np.array([[meeting.xx_m2, meeting.xy_m2], [meeting.xy_m2, meeting.yy_m2]])
+    offset_m2 = (MOVED_M_S * meeting.age_s) ** 2 + (SIDE_SD_M**2 if meeting.range_m is None else 0.0)
+    found: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
+    return found
+
+
+def share_of(meeting: Meeting) -> float:
+    """The power of a meeting's likelihood: of one measurement that several teammates tell of all powers sum to 1."""
+    return meeting.share if isinstance(meeting, PreparedMeeting) else 1.0
+
+
+def start_at(meeting: Meeting) -> CheckIn:
+    """A start by a meeting alone: about the teammate, within the radio's range and the way until then, with any heading."""
+    range_m = 0.0 if meeting.range_m is None else meeting.range_m
+    way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, PreparedMeeting) else 0.0
+    sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
+    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)
+
+
+def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -> Floats:
+    """Log of the density (n,) of a right meeting for a wearer at `place` (n, 2): per m2 after a tap, per metre by radio."""
+    away, spread = place - [meeting.x_m, meeting.y_m], covariance(meeting)
+    other = (1.0 - meeting.level_probability) / max(levels - 1, 1)
+    log_level = np.log(np.maximum(np.where(on_level, meeting.level_probability, other), 1e-12))
+    if meeting.range_m is None:
+        square = np.einsum("ni,ij,nj->n", away, np.linalg.inv(spread), away)
+        log_normal = -0.5 * square - math.log(2.0 * math.pi) - 0.5 * math.log(np.linalg.det(spread))
+    else:
+        distance = np.hypot(away[:, 0], away[:, 1])
+        variance = _range_variance(meeting, away, spread)
+        log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * np.log(2.0 * math.pi * variance)
+    found: Floats = log_normal + log_level
+    return found
+
+
+def information(meeting: Meeting, mean: Floats) -> Floats:
+    """Inverse covariance (2, 2) of the wearer's place by the meeting; of a radio range only along the line from the teammate to `mean` (2,)."""
+    spread = covariance(meeting)
+    if meeting.range_m is None:
+        inverse: Floats = np.asarray(np.linalg.inv(spread), np.float64)
+        return inverse
+    away = (mean - [meeting.x_m, meeting.y_m])[None]
+    along = _along(away)[0]
+    found: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
+    return found
+
+
+def best_omega(own: Floats, other: Floats) -> float:
+    """The share of one's own information (2, 2) that minimises the fused determinant: det(omega A + (1 - omega) B) is a parabola."""
+    a, b = float(np.linalg.det(own)), float(np.linalg.det(other))
+    c = float(own[0, 0] * other[1, 1] + own[1, 1] * other[0, 0] - own[0, 1] * other[1, 0] - own[1, 0] * other[0, 1])
+    curvature = a - c + b
+    if curvature >= 0.0:
+        return 1.0 if a >= b else 0.0
+    return min(max((2.0 * b - c) / (2.0 * curvature), 0.0), 1.0)
+
+
+def places_at(cloud: Cloud, meeting: Meeting) -> Floats:
+    """Places (n, 2) of the particles at the meeting, map frame."""
+    place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
+    if isinstance(meeting, PreparedMeeting):
+        c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
+        x, y = meeting.way_x_m, meeting.way_y_m
+        place += cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
+    return place
+
+
+def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
+    """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
+    place = places_at(cloud, meeting)
+    if cloud.sheet is None:
+        on_level, levels = np.full(len(place), meeting.level == 0), 1
+    else:
+        heights = cloud.sheet.height_m
+        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < SAME_LEVEL_M, len(heights)
+    log_met, weight = log_density(meeting, place, on_level, levels), cloud.weight
+    wrong = WRONG[meeting.status]
+    anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
+    density = (1.0 - wrong) * float(weight @ np.exp(log_met))
+    right = density / (density + wrong * anywhere)
+    factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
+    if factor is not None:  # a gathered cloud elsewhere is left alone
+        factor = share_of(meeting) * factor
+        factor -= factor.max()
+        factor -= math.log(float(weight @ np.exp(factor)))
+        # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
+        cloud.reweight(np.log(np.maximum(right * np.exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))
+    return right
+
+
+def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floats) -> Floats | None:
+    """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud knows every direction better."""
+    mean = weight @ place
+    spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
+    own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
+    omega = best_omega(own, information(meeting, mean))
+    if omega >= 1.0:
+        return None
+    away = place - mean
+    log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
+    found: Floats = (1.0 - omega) * (log_met - log_prior)
+    return found
+
+
+def _along(away: Floats) -> Floats:
+    """Unit vectors (n, 2); east where there is no direction."""
+    distance = np.hypot(away[:, 0], away[:, 1])[:, None]
+    found: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
+    return found
+
+
+def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
+    """Variance (n,) of a radio range, with the teammate's own along the line to each place."""
+    along = _along(away)
+    found: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + LEAST_SD_M**2
+    return found
+
+
+class MeetingEffect(StrEnum):
+    """What a meeting did.
+
+    `used`: the cloud agrees, and was weighed; `moved`: the cloud was doubted, or others contradicted it too, and the one that is tracked now lies
+    about the teammate; `contradicts`: the teammate is elsewhere, and nothing was changed; `empty`: the teammate does not know its own place;
+    `repeated`: nothing is new since the last meeting with this teammate.
+    """
+
+    USED = "used"
+    MOVED = "moved"
+    CONTRADICTS = "contradicts"
+    EMPTY = "empty"
+    REPEATED = "repeated"
+
+
+@dataclass(frozen=True, slots=True)
+class MeetingNews:
+    """The newest meeting: its number, counted from 1, with whom, and what it did."""
+
+    number: int
+    name: str
+    effect: MeetingEffect
+
+
+class MeetingMemory:
+    """Says which meetings may count: a teammate's position counts again when the own cloud has been renewed."""
+
+    def __init__(self) -> None:
+        self._path_m: dict[
+            tuple[str, int | None], float
+        ] = {}  # length of the path at the last meeting with each teammate, or range to a beacon of theirs
+        self._contradicted_m: list[float] = []  # lengths of the path at the contradictions since the last agreement
+
+    def refusal(self, meeting: Meeting, path_m: float) -> MeetingEffect | None:
+        """Why a meeting does not count; None where it does, which is remembered."""
+        if not carries_position(meeting):
+            return MeetingEffect.EMPTY
+        key = meeting.name, meeting.beacon
+        last_m = self._path_m.pop(key, None)
+        repeated = last_m is not None and path_m - last_m < RENEWED_M
+        self._path_m[key] = last_m if repeated and last_m is not None else path_m
+        if len(self._path_m) > MOST_NAMES:
+            self._path_m.pop(next(iter(self._path_m)))
+        return MeetingEffect.REPEATED if repeated else None
+
+    def forget_beacons(self) -> None:
+        """A search has begun, which no range to a beacon has weighed yet."""
+        self._path_m = {key: m for key, m in self._path_m.items() if key[1] is None}
+
+    def agree(self) -> None:
+        """A teammate agrees with the cloud: what others said against it is answered."""
+        self._contradicted_m.clear()
+
+    def contradict(self, path_m: float) -> int:
+        """A teammate contradicts the cloud; returns how many have done so in the last RENEWED_M without an agreement since."""
+        self._contradicted_m = [*(m for m in self._contradicted_m if path_m - m < RENEWED_M), path_m][-MOST_NAMES:]
+        return len(self._contradicted_m)
+
+
+def moved_probability(here: float, meeting: Meeting, count: int) -> float:
+    """Probability that the meeting is right where `count` meetings contradict a cloud that is right with probability `here`.
+
+    If the cloud is right, all of them are wrong: odds of here wrong^count; otherwise this one is right with 1 - wrong.
+    """
+    wrong = WRONG[meeting.status]
+    return (1.0 - here) * (1.0 - wrong) / (here * wrong**count + 1.0 - here)
+
+
+def moved_by(meeting: Meeting, here: float, count: int) -> float | None:
+    """Probability of the teammate's place where `count` contradictions move the cloud there; None where they do not. `here`: that it is right."""
+    moved = moved_probability(here, meeting, count)
+    is_alone = count < CONTRADICTIONS and here >= DOUBTED
+    return None if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < FITS else moved
+
+
+class MeetingQueue:
+    """Meetings that wait for their segment. `counts`: of all meetings by what they did; `bad` ones are no meetings."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.news: MeetingNews | None = None
+        self._waiting: list[TimedMeeting] = []
+
+    def hear(self, payload: bytes, levels: int) -> Meeting | None:
+        """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
+        meeting = parse_meeting(payload)
+        if meeting is None or meeting.level >= levels:
+            self.counts["bad"] += 1
+            return None
+        return meeting
+
+    def add(self, meeting: Meeting, t_s: float) -> None:
+        """Keep a meeting of this time; of too many the oldest are dropped."""
+        self._waiting = [*self._waiting, (-math.inf if math.isnan(t_s) else t_s, meeting)][-MOST_WAITING:]
+
+    def pop(self, t_s: float) -> list[TimedMeeting]:
+        """The waiting meetings up to a time."""
+        ready = [(met_s, meeting) for met_s, meeting in self._waiting if met_s <= t_s]
+        self._waiting = [(met_s, meeting) for met_s, meeting in self._waiting if met_s > t_s]
+        return ready
+
+    def note(self, meeting: Meeting, effect: MeetingEffect) -> None:
+        """Count what a meeting did; a range to a teammate's beacon is no news."""
+        if meeting.beacon is not None:
+            self.counts[f"beacon {effect.value}"] += 1
+            return
+        self.counts[effect.value] += 1
+        self.news = MeetingNews(1 if self.news is None else self.news.number + 1, meeting.name, effect)
+
+
+def weigh_range(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
+    """Weigh the cloud by a range to a teammate's beacon; returns the probability that the range is right, given the cloud.
+
+    A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
+    """
+    right = weigh(each.cloud, meeting, area_m2)
+    if each.has_contracted or each.is_stated:
+        before = each.doubts.get(meeting.name, 0.0)
+        after = before + share_of(meeting) * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
+        each.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)
+        each.plausibility.add(each.doubts[meeting.name] - before)
+    return right
+
+
+def weigh_by(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
+    """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud."""
+    return weigh(each.cloud, meeting, area_m2) if meeting.beacon is None else weigh_range(each, meeting, area_m2)

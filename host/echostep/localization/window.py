@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""The last metres of the path, for a second pass: storeys of a building are often alike, and a coarse search cannot tell them apart.
+
+In: moves with their pings and changes of height; a cloud that has just turned exact. Out: the same cloud, after the pass. Owns the moves.
+
+A coarse cloud has a particle or two about each true pose, and hears half of what the echoes tell. So which of two storeys gets the weight is chance,
+and doors tell them apart late. The places that it has found are therefore tried once more on every level, exactly, from where the way to them began.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from echostep.localization.echoes.likelihood import EchoModel
+from echostep.localization.height.levels import HeightChange
+from echostep.localization.particle_arrays import Move, PingBatch
+from echostep.localization.particles.cloud import Cloud
+from echostep.walls.echo_sources import Walls
+
+PAST_M = 40.0  # path that is passed again, by reason: that on which a place is found
+MOST_PIECES = 1_000  # of it, by reason: eight minutes of standing
+
+
+class RecentWay:
+    """The last PAST_M of the path."""
+
+    def __init__(self) -> None:
+        self._pieces: deque[tuple[Move, PingBatch, HeightChange]] = deque()
+        self.length_m = 0.0
+
+    def __len__(self) -> int:
+        return len(self._pieces)
+
+    def add(self, move: Move, pings: PingBatch, change: HeightChange) -> None:
+        """One more move."""
+        self._pieces.append((move, pings, change))
+        self.length_m += math.hypot(move.dx_m, move.dy_m)
+        while self._pieces and (self.length_m > PAST_M or len(self._pieces) > MOST_PIECES):
+            first, _, _ = self._pieces.popleft()
+            self.length_m -= math.hypot(first.dx_m, first.dy_m)
+
+    def pass_again(self, cloud: Cloud, model: EchoModel, walls: Walls) -> None:
+        """Let a cloud walk the way once more, from its beginning on each level; not where the level is known: stairs may have led there."""
+        if cloud.sheet is not None and not cloud.is_on_any_level:
+            return
+        dx_m = sum(move.dx_m for move, _, _ in self._pieces)
+        dy_m = sum(move.dy_m for move, _, _ in self._pieces)
+        with cloud.passing_again(dx_m, dy_m):
+            for move, pings, change in self._pieces:
+                cloud.propagate_and_reweight(move, pings, model, walls)
+                cloud.change_levels(move, change)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""The walls of a solved graph.
+
+In: a graph, its pings. Out: `Drawing`. Owns the order: first the lines that have the building's directions, then the others from what is left.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats, Ints, spans
+from echostep.mapping.graph.companions import ALONG_SD_RAD, course_of
+from echostep.mapping.graph.graph import Graph
+from echostep.mapping.graph.nodes import Pings
+from echostep.mapping.walls.evidence import add_crossings, cell_counts, explained_by_ends, is_straight, ping_poses
+from echostep.mapping.walls.lines import Lines, find_lines, joined
+from echostep.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
+from echostep.mapping.walls.wall_sd import wall_sds
+
+# Of wall on one line, at least; shorter ones must be heard again, or be across the path. One passer-by in 15, in 70, goes along for longer, when one
+# second is the mean
+LONE_M, LONE_ASKEW_M = 2.5, 6.0
+PASSAGE_M = 5.0  # of path, between two passages
+ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within which a person may have gone along
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """`walls` (n, 4): x0, y0, x1, y1 in metres; `sd_m` (n,): standard deviation of the distance of each from the places beside it; `paths_m`: the
+    corrected path (k, 2) of each walk, or each piece of it on this storey.
+    """
+
+    walls: Floats
+    sd_m: Floats
+    paths_m: tuple[Floats, ...]
+
+
+def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
+    """The walls that the echoes of a walk show, on each storey."""
+    storeys = graph.storeys
+    if storeys is None:
+        return (_drawn(graph, pings, graph.paths()),)
+    found = []
+    for k in range(len(storeys.height_m)):
+        on = storeys.of == k
+        of = np.where(on[graph.fragments.node], graph.walls.of, -1)
+        own = on[pings.node]
+        paths = tuple(piece for path in graph.paths() for piece in pieces_on(path, on))
+        part = replace(graph, walls=replace(graph.walls, of=of))
+        found.append(_drawn(part, Pings(*(getattr(pings, f.name)[own] for f in fields(pings))), paths))
+    return tuple(found)
+
+
+def pieces_on(path: Floats, on: Bools) -> list[Floats]:
+    """The pieces (k, 2) of a path (n, 2) whose nodes are `on` (n,) a storey."""
+    return [path[a:b] for a, b in spans(on)]
+
+
+class _Heard(NamedTuple):
+    """Pings (k,): corrected place and axis (k, 3), length of the path so far, course of the path there."""
+
+    poses: Floats
+    way_m: Floats
+    course_rad: Floats
+
+
+def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
+    """The walls that these pings show, beside these paths."""
+    poses = ping_poses(graph, pings)
+    way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
+    heard = _Heard(poses, way_m, course_of(graph.pose, graph.nodes.way_m, way_m))
+    lines = find_lines(graph)
+    free = np.ones(len(poses), np.bool_)
+    aligned = lines.aligned if lines.aligned.any() else np.ones(len(lines.rho_m), np.bool_)
+    straight = _selected(lines, aligned)
+    cells = cell_counts(straight, poses, pings.range_m, free, ahead)
+    add_crossings(straight, paths, cells)
+    found = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
+    runs = _without_lone(found, straight, LONE_M, heard, cells.of)
+    if not aligned.all():
+        walls = segments_of(straight, runs, cells)
+        free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
+        askew = _selected(lines, ~aligned)
+        more = cell_counts(askew, poses, pings.range_m, free, ahead)
+        add_crossings(askew, paths, more)
+        found = _without_lone(find_runs(more, ASKEW), askew, LONE_ASKEW_M, heard, more.of)
+        kept = sorted({run.line for run in found})
+        both = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), kept)))
+        runs += [run._replace(line=len(straight.rho_m) + kept.index(run.line)) for run in found]
+        cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
+        add_crossings(both, paths, cells)
+        straight = both
+    walls = segments_of(straight, runs, cells)
+    return Drawing(walls, wall_sds(graph, pings, poses, straight, runs, cells.of), paths)
+
+
+def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, of: Ints) -> list[Run]:
+    """Without pieces shorter than `least_m` in all on their line that meet no wall and that a person may have left; `of` (k,): line of each ping."""
+    total = np.zeros(len(lines.rho_m))
+    for run in runs:
+        total[run.line] += run.high_m - run.low_m
+    return [
+        run
+        for i, run in enumerate(runs)
+        if meets(lines, runs, i) or total[run.line] >= least_m or not _is_of_a_person(run, lines, heard, of)
+    ]
+
+
+def _is_of_a_person(run: Run, lines: Lines, heard: _Heard, of: Ints) -> bool:
+    """Whether a piece may be one: heard in one passage, and along the path or along no direction of the building."""
+    normal = lines.normal_rad[run.line]
+    along = math.cos(normal) * heard.poses[:, 1] - math.sin(normal) * heard.poses[:, 0]
+    own = np.flatnonzero((of == run.line) & (along >= run.low_m) & (along <= run.high_m))
+    if (np.diff(np.sort(heard.way_m[own])) > PASSAGE_M).any():
+        return False
+    off = np.abs((normal - heard.course_rad[own]) % math.pi - 0.5 * math.pi)
+    return not lines.aligned[run.line] or bool(np.median(off) < ALONG_RAD)
+
+
+def _selected(lines: Lines, which: Bools) -> Lines:
+    return Lines(
+        lines.normal_rad[which],
+        lines.rho_m[which],
+        lines.sd_m[which],
+        lines.low_m[which],
+        lines.high_m[which],
+        lines.aligned[which],
+    )

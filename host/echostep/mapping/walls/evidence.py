@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Where along its line a wall stands: cells that echoes came from, and cells through which a ranger heard something farther.
+
+In: lines, pings at their corrected places. Out: counts by line and cell. Owns the sensor's inverse model: a smooth wall answers from the foot of the
+perpendicular, so one ping says something about one cell of each line within its cone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.angles import wrap
+from echostep.arrays import Bools, Floats, Ints
+from echostep.jit import kernel
+from echostep.mapping.graph.graph import Graph
+from echostep.mapping.graph.nodes import Pings
+from echostep.mapping.walls.lines import Lines
+
+CELL_M = 0.05
+MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
+FITS_M = 0.1  # of a range from the distance of the line
+BEYOND_M = 0.18  # a range longer by more than so much passed through the cell
+HALF_CONE_RAD = math.radians(27.5)
+NEAR_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
+HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least so wide; weight of that against pings
+CORNER_M = 0.15  # of a range from the distance of a corner
+TURNING_RAD = math.radians(15.0)  # turn of a stride
+SURE_RAD, SURE_M = math.radians(15.0), 3.0  # within which a wall is hardly ever missed
+
+
+class Cells(NamedTuple):
+    """`heard`, `passed` (l, c): pings by line and cell; `first_m` (l,): place of the first cell along the line; `size` (l,): cells of it.
+
+    `of` (k,): line that explains each ping, -1: none.
+    """
+
+    heard: Floats
+    passed: Floats
+    first_m: Floats
+    size: Ints
+    of: Ints
+
+
+def ping_poses(graph: Graph, pings: Pings) -> Floats:
+    """Corrected place and axis (k, 3) of each ping: the node's pose, moved on by the share of the way to the next."""
+    a = graph.pose[pings.node]
+    b = graph.pose[np.minimum(pings.node + 1, len(graph.pose) - 1)]
+    at = a[:, :2] + pings.share[:, None] * (b[:, :2] - a[:, :2])
+    turn = wrap(b[:, 2] - a[:, 2])
+    return np.column_stack([at, a[:, 2] + pings.share * turn + pings.off_heading_rad])
+
+
+def is_straight(graph: Graph, pings: Pings) -> Bools:
+    """Pings (k,) on a stride that turns little: in between two nodes the heading is interpolated."""
+    after = np.minimum(pings.node + 1, len(graph.pose) - 1)
+    turn = wrap(graph.pose[after, 2] - graph.pose[pings.node, 2])
+    found: Bools = np.abs(turn) < TURNING_RAD
+    return found
+
+
+def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools) -> Cells:
+    """Pings that each cell of each line explains, and pings that passed it.
+
+    `free` (k,): pings that nothing else explains already; `straight` (k,): those with a well-known axis, which alone show that a wall is not there.
+    """
+    first = lines.low_m - MARGIN_M
+    count = np.ceil((lines.high_m - lines.low_m + 2.0 * MARGIN_M) / CELL_M).astype(np.int64)
+    heard, passed = np.zeros((2, len(count), int(count.max(initial=1))))
+    of = np.full(len(range_m), -1, np.int64)
+    _count(lines, poses, range_m, free, straight, Cells(heard, passed, first, count, of))
+    return Cells(heard, passed, first, count, of)
+
+
+def add_crossings(lines: Lines, paths_m: Sequence[Floats], cells: Cells) -> None:
+    """Cells of lines through which a path (n, 2) leads are open, half a trunk to either side."""
+    for path_m in paths_m:
+        _add_crossings(lines, path_m, cells)
+
+
+def _add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
+    for line in range(len(cells.size)):
+        c, s = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line])
+        off, along = c * path_m[:, 0] + s * path_m[:, 1] - lines.rho_m[line], c * path_m[:, 1] - s * path_m[:, 0]
+        k = np.flatnonzero(off[1:] * off[:-1] < 0.0)
+        at = along[k] + (along[k + 1] - along[k]) * off[k] / (off[k] - off[k + 1])
+        for place in at:
+            low, high = (int((place + side * HALF_TRUNK_M - cells.first_m[line]) / CELL_M) for side in (-1.0, 1.0))
+            low, high = max(low, 0), min(high, int(cells.size[line]))
+            if low < high:
+                cells.passed[line, low:high] += CROSSED
+                cells.heard[line, low:high] = 0.0
+
+
+@kernel
+def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools, cells: Cells) -> None:
+    cosine, sine = np.cos(lines.normal_rad), np.sin(lines.normal_rad)
+    for k in range(len(range_m)):
+        for line in range(len(cells.size)):
+            c, s = cosine[line], sine[line]
+            distance, normal = lines.rho_m[line] - c * poses[k, 0] - s * poses[k, 1], lines.normal_rad[line]
+            if distance < 0.0:
+                distance, normal = -distance, normal + math.pi
+            fits = abs(range_m[k] - distance) < FITS_M
+            if not fits and (distance >= SURE_M or range_m[k] < distance + BEYOND_M):
+                continue  # most lines, before anything is computed of them
+            off_axis = abs((normal - poses[k, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+            if off_axis > HALF_CONE_RAD:
+                continue
+            along = c * poses[k, 1] - s * poses[k, 0]
+            cell = math.floor((along - cells.first_m[line]) / CELL_M)
+            if cell < 0 or cell >= cells.size[line]:
+                continue
+            if fits:
+                near = lines.low_m[line] - NEAR_M < along < lines.high_m[line] + NEAR_M
+                if free[k] and cells.of[k] < 0 and near:
+                    cells.heard[line, cell] += 1.0
+                    cells.of[k] = line
+            elif straight[k] and off_axis < SURE_RAD:
+                cells.passed[line, cell] += 1.0
+
+
+def explained_by_ends(segments: Floats, poses: Floats, range_m: Floats) -> Bools:
+    """Which pings (k,) the ends of segments (n, 4) explain: corners and edges."""
+    ends = np.unique(np.round(segments.reshape(-1, 2), 2), axis=0)
+    found = np.zeros(len(range_m), np.bool_)
+    for x, y in ends:
+        dx, dy = x - poses[:, 0], y - poses[:, 1]
+        fits = np.flatnonzero(np.abs(np.hypot(dx, dy) - range_m) < CORNER_M)
+        off_axis = np.abs((np.arctan2(dy[fits], dx[fits]) - poses[fits, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+        found[fits] |= off_axis < HALF_CONE_RAD + 0.1
+    return found

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""Stillness: since when the wearer has not moved, from the sensors themselves and not from the track.
+
+In: samples of the foot's MTx and of the leg gyros, with their times. Out: windows, with or without motion. Owns the extremes of the unfinished ones.
+A window of half a second has motion when the range of a channel (largest less smallest sample) exceeds its limit: so a slow bias, gravity and the
+orientation in which a wearer lies do not matter, and the result does not depend on how samples are cut into portions. Pings are not used: they change
+when others walk by. A window below these limits may still show that a living wearer stands or crouches on the foot (`sway.py`).
+
+Sway, the small slow turning of a foot or a leg that carries a living wearer, is told from the noise of its gyros. Noise is white: means over 0.1 s
+have a fifth of the variance of means over 0.02 s. Sway is slow (below 3 Hz), so it adds to the former alone; shivering, machines and engines add to
+the latter as well. No level of noise has to be known or learnt.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats, Ints
+from echostep.legs.trunk_path import GyroBlock
+
+SHORT, GROUPS = 25, 5  # short means of 0.02 s in a window of half a second, long means of 0.1 s
+# Ratio of the long means' variance to that of white noise. By reason: a pair of leg gyros, the least that is judged, exceeds 2.5 by chance in 3 % of
+# all windows, hence never in most of ten. Where recorded feet are stillest it is 0.6 to 2.
+LEAST_RATIO = 2.5
+# rad/s, standard deviation of the long means, all channels: in public recordings of quiet standing 40-100 % of the half seconds of shanks and
+# thighs exceed it, 0-80 % of those of feet; breathing turns neither.
+LEAST_RAD_S = 0.004
+WINDOW_S = 0.5
+# Limits by reason: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
+# public recordings: 0.04 rad/s, 0.16 m/s2). A foot that is lifted, turned or shifted exceeds them several times; breathing turns no shoe.
+FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
+LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range of 0.05 rad/s, breathing turns a belt by less than 0.03 rad/s
+# Sway counts when most windows of the last seconds have it: a twitch of a wearer who is unconscious is a window or two.
+SWAY_WINDOWS, LEAST_SWAYING = 10, 8
+
+
+class SwayWindows:
+    """`add` takes samples; `restart` tells of the last window when the next sample is of a later one."""
+
+    def __init__(self, channels: int) -> None:
+        self.channels = channels
+        self._sums: Floats = np.zeros((SHORT, channels))
+        self._counts: Floats = np.zeros(SHORT)
+
+    def add(self, index: Ints, part: Ints, values: Floats) -> Bools:
+        """Whether the windows sway that these samples touch, in ascending order; the last one is not finished.
+
+        `index` (n,), ascending: window of each sample. `part` (n,): its short mean, 0 to 24. `values` (n, c) in rad/s. The first window is the last
+        one of the previous call when nothing came in between (`restart` otherwise).
+        """
+        windows = np.r_[True, index[1:] != index[:-1]].cumsum() - 1
+        flat, total = windows * SHORT + part, int(windows[-1] + 1) * SHORT
+        counts = np.bincount(flat, minlength=total).astype(np.float64)
+        sums: Floats = np.column_stack([np.bincount(flat, column, total) for column in values.T])
+        counts[:SHORT] += self._counts
+        sums[:SHORT] += self._sums
+        self._counts, self._sums = counts[-SHORT:], sums[-SHORT:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            short = (sums / counts[:, None]).reshape(-1, SHORT, values.shape[1])
+        return sways(short)
+
+    def restart(self) -> Bools:
+        """Whether the last window sways; the next samples are of a later one."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            short = (self._sums / self._counts[:, None])[None]
+        self._sums, self._counts = np.zeros_like(self._sums), np.zeros(SHORT)
+        return sways(short)
+
+
+def sways(short: Floats) -> Bools:
+    """Whether windows of short means (w, 25, c) in rad/s sway (w,); one with a missing mean does not."""
+    long = short.reshape(len(short), GROUPS, SHORT // GROUPS, -1).mean(axis=2)
+    slow = long.var(axis=1, ddof=1).sum(axis=1)
+    noise = 0.5 * (np.diff(short, axis=1) ** 2).mean(axis=1).sum(axis=1) / (SHORT // GROUPS)
+    found: Bools = (slow > LEAST_RATIO * noise) & (slow > LEAST_RAD_S**2)
+    return found
+
+
+class Window(NamedTuple):
+    """Half a second of one sensor that ends at `end_s`; `moved`: there was motion. `sways`: none, but sway for some time."""
+
+    end_s: float
+    moved: bool
+    sways: bool = False
+
+
+class MotionWindows:
+    """Windows of one sensor: `add` takes samples and returns the windows that they complete."""
+
+    def __init__(self, limits: Floats, swaying: int = 0) -> None:
+        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros by which sway is judged."""
+        self._limits = limits
+        self._index = -1  # of the unfinished window
+        self._low, self._high = np.full(len(limits), np.inf), np.full(len(limits), -np.inf)
+        self._sway = SwayWindows(swaying) if swaying else None
+        self._swayed: deque[bool] = deque(maxlen=SWAY_WINDOWS)
+
+    def add(self, t_s: Floats, values: Floats) -> list[tuple[int, Window]]:
+        """Windows completed by samples `values` (n, c) at `t_s` (n,), each with the index of the sample that does.
+
+        Samples of an earlier window are skipped.
+        """
+        index = np.floor(t_s / WINDOW_S).astype(np.int64)
+        kept = np.flatnonzero(index >= self._index)
+        t_s, index, values = t_s[kept], index[kept], values[kept]
+        if not len(index):
+            return []
+        begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
+        low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
+        sways = self._sways(t_s, index, values)
+        index, completed_by = index[begins], kept[begins]
+        if index[0] == self._index:
+            completed_by = completed_by[1:]
+            low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
+        elif self._index < 0:
+            completed_by = completed_by[1:]
+        else:
+            index = np.r_[self._index, index]
+            low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
+        self._index, self._low, self._high = int(index[-1]), low[-1], high[-1]
+        moved: list[bool] = np.any((high - low)[:-1] > self._limits, axis=1).tolist()
+        ends_s: list[float] = (WINDOW_S * (index[:-1] + 1.0)).tolist()
+        rows = zip(ends_s, moved, sways[:-1].tolist(), strict=True)
+        return list(zip(completed_by.tolist(), [self._window(*row) for row in rows], strict=True))
+
+    def _sways(self, t_s: Floats, index: Ints, values: Floats) -> Bools:
+        """Whether the windows sway that the samples touch, and before them the last one, when it is complete."""
+        if self._sway is None:
+            return np.zeros(len(np.unique(index)) + (0 <= self._index != index[0]), np.bool_)
+        before = self._sway.restart() if 0 <= self._index != index[0] else np.zeros(0, np.bool_)
+        part = np.clip(SHORT * (t_s / WINDOW_S - index), 0, SHORT - 1).astype(np.int64)
+        return np.r_[before, self._sway.add(index, part, values[:, : self._sway.channels])]
+
+    def _window(self, end_s: float, moved: bool, sways: bool) -> Window:
+        """A finished window: it counts as swaying when most of those before it did so too, up to a movement."""
+        self._swayed.append(sways and not moved)
+        return Window(end_s, moved, self._swayed[-1] and sum(self._swayed) >= LEAST_SWAYING)
+
+
+class Stillness:
+    """Windows of foot and legs. A sensor counts from its first motion on: one that has never moved is not worn."""
+
+    def __init__(self) -> None:
+        self._foot = MotionWindows(np.array([FOOT_RAD_S] * 3 + [FOOT_M_S2] * 3), 3)
+        self._legs = MotionWindows(
+            np.array([LEG_RAD_S] * 3), 2
+        )  # sway of thigh and shank: a belt turns with each breath
+        self._worn: set[MotionWindows] = set()
+
+    def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats) -> list[tuple[int, Window]]:
+        """Windows completed by samples of the foot: t_s (n,), gyro (n, 3) rad/s, accel (n, 3) m/s2; each with the sample's index."""
+        with np.errstate(over="ignore", invalid="ignore"):  # of numbers that no sensor measures
+            return self._of_worn(self._foot, self._foot.add(t_s, np.hstack([gyro, accel])))
+
+    def add_legs(self, block: GyroBlock) -> list[Window]:
+        """Windows completed by a block of the leg gyros."""
+        found = self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
+        return [window for _, window in self._of_worn(self._legs, found)]
+
+    def _of_worn(self, source: MotionWindows, windows: list[tuple[int, Window]]) -> list[tuple[int, Window]]:
+        kept: list[tuple[int, Window]] = []
+        for index, window in windows:
+            if window.moved:
+                self._worn.add(source)
+            if source in self._worn:
+                kept.append((index, window))
+        return kept

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+// Text around the map: status, position, stream rates, beacons, guidance, floors, scale bar; and the text for screen readers.
+
+import { drawnText } from './drawing.js';
+import { marksText } from '../marks.js';
+
+const MARKS = { waiting: '○', tracking: '●', uncertain: '◐', lost: '✕', ended: '■' };
+const COMPASS = ['E', 'NE', 'N', 'NW', 'W', 'SW', 'S', 'SE'];
+const SPOKEN_MS = 8000;  // shortest time between two positions for a screen reader
+const FASTEST_RAD_S = Math.PI;  // of the guidance arrow's turn
+const MOST_BUTTONS = 3;  // floors as buttons on a phone; more of them are a list
+const LEAST_RAD = 0.01;  // the arrow ignores smaller changes
+const $ = (id) => document.getElementById(id);
+const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };  // unchanged text causes no new layout
+
+export class Panel {
+  constructor(onFloor) {
+    this.onFloor = onFloor;
+    this.spoken = { at: -Infinity, status: '', text: '' };
+    this.turn = 0;  // angle of the arrow in radians, not wrapped, so that the transition takes the short way
+  }
+
+  hello({ title, plan }) {
+    this.plan = plan;
+    this.shownGoal = null;
+    this.fault('');
+    $('title').textContent = `${title}: ${plan.name}`;
+    document.title = title;
+    $('goal').replaceChildren(new Option('Go to…', ''), new Option('a place on the map', 'map'),
+      ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
+    $('floors').hidden = plan.levels.length < 2;
+    $('floors').classList.toggle('many', plan.levels.length > MOST_BUTTONS);
+    $('floor').replaceChildren(...plan.levels.map(({ name }, level) => new Option(name, level)).reverse());
+    $('floor').onchange = () => this.onFloor(Number($('floor').value));
+    $('floors').replaceChildren(...plan.levels.map((level, k) => {
+      const button = document.createElement('button'), share = document.createElement('span');
+      button.type = 'button';
+      button.textContent = level.name;
+      share.className = 'share';
+      button.append(share);
+      button.onclick = () => this.onFloor(k);  // with the index of the level
+      return button;
+    }));
+  }
+
+  frame({ told: estimate, words: said, streams, guidance, goal, beams, beacons, play, ended, alarm }) {
+    const status = ended ? 'ended' : estimate?.status ?? 'waiting', words = ended ? `ended: ${ended}${play ? '. ▶ plays it again' : ''}` : said;
+    this.status(status, words);
+    put('place', estimate ? positionText(estimate, this.plan.levels) : '');
+    put('places', estimate ? placesText(estimate, this.plan.levels) : '');
+    $('places').hidden = !estimate?.hypotheses.length;
+    put('echoes', estimate ? echoText(beams) : '');
+    put('health', streams ? rateText(streams) : 'no bytes yet');
+    put('wrong', streams?.wrong ?? '');
+    $('wrong').hidden = !streams?.wrong;
+    put('beacons', beaconText(beacons));
+    $('beacons').hidden = !beacons.length;
+    this.alarm(alarm);
+    this.guidance(guidance);
+    this.goal(goal);
+    this.announce(`${status} ${streams?.wrong ?? ''}`, [words, estimate?.where, streams?.wrong].filter(Boolean).join('. '));
+  }
+
+  // The marks that commanders have set; a screen reader says them when they change.
+  marks(marks) {
+    put('marks', marksText(marks, this.plan.levels));
+    $('marks').hidden = !marks.length;
+  }
+
+  drawing(drawing) {
+    put('drawn', drawnText(drawing));
+    $('drawn').hidden = !drawing;
+  }
+
+  // The teammates who can be met: a list that is there only when there are any.
+  team(names) {
+    $('met').hidden = !names.length;
+    $('met').replaceChildren(new Option('I met…', ''), ...names.map((name) => new Option(name, name)));
+  }
+
+  alarm(alarm) {
+    $('alarm').hidden = !alarm;
+    if (!alarm) return;
+    $('alarm').dataset.kind = alarm.kind;
+    $('fine').hidden = alarm.kind === 'over';
+    put('alarm-text', alarm.text);
+  }
+
+  // The arrow is relative to the heading: up is straight ahead.
+  guidance(guidance) {
+    $('guidance').hidden = !guidance;
+    if (!guidance) return;
+    const { kind, text, arrow_rad, left_m, own } = guidance;
+    $('guidance').dataset.kind = kind;
+    $('turn').dataset.sign = arrow_rad !== null ? 'arrow' : { arrived: 'there', looking: 'look' }[kind] ?? 'halt';
+    const by = arrow_rad === null ? 0 : Math.atan2(Math.sin(-arrow_rad - this.turn), Math.cos(-arrow_rad - this.turn));
+    if (Math.abs(by) > LEAST_RAD) {
+      this.turn += by;
+      $('arrow').style.transition = `transform ${0.2 + Math.abs(by) / FASTEST_RAD_S}s ease-out`;
+      $('arrow').style.transform = `rotate(${this.turn}rad)`;
+    }
+    put('cue', text);
+    put('left', left_m === null ? '' : `${left_m < 0.95 ? left_m.toFixed(1) : left_m.toFixed(0)} m to go`);
+    $('end-guidance').hidden = !own;
+  }
+
+  // The list of places shows the destination of the run, whichever page chose it.
+  goal(goal) {
+    const text = JSON.stringify(goal);
+    if (text === this.shownGoal) return;
+    this.shownGoal = text;
+    $('goal').value = goal ? this.optionOf(goal) : '';
+  }
+
+  optionOf({ x_m, y_m, level }) {
+    const room = this.plan.levels[level].rooms.findIndex(({ at_m: [x, y] }) => x === x_m && y === y_m);
+    return room < 0 ? 'map' : `${level} ${room}`;
+  }
+
+  // A fault of the server or of this page, in words; empty: none.
+  fault(text) {
+    put('fault', text);
+    $('fault').hidden = !text;
+  }
+
+  status(status, words) {
+    $('words').dataset.status = status;
+    $('mark').textContent = MARKS[status];
+    put('status-text', words);
+  }
+
+  // One button per level of the plan, with the level's share of the particles; the same as a list.
+  floors(shownLevel, estimate) {
+    $('floor').value = shownLevel;
+    for (const option of $('floor').options) {
+      const share = Math.round(100 * (estimate?.levels?.[option.value] ?? 0)), text = `${this.plan.levels[option.value].name}${share ? ` ${share} %` : ''}`;
+      if (option.text !== text) option.text = text;
+    }
+    [...$('floors').children].forEach((button, level) => {
+      const share = estimate?.levels?.[level] ?? 0;
+      button.setAttribute('aria-pressed', String(level === shownLevel));
+      button.setAttribute('aria-label', `${button.firstChild.textContent}, ${Math.round(100 * share)} % likely`);
+      button.lastChild.style.width = `${100 * share}%`;
+    });
+  }
+
+  scale(view) {
+    const longest = 90 / view.scale, unit = 10 ** Math.floor(Math.log10(longest)), length = [5, 2, 1].find((k) => k * unit <= longest) * unit;
+    $('bar').style.width = `${length * view.scale}px`;
+    $('bar-text').textContent = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
+    $('needle').style.transform = `rotate(${-view.turn}rad)`;
+  }
+
+  // Text for screen readers: at once when the status has changed, else not more often than every SPOKEN_MS.
+  announce(status, text) {
+    const now = performance.now(), { spoken } = this;
+    if (text === spoken.text || (status === spoken.status && now - spoken.at < SPOKEN_MS)) return;
+    this.spoken = { at: now, status, text };
+    $('live').textContent = text;
+  }
+}
+
+// The places that fit, the likeliest first.
+function placesText(estimate, levels) {
+  const texts = estimate.hypotheses.map(({ probability, where, level, x_m, y_m }) => {
+    const floor = levels.length > 1 ? levels[level].name : '', at = where || `x ${x_m.toFixed(0)}, y ${y_m.toFixed(0)} m`;
+    return `${Math.round(100 * probability)} % ${[at, floor].filter(Boolean).join(', ')}`;
+  });
+  return texts.length ? `places that fit: ${texts.join(' · ')}` : '';
+}
+
+function positionText(estimate, levels) {
+  if (estimate.status === 'lost' && estimate.hypotheses.length > 1) return 'no position yet';
+  const degrees = ((estimate.heading_rad * 180) / Math.PI + 360) % 360, spread = Math.round((estimate.heading_sd_rad * 180) / Math.PI);
+  const heading = estimate.heading_known ? `${COMPASS[Math.round(degrees / 45) % 8]} ${Math.round(degrees) % 360}° ±${spread}°` : 'heading unknown';
+  const floor = levels.length > 1 ? levels[estimate.level].name : '';
+  const safe = estimate.protection_m === null ? '' : `within ${length(estimate.protection_m)}`;
+  return [[estimate.where, floor].filter(Boolean).join(', '), `x ${estimate.x_m.toFixed(1)}, y ${estimate.y_m.toFixed(1)} m`, safe, heading].filter(Boolean).join(' · ');
+}
+
+function echoText(lines) {
+  const ranges = ({ measured_m, expected_m }) => `${length(measured_m)}, plan ${length(expected_m)}`;
+  const texts = lines.map((line) => `${line.ranger ? 'right' : 'left'} ${ranges(line)}`);
+  return texts.length ? texts.join(' · ') : 'no echoes';
+}
+
+// How many beacons are heard, and the numbers of those that are silent or moved.
+function beaconText(beacons) {
+  const of = (state) => beacons.filter((beacon) => beacon.state === state).map(({ number }) => number).join(', ');
+  const own = beacons.filter(({ by }) => !by), names = [...new Set(beacons.map(({ by }) => by).filter(Boolean))].join(', ');
+  const heard = own.length && `beacons: ${own.filter((beacon) => beacon.heard).length} of ${own.length} heard`;
+  return [heard, names && `beacons of ${names}: ${beacons.length - own.length}`, of('silent') && `silent: ${of('silent')}`, of('moved') && `moved: ${of('moved')}`].filter(Boolean).join(' · ');
+}
+
+const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`);
+
+function rateText({ foot, mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
+  const rate = (value, unit) => (value === null ? '…' : `${Math.round(value)}${unit}`);
+  const late = late_pings ? ` · ${late_pings} late` : '';
+  return `${foot} ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected}${foot !== 'MTx' ? '' : synchronised ? ' · SyncOut' : ' · no SyncOut'}`;
+}

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""Beacons that a teammate has placed: the message on the broker, and the same bytes as a chunk of the port `TEAM_BEACONS`.
+
+In: places of beacons by a teammate's tracker. Out: the bytes, and `TeamBeacons` from such bytes, which may be damaged or hostile. Owns the limits.
+The bytes are recorded like those of any port, so a replay has the same beacons in the same order.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from echostep.ports.people.check_in import MOST_LEVELS
+from echostep.ports.people.payloads import Metres, Variance, decoded, has_covariance
+
+TEAM_BEACONS = "team_beacons"  # name of the port
+MOST_BYTES = 8192  # of one encoded message; 64 beacons have 6,500
+MOST_SHARED = 64  # beacons of one teammate: the most that a gateway tells apart
+MOST_NUMBER = 0xFFFF  # of a beacon [protocol/messages.toml, beacon]
+
+
+class SharedBeacon(msgspec.Struct, frozen=True):
+    """Beacon `number` at (x_m, y_m) on `level` of the plan, with the covariance (m2) of its place, the placing wearer's own error included."""
+
+    number: Annotated[int, Meta(ge=0, le=MOST_NUMBER)]
+    x_m: Metres
+    y_m: Metres
+    level: Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
+    xx_m2: Variance
+    xy_m2: Annotated[float, Meta(ge=-1e12, le=1e12)]
+    yy_m2: Variance
+
+
+class TeamBeacons(msgspec.Struct, frozen=True):
+    """All beacons that the wearer `name` has placed in one run; they replace those of its earlier message. Numbers are unique."""
+
+    echostep_beacons: Literal[1]
+    name: Annotated[str, Meta(min_length=1, max_length=32)]
+    run: Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
+    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+    beacons: Annotated[tuple[SharedBeacon, ...], Meta(max_length=MOST_SHARED)]
+
+    def encode(self) -> bytes:
+        """The message as JSON: the bytes of a chunk."""
+        return msgspec.json.encode(self)
+
+
+_DECODER = msgspec.json.Decoder(TeamBeacons)
+
+
+def parse_team_beacons(payload: bytes) -> TeamBeacons | None:
+    """The message in a chunk; None when the bytes are none, name a beacon twice, or hold no covariance."""
+    told = decoded(payload, _DECODER, MOST_BYTES)
+    if told is None:
+        return None
+    is_unique = len({b.number for b in told.beacons}) == len(told.beacons)
+    return told if is_unique and all(has_covariance(b) for b in told.beacons) else None

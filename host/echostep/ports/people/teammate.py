@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Teammate: where another wearer is, as a chunk of the port `TEAM`, so that a rescuer's recording holds what the guidance was told.
+
+In: a position from a team report. Out: the bytes of a chunk, and a `Teammate` from such bytes, which may be damaged or hostile. Owns the limits.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from echostep.ports.people.check_in import MOST_LEVELS
+from echostep.ports.people.payloads import Metres, decoded
+
+TEAM = "team"  # name of the port
+MOST_BYTES = 512  # of one encoded position, by reason
+
+
+class Teammate(msgspec.Struct, frozen=True):
+    """A wearer's place (x_m, y_m) on a level, within `radius_m` (95 %), and where that is in words."""
+
+    name: Annotated[str, Meta(max_length=32)]
+    x_m: Metres
+    y_m: Metres
+    level: Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
+    radius_m: Annotated[float, Meta(ge=0.0, le=1e7)]
+    words: Annotated[str, Meta(max_length=200)] = ""
+
+    def encode(self) -> bytes:
+        """The place as JSON: the bytes of a chunk."""
+        return msgspec.json.encode(self)
+
+
+_DECODER = msgspec.json.Decoder(Teammate)
+
+
+def parse_teammate(payload: bytes) -> Teammate | None:
+    """The place in a chunk; None when the bytes are none."""
+    return decoded(payload, _DECODER, MOST_BYTES)

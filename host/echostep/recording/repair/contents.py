@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Contents of a recording: counts per port, decoded frames, gaps, and what is wrong with the file.
+
+In: a recording. Out: a summary as lines of text. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from echostep.board.messages import SCHEMA_HASH, Identity
+from echostep.errors import EchostepError
+from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
+from echostep.recording.capture import Decoder
+from echostep.recording.mcap_records import port_of
+from echostep.recording.repair.arrival_order import ArrivalOrder
+from echostep.recording.repair.recovery import RecordedMessage, Recovery
+
+# All by reason.
+MESSAGES_PER_UPDATE = 5000  # of the progress bar
+LONGEST_LINE = 4000  # characters
+LONGEST_VALUE = 100  # characters of a metadata value on the line of its key
+DECODED_AT_ONCE = 1 << 16  # bytes of one port
+GAP_S = 1.0  # a longer time between two chunks of a port is counted as a gap
+
+
+@dataclass
+class PortContents:
+    """Counts of one port's chunks and bytes."""
+
+    chunks: int = 0
+    received: int = 0  # bytes
+    last_ns: int = 0  # arrival of the newest chunk
+    longest_gap_s: float = 0.0
+    gaps: int = 0  # longer than `GAP_S`
+
+    def add(self, message: RecordedMessage) -> None:
+        """Count one chunk."""
+        gap_s = (message.t_ns - self.last_ns) * 1e-9 if self.chunks else 0.0
+        self.longest_gap_s = max(self.longest_gap_s, gap_s)
+        self.gaps += gap_s > GAP_S
+        self.chunks += 1
+        self.received += len(message.body)
+        self.last_ns = message.t_ns
+
+
+@dataclass
+class Contents:
+    """Counts of a recording: `ports` by name, and `derived` messages by topic."""
+
+    ports: dict[str, PortContents] = field(default_factory=dict)
+    derived: dict[str, int] = field(default_factory=dict)
+    first_ns: int = LATEST_NS  # earliest arrival
+    last_ns: int = 0  # latest arrival
+    out_of_order: int = 0  # chunks that arrived before an earlier chunk of the file
+    order: ArrivalOrder = field(default_factory=ArrivalOrder)  # corrects what is counted here
+    decoder: Decoder = field(default_factory=Decoder)
+    errors: list[str] = field(default_factory=list)  # of the decoder
+    firmware: str = ""  # version and protocol hash in the board's newest Identity message
+    _undecoded: dict[str, bytearray] = field(default_factory=dict)  # bytes by port
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first chunk to the last, s."""
+        return max(self.last_ns - self.first_ns, 0) * 1e-9
+
+    @property
+    def chunks(self) -> int:
+        """Chunks of all ports."""
+        return sum(port.chunks for port in self.ports.values())
+
+    def add(self, message: RecordedMessage) -> None:
+        """Count one message."""
+        port = port_of(message.channel)
+        if not port:
+            self.derived[message.channel.topic] = self.derived.get(message.channel.topic, 0) + 1
+            return
+        self.out_of_order += message.t_ns < self.last_ns
+        self.first_ns, self.last_ns = min(self.first_ns, message.t_ns), max(self.last_ns, message.t_ns)
+        self.ports.setdefault(port, PortContents()).add(message)
+        undecoded = self._undecoded.setdefault(port, bytearray())
+        undecoded += message.body
+        if len(undecoded) >= DECODED_AT_ONCE:
+            self._decode(port, undecoded)
+
+    def finish(self) -> None:
+        """Decode the remaining bytes; call it after the last `add`."""
+        for port, undecoded in self._undecoded.items():
+            self._decode(port, undecoded)
+
+    def _decode(self, port: str, undecoded: bytearray) -> None:
+        """Decode and clear the bytes of a port; each different error is kept once."""
+        try:
+            if port == BOARD:
+                self._decode_board(bytes(undecoded))
+            elif port == FOOT:
+                self.decoder.foot.frames(bytes(undecoded))
+            elif port == MTX:
+                self.decoder.tracked.feed_batch(bytes(undecoded))
+        except EchostepError as error:
+            if str(error) not in self.errors:
+                self.errors.append(str(error))
+        undecoded.clear()
+
+    def _decode_board(self, received: bytes) -> None:
+        for row in self.decoder.board.frames(received).rows(Identity)[1]:
+            identity = Identity.unpack(row.tobytes())
+            version = f"{identity.version_major}.{identity.version_minor}.{identity.version_patch}"
+            self.firmware = f"{version}, protocol 0x{identity.schema_hash:08X}"
+
+
+def info(path: Path) -> list[str]:
+    """The summary of a recording, as lines; raises EchostepError when it holds no readable message."""
+    recovery, contents = Recovery(path), Contents()
+    for message in with_progress(recovery, contents, f"reading {path.name}"):
+        contents.add(message)
+    contents.finish()
+    if not contents.ports and not contents.derived:
+        raise EchostepError(f"{path}: no message in it can be read: is this an echostep recording (.mcap)?")
+    problems = problems_of(recovery, contents)
+    condition = [*problems, f"  echostep repair {path} -o OUT makes a whole file of it"] if problems else ["  whole"]
+    return [printable(line) for line in [*_head(recovery, contents), *_port_lines(contents), *condition]]
+
+
+def printable(line: str) -> str:
+    """The line, shortened and without control characters: the text of a file could control the terminal."""
+    line = line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE] + " ..."
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in line)
+
+
+def _head(recovery: Recovery, contents: Contents) -> list[str]:
+    """Size, duration and metadata."""
+    lines = [f"{recovery.path}: {recovery.size / 1e6:.1f} MB, {contents.seconds:.1f} s"]
+    for key, value in recovery.metadata.items():
+        if value:
+            lines.append(
+                f"  {key}: {value if len(value) < LONGEST_VALUE and chr(10) not in value else _indented(value)}"
+            )
+    return lines
+
+
+def _indented(text: str) -> str:
+    return "".join(f"\n    {line}" for line in text.splitlines())
+
+
+def _port_lines(contents: Contents) -> list[str]:
+    """Chunks and gaps of each port, frames of the board, samples of the MTx, derived messages."""
+    lines = []
+    for name, port in sorted(contents.ports.items()):
+        gaps = f", silent {port.gaps} times, {port.longest_gap_s:.1f} s at most" if port.gaps else ""
+        lines.append(f"  {name}: {port.received} bytes in {port.chunks} chunks{gaps}")
+    board, mtx = contents.decoder.board.counts, contents.decoder.tracked.counts
+    if BOARD in contents.ports:
+        lines.append(f"  board frames: {board.good} good, {board.rejected} bad, {board.lost} lost")
+        lines.append(
+            f"  firmware: {contents.firmware or 'the board did not say'}; this host: protocol 0x{SCHEMA_HASH:08X}"
+        )
+    if MTX in contents.ports:
+        rate = f" ({mtx.good / contents.seconds:.1f}/s)" if contents.seconds > 0.0 else ""
+        lines.append(f"  MTx samples: {mtx.good}{rate}, {mtx.bad_checksum} bad checksums")
+    if FOOT in contents.ports:
+        foot = contents.decoder.foot.counts
+        lines.append(f"  foot board frames: {foot.good} good, {foot.rejected} bad, {foot.lost} lost")
+    if contents.derived:
+        lines.append("  derived: " + ", ".join(f"{name} {count}" for name, count in sorted(contents.derived.items())))
+    return lines
+
+
+def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
+    """What is wrong with a file that was read to its end, as lines; empty for a complete file."""
+    lines = [f"  {error}" for error in contents.errors]
+    inside = [(begin, end) for begin, end in recovery.damaged if end < recovery.size]
+    if inside:
+        byte_count, first = sum(end - begin for begin, end in inside), inside[0][0]
+        lines.append(f"  damaged: {byte_count} bytes in {len(inside)} places are not valid, the first at byte {first}")
+    if recovery.unreadable_chunks:
+        lines.append(f"  damaged: {recovery.unreadable_chunks} compressed chunks cannot be opened")
+    if contents.order.corrected:
+        lines.append(f"  {contents.order.corrected} arrival times contradict their neighbours; repair corrects them")
+    if recovery.altered:
+        lines.append("  its checksum is wrong: bytes have changed since it was written")
+    if contents.out_of_order:
+        lines.append(f"  {contents.out_of_order} chunks are out of time order")
+    if not recovery.has_footer:
+        middle = ", in the middle of a record" if len(inside) < len(recovery.damaged) else ""
+        lines.append(f"  the file ends too early{middle}: the recorder was stopped before it could close it")
+    return lines
+
+
+def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:
+    """All messages with corrected arrival times, with a progress bar on a terminal."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(title, total=1.0)
+        for message_index, message in enumerate(contents.order.correct(recovery.messages())):
+            if not message_index % MESSAGES_PER_UPDATE:
+                progress.update(task, completed=recovery.fraction)
+            yield message

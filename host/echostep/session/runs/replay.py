@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""`echostep replay`: track a recorded walk again, through the same stages as a live run.
+
+In: a recording, its plan. Out: track, summary, errors where the true path is given. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from echostep.plan.model import Plan
+from echostep.recording.reading import Recording, open_recording
+from echostep.scorecard.truth import load_truth
+from echostep.session.chunk_streams import paced, portions_of
+from echostep.session.console import console
+from echostep.session.metadata import CHECK_IN_START, SIMULATED, plan_of, recorded_seed, recorded_start, start_given
+from echostep.session.options import OutputOptions, TrackingOptions
+from echostep.session.progress import with_bar
+from echostep.session.results import output_folder
+from echostep.session.runs.starts import check_start
+from echostep.session.session import Session
+from echostep.session.skipped import skipped
+from echostep.settings import parse_settings, read_settings
+from echostep.tracker import Tracker
+
+VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on, by reason: about 10 ms
+
+
+def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:
+    """Track a recording; start, settings and seed are the recorded ones unless `tracking` gives others."""
+    recording, plan = open_recording(path), plan_of(tracking)
+    if plan.is_drawn and recording.metadata.get("plan_sha256", plan.digest) != plan.digest:
+        console.print(f"Note: {tracking.plan_path} is not the plan that {path} was tracked on.")
+    truth = load_truth(truth_path) if truth_path else None
+    tracker = tracker_of(recording, plan, tracking)
+    check_start(plan, tracker.start, given=tracking.start is not None, recorded="start_x_y_rad" in recording.metadata)
+    output_folder(output.folder)
+    if note := recording.metadata.get("note"):
+        console.print(f"Recording: {note}")
+    simulated = recording.metadata.get("source") == SIMULATED
+    title = f"echostep replay {path.name}{' (simulated)' if simulated else ''}"
+    with Session(
+        tracker, title, "simulated" if simulated else "replay", output, tracking.guide_to, recording
+    ) as session:
+        session.prepare()
+        start_s = time.perf_counter()
+        portions = recording.portions()
+        if output.foxglove:  # a viewer shows what comes, so it comes as it came
+            portions = portions_of(paced(recording.chunks(), 1.0), VIEWED_PORTION)
+        if not output.terminal:
+            portions = with_bar(portions, f"tracking {path.name}", lambda: recording.fraction)
+        session.track(portions, lambda: recording.fraction)
+        elapsed_s = time.perf_counter() - start_s
+        for line in skipped(recording, tracker.streams):
+            console.print(line, markup=False, highlight=False)
+        session.finish(path.name, truth, elapsed_s)
+        session.keep_page_open()
+
+
+def tracker_of(recording: Recording, plan: Plan, tracking: TrackingOptions) -> Tracker:
+    """A tracker with the recorded start, settings and seed unless `tracking` gives others.
+
+    Raises EchostepError when one of them is missing or damaged.
+    """
+    metadata, path = recording.metadata, recording.path
+    settings_path = tracking.settings_path
+    text = read_settings(settings_path) if settings_path else metadata.get("settings_toml", "")
+    settings = parse_settings(text, str(settings_path or path))
+    start = start_given(tracking, plan) or recorded_start(metadata, path)
+    seed = recorded_seed(metadata, path) if tracking.seed is None else tracking.seed
+    return Tracker(plan, start, settings, seed, waits=metadata.get("start") == CHECK_IN_START)

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""The marks' ear: marks that commanders have set, and who has acknowledged which alarm of this run, for the page of a wearer's run.
+
+In: retained messages of the broker that a run publishes to. Out: marks on this plan, when they change; names of commanders. Owns the subscription
+and its thread; the tracker never waits for it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+
+from echostep.page.elements.marks import ShownMark
+from echostep.team.endpoint import Endpoint, Outlet
+from echostep.team.inbox import Inbox, Receiver
+from echostep.team.messages.marks import MARKS, MarkBoard, acks_of
+from echostep.team.messages.report import BadReportError
+from echostep.team.mqtt.publisher import Listener
+
+LOOK_S = 0.5  # between two looks at what was heard, by reason
+
+
+class MarksEar:
+    """`news` gives the marks when they have changed; messages that are not believed are counted in `rejected`."""
+
+    def __init__(
+        self, broker: Endpoint, outlet: Outlet, run: str, plan_sha256: str, print_line: Callable[[str], None]
+    ) -> None:
+        """`outlet`, `run`: under which names this wearer's alarms are published."""
+        self.rejected: Counter[str] = Counter()
+        self._team, self._name, self._run = outlet.team, outlet.name, run
+        self._plan_sha256 = plan_sha256
+        self._inbox, self._board = Inbox(), MarkBoard()
+        self._shown: tuple[ShownMark, ...] = ()
+        self._looked_s = -math.inf
+        self._receiver = Receiver(
+            Listener(broker, [MARKS, acks_of(outlet.team, outlet.name)], self._inbox.put),
+            lambda text: print_line(f"{broker}: marks: {text}"),
+        )
+
+    def news(self) -> tuple[ShownMark, ...] | None:
+        """All marks on this plan; None when they are the same as before. Never waits."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s < LOOK_S:
+            return None
+        self._looked_s = now_s
+        messages, dropped = self._inbox.take_all()
+        self.rejected.update(dropped)
+        for message in messages:
+            try:
+                self._board.receive(message.topic or "", message.payload)
+            except BadReportError as error:
+                self.rejected[str(error)] += 1
+        marks = [m for m in self._board.marks.values() if m.plan_sha256 == self._plan_sha256]
+        shown = tuple(ShownMark(m.id, m.mark, m.x_m, m.y_m, m.level, m.by) for m in marks)
+        if shown == self._shown:
+            return None
+        self._shown = shown
+        return shown
+
+    def acknowledged_by(self, number: int) -> str | None:
+        """The commander who has acknowledged the alarm of this number; of what the last `news` has heard."""
+        ack = self._board.acks.get((self._team, self._name, f"{self._run}-{number}"))
+        return ack.by if ack else None
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._receiver.close()

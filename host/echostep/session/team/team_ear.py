@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""The team ear: the newest place of one other wearer, from the broker that a run publishes to.
+
+In: reports of all teams on the broker. Out: payloads of chunks of the port `TEAM`, at most one a second. Owns the subscription, its thread and the
+roster of what was heard; the tracker never waits for it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+
+from echostep.errors import EchostepError
+from echostep.plan.model import Plan
+from echostep.ports.people.teammate import Teammate
+from echostep.team.commander import update_roster
+from echostep.team.endpoint import Outlet
+from echostep.team.inbox import Inbox, Receiver
+from echostep.team.mqtt.publisher import Listener
+from echostep.team.roster import Member, MemberState, Roster
+
+LOOK_S = 0.5  # between two looks at what was heard, by reason
+NEWS_S = 1.0  # between two places that are passed on, by reason
+
+
+class TeamEar:
+    """`pop` gives new places of the wearer; `close` ends the subscription."""
+
+    def __init__(self, outlet: Outlet | None, name: str, plan: Plan, print_line: Callable[[str], None]) -> None:
+        """Raises EchostepError without a broker to listen at."""
+        broker = outlet.broker if outlet else None
+        if broker is None or outlet is None:
+            raise EchostepError(f"--guide wearer:{name} needs the team's broker: --publish mqtt://HOST --name YOURS")
+        self._name, self._team, self._plan, self._print_line = name, outlet.team, plan, print_line
+        self._inbox, self._roster = Inbox(), Roster()
+        self._last: Teammate | None = None
+        self._looked_s = self._told_s = -math.inf
+        self._warned = False
+        listener = Listener(broker, [f"echostep/+/{name}/+"], self._inbox.put)
+        self._receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))
+
+    def pop(self) -> Iterator[bytes]:
+        """The wearer's place as the bytes of a chunk, when it is new; never waits."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s < LOOK_S:
+            return
+        self._looked_s = now_s
+        update_roster(self._inbox, self._roster)
+        member = self._member(now_s)
+        place = None if member is None else self._place(member, now_s)
+        if place is not None and place != self._last and now_s - self._told_s >= NEWS_S:
+            self._last, self._told_s = place, now_s
+            yield place.encode()
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._receiver.close()
+
+    def _member(self, now_s: float) -> Member | None:
+        """The wearer of this name: of the own team before another's, running before ended, the latest heard."""
+        named = [m for m in self._roster.members(now_s) if m.report.position is not None]
+        return min(named, default=None, key=lambda m: (
+            m.report.team != self._team, m.state(now_s) is MemberState.ENDED, m.silent_s(now_s),
+        ))  # fmt: skip
+
+    def _place(self, m: Member, now_s: float) -> Teammate | None:
+        """Where a member is on this plan; None when it is tracked on another one, which is said once."""
+        p = m.position(now_s)
+        if p is None or m.report.plan_sha256 != self._plan.digest or not 0 <= p.floor < len(self._plan.levels):
+            if not self._warned:
+                self._warned = True
+                self._print_line(f"{self._name} is tracked on another plan ({m.report.plan}): no way can be found")
+            return None
+        words = ", ".join(filter(None, (f"on {p.floor_name}" if p.floor_name else "", p.where)))
+        # Centimetres: the same place is told once
+        return Teammate(
+            m.report.name, round(p.x_m, 2), round(p.y_m, 2), p.floor, round(min(p.radius95_m, 1e7), 1), words
+        )

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""What commanders share: marks on the plan, and who has acknowledged which alarm. The broker keeps it, so all commanders have one state.
+
+In: retained messages from untrusted senders, on `echostep-table/mark/<id>` and `echostep-table/ack/<team>/<wearer>/<run>-<number>`; an empty one
+removes. Out: `Mark`s and `Ack`s, and the messages for new ones. Owns those that are known; their number is bounded.
+
+A mark that a commander removes stays as a message that says so: the state of a mark only goes from set to removed; of several acknowledgements
+the earliest counts. So what each commander knows can be sent again in any order, also to a broker that has lost its memory (`Restorer`), and all
+come to one state: a message behind what is known is answered with what is known, for the broker keeps the last one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Annotated, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from echostep.team.messages.report import BadReportError, Metres, check_name, is_printable
+
+ROOT = "echostep-table"
+MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
+MOST_MARKS, MOST_ACKS = 256, 1024  # further ones are refused
+MOST_ANSWERS = 64  # that wait; further ones replace the oldest
+MOST_REMOVED = 1024  # removed marks that are remembered, the newest ones
+MarkKind = Literal["cleared", "hazard", "meeting"]
+Identity = Annotated[str, Meta(pattern="^[0-9a-f]{8}$")]
+Person = Annotated[str, Meta(min_length=1, max_length=32)]
+
+
+class Mark(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A place on the plan: a room that is cleared, a hazard, a meeting point. `by`: who set it; `unix_s`: when, by that clock.
+
+    `removed`: it is not there any more.
+    """
+
+    echostep_mark: Literal[1]
+    id: Identity
+    mark: MarkKind
+    x_m: Metres
+    y_m: Metres
+    level: Annotated[int, Meta(ge=0, lt=1000)]
+    by: Person
+    unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
+    plan_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+    removed: bool = False
+
+    @property
+    def message(self) -> tuple[str, bytes]:
+        """Topic and payload."""
+        return f"{ROOT}/mark/{self.id}", msgspec.json.encode(self)
+
+
+class Ack(msgspec.Struct, frozen=True):
+    """An alarm that a commander has acknowledged."""
+
+    echostep_ack: Literal[1]
+    by: Person
+    unix_s: Annotated[float, Meta(ge=0.0, le=1e11)]
+
+
+AlarmKey = tuple[str, str, str]  # team, wearer, "<run>-<number>"
+T = TypeVar("T")
+_MARK, _ACK = msgspec.json.Decoder(Mark), msgspec.json.Decoder(Ack)
+
+
+def ack_message(key: AlarmKey, by: str, unix_s: float) -> tuple[str, bytes]:
+    """Topic and payload of an acknowledgement."""
+    return f"{ROOT}/ack/{'/'.join(key)}", msgspec.json.encode(Ack(1, by, unix_s))
+
+
+def acks_of(team: str, name: str) -> str:
+    """Topic filter of the acknowledgements of one wearer's alarms."""
+    return f"{ROOT}/ack/{team}/{name}/+"
+
+
+def is_shared(topic: str | None) -> bool:
+    """Whether a topic is one of this module's."""
+    return topic is not None and topic.startswith(f"{ROOT}/")
+
+
+class MarkBoard:
+    """`receive` takes messages; `marks` and `acks` are what they amount to; `removed`: marks that were there.
+
+    `answers`: messages for the broker, which keeps older ones.
+    """
+
+    def __init__(self) -> None:
+        self.marks: dict[str, Mark] = {}
+        self.removed: dict[str, Mark] = {}
+        self.acks: dict[AlarmKey, Ack] = {}
+        self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
+
+    def copy(self) -> MarkBoard:
+        """A board of the same state that changes by itself."""
+        made = MarkBoard()
+        made.marks, made.removed, made.acks = dict(self.marks), dict(self.removed), dict(self.acks)
+        return made
+
+    @property
+    def messages(self) -> Iterator[tuple[str, bytes]]:
+        """Topic and payload of all that is known."""
+        for mark in (*self.marks.values(), *self.removed.values()):
+            yield mark.message
+        for key, ack in self.acks.items():
+            yield ack_message(key, ack.by, ack.unix_s)
+
+    def receive(self, topic: str, payload: bytes) -> None:
+        """Take one message; raises BadReportError with the reason why it is not believed."""
+        parts = topic.split("/")
+        match parts[1:]:
+            case ["mark", identity]:
+                self._receive_mark(identity, payload)
+            case ["ack", team, name, alarm]:
+                self._receive_ack((team, name, alarm), payload)
+            case _:
+                raise BadReportError("unknown topic")
+
+    def _receive_mark(self, identity: str, payload: bytes) -> None:
+        if not payload:
+            self.marks.pop(identity, None)
+            self.removed.pop(identity, None)
+            return
+        mark = _decoded(payload, _MARK, "mark")
+        if mark.id != identity:
+            raise BadReportError("mark and topic contradict each other")
+        if not is_printable(mark.by):
+            raise BadReportError("unprintable text")
+        if identity in self.removed:
+            if not mark.removed:  # sent by a commander who had not heard that it was removed
+                self.answers.append(self.removed[identity].message)
+            return
+        if mark.removed:
+            self.marks.pop(identity, None)
+            if len(self.removed) >= MOST_REMOVED:
+                self.removed.pop(next(iter(self.removed)))
+            self.removed[identity] = mark
+            return
+        if identity not in self.marks and len(self.marks) >= MOST_MARKS:
+            raise BadReportError(f"more than {MOST_MARKS} marks")
+        self.marks[identity] = mark
+
+    def _receive_ack(self, key: AlarmKey, payload: bytes) -> None:
+        for name in key[:2]:
+            check_name(name)
+        if len(key[2]) > 32:
+            raise BadReportError("unknown topic")
+        if not payload:
+            self.acks.pop(key, None)
+            return
+        ack = _decoded(payload, _ACK, "acknowledgement")
+        if not is_printable(ack.by):
+            raise BadReportError("unprintable text")
+        known = self.acks.get(key)
+        if known is None and len(self.acks) >= MOST_ACKS:
+            raise BadReportError(f"more than {MOST_ACKS} acknowledgements")
+        if known is not None and (known.unix_s, known.by) < (ack.unix_s, ack.by):
+            self.answers.append(ack_message(key, known.by, known.unix_s))
+        else:
+            self.acks[key] = ack
+
+
+def _decoded(payload: bytes, decoder: msgspec.json.Decoder[T], what: str) -> T:
+    try:
+        return decoder.decode(payload)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise BadReportError(f"not a valid {what}") from error

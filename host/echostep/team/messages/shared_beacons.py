@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""Beacons that wearers share: retained messages on `echostep/<team>/<wearer>/beacons`.
+
+In: the beacons that a tracker has placed; or the bytes of a payload from an untrusted sender. Out: topic and payload; or `TeamBeacons`. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from echostep.ports.people.team_beacons import TeamBeacons, parse_team_beacons
+from echostep.team.messages.report import BadReportError, is_printable
+
+BEACONS = "beacons"  # last part of the topic
+SHARE_S = 5.0  # between two messages of a wearer, at least, by reason
+
+
+def beacons_message(team: str, told: TeamBeacons) -> tuple[str, bytes]:
+    """Topic and payload."""
+    return f"echostep/{team}/{told.name}/{BEACONS}", told.encode()
+
+
+def decode_beacons(name: str, payload: bytes) -> TeamBeacons:
+    """The message in a payload on the topic of this wearer; raises BadReportError with the reason why it is not believed."""
+    told = parse_team_beacons(payload)
+    if told is None:
+        raise BadReportError("not valid beacons")
+    if told.name != name:
+        raise BadReportError("beacons and topic contradict each other")
+    if not is_printable(told.name):
+        raise BadReportError("unprintable text")
+    return told

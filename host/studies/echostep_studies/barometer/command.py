@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""`echostep floors`: the command's arguments and options. Heavy imports wait until it runs.
+
+In: nothing. Out: `floors`, declared for typer. Owns nothing.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from echostep.commands.options import needs
+
+
+def floors(
+    pressure: Annotated[
+        Path, typer.Argument(help="CSV: t_s,pressure_pa[,temperature_c] in s, Pa, degC; 0.5 to 50 Hz.")
+    ],
+    heights: Annotated[
+        str,
+        typer.Option(
+            "--heights", metavar="METRES", help="Heights of the floors, as 0,3.5,7; auto: from the recording."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    start: Annotated[
+        int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
+    ] = None,
+    plot: Annotated[
+        bool, typer.Option("--plot", callback=needs("matplotlib"), help="Draw the floors as PNG, beside the CSV.")
+    ] = False,
+) -> None:
+    """Floors of a recorded barometer. Writes t_s,floor,probability,height_m; a floor is the index into --heights, from 0."""
+    from echostep_studies.barometer import floors_command
+
+    floors_command.floors(pressure, heights, out, start, plot=plot)

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""A recorded barometer as a CSV file: samples checked and read, the floors written.
+
+In: columns `t_s,pressure_pa[,temperature_c]`, 0.5 to 50 Hz. Out: `Pressures` with notes on what was mended, or an EchostepError that names file,
+line and field; the floors as CSV. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echostep.arrays import Bools, Floats, Ints
+from echostep.errors import EchostepError
+from echostep.offline.csv_lines import CsvLimits, header_of, lines_of
+from echostep.offline.csv_table import MOST_BAD, open_samples, rate_complaint, read_rows
+from echostep_studies.barometer.altitude import COLDEST_C, HIGHEST_PA, LOWEST_PA, WARMEST_C, Pressures
+from echostep_studies.barometer.floor_filter import Floors
+
+COLUMNS = ("t_s", "pressure_pa")
+TEMPERATURE = "temperature_c"
+FLOOR_COLUMNS = ("t_s", "floor", "probability", "height_m")
+TIME, PRESSURE, AIR_TEMPERATURE = range(3)  # columns of a table of samples
+
+# By reason, all of them.
+LIMITS = CsvLimits(line_chars=1000, lines=19_999_999, early_rows=None)  # they bound the memory: four days at 50 Hz
+RATE_HZ = (0.45, 55.0)  # 0.5 to 50 Hz with a margin of 10 %
+BACK_SHARE = 0.01  # largest share of rows whose time goes back: damage, not another order of rows
+LONGEST_GAP_S = 5.0  # a longer gap is reported: in it a storey can be climbed
+MOST_GAPS = 3  # reported one by one
+KELVIN_FROM = 200.0  # a median temperature above this number is likely in kelvins: no air is so hot in degC
+UNITS = (  # name, and pascals in it
+    ("hPa", 100.0),
+    ("kPa", 1000.0),
+    ("bar", 1e5),
+    ("mmHg", 133.322),
+    ("inHg", 3386.39),
+    ("a quarter of a pascal (SCP1000 counts)", 0.25),
+)
+USUAL_PA = (80_000.0, 108_000.0)  # pressures from about 2000 m of height down to the sea, to guess a unit
+
+
+@dataclass(frozen=True, slots=True)
+class PressureRecord:
+    """`samples`, and `notes` on rows that were skipped and on gaps, a line each."""
+
+    samples: Pressures
+    notes: tuple[str, ...]
+
+
+def load_pressures(path: Path | str) -> PressureRecord:
+    """Samples of a CSV file; raises EchostepError that names the file, the line and the field."""
+    return open_samples(path, lambda file: _checked(*_table(lines_of(file, LIMITS))))
+
+
+def _table(lines: Iterator[str]) -> tuple[Floats, Ints]:
+    """Time, pressure and temperature (n, 3), NaN where there is no number, and the line number of each row (n,)."""
+    header, separator = header_of(next(lines, ""))
+    if missing := [name for name in COLUMNS if name not in header]:
+        raise ValueError(
+            f"line 1: no column {', '.join(missing)}; the first line must name t_s,pressure_pa[,temperature_c]"
+        )
+    if twice := [name for name in (*COLUMNS, TEMPERATURE) if header.count(name) > 1]:
+        raise ValueError(f"line 1: column {twice[0]} is there twice")
+    columns = [header.index(name) if name in header else -1 for name in (*COLUMNS, TEMPERATURE)]
+    table = read_rows(lines, separator, columns, len(COLUMNS), LIMITS)
+    if len(table.line) < 2:
+        raise ValueError("no samples: two rows at least are needed under the names of the columns")
+    return table.values, table.line
+
+
+def _checked(table: Floats, lines: Ints) -> PressureRecord:
+    """The usable samples of a table (n, 3) with line numbers (n,); raises ValueError when too few are usable, or when the unit is wrong."""
+    table, lines, notes = _usable_rows(table, lines)
+    _check_rate(table[:, TIME])
+    notes += _gap_notes(table[:, TIME], lines)
+    if np.ptp(table[:, PRESSURE]) == 0.0:
+        raise ValueError("pressure_pa never changes: is the sensor read?")
+    temperature, more = _temperatures(table[:, AIR_TEMPERATURE], lines)
+    return PressureRecord(Pressures(table[:, TIME], table[:, PRESSURE], temperature), (*notes, *more))
+
+
+def _usable_rows(table: Floats, lines: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
+    """Rows with a possible pressure and increasing times, their line numbers, and notes on the rows left out."""
+    whole: Bools = np.asarray(np.isfinite(table[:, : len(COLUMNS)]).all(axis=1))
+    if not whole.all() and (~whole).mean() > MOST_BAD:
+        raise ValueError(
+            f"line {lines[~whole][0]}: no number in {_field(table[~whole][0])}, as in {100 * (~whole).mean():.0f} % of the rows"
+        )
+    notes = _note(~whole, lines, "without a number in t_s or pressure_pa: skipped")
+    table, lines = table[whole], lines[whole]
+    if len(table) < 2:
+        raise ValueError("no samples: two rows with numbers at least are needed")
+    _check_unit(table[:, PRESSURE], lines)
+    possible = (table[:, PRESSURE] >= LOWEST_PA) & (table[:, PRESSURE] <= HIGHEST_PA)
+    notes += _note(~possible, lines, f"with pressure_pa outside of {LOWEST_PA:.0f} to {HIGHEST_PA:.0f} Pa: skipped")
+    table, lines = table[possible], lines[possible]
+    again = np.concatenate([[False], np.diff(table[:, TIME]) == 0.0])
+    notes += _note(again, lines, "with the t_s of the row before: skipped")
+    table, lines = table[~again], lines[~again]
+    back = np.flatnonzero(np.diff(table[:, TIME]) < 0.0)
+    if len(back) > max(1.0, BACK_SHARE * len(table)):
+        raise ValueError(
+            f"line {lines[back[0] + 1]}: t_s does not advance, as in {len(back)} rows: sort the rows by t_s, one recording in a file"
+        )
+    later = np.concatenate([[True], table[1:, TIME] > np.maximum.accumulate(table[:, TIME])[:-1]])
+    notes += _note(~later, lines, "not later than the row before: skipped")
+    return table[later], lines[later], notes
+
+
+def _gap_notes(t_s: Floats, lines: Ints) -> tuple[str, ...]:
+    """Notes on the first long gaps between the times (n,)."""
+    gaps = np.flatnonzero(np.diff(t_s) > LONGEST_GAP_S)
+    return tuple(
+        f"line {lines[k + 1]}: {t_s[k + 1] - t_s[k]:.0f} s without a sample: judged by the pressure before and after"
+        for k in gaps[:MOST_GAPS]
+    )
+
+
+def _field(row: Floats) -> str:
+    """Name of the first column without a number."""
+    return COLUMNS[TIME] if not math.isfinite(row[TIME]) else COLUMNS[PRESSURE]
+
+
+def _note(bad: Any, lines: Ints, what: str) -> tuple[str, ...]:
+    """A note with the number of rows where `bad` (n,) is true and the line of the first; none without such rows."""
+    return (f"{int(bad.sum())} rows {what} (first: line {lines[bad][0]})",) if bad.any() else ()
+
+
+def _check_unit(pressure: Floats, lines: Ints) -> None:
+    """Raise ValueError, with the likely unit, when the median pressure is not that of air in pascals."""
+    middle = float(np.median(pressure))
+    if LOWEST_PA <= middle <= HIGHEST_PA:
+        return
+    for unit, factor in UNITS:
+        if USUAL_PA[0] <= middle * factor <= USUAL_PA[1]:
+            raise ValueError(
+                f"line {lines[0]}: pressure_pa is {pressure[0]:g}: is it in {unit}? multiply it by {factor:g} to have pascals"
+            )
+    raise ValueError(
+        f"line {lines[0]}: pressure_pa is {pressure[0]:g}, not the pressure of air: pascals are expected, about 100000"
+    )
+
+
+def _check_rate(t_s: Floats) -> None:
+    """Raise ValueError when the sample rate is outside of RATE_HZ."""
+    rate = 1.0 / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
+    if wrong := rate_complaint(
+        rate, RATE_HZ, "two seconds between samples are the most", "average them down to 50 or fewer"
+    ):
+        raise ValueError(wrong)
+
+
+def _temperatures(column: Floats, lines: Ints) -> tuple[Floats | None, tuple[str, ...]]:
+    """The temperatures (n,), None when the column has no number; a note when values are outside of the possible range."""
+    known = np.isfinite(column)
+    if not known.any():
+        return None, ()
+    strange = known & ~((column >= COLDEST_C) & (column <= WARMEST_C))
+    if not strange.any():
+        return column, ()
+    note = f"{int(strange.sum())} temperature_c outside of {COLDEST_C:.0f} to {WARMEST_C:.0f} degC: ignored (first: line {lines[strange][0]})"
+    return column, (f"{note}; are they kelvins?" if float(np.median(column[known])) > KELVIN_FROM else note,)
+
+
+def write_floors(path: Path | str, floors: Floors) -> None:
+    """`t_s,floor,probability,height_m` for every sample; raises EchostepError when the file cannot be written."""
+    best = floors.probability[np.arange(len(floors.t_s)), floors.floor]
+    try:
+        with Path(path).open("w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(FLOOR_COLUMNS)
+            writer.writerows(
+                [f"{t:.6f}", k, f"{p:.4f}", f"{h:.3f}"]
+                for t, k, p, h in zip(
+                    floors.t_s.tolist(), floors.floor.tolist(), best.tolist(), floors.height_m.tolist(), strict=True
+                )
+            )
+    except OSError as error:
+        raise EchostepError(f"{path}: cannot write the floors: {error.strerror}") from error

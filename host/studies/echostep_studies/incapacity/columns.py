@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""The columns of the study: rows of runs -> one summary row for each name -> tables. Those of falls are in `falls`.
+
+In: rows of runs. Out: summary rows, tables. Owns the names of the columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from echostep.output.table import Table
+from echostep_studies.frame.report import as_dicts, rows_by_name
+from echostep_studies.frame.study import StudyRequest
+from echostep_studies.incapacity import falls
+
+TOLD_S = 35.0  # within which a wearer who cannot move is told
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LyingRun:
+    """A wearer who cannot move: after how long that was told, and whether within TOLD_S."""
+
+    name: str
+    seed: int
+    told_s: float
+    told: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DayRun:
+    """A working day, or a recording: how often the wearer was asked, and others were called."""
+
+    name: str
+    seed: int
+    hours: float
+    asked: int
+    maydays: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LyingSummary:
+    """All wearers who cannot move."""
+
+    name: str
+    runs: int
+    told: float
+    median_s: float
+    longest_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DaySummary:
+    """All days, or recordings, of a name."""
+
+    name: str
+    runs: int
+    hours: float
+    asked: int
+    maydays: int
+    per_8h: float
+
+
+RunRow = LyingRun | DayRun | falls.FallRun | falls.NoFallRun
+SummaryRow = LyingSummary | DaySummary | falls.FallSummary | falls.NoFallSummary
+
+
+def summarize(rows: Sequence[RunRow]) -> list[SummaryRow]:
+    """One row for each name; those of falls last."""
+    lying = rows_by_name(row for row in rows if isinstance(row, LyingRun))
+    days = rows_by_name(row for row in rows if isinstance(row, DayRun))
+    fell = [row for row in rows if isinstance(row, (falls.FallRun, falls.NoFallRun))]
+    return [*map(_lying_summary, lying), *map(_day_summary, days), *falls.summarize(fell)]
+
+
+def _lying_summary(group: Sequence[LyingRun]) -> LyingSummary:
+    told_s = [row.told_s for row in group]
+    told, median_s = sum(row.told for row in group), float(np.median(told_s))
+    return LyingSummary(name=group[0].name, runs=len(group), told=told, median_s=median_s, longest_s=max(told_s))
+
+
+def _day_summary(group: Sequence[DayRun]) -> DaySummary:
+    hours, maydays = sum(row.hours for row in group), sum(row.maydays for row in group)
+    return DaySummary(
+        name=group[0].name, runs=len(group), hours=hours, asked=sum(row.asked for row in group), maydays=maydays,
+        per_8h=8.0 * maydays / hours,
+    )  # fmt: skip
+
+
+def tables(rows: Sequence[SummaryRow], _: StudyRequest) -> list[Table]:
+    """Those who cannot move, those who can, falls."""
+    told = f"told within {TOLD_S:.0f} s"
+    lying = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
+    days = {
+        "name": "",
+        "runs": "runs",
+        "hours": "hours",
+        "asked": "asked",
+        "maydays": "maydays",
+        "per_8h": "in 8 hours",
+    }
+    return [
+        Table(
+            "Wearers who cannot move (simulated)", as_dicts(row for row in rows if isinstance(row, LyingSummary)), lying
+        ),
+        Table(
+            "Wearers who can (days simulated, recordings real)",
+            as_dicts(row for row in rows if isinstance(row, DaySummary)),
+            days,
+        ),
+        *falls.tables([row for row in rows if isinstance(row, (falls.FallSummary, falls.NoFallSummary))]),
+    ]

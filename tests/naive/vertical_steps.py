@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""Slow, obviously right twin of the vertical filter's steps: lists of successors, merged by their moments.
+
+In: the same arrays as the kernels. Out: weights, Gaussians and joint weights after each sample. Owns `VerticalFilter`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echostep.arrays import Floats
+from echostep_studies.barometer import vertical_model as model
+from echostep_studies.barometer.vertical_model import (
+    CALM,
+    FADING,
+    GUST,
+    HEIGHT,
+    HELD,
+    LIFT_DOWN,
+    LIFT_UP,
+    ON,
+    RATE,
+    STAIRS_DOWN,
+    STAIRS_UP,
+    WEATHER,
+)
+from naive.vertical import (
+    Gaussian,
+    Successor,
+    handed_over,
+    mixed,
+    motion,
+    near,
+    observed,
+    propagated,
+    set_to,
+    wider,
+    within,
+)
+
+STAIRS, LIFTS = (STAIRS_UP, STAIRS_DOWN), (LIFT_UP, LIFT_DOWN)
+
+
+class VerticalFilter:
+    """Hypotheses over these levels, or over level ground at any height (`free`)."""
+
+    def __init__(self, heights_m: Floats, free: bool, weights: Floats, gaussians: list[Gaussian]) -> None:
+        self.heights_m, self.free = heights_m, free
+        self.weights, self.gaussians = weights.copy(), list(gaussians)
+
+    def sample(self, seen: Floats) -> Floats:
+        """One sample: after a gap in one step, otherwise in equal steps of LONGEST_STEP_S at most, pressure in the last; returns p(now, before)."""
+        dt = float(seen[model.DT])
+        if dt > model.GAP_S:
+            return self._step(seen, dt, after_gap=True)
+        parts = max(1, math.ceil(dt / model.LONGEST_STEP_S - 1e-9))
+        joint = np.diag(self.weights)
+        for part in range(parts):
+            now = seen.copy()
+            if part < parts - 1:
+                now[model.CLAIMED] = math.nan
+            later = self._step(now, dt / parts, after_gap=False)
+            before = joint.sum(axis=1, keepdims=True)
+            joint = later @ np.divide(joint, before, out=np.zeros_like(joint), where=before > 0.0)
+        return joint
+
+    def _step(self, seen: Floats, dt: float, *, after_gap: bool) -> Floats:
+        """Every hypothesis with each of its successors: propagated, weighed, updated, and merged by target; returns the joint weights."""
+        size = len(self.weights)
+        arrived: list[list[tuple[float, Gaussian]]] = [[] for _ in range(size)]
+        joint = np.zeros((size, size))
+        for s in np.flatnonzero(self.weights >= model.TINY).tolist():
+            for level, air, way, share, gaussian in self._gap(s, dt) if after_gap else self._successors(s, seen, dt):
+                if self.weights[s] * share < model.TINIEST:
+                    continue
+                passed = 0.0 if after_gap else dt
+                late = seen.copy()
+                if after_gap:
+                    late[model.FOOT] = math.nan
+                likelihood, then = observed(propagated(gaussian, air, way, passed), way, late, passed)
+                target = level * model.MODES + air * model.WAYS + way
+                arrived[target].append((self.weights[s] * share * likelihood, then))
+                joint[target, s] += self.weights[s] * share * likelihood
+        total = joint.sum()
+        if not total > 0.0:
+            return np.diag(self.weights)
+        self.weights = joint.sum(axis=1) / total
+        for target in np.flatnonzero(self.weights > 0.0).tolist():
+            weights = np.array([weight for weight, _ in arrived[target]])
+            self.gaussians[target] = mixed((weights / weights.sum()).tolist(), [g for _, g in arrived[target]])
+        return joint / total
+
+    def _successors(self, s: int, seen: Floats, dt: float) -> list[Successor]:
+        """All that may follow hypothesis s within dt; what does not leave stays as it is, though nobody stays between levels for long."""
+        level, air, way = s // model.MODES, s % model.MODES // model.WAYS, s % model.WAYS
+        here = Successor(level, air, way, 1.0, self.gaussians[s])
+        leaving = self._calm(here, seen, dt) if air == CALM else self._gust(here, dt)
+        leaving += self._departures(here, seen, dt) if way == ON else self._arrivals(here, dt)
+        stays = 1.0 - sum(successor.share for successor in leaving)
+        if way != ON:
+            stays *= math.exp(-dt / model.BETWEEN_S)
+        return [*leaving, here._replace(share=stays)]
+
+    def _calm(self, here: Successor, seen: Floats, dt: float) -> list[Successor]:
+        """A gust begins; on level ground the weather term may jump, by far only where pressure is far off."""
+        g = here.gaussian
+        gust = set_to(g, GUST, 0.0, model.GUST_M)
+        found = [
+            here._replace(air=air, share=within(0.5 * model.GUST_BEGINS, dt), gaussian=gust) for air in (HELD, FADING)
+        ]
+        if here.way == ON:
+            jump = wider(g, WEATHER, model.SHIFT_M**2)
+            found.append(here._replace(share=within(model.SHIFTS, dt), gaussian=jump))
+            if abs(seen[model.CLAIMED] - g.mean[HEIGHT] - g.mean[WEATHER]) > model.SEALED_OFF_M:
+                lost = wider(g, WEATHER, model.SEALED_M**2)
+                found.append(here._replace(share=within(model.SEALED, dt), gaussian=lost))
+        return found
+
+    def _gust(self, here: Successor, dt: float) -> list[Successor]:
+        """A gust jumps, changes its kind, ends where it is about zero; on level ground a held one of a shift's size may become weather."""
+        g = here.gaussian
+        found = [here._replace(share=within(model.GUST_JUMPS, dt), gaussian=set_to(g, GUST, 0.0, model.GUST_M))]
+        if here.air == HELD:
+            found.append(here._replace(air=FADING, share=within(model.HELD_FADES, dt)))
+        else:
+            found.append(here._replace(air=HELD, share=within(model.FADING_HOLDS, dt)))
+        over, ended = near(g, GUST, 0.0, model.GUST_OVER_M)
+        found.append(
+            here._replace(air=CALM, share=within(model.GUST_ENDS, dt) * over, gaussian=set_to(ended, GUST, 0.0, 0.0))
+        )
+        if here.air == HELD and here.way == ON:
+            alike, shift = near(g, GUST, 0.0, model.SHIFT_M)
+            weather = handed_over(shift, WEATHER, GUST, 0.0)
+            found.append(here._replace(air=CALM, share=within(model.GUST_SHIFTS, dt) * alike, gaussian=weather))
+        return found
+
+    def _departures(self, here: Successor, seen: Floats, dt: float) -> list[Successor]:
+        """From level ground to stairs and lifts, at the speed of a stop."""
+        often = (10.0 if seen[model.PLACE] == model.CONNECTOR else 1.0) * (model.FREE_RATES if self.free else 1.0)
+        found = []
+        for ways, rate, sd in (
+            (STAIRS, model.CLIMB_BEGINS, model.CLIMB_STOPS_M_S),
+            (LIFTS, model.RIDE_BEGINS, model.RIDE_STOPS_M_S),
+        ):
+            slow = set_to(here.gaussian, RATE, 0.0, sd)
+            found += [here._replace(way=way, share=within(often * rate, dt), gaussian=slow) for way in ways]
+        return found
+
+    def _arrivals(self, here: Successor, dt: float) -> list[Successor]:
+        """From stairs and lifts to a level that is near, at a speed near zero; on stairs the direction may turn."""
+        g, stairs = here.gaussian, here.way in STAIRS
+        ends = within(model.CLIMB_ENDS if stairs else model.RIDE_ENDS, dt)
+        slow, stopped = near(g, RATE, 0.0, model.CLIMB_STOPS_M_S if stairs else model.RIDE_STOPS_M_S)
+        found = []
+        for level, height in enumerate(self.heights_m.tolist()):
+            share, arrived = ends * slow, stopped
+            if not self.free:
+                width = math.hypot(model.STOREY_M, model.SCALE * (height - self.heights_m[here.level]))
+                if abs(g.mean[HEIGHT] - height) > 5.0 * math.sqrt(g.cov[HEIGHT, HEIGHT] + width**2):
+                    continue
+                close, arrived = near(stopped, HEIGHT, height, width)
+                share, arrived = share * close, handed_over(arrived, WEATHER, HEIGHT, height)
+            found.append(Successor(level, here.air, ON, share, set_to(arrived, RATE, 0.0, 0.0)))
+        if stairs:
+            other = STAIRS_DOWN if here.way == STAIRS_UP else STAIRS_UP
+            found.append(here._replace(way=other, share=within(model.CLIMB_TURNS, dt)))
+        return found
+
+    def _gap(self, s: int, dt: float) -> list[Successor]:
+        """After a gap: the same level, any level, or stairs and lifts; the weather has gone on, the building's pressure shifted or not."""
+        level, way, before = s // model.MODES, s % model.WAYS, self.gaussians[s]
+        rests = math.exp(-2.0 * (model.CLIMB_BEGINS + model.RIDE_BEGINS) * dt)
+        stays = max(model.RESTS, rests) if way == ON else 0.0
+        trend = model.WEATHER_M**2 * dt + (model.TREND_M_S * dt) ** 2
+        rested = set_to(set_to(wider(before, WEATHER, trend), RATE, 0.0, 0.0), GUST, 0.0, 0.0)
+        shifts = within(model.SHIFTS + 0.5 * model.GUST_BEGINS, dt)
+        found = []
+        for probability, air in ((1.0 - shifts, rested), (shifts, wider(rested, WEATHER, model.SHIFT_M**2))):
+            for target, share, ground in self._grounds(level, stays, air):
+                found.append(Successor(target, CALM, ON, probability * share, ground))
+        low, high = self.heights_m[0], self.heights_m[-1]
+        middle, wide = 0.5 * (low + high), 0.5 * (high - low) + model.STOREY_M
+        if self.free:
+            middle, wide = before.mean[HEIGHT], model.WANDERED_M
+        for target in (*STAIRS, *LIFTS):
+            speed, sd, _ = motion(target)
+            moving = set_to(set_to(rested, HEIGHT, middle, wide), RATE, speed, sd)
+            found.append(Successor(level, CALM, target, (1.0 - stays) * model.UNDER_WAY / 4.0, moving))
+        return found
+
+    def _grounds(self, level: int, stays: float, g: Gaussian) -> list[tuple[int, float, Gaussian]]:
+        """Level, share and Gaussian of each level ground after a gap; without levels: where it was, or metres away."""
+        moved = (1.0 - stays) * (1.0 - model.UNDER_WAY)
+        if self.free:
+            return [(0, stays, g), (0, moved, wider(g, HEIGHT, model.WANDERED_M**2))]
+        count = len(self.heights_m)
+        return [
+            (target, stays * (target == level) + moved / count, set_to(g, HEIGHT, height, 0.0))
+            for target, height in enumerate(self.heights_m.tolist())
+        ]

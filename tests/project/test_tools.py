@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""Every tool of tools/ starts and says what it is for; those without a test of their own run in small; what Makefile and pages name exists."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from board_runs import ROOT, needs_twin
+from command_line import echostep
+from echostep.recording.recorder import Recorder
+from echostep_studies.speed import stages
+from release import same_bits, tested_versions
+from reliability import campaign, faults
+from reliability.fault_outcomes import Outcome
+from reliability.fuzz import codec, host
+from team.team_broker import needs_broker
+from walks import walk_chunks
+
+HERE = "project/test_tools.py"
+STARTED_BY = {
+    "docs.generate": HERE,
+    "hardware.boxes": "project/test_boxes.py",
+    "release.licences": "project/test_licences.py",
+    "release.same_bits": HERE,
+    "release.tested_versions": HERE,
+    "release.wheel": "project/test_wheel.py",
+    "reliability.faults": HERE,
+    "reliability.flip_recording": HERE,
+    "reliability.fuzz.codec": HERE,
+    "reliability.fuzz.host": HERE,
+    "reliability.fuzz.mtx": HERE,
+    "reliability.kill_recorder": HERE,
+    "reliability.soak": "project/test_soak.py",
+    "reliability.team_load": HERE,
+    "reliability.team_operation": "project/test_operation_tool.py",
+    "twin.measure": HERE,
+    "twin.run": "commands/test_live.py",
+}
+Start = Callable[..., int | None]
+
+
+@pytest.fixture
+def start(monkeypatch: pytest.MonkeyPatch) -> Start:
+    """Run a tool's `main` with words of a command line; its exit status."""
+
+    def run(name: str, *words: object) -> int | None:
+        monkeypatch.setattr("sys.argv", [name, *map(str, words)])
+        status: int | None = importlib.import_module(name).main()
+        return status
+
+    return run
+
+
+def tools() -> list[str]:
+    """The modules that are programs."""
+    files = [path for path in sorted((ROOT / "tools").rglob("*.py")) if "def main(" in path.read_text()]
+    return [".".join(path.relative_to(ROOT / "tools").with_suffix("").parts) for path in files]
+
+
+def test_every_tool_is_started_by_a_test() -> None:
+    assert tools() == sorted(STARTED_BY)
+    for name, test in STARTED_BY.items():
+        assert name.rpartition(".")[2] in (ROOT / "tests" / test).read_text(), name
+
+
+@pytest.mark.parametrize("name", tools())
+def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        start(name, "--help")
+    assert ended.value.code == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "usage:" in said
+    assert len(said.partition("options:")[0]) > 60
+
+
+def test_what_the_makefile_and_the_pages_start_exists() -> None:
+    pages = [*(ROOT / "host").glob("*.md"), *(ROOT / "host/docs").glob("*.md"), ROOT / "tools/twin/README.md"]
+    named = set(re.findall(r"\$\(TOOL\) ([\w.]+)", (ROOT / "Makefile").read_text()))
+    for page in pages:
+        named |= set(re.findall(r"PYTHONPATH=tools\S*\s+\.venv/bin/python\s+-m\s+([a-z_.]+)", page.read_text()))
+    assert len(named) > 12
+    assert named <= set(STARTED_BY)
+
+
+def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    with Recorder(tmp_path / "walk.mcap", {"seed": "1"}) as recorder:
+        for chunk in walk_chunks(8.0):
+            recorder.write(chunk)
+    start(stages.__name__, tmp_path / "walk.mcap", "--rounds", 1)
+    rows = re.findall(r"│ (\S.*?\S) +│ ([\d.]+) +│ \d+ +│", capsys.readouterr().out)
+    ms = {name: float(value) for name, value in rows}
+    assert {"foot samples", "cloud and estimates", "replay"} <= ms.keys()
+    assert ms["replay"] == pytest.approx(ms["bytes to legs and pings"] + ms["cloud and estimates"], abs=0.2)
+
+
+def test_the_pages_are_compared(start: Start) -> None:
+    assert start("docs.generate", "--check") == 0
+
+
+def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tested_versions, "FILE", tmp_path / "versions.txt")
+    assert start("release.tested_versions") == 0
+    assert re.search(r"^numpy==[\d.]+$", (tmp_path / "versions.txt").read_text(), flags=re.M)
+
+
+def test_same_bits_are_digests(
+    start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "tests/captures").mkdir(parents=True)
+    capture = Path(shutil.copy(ROOT / "tests/captures/board.bin", tmp_path / "tests/captures"))
+    monkeypatch.setattr(same_bits, "ROOT", tmp_path)
+    assert start("release.same_bits", "--only", "captures") == 0
+    assert capsys.readouterr().out == f"decode/board.bin {same_bits.sha256(echostep('decode', capture).stdout)}\n"
+
+
+def test_faults_go_on_where_they_stopped(
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal, played = campaign.Journal(tmp_path / "faults.jsonl"), list[str]()
+    names = [name for name, _ in faults._matrix(tmp_path)]
+    for name in names[1:]:
+        journal.add(asdict(Outcome(name, lost_frames=7)))
+
+    def play(fault: faults.Fault) -> Outcome:
+        played.append(fault.name)
+        return Outcome(fault.name, wrongly_sure=len(played))
+
+    monkeypatch.setattr(faults, "run", play)
+    for status in (1, 1):
+        assert start("reliability.faults", "--out", tmp_path / "faults.jsonl") == status
+    assert played == names[:1]
+    assert capsys.readouterr().out.count("| 7 |") == 2 * len(names[1:])
+
+
+def test_flips(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    assert start("reliability.flip_recording", "--flips", 1, "--seconds", 8.0) == 0
+    assert "1 flips of" in capsys.readouterr().out
+
+
+def test_kills(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    assert start("reliability.kill_recorder", "--kills", 1, "--longest", 0.3) == 0
+    assert capsys.readouterr().out.count("PASS") == 3
+
+
+def test_mutated_frames_of_the_mtx(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    assert start("reliability.fuzz.mtx", "--frames", 2000) == 0
+    assert re.search(r"│ good +│ [1-9]\d+", capsys.readouterr().out)
+
+
+def test_mutated_inputs_go_on_where_they_stopped(
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(host, "LOG", tmp_path / "host.jsonl")
+    monkeypatch.setattr(host, "SHARD_S", 0.1)
+    for shard in (1, 2):
+        assert start("reliability.fuzz.host", "--seconds", 0.2, "--targets", "person", "drawing") == 0
+        assert f"host, shard {shard}:" in capsys.readouterr().out
+    runs = [json.loads(line) for line in (tmp_path / "host.jsonl").read_text().splitlines()]
+    assert [run["shard"] for run in runs] == [1, 2]
+    assert all(run["executions"]["drawing"] > 10 for run in runs)
+
+
+@pytest.mark.skipif(not shutil.which("clang"), reason="clang is missing (make test installs it when it may)")
+def test_the_codecs_corpus_is_kept(
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(codec, "CORPUS", Path(shutil.copy(codec.CORPUS, tmp_path)))
+    monkeypatch.setattr(codec, "FOLDER", tmp_path / "fuzz")
+    assert start("reliability.fuzz.codec", "--seconds", 1) == 0
+    assert "codec, shard 1: none failed" in capsys.readouterr().out
+    assert len((tmp_path / "corpus.txt").read_text().splitlines()) > 10
+
+
+@needs_twin
+def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    start("twin.measure", "--minutes", 0.1)
+    said = capsys.readouterr().out
+    assert said.count("PASS") > 20
+    assert "FAIL" not in said
+
+
+@needs_broker
+def test_a_small_team_loads_the_broker(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    start("reliability.team_load", "--trackers", 2, "--seconds", 1.0)
+    assert "2 trackers shown, 0 of their reports missed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("passed", "status"), [(True, 0), (None, 0), (False, 1)])
+def test_a_missed_limit_is_the_exit_status(passed: bool | None, status: int) -> None:
+    figures = [campaign.Figure("a", "1"), campaign.Figure("b", "2", "<= 1", passed), campaign.none("c", 0)]
+    assert campaign.report("x", figures) == status

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""The runs of a study: its journal, from which a killed study goes on, on this machine and on a cluster."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec import UNSET, UnsetType
+
+from echostep.errors import EchostepError
+from echostep_studies.frame.report import as_dicts, write_json
+from echostep_studies.frame.runs import Journal, SeededRuns
+from waiting import until
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counted:
+    """A row."""
+
+    name: str
+    value: float
+
+
+KINDS = (Counted,)
+
+
+def counted(folder: str, seed: int) -> list[Counted]:
+    """A run that leaves a trace."""
+    (Path(folder) / f"ran-{seed}-{os.getpid()}").touch()
+    return [Counted(name="a", value=math.sqrt(seed))]
+
+
+class CountingRun:
+    """A picklable run."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __call__(self, seed: int) -> list[Counted]:
+        return counted(str(self.folder), seed)
+
+    def __repr__(self) -> str:
+        return "CountingRun"
+
+
+def ran(folder: Path) -> int:
+    return len(list(folder.glob("ran-*")))
+
+
+def test_a_killed_study_goes_on_where_it_was(tmp_path: Path) -> None:
+    one = CountingRun(tmp_path)
+    first = SeededRuns("s", 3, 10, one, tmp_path, KINDS).rows()
+    (journal,) = tmp_path.glob("s.*.journal.jsonl")
+    journal.write_text(journal.read_text() + '{"seed": 13, "rows": [{"na')  # killed while writing
+    whole = SeededRuns("s", 5, 10, one, tmp_path, KINDS).rows()
+    assert whole[:3] == first
+    assert [row.value for row in whole] == [math.sqrt(seed) for seed in range(10, 15)]
+    assert ran(tmp_path) == 5
+    journal.rename(tmp_path / "s.other.journal.jsonl")
+    assert SeededRuns("s", 2, 10, one, tmp_path, KINDS).rows() == whole[:2]
+    assert ran(tmp_path) >= 6  # other code's rows are not taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CountedMore(Counted):
+    """A row that may lack a column."""
+
+    counts: list[int] | UnsetType = UNSET
+
+
+def test_rows_come_back_from_the_journal_as_they_were(tmp_path: Path) -> None:
+    rows = [
+        Counted(name="a", value=math.inf),
+        CountedMore(name="b", value=0.1, counts=[1]),
+        CountedMore(name="c", value=0.0),
+    ]
+    path, kinds = tmp_path / "s.journal.jsonl", (Counted, CountedMore)
+    Journal(path, kinds).add(7, rows)
+    assert Journal(path, kinds).runs == {7: rows}
+    assert [list(row) for row in as_dicts(rows)] == [["name", "value"], ["name", "value", "counts"], ["name", "value"]]
+
+
+def named(name: str, _seed: int) -> list[Counted]:
+    return [Counted(name=name, value=0.0)]
+
+
+def test_rows_of_other_arguments_are_not_taken(tmp_path: Path) -> None:
+    for name in ("first", "second", "first"):
+        assert SeededRuns("s", 1, 10, partial(named, name), tmp_path, KINDS).rows() == named(name, 10)
+    assert len(list(tmp_path.glob("s.*.journal.jsonl"))) == 2  # neither was overwritten
+
+
+def held(folder: str, seed: int) -> list[Counted]:
+    """The first run ends at once, another one only when it is patient no more."""
+    if seed > 1:
+        until((Path(folder) / "never").exists)
+        (Path(folder) / "finished").touch()
+    return [Counted(name="held", value=0.0)]
+
+
+def test_an_interrupted_study_waits_for_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(_journal: Journal[Counted], _seed: int, _rows: list[Counted]) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Journal, "add", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        SeededRuns("s", 2, 1, partial(held, str(tmp_path)), tmp_path, KINDS).rows()
+    assert not multiprocessing.active_children()
+    assert not (tmp_path / "finished").exists()
+
+
+def test_the_same_numbers_from_a_cluster(tmp_path: Path) -> None:
+    distributed = pytest.importorskip(
+        "distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')"
+    )
+    here, there = tmp_path / "here", tmp_path / "there"
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
+    ) as cluster:
+        far = SeededRuns("s", 4, 1, math_run, there, KINDS, cluster.scheduler_address).rows()
+    assert far == SeededRuns("s", 4, 1, math_run, here, KINDS).rows()
+
+
+def math_run(seed: int) -> list[Counted]:
+    """Importable by the workers of a cluster."""
+    return [Counted(name="m", value=float(np.random.default_rng(seed).random()))]
+
+
+def test_no_cluster_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="skipped: no Dask (pip install 'echostep-studies[cluster]')")
+    monkeypatch.setattr("echostep_studies.frame.runs.SCHEDULER_TIMEOUT", "1s")
+    with pytest.raises(EchostepError, match="no Dask scheduler answers there"):
+        SeededRuns("s", 2, 1, math_run, tmp_path, KINDS, "tcp://127.0.0.1:9").rows()
+
+
+def test_results_that_cannot_be_written_are_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(EchostepError, match="cannot write"):
+        write_json(tmp_path / "file" / "x.json", "s", 1, 1, [])
+    with pytest.raises(EchostepError, match="cannot write there"):
+        SeededRuns("s", 1, 1, math_run, tmp_path / "file", KINDS).rows()

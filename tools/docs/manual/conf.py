@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""The manual as a site (`make site`): the same pages as in the source tree, with search, for Sphinx.
+
+In: the Markdown files named in `include_patterns`, at their places, so that their links hold in both. Out: HTML that needs no network. The order
+of the contents is that of the table in host/docs/README.md. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[3]
+MANUAL = Path("host/docs")
+
+project = "echostep"
+version = release = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]["version"]
+copyright = "the echostep authors"  # noqa: A001 (Sphinx' name)
+extensions = ["myst_parser"]
+highlight_language = "none"  # of blocks that name no language
+root_doc = "README"
+include_patterns = [
+    "README.md",
+    "host/*.md",
+    "host/docs/*.md",
+    "firmware/*.md",
+    "firmware/hardware/*.md",
+    "protocol/*.md",
+    "tools/twin/*.md",
+]
+exclude_patterns = [".?*", "out", "tests", "host/echostep", "**/build", "**/__pycache__"]
+myst_heading_anchors = 4
+suppress_warnings = ["myst.header"]  # a page may begin below its title's level
+
+html_theme = "furo"
+html_title = f"echostep {version}"
+html_favicon = str(ROOT / "host/echostep/page/static/icon.svg")
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = html_show_sphinx = False
+
+
+def contents(manual: str) -> list[str]:
+    """Documents that the manual's table lists, in its order, as paths from the root without suffix."""
+    rows = re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", manual, flags=re.M)
+    return [(ROOT / MANUAL / row).resolve().relative_to(ROOT).as_posix() for row in rows]
+
+
+def add_contents(_app: Any, document: str, source: list[str]) -> None:
+    """Append the contents to the first page's text; they are seen in the sidebar only."""
+    if document == root_doc:
+        pages = "\n".join([f"{MANUAL}/README", *contents((ROOT / MANUAL / "README.md").read_text())])
+        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
+
+
+def copy_first_page(app: Any, failure: Exception | None) -> None:
+    """index.html, where servers look for it."""
+    if failure is None and app.builder.format == "html":
+        shutil.copy(Path(app.outdir) / f"{app.config.root_doc}.html", Path(app.outdir) / "index.html")
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    app.connect("source-read", add_contents)
+    app.connect("build-finished", copy_first_page)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""host/docs/commands.md: every command with its arguments and options, from typer.
+
+In: `echostep.cli`. Out: the page. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, get_args, get_type_hints
+
+import typer
+import typer.models
+
+from docs.pages import MADE
+from echostep.cli import app
+
+
+def page() -> str:
+    """Every command with its arguments and options."""
+    parts = [
+        "# Commands\n",
+        MADE,
+        "`echostep COMMAND --help` says the same. A mistake ends with one line and exit status 2.\n",
+    ]
+    for name, call in sorted(commands("echostep", app)):
+        parts.append(f"## {name}\n\n{inspect.cleandoc(call.__doc__ or '')}\n")
+        hints = get_type_hints(call, include_extras=True)
+        rows = [
+            _row(name, hints[name], parameter.default) for name, parameter in inspect.signature(call).parameters.items()
+        ]
+        if rows:
+            parts.append("| | default | |\n|---|---|---|\n" + "".join(rows))
+    return "\n".join(parts)
+
+
+def commands(name: str, group: typer.Typer) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """The function behind each command, by its full name."""
+    for command in group.registered_commands:
+        if command.callback is not None and not command.hidden:
+            yield f"{name} {command.name or command.callback.__name__.replace('_', '-')}", command.callback
+    for sub in group.registered_groups:
+        if sub.typer_instance is not None:
+            yield from commands(f"{name} {sub.name}" if isinstance(sub.name, str) else name, sub.typer_instance)
+
+
+def _row(name: str, hint: Any, default: Any) -> str:
+    """A parameter in the table: how it is written, its default, what it means."""
+    plain, info = (hint.__origin__, hint.__metadata__[0]) if hasattr(hint, "__metadata__") else (hint, None)
+    if isinstance(info, typer.models.ArgumentInfo):
+        written = f"`{info.metavar or name.upper()}`"
+    else:
+        given = (
+            (info.default, *(info.param_decls or ())) if info else ()
+        )  # in Annotated[], the first name stands where a default would
+        declared = [name for d in given if isinstance(d, str) and d.startswith("-") for name in d.split("/")]
+        flag = plain is bool or bool in get_args(plain)
+        value = "" if flag else f" `{(info.metavar if info else None) or 'VALUE'}`"
+        written = ", ".join(f"`{d}`" for d in declared or [f"--{name.replace('_', '-')}"]) + value
+    text = " ".join(((info.help if info else None) or "").split()).replace("|", "\\|")
+    return f"| {written} | {_default(default)} | {text} |\n"
+
+
+def _default(value: Any) -> str:
+    if value is inspect.Parameter.empty:
+        return "required"
+    if value is None or value is False or value == "" or (isinstance(value, float) and math.isinf(value)):
+        return ""
+    return f"`{value}`"

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""firmware/README.md: its tables of parts, reasons and wires, from firmware/hardware; and the drawings and schematics from the same tables.
+
+In: parts.toml, wiring.toml. Out: the page with its marked tables made anew; SVG of each board's wiring, KiCad schematics. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from docs.pages import END
+from hardware import HARDWARE
+from hardware.drawing import drawing
+from hardware.kicad import schematic
+from hardware.wearing import wearing
+from hardware.wiring import POWER, Board, boards
+
+README = HARDWARE.parent / "README.md"
+KITS = {"papers": "parts of the papers", "2026": "parts of 2026"}
+SEEN = {"maker": "maker", "lists": "lists", "memory": "**memory**", "any": "-"}
+Row = dict[str, Any]
+
+
+def page() -> str:
+    """The page as it is, with its tables made anew."""
+    made = {f"parts {kit}": parts_table(kit) for kit in KITS}
+    made |= {"reasons 2026": reasons_table("2026")}
+    made |= {f"wires {board.name}": wires_table(board) for board in boards()}
+    text = README.read_text(encoding="utf-8")
+    for name, table in made.items():
+        begin = f"<!-- made by make docs: {name} -->\n"
+        before, mark, rest = text.partition(begin)
+        if not mark:
+            raise SystemExit(f"{README}: has no mark {begin.strip()}")
+        text = before + begin + table + END + rest.partition(END)[2]
+    return text
+
+
+def drawings() -> dict[Path, str]:
+    """The drawings by their paths: wiring of each board, where everything is worn."""
+    made = {f"wiring-{board.name}": drawing(board) for board in boards()} | {"wearing": wearing()}
+    return {HARDWARE / "drawings" / f"{name}.svg": text for name, text in made.items()}
+
+
+def schematics() -> dict[Path, str]:
+    """The schematic of each board by its path."""
+    return {HARDWARE / "schematic" / f"{board.name}.kicad_sch": schematic(board) for board in boards()}
+
+
+def parts() -> list[Row]:
+    """The rows of the bill of materials."""
+    rows: list[Row] = tomllib.loads((HARDWARE / "parts.toml").read_text(encoding="utf-8"))["part"]
+    return rows
+
+
+def parts_table(kit: str) -> str:
+    """What to order for a kit, and its cost as an order of magnitude."""
+    head = "| role | part | order | sold by | bus, supply | count | EUR each | number seen |\n" + "|---" * 8 + "|\n"
+    body, total = "", 0
+    for row in (row for row in parts() if kit in row["kits"]):
+        count = row["count"][kit]
+        total += count * row["eur"]
+        seen = SEEN[row["source"]]
+        bus = ", ".join(text for text in (row["bus"], row["supply"]) if text)
+        cells = (row["role"], row["part"], row["order"], row["sold"], bus, count, row["eur"], seen)
+        body += f"| {' | '.join(str(cell) for cell in cells)} |\n"
+    return head + body + f"\nTogether about {_rounded(total)} EUR.\n"
+
+
+def reasons_table(kit: str) -> str:
+    """How the firmware knows each part of a kit, and why it was chosen."""
+    rows = [row for row in parts() if kit in row["kits"] and "identity" in row]
+    return "| role | part | identity register | why this one |\n|---|---|---|---|\n" + "".join(
+        f"| {row['role']} | {row['part']} | {row['identity']} | {row['why']} |\n" for row in rows
+    )
+
+
+def wires_table(board: Board) -> str:
+    """All wires of a board: each net, the processor's pin, and the pins of the parts."""
+    ends: dict[str, list[str]] = {}
+    for device in board.devices:
+        for pin, net in device.pins.items():
+            ends.setdefault(net, []).append(f"{device.name} {pin}")
+    rows = "| on the Micro | processor | signal | to |\n|---|---|---|---|\n"
+    for net in (*board.pins, *sorted(ends.keys() - board.pins.keys() - POWER.keys()), *POWER):
+        if net in ends:
+            processor = board.pins.get(net)
+            on_board, port = (processor.board, processor.port) if processor else (net if net in POWER else "-", "")
+            rows += f"| {on_board} | {port} | {net} | {', '.join(ends[net])} |\n"
+    return rows
+
+
+def _rounded(eur: int) -> int:
+    """A cost with one significant digit in its tens."""
+    step = 10 if eur < 300 else 100
+    return round(eur / step) * step

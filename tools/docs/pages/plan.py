@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""host/docs/plan.md: its table of every field of plan.json, from the schema.
+
+In: host/echostep/plans/plan.schema.json. Out: the page with its tables made anew. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from docs.pages import DOCS, HOST, between_marks
+
+SCHEMA = HOST / "echostep/plans/plan.schema.json"
+FIELDS = "| field | type | needed | meaning |\n|---|---|---|---|\n"
+TYPES = "\n| type | meaning |\n|---|---|\n"
+
+
+def page() -> str:
+    """The page as it is, with its tables made anew."""
+    schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
+    rows = [
+        f"| `{name}` | {kind} | {'yes' if needed else ''} | {meaning} |\n"
+        for name, kind, needed, meaning in fields(schema, schema, "")
+    ]
+    types = [f"| {name} | {node['description']} |\n" for name, node in schema["$defs"].items()]
+    return between_marks((DOCS / "plan.md").read_text(), FIELDS + "".join(rows) + TYPES + "".join(types))
+
+
+def fields(schema: dict[str, Any], node: dict[str, Any], path: str) -> Iterator[tuple[str, str, bool, str]]:
+    """Name, type, need and meaning of each field below a node."""
+    for name, field in node.get("properties", {}).items():
+        full = f"{path}{name}"
+        whole = resolved(schema, field)
+        yield (
+            full,
+            kind(schema, field),
+            name in node.get("required", []),
+            field.get("description") or whole.get("description", ""),
+        )
+        yield from fields(schema, whole, f"{full}.")
+        if "items" in whole and isinstance(whole["items"], dict):
+            yield from fields(schema, resolved(schema, whole["items"]), f"{full}[].")
+
+
+def resolved(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
+    """The definition that a reference means."""
+    return schema["$defs"][node["$ref"].rsplit("/", 1)[1]] if "$ref" in node else node
+
+
+def kind(schema: dict[str, Any], node: dict[str, Any]) -> str:
+    """The type in words."""
+    if "$ref" in node:
+        return str(node["$ref"].rsplit("/", 1)[1])
+    if "enum" in node:
+        return ", ".join(node["enum"])
+    if "const" in node:
+        return str(node["const"])
+    if "oneOf" in node:
+        return " or ".join(kind(schema, one) for one in node["oneOf"] if one.get("type") != "null")
+    found = node["type"] if isinstance(node["type"], str) else next(one for one in node["type"] if one != "null")
+    if found == "array" and isinstance(node.get("items"), dict):
+        return f"list of {kind(schema, node['items'])}"
+    return {"object": "object", "array": "list"}.get(found, found)

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""host/docs/recordings.md: its table of derived messages, from their schemas.
+
+In: `echostep.output`. Out: the page with its table made anew. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+
+from docs.pages import DOCS, between_marks
+from echostep.output.derived import TOPICS
+from echostep.output.foxglove import FRAME, LOCATION, POSE, SCENE
+from echostep.recording.recorder import Topic
+
+SHOWN_BY = {
+    POSE.name: "where the trunk is; 3D panel",
+    FRAME.name: "the same as a frame that the 3D panel can follow",
+    SCENE.name: "plan (once), track, 95 % ellipse, both echoes as beams; 3D panel",
+    LOCATION.name: "the place on Earth with its covariance, when the plan is georeferenced; map panel",
+}
+
+
+def page() -> str:
+    """The page as it is, with its table of derived messages made anew."""
+    rows = [
+        f"| `{t.name}` | `{t.schema_name}` | {SHOWN_BY.get(t.name) or _fields(t)} |\n"
+        for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION)
+    ]
+    table = "| topic | schema | |\n|---|---|---|\n" + "".join(rows)
+    return between_marks((DOCS / "recordings.md").read_text(), table)
+
+
+def _fields(topic: Topic) -> str:
+    return ", ".join(f"`{name}`" for name in json.loads(topic.schema)["properties"])

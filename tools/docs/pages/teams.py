@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""host/docs/teams.md: its tables of every field of a report, and the report's JSON Schema, from the dataclasses that the host checks with.
+
+In: `echostep.team.messages.report`. Out: the page with its tables made anew, and the text of report.schema.json. Owns nothing.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from docs.pages import DOCS, HOST, between_marks
+from echostep.team.messages.report import schema
+
+SCHEMA = HOST / "echostep/team/report.schema.json"
+
+
+def tables(tree: dict[str, Any]) -> str:
+    """A table of fields for each object of the schema, the report first."""
+    made = []
+    for name, part in sorted(tree["$defs"].items(), key=lambda pair: pair[0] != "Report"):
+        made.append(f"### {name}\n{part['description']}\n\n| field | type | limits | meaning |\n|---|---|---|---|\n")
+        made += [
+            f"| `{field}` | {kind(row)} | {limits(row)} | {meaning(row)} |\n"
+            for field, row in part["properties"].items()
+        ]
+        made.append("\n")
+    return "".join(made)
+
+
+def kind(row: dict[str, Any]) -> str:
+    """The type of a field in words."""
+    if "$ref" in row:
+        return str(row["$ref"]).rpartition("/")[2]
+    if "anyOf" in row:
+        return " or ".join(kind(part) for part in row["anyOf"])
+    if "enum" in row:
+        return ", ".join(f"`{value}`" for value in row["enum"])
+    if row.get("type") == "array":
+        return f"list of {kind(row['items'])}"
+    return str(row.get("type", ""))
+
+
+def limits(row: dict[str, Any]) -> str:
+    """The range of a number, the length of a text."""
+    if "anyOf" in row:
+        return next((found for part in row["anyOf"] if (found := limits(part))), "")
+    low, high = row.get("minimum"), row.get("maximum")
+    if low is not None:
+        return f"{low:g} to {'2^53' if high == 2**53 else f'{high:g}'}"
+    if "maxItems" in row:
+        return f"at most {row['maxItems']}, of {limits(row['items'])}"
+    least, most = row.get("minLength", 0), row.get("maxLength")
+    if most is not None:
+        return f"{least} to {most} characters"
+    return f"`{row['pattern']}`" if "pattern" in row else ""
+
+
+def meaning(row: dict[str, Any]) -> str:
+    """What a field's description says."""
+    parts = [row, *row.get("anyOf", [])]
+    return next((str(part["description"]) for part in parts if "description" in part), "")
+
+
+def tree() -> dict[str, Any]:
+    """The schema as objects."""
+    found: dict[str, Any] = json.loads(schema())
+    return found
+
+
+def page() -> str:
+    """The page as it is, with its tables made anew."""
+    return between_marks((DOCS / "teams.md").read_text(), tables(tree()))

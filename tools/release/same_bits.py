@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Digests of everything that a refactoring must not change, to be compared between two checkouts.
+
+In: the recordings' folder ($ECHOSTEP_DATA or ../shared/data), the twin when it is built. Out: one line `name sha256` per result on stdout:
+estimates of the demo (seeds 1-3, real firmware in the twin) and of `make real`, decodes of the captures, the foot's track of each public
+recording, and
+the rows of the first runs of every study. Owns nothing. Digests depend on the machine's floating point: compare runs of one machine only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from places import DATA, ROOT, TWIN
+
+STUDIES = ("girard2011", "echoes", "trails", "lee2010", "floors", "legs", "storeys", "fischer2008", "feet")
+WITHOUT_RUNS = ("echoes", "feet")
+WITH_DATA = ("feet", "storeys")
+TIMING = re.compile(r"_ms$|_s_cpu$|core|latency|speed|real_time|pace")  # keys and metrics that are measured times
+
+
+def run(*words: object) -> str:
+    """Standard output of a command of this checkout; raises CalledProcessError with its stderr printed."""
+    done = subprocess.run([str(word) for word in words], cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(
+            f"{' '.join(str(word) for word in words)}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+        )
+    return done.stdout
+
+
+def echostep(*words: object) -> str:
+    """Standard output of an echostep command of this checkout."""
+    return run(sys.executable, "-m", "echostep", *words)
+
+
+def sha256(text: str | bytes) -> str:
+    """Hex digest of text (UTF-8) or bytes."""
+    return hashlib.sha256(text.encode() if isinstance(text, str) else text).hexdigest()
+
+
+def demo(out: Path) -> Iterator[tuple[str, str]]:
+    """track.csv of three simulated walks through the real firmware."""
+    if not Path(TWIN[0]).exists():
+        print("demo: skipped, the twin is not built (make demo builds it)", file=sys.stderr)
+        return
+    for seed in (1, 2, 3):
+        folder = out / f"demo{seed}"
+        said = echostep(
+            "demo", "--headless", "--no-page", "--seed", seed, "--out", folder, "--board-command", " ".join(TWIN)
+        )
+        yield f"demo/{seed}/estimates", said.split("sha256 ")[1].split()[0].rstrip(";")
+        yield f"demo/{seed}/track", sha256((folder / "track.csv").read_bytes())
+
+
+def real(out: Path) -> Iterator[tuple[str, str]]:
+    """Estimates of the recorded foot on the plan drawn around its path."""
+    said = run(sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", out / "real")
+    yield "real/estimates", said.split("sha256 ")[1].split()[0]
+
+
+def captures() -> Iterator[tuple[str, str]]:
+    """JSON lines of the captures that the tests ship."""
+    for path in sorted((ROOT / "tests/captures").glob("*.bin")) + sorted((ROOT / "tests/captures").glob("*.mcap")):
+        yield f"decode/{path.name}", sha256(echostep("decode", path))
+
+
+FOOT = """
+import hashlib, sys
+from pathlib import Path
+from echostep.foot.steps import walk_track
+from echostep_studies.bench.recordings.feet import SETS
+from echostep_studies.frame.recordings import read_sets
+for r in read_sets(Path(sys.argv[1]), SETS)[0]:
+    track = walk_track(r.t_s, r.accel, r.gyro, mag=r.mag)
+    print(r.group, r.name, hashlib.sha256(track.position_m.tobytes()).hexdigest(), sep="\\t")
+"""
+
+
+def foot() -> Iterator[tuple[str, str]]:
+    """Positions of the foot on each public recording."""
+    for line in run(sys.executable, "-c", FOOT, DATA).splitlines():
+        group, name, digest = line.split("\t")
+        yield f"foot/{group}/{name.replace(' ', '_')}", digest
+
+
+def studies(out: Path, runs: int, chosen: list[str] | None) -> Iterator[tuple[str, str]]:
+    """Rows of the first runs of every study, or of the chosen ones, without measured times."""
+    for study in chosen or STUDIES:
+        folder = out / study
+        words = [] if study in WITHOUT_RUNS else ["--runs", runs]
+        words += ["--data", DATA] if study in WITH_DATA else []
+        echostep("evaluate", study, *words, "--out", folder, "--json", folder / "rows.json")
+        rows = json.loads((folder / "rows.json").read_text())["rows"]
+        kept = [
+            {k: v for k, v in row.items() if not TIMING.search(k)}
+            for row in rows
+            if not TIMING.search(str(row.get("metric")))
+        ]
+        for k, row in enumerate(kept):
+            yield (
+                f"study/{study}/{k}",
+                sha256(json.dumps(row, sort_keys=True))[:16] + " " + json.dumps(row, sort_keys=True),
+            )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=5, help="runs of each study")
+    parser.add_argument("--only", choices=("demo", "real", "captures", "foot", "studies"), action="append")
+    parser.add_argument("--study", choices=STUDIES, action="append", help="only this study")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        parts: dict[str, Iterator[tuple[str, str]]] = {
+            "captures": captures(),
+            "demo": demo(out),
+            "real": real(out),
+            "foot": foot(),
+            "studies": studies(out, options.runs, options.study),
+        }
+        for name, rows in parts.items():
+            if options.only and name not in options.only:
+                continue
+            for row, digest in rows:
+                print(row, digest, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""What all campaigns share: options, a journal of what is done already, a progress bar, figures with their limits.
+
+In: defaults, rows, figures. Out: what was asked for; JSON lines; a table on stdout and the exit status. Owns the form of a journal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+__all__ = ["Figure", "Journal", "none", "options", "report", "track"]
+
+
+class Figure(NamedTuple):
+    """What a campaign has measured; `passed` is None where there is no limit."""
+
+    what: str
+    measured: str
+    limit: str = "-"
+    passed: bool | None = None
+
+
+class Journal:
+    """Rows of a file, a JSON line each: the next run goes on behind them."""
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path = path
+        self.rows: list[dict[str, Any]] = [*map(json.loads, path.read_text().splitlines())] if path.exists() else []
+
+    def add(self, row: dict[str, Any]) -> None:
+        """Keep one more row at once, for a campaign may be stopped at any time."""
+        self.rows.append(row)
+        with self._path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+
+
+def options(doc: str | None, **known: tuple[Any, str]) -> argparse.Namespace:
+    """What was asked for: of each known option its default, which gives the type, and its help. The first line of `doc` says what it is all about."""
+    parser = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
+    for name, (default, text) in known.items():
+        if isinstance(default, bool):
+            parser.add_argument(f"--{name}", action="store_true", help=text)
+        elif isinstance(default, list):
+            parser.add_argument(f"--{name}", nargs="+", choices=default, default=default, help=text)
+        else:
+            parser.add_argument(f"--{name}", type=type(default), default=default, help=f"{text} (default {default})")
+    return parser.parse_args()
+
+
+def none(what: str, count: int) -> Figure:
+    """The figure of something that may never happen."""
+    return Figure(what, f"{count:,}", "0", count == 0)
+
+
+def report(title: str, figures: Iterable[tuple[str, str, str, bool | None]]) -> int:
+    """Print the figures; 1 when one has missed its limit."""
+    table, status = Table("figure", "measured", "limit", "", title=title), 0
+    for what, measured, limit, passed in figures:
+        table.add_row(what, measured, limit, {True: "PASS", False: "FAIL", None: ""}[passed])
+        status |= passed is False
+    Console().print(table)
+    return status

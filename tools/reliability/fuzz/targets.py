@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""The ways by which bytes come into the host, for `host.py`: for each a valid input, and what takes it.
+
+In: nothing. Out: `TARGETS`. Owns nothing. A target may raise EchostepError, and ValueError where its docstring says so; anything else is a fault.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from echostep.board.frames import encode
+from echostep.board.gateway import Gateway
+from echostep.offline.imu_csv import load_imu
+from echostep.offline.leg_csv import load_legs
+from echostep.page.requests import parse_request
+from echostep.plan.importers.formats import import_plan
+from echostep.plan.model import load_plan, parse_plan
+from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
+from echostep.ports.datagram_key import Opener, seal
+from echostep.ports.people.check_in import parse_person
+from echostep.recording.reading import open_recording
+from echostep.recording.recorder import Recorder
+from echostep.recording.repair.recovery import Recovery
+from echostep.settings import parse_settings
+from echostep.simulation.devices.beacon_gateway import message
+from echostep.team.messages.report import decode
+from echostep.team.messages.report import encode as report_bytes
+from echostep.team.messages.shared_drawings import checked_drawing
+from echostep.tracker import Tracker
+from echostep.xsens.message import MessageReader
+from echostep_studies.barometer.pressure_csv import load_pressures
+from imported_plans import write_seven_floors
+from team.team_reports import report
+from walks import DEMO, walk_chunks
+
+KEY = bytes(range(32))
+PLAN = """{"echostep_plan":1,"name":"p","levels":[{"name":"g","height_m":0,"walls":[[0,0,4,0],[4,0,4,4],[4,4,0,4],[0,4,0,0]],
+"rooms":[{"name":"r","at":[1,1],"outline":[[0,0],[2,0],[2,2]]}],"doors":[{"line":[1,0,2,0]}],"obstacles":[[[1,1],[2,1],[2,2]]]}],
+"start":{"x":0.5,"y":0.5,"heading_deg":0},"georeference":{"origin":[8,53]},"uncertainty_m":0.1}"""
+OSM = """<osm><node id="1" lat="53.1" lon="8.8"/><node id="2" lat="53.1001" lon="8.8"/><node id="3" lat="53.1001" lon="8.8002"/>
+<node id="4" lat="53.1" lon="8.8002"/><way id="9"><nd ref="1"/><nd ref="2"/><nd ref="3"/><nd ref="4"/><nd ref="1"/>
+<tag k="indoor" v="room"/><tag k="level" v="0"/><tag k="name" v="Hall"/></way></osm>"""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A valid input, and a function that takes any bytes."""
+
+    seed: Callable[[], bytes]
+    take: Callable[[bytes], object]
+
+
+@cache
+def tracker() -> Tracker:
+    """One tracker for all inputs: what one leaves behind must not harm the next."""
+    return Tracker(load_plan(DEMO), None, None, 1)
+
+
+def port(name: str) -> Callable[[bytes], object]:
+    """The tracker's own port: bytes as one chunk, half a second after the one before."""
+    arrivals = iter(range(0, 1 << 62, 500_000_000))
+    return lambda data: tracker().take(portion_of([Chunk(name, next(arrivals), data)]))
+
+
+def bytes_of(name: str) -> bytes:
+    """The first bytes of a port in the demo."""
+    return b"".join(chunk.data for chunk in walk_chunks(15.0) if chunk.port == name)[:400]
+
+
+def file(name: str, read: Callable[[Path], object]) -> Callable[[bytes], object]:
+    """Have a function read the bytes from a file of this name."""
+
+    def take(data: bytes) -> object:
+        with TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
+            (Path(folder) / name).write_bytes(data)
+            return read(Path(folder) / name)
+
+    return take
+
+
+def recording() -> bytes:
+    """A small recording."""
+    with TemporaryDirectory() as folder:
+        with Recorder(Path(folder) / "a.mcap", {"seed": "1", "start_x_y_rad": "1,2,0"}) as recorder:
+            for k in range(12):
+                recorder.write(Chunk(BOARD if k % 2 else MTX, k * 10_000_000, bytes(range(k, k + 20))))
+        return (Path(folder) / "a.mcap").read_bytes()
+
+
+def read_recording(path: Path) -> None:
+    """Read it as a replay does, and as repair does."""
+    list(open_recording(path).portions())
+    list(Recovery(path).messages())
+
+
+def written(write: Callable[[Path], Path]) -> Callable[[], bytes]:
+    """The bytes of a file that a function writes into a folder."""
+
+    def read() -> bytes:
+        with TemporaryDirectory() as folder:
+            return write(Path(folder)).read_bytes()
+
+    return read
+
+
+def write_drawing(folder: Path) -> Path:
+    """A room with a door's swing and a name, in metres."""
+    from ezdxf.filemanagement import new
+
+    drawing = new(units=6)
+    space = drawing.modelspace()
+    space.add_lwpolyline([(0, 0), (4, 0), (4, 4), (0, 4)], close=True, dxfattribs={"layer": "Walls"})
+    space.add_arc((1, 0), 0.9, 0, 90, dxfattribs={"layer": "Doors"})
+    space.add_text("Hall", dxfattribs={"layer": "Rooms", "insert": (2, 2)})
+    drawing.saveas(folder / "a.dxf")
+    return folder / "a.dxf"
+
+
+def csv(header: str, *columns: float, rate_hz: float = 100.0) -> Callable[[], bytes]:
+    """A table of 150 rows: sines about each of these values."""
+    rows = [
+        ",".join([f"{k / rate_hz:.2f}", *(f"{mean + math.sin(0.07 * k + n):.3f}" for n, mean in enumerate(columns))])
+        for k in range(150)
+    ]
+    return "\n".join([header, *rows]).encode
+
+
+def text(read: Callable[[str], object]) -> Callable[[bytes], object]:
+    """Have a function read the bytes as text."""
+    return lambda data: read(data.decode("utf-8", "replace"))
+
+
+TARGETS: dict[str, Target] = {
+    "board": Target(lambda: bytes_of(BOARD), port(BOARD)),
+    "mtx": Target(lambda: bytes_of(MTX), port(MTX)),
+    "xbus": Target(lambda: bytes_of(MTX), lambda data: MessageReader().feed(data, ended=True)),
+    "gateway": Target(lambda: encode(message(7, 3.0, 0.5, 10.0), 0) * 3, lambda data: Gateway().read(data, 10.0)),
+    "datagram": Target(lambda: seal(KEY, b"frames", 1), Opener(KEY).open),
+    "person": Target(lambda: b'{"x_m":1.0,"y_m":2.0,"level":0,"sd_m":0.5}', parse_person),
+    "websocket": Target(lambda: b'{"kind":"go_to","x_m":1.0,"y_m":2.0,"level":0}', text(parse_request)),
+    "mqtt": Target(lambda: report_bytes(report()), decode),
+    "drawing": Target(PLAN.encode, checked_drawing),
+    "settings": Target(lambda: b"[cloud]\nsize = 300\n[mtx]\nrate_hz = 100\n", text(lambda t: parse_settings(t, "x"))),
+    "plan": Target(PLAN.encode, parse_plan),
+    "mcap": Target(recording, file("a.mcap", read_recording)),
+    "dxf": Target(written(write_drawing), file("a.dxf", import_plan)),
+    "osm": Target(OSM.encode, file("a.osm", import_plan)),
+    "wrld": Target(written(write_seven_floors), file("main.json", import_plan)),
+    "ifc": Target(
+        lambda: b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=IFCWALL('a',$);\nENDSEC;\n", file("a.ifc", import_plan)
+    ),
+    "legs": Target(csv("t_s,thigh_rad_s,shank_rad_s", 0.0, 0.1), file("a.csv", load_legs)),
+    "imu": Target(csv("t_s,ax,ay,az,gx,gy,gz", 0.0, 0.0, 9.8, 0.0, 0.0, 0.0), file("a.csv", load_imu)),
+    "pressure": Target(csv("t_s,pressure_pa", 101_325.0, rate_hz=10.0), file("a.csv", load_pressures)),
+}
+ALLOWED = {"plan": (ValueError,), "mqtt": (ValueError,)}  # besides EchostepError: their callers turn it into words

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: MIT
+"""An operation: a team on one broker, one of it lost, one fallen, one rescuer guided to the fallen one, and a commander.
+
+In: number of wearers, speed; the twin for those with the real firmware. Out: figures on the terminal. Owns the broker and all processes. The fallen
+wearer and the rescuer are simulated walks through the whole tracker, each in a process of its own, the others simulated reports; the rescuer sets out
+when the mayday has come. Exit status 1 when something of this did not happen.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+from echostep.guidance.cues import CueKind
+from echostep.plan.model import Plan, load_plan
+from echostep.ports.chunks import Chunk
+from echostep.session.chunk_streams import paced, portions_of, with_team
+from echostep.session.options import OutputOptions
+from echostep.session.session import Session
+from echostep.simulation.devices.board import PythonBoard
+from echostep.simulation.people.walker import Waypoint
+from echostep.simulation.scenario import Scenario
+from echostep.team.commander import update_roster
+from echostep.team.endpoint import parse_endpoint, parse_outlet
+from echostep.team.inbox import Inbox, Receiver
+from echostep.team.mqtt.publisher import Listener, MqttTransport
+from echostep.team.outbox import Outbox
+from echostep.team.publish import empty_report
+from echostep.team.roster import Member, MemberState, Roster
+from echostep.tracker import Tracker
+from places import PLAN, TWIN
+from reliability.broker import broker
+from reliability.campaign import options
+from reliability.team_load import report_at
+
+FALLEN_WAY: tuple[Waypoint, ...] = (
+    (2.0, 7.5),
+    (9.5, 7.5),
+    (9.5, 10.8, 300.0),
+)  # into a room, where nothing moves any more
+RESCUE_WAY: tuple[Waypoint, ...] = ((24.0, 2.0), (24.0, 7.5), (9.5, 7.5), (9.5, 10.8))
+RATE_HZ = 10.0  # of the simulated reports
+LONGEST_S = 300.0  # by reason: of the whole operation
+
+
+def walk(role: str, url: str, plan: Plan, speed: float) -> None:
+    """One wearer: the whole tracker on a simulated walk, published; the rescuer is guided to `fallen`. Prints the last cue as JSON."""
+    way, seed = (RESCUE_WAY, 8) if role == "rescuer" else (FALLEN_WAY, 7)
+    scenario = Scenario(plan, way, seed, PythonBoard(seed=seed))
+    tracker = Tracker(plan, scenario.start, seed=seed)
+    with tempfile.TemporaryDirectory() as folder:
+        output = OutputOptions(Path(folder), terminal=False, outlet=parse_outlet([url], role, "load"))
+        guide = "wearer:fallen" if role == "rescuer" else None
+        with Session(tracker, role, "simulated", output, guide) as session:
+            session.prepare()
+            print("walks", flush=True)
+            chunks = with_team(paced(scenario.chunks(), speed), session.ear, _arrival_ns)
+            session.track(portions_of(chunks, 16))
+            cue = session.guided.cue if session.guided else None
+    print(json.dumps({"role": role, "cue": cue.text if cue else "", "kind": cue.kind.value if cue else ""}), flush=True)
+
+
+def _arrival_ns(chunk: Chunk | None) -> int:
+    return chunk.t_arrival_ns if chunk else 0
+
+
+class Crowd:
+    """Wearers whose reports are simulated; the first one is lost."""
+
+    def __init__(self, url: str, plan: Plan, count: int) -> None:
+        names = ["lost", *(f"wearer {k:02d}" for k in range(1, count))]
+        self._bases = [empty_report(plan, name, "load", f"{k:08x}", "simulated") for k, name in enumerate(names)]
+        endpoint = parse_endpoint(url)
+        self._boxes = [Outbox(MqttTransport(endpoint, b.team, b.name, b.run), b.name, print) for b in self._bases]
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        began, n = time.monotonic(), 0
+        while not self._ended.wait(max(began + n / RATE_HZ - time.monotonic(), 0.0)):
+            for k, (box, base) in enumerate(zip(self._boxes, self._bases, strict=True)):
+                made = report_at(base, k, n / RATE_HZ)
+                box.offer(replace(made, status="lost") if k == 0 else made)
+            n += 1
+
+    def close(self) -> list[str]:
+        """End; the line of each outbox."""
+        self._ended.set()
+        self._thread.join(10.0)
+        return [box.close() for box in self._boxes]
+
+
+class Listening:
+    """What a commander hears, for the figures."""
+
+    def __init__(self, url: str) -> None:
+        self.roster, self._inbox = Roster(), Inbox()
+        self.receiver = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+"], self._inbox.put), print)
+
+    def member(self, name: str) -> Member | None:
+        """The newest of a wearer."""
+        update_roster(self._inbox, self.roster)
+        return next((m for m in self.roster.members(time.monotonic()) if m.report.name == name), None)
+
+    def mayday_s(self) -> float | None:
+        """How long the fallen wearer had not moved when the mayday came; None: it has not come."""
+        m = self.member("fallen")
+        alarm = m.report.alarm if m else None
+        return alarm.age_s if m and alarm and m.state(time.monotonic()) is MemberState.MAYDAY else None
+
+
+def operate(url: str, plan_path: Path, wearers: int, firmware: int, speed: float, folder: Path) -> bool:
+    """Run the operation and print its figures; whether all of it happened."""
+    plan, began = load_plan(plan_path), time.monotonic()
+    with ExitStack() as opened:
+        ear = Listening(url)
+        opened.callback(ear.receiver.close)
+        commander = _start(
+            opened,
+            [
+                "-m",
+                "echostep",
+                "command",
+                url,
+                "--plan",
+                str(plan_path),
+                "--json",
+                "--port",
+                "0",
+                "--out",
+                str(folder / "operation.mcap"),
+            ],
+        )
+        for k in range(firmware):
+            out, name = str(folder / f"firmware-{k}"), f"firmware {k}"
+            _start(opened, ["-m", "echostep", "demo", "--headless", "--speed", "1", "--board-command", " ".join(TWIN), "--publish", url,
+                            "--name", name, "--team", "load", "--seed", str(k + 1), "--out", out])  # fmt: skip
+        crowd = Crowd(url, plan, wearers - firmware - 2)
+        _start(opened, ["-m", "reliability.team_operation", "--role", "fallen", "--url", url, "--speed", str(speed)])
+        told_s = _wait(ear.mayday_s)
+        rescuer = _start(
+            opened, ["-m", "reliability.team_operation", "--role", "rescuer", "--url", url, "--speed", str(speed)]
+        )
+        out, _ = rescuer.communicate(timeout=LONGEST_S)
+        arrived = json.loads(out.splitlines()[-1])
+        commander.send_signal(signal.SIGINT)  # before the wearers end
+        state = json.loads(commander.communicate(timeout=30)[0])
+        summaries = crowd.close()
+    return judge(state, summaries, told_s, arrived, wearers, time.monotonic() - began)
+
+
+def judge(
+    state: dict[str, list[dict[str, object]]], summaries: Sequence[str], told_s: float | None,
+    arrived: dict[str, str], wearers: int, span_s: float,
+) -> bool:  # fmt: skip
+    """Print what happened; whether all of it did."""
+    members = {str(m["name"]): m for m in state["members"]}
+    states = [m["state"] for m in state["members"]]
+    cpu = resource.getrusage(resource.RUSAGE_CHILDREN)
+    first = ", ".join(f"{m['name']} ({m['state']})" for m in state["members"][:2])
+    all_sent = sum(", 0 unsent" in line for line in summaries)
+    checks = {
+        f"{len(members)} of {wearers} wearers with the commander": len(members) == wearers,
+        f"first in the list: {first}": states[:2] == ["mayday", "lost"],
+        f"mayday after {told_s or 0.0:.1f} s without motion": told_s is not None and 30.0 <= told_s <= 35.0,
+        f"rescuer: {arrived['cue']}": arrived["kind"] == CueKind.ARRIVED.value,
+        f"{all_sent} of {len(summaries)} simulated wearers sent all": all_sent == len(summaries),
+    }
+    for words, holds in checks.items():
+        print(f"{'ok ' if holds else 'NOT'} {words}")
+    missed = sum(int(str(m["missed"])) for m in members.values())
+    print(f"{missed} reports missed by the commander")
+    print(
+        f"{span_s:.0f} s on {os.cpu_count()} cores; the processes took {100.0 * (cpu.ru_utime + cpu.ru_stime) / span_s:.0f} % of one core"
+    )
+    return all(checks.values())
+
+
+def _start(opened: ExitStack, arguments: Sequence[str]) -> subprocess.Popen[str]:
+    """A process of Python that is ended with the operation."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    running = subprocess.Popen(
+        [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
+    )
+    opened.callback(_end, running)
+    return running
+
+
+def _end(running: subprocess.Popen[str]) -> None:
+    if running.poll() is None:
+        running.send_signal(signal.SIGINT)
+    try:
+        running.communicate(timeout=20)
+    except subprocess.TimeoutExpired:
+        running.kill()
+        running.communicate()
+
+
+def _wait(found: object) -> float | None:
+    """The first value that is not None, within LONGEST_S."""
+    end_s = time.monotonic() + LONGEST_S
+    while time.monotonic() < end_s:
+        if (value := found()) is not None:  # type: ignore[operator]
+            return float(value)
+        time.sleep(0.1)
+    return None
+
+
+def main() -> None:
+    """Run the broker, operate."""
+    asked = options(
+        __doc__,
+        wearers=(20, "of the team"),
+        firmware=(2, "wearers with the real firmware in the twin"),
+        speed=(1.0, "times real time, of the fallen wearer and of the rescuer"),
+        role=("", "internal: one wearer"),
+        url=("", "internal: the broker"),
+    )
+    with ExitStack() as opened:
+        if asked.role:
+            walk(asked.role, asked.url, load_plan(PLAN), asked.speed)
+            return
+        url = opened.enter_context(broker())
+        print(
+            "Preparing: kernels that are not compiled yet are compiled once, not by four wearers at a time", flush=True
+        )
+        Tracker(load_plan(PLAN)).warm_up()
+        folder = Path(opened.enter_context(tempfile.TemporaryDirectory()))
+        happened = operate(url, PLAN, asked.wearers, asked.firmware, asked.speed, folder)
+    sys.exit(0 if happened else 1)
+
+
+if __name__ == "__main__":
+    main()
