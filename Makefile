@@ -46,13 +46,15 @@ demo: $(READY) ## track a simulated walk through the real firmware in the simula
 real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path, echoes simulated; prints the error
 	$(BIN)/python -m echostep_studies.figures.real_walk --out out/real
 
-quick: $(READY) ## run the tests that need no twin, browser, process or study
-	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or speed)"
+quick: $(READY) ## run the tests that need no twin, browser, process, study or more than a second
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or long or speed)"
 
 test: $(READY) ## run every test
 	@tools/apt.sh $(APT_PACKAGES) $(TEST_PACKAGES) || echo "No right to install the AVR tools, Mosquitto, Chromium, clang and OpenSCAD: tests that need them are skipped and named."
 	@if command -v avr-gcc >/dev/null && [ -e /usr/include/simavr/sim_avr.h ]; then $(MAKE) --quiet -C firmware && $(MAKE) --quiet -C tools/twin; fi
-	$(MAKE) --quiet check
+	$(MAKE) --quiet --jobs 2 check suite
+
+suite: $(READY) ## the tests of make test, which runs the checks beside them
 	$(BIN)/python -m pytest -q -n auto --dist loadfile --durations 25 --durations-min 1
 
 check: $(READY) ## types, style, layers, generated files, C checks
@@ -149,4 +151,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: operation help setup firmware twin demo real quick test check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean
+.PHONY: operation help setup firmware twin demo real quick test suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill flips hardware docs site licences lock audit flash clean

@@ -9,10 +9,14 @@ from __future__ import annotations
 import sys
 from unittest import mock
 
+import numpy as np
+
 from board_runs import ROOT
 from echostep.odometry.front_end import FrontEnd
 from echostep.plan.model import load_plan
 from echostep.tracker import Tracker
+from echostep_studies.barometer.altitude import Altitude, Pressures
+from echostep_studies.barometer.floor_filter import FloorFilter
 from walks import walk_chunks
 
 
@@ -28,7 +32,14 @@ def compile_filter() -> None:
         Tracker(load_plan(ROOT / "host/echostep/plans/demo.json")).warm_up()
 
 
-PARTS = {"front-end": compile_front_end, "filter": compile_filter}
+def compile_heights() -> None:
+    """The filters of a barometer's record, by a minute on one floor."""
+    samples = Pressures(np.arange(60.0), np.full(60, 101_325.0))
+    Altitude().feed(samples)
+    FloorFilter(np.array([0.0, 3.5])).smooth(samples)
+
+
+PARTS = {"front-end": compile_front_end, "filter": compile_filter, "heights": compile_heights}
 
 
 if __name__ == "__main__":

@@ -30,7 +30,10 @@ def pytest_configure(config: pytest.Config) -> None:
     if not config.getoption("numprocesses", None) or hasattr(config, "workerinput"):
         return
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    parts = [subprocess.Popen([sys.executable, COMPILER, part], env=environment) for part in ("front-end", "filter")]
+    parts = [
+        subprocess.Popen([sys.executable, COMPILER, part], env=environment)
+        for part in ("front-end", "filter", "heights")
+    ]
     for part in parts:
         part.wait()
 
@@ -43,8 +46,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """A test of `make quick` that starts a process fails in every run."""
-    with layers.no_process() if layers.is_quick(item) else contextlib.nullcontext():
+    """A test that starts a process and is not marked so fails, in `make quick` and in every other run."""
+    with layers.no_process() if layers.is_alone(item) else contextlib.nullcontext():
         return (yield)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The layers of the suite: which tests need the twin, a browser, a process or a study's time; `make quick` runs the others.
+"""The layers of the suite: which tests need the twin, a browser, a process, a study or long; `make quick` runs the others.
 
 In: collected tests. Out: their marks, and a failure of every other test that starts a process. Owns the rules by which a test gets its mark.
 """
@@ -36,8 +36,8 @@ def mark(item: pytest.Item) -> None:
         item.add_marker("study")
 
 
-def is_quick(item: pytest.Item) -> bool:
-    """Whether `make quick` runs a test."""
+def is_alone(item: pytest.Item) -> bool:
+    """Whether a test does without any other process."""
     return not any(map(item.get_closest_marker, LAYERS))
 
 

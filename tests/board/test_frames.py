@@ -53,6 +53,7 @@ def test_cobs_vectors(vector: dict[str, str]) -> None:
     assert cobs.encode(bytes.fromhex(vector["plain"])).hex() == vector["encoded"]
 
 
+@pytest.mark.process
 def test_generated_files_are_fresh() -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "protocol/generate.py", "--check"], capture_output=True, text=True, check=False

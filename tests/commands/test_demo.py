@@ -47,6 +47,7 @@ def short_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "DEMO_WAYPOINTS", DEMO_WAYPOINTS[:2])
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("short_walk")
 def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: Path) -> None:
     """With a page at 30 times real time, and as fast as it can: not on a terminal, it waits for no one."""
@@ -83,6 +84,7 @@ def frame(socket: ClientConnection) -> dict[str, Any]:
     return message(socket, "frame")
 
 
+@pytest.mark.long
 def test_at_the_end_the_page_says_so_and_plays_the_run_again() -> None:
     tracker = Tracker(PLAN, seed=1)
     with LivePage(tracker, "demo", LOCAL, keeps=True) as page:

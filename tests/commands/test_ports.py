@@ -75,6 +75,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.process
 def test_the_second_program_on_a_port_is_told_who_has_it(tmp_path: Path) -> None:
     with pseudo_terminal() as (_, port):
         first = subprocess.Popen(

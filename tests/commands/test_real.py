@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from echostep.recording.reading import open_recording
 from echostep_studies.bench.recordings.hallways import names_in, read_hallway
 from needs_data import needs_data
@@ -16,6 +18,7 @@ from waiting import PATIENCE_S
 pytestmark = needs_data("gx5_gcp")
 
 
+@pytest.mark.process
 def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", str(tmp_path), "--seed", "3"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)

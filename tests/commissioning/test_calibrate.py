@@ -201,6 +201,7 @@ def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
     assert not (tmp_path / "x.toml").exists()
 
 
+@pytest.mark.long
 def test_the_rehearsal_of_the_twin_calibrates_everything() -> None:
     """What the wearer of `make twin STILL=1` does, as the Python board reports it, without waiting for it."""
     board = PythonBoard()

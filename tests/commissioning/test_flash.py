@@ -92,6 +92,7 @@ def board(link: Path, log: Path, obeys: bool = True) -> Iterator[None]:
         thread.join(timeout=PATIENCE_S)
 
 
+@pytest.mark.process
 def test_a_board_is_touched_written_verified_and_answers(tmp_path: Path) -> None:
     path, log = fake_avrdude(tmp_path, GOOD)
     with board(tmp_path / "port", log):
@@ -105,6 +106,7 @@ def test_a_board_is_touched_written_verified_and_answers(tmp_path: Path) -> None
     assert str(SHIPPED) in arguments
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("body", "words"), [(BAD, "verification error"), (DEAF, "programmer is not responding")])
 def test_what_avrdude_says_is_passed_on(tmp_path: Path, body: str, words: str) -> None:
     path, log = fake_avrdude(tmp_path, body)
@@ -131,6 +133,7 @@ def make_flash(port: object, path: str, *more: object) -> subprocess.CompletedPr
     return subprocess.run(command, env={"PATH": path}, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
 
 
+@pytest.mark.process
 def test_make_flash_writes_without_an_environment(tmp_path: Path) -> None:
     path, log = fake_avrdude(tmp_path, GOOD)
     with board(tmp_path / "port", log):

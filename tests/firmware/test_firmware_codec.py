@@ -101,6 +101,7 @@ def case(line: int, vector: dict[str, Any]) -> str:
     return received_case(line, name, vector) if name in HOST_MESSAGES else sent_case(line, name, vector)
 
 
+@pytest.mark.process
 def test_every_vector(tmp_path: Path) -> None:
     lines = (ROOT / "protocol" / "vectors.jsonl").read_text().splitlines()
     cases = [
@@ -113,11 +114,13 @@ def test_every_vector(tmp_path: Path) -> None:
     assert len(cases) > 80
 
 
+@pytest.mark.process
 def test_seeded_hostile_bytes(tmp_path: Path) -> None:
     done = run(build(tmp_path / "fuzz", "cc", FUZZ, "-fsanitize=address,undefined"), "1", "30000")
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.process
 @pytest.mark.skipif(shutil.which("clang") is None, reason="no clang, so no libFuzzer")
 def test_coverage_guided_hostile_bytes(tmp_path: Path) -> None:
     """A small shard of `make fuzz`, from its corpus."""

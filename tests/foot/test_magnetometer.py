@@ -51,6 +51,7 @@ def test_a_clean_field_holds_the_heading_in_any_unit(manner: str, unit: float) -
     assert 0.5 * read < trusted <= read
 
 
+@pytest.mark.long
 def test_a_field_that_changes_from_step_to_step_changes_nothing() -> None:
     rng = np.random.default_rng(2)
     t = walked("walking", EARTH, 3)[0]
@@ -62,6 +63,7 @@ def test_a_field_that_changes_from_step_to_step_changes_nothing() -> None:
     assert np.array_equal(plain.heading_rad, fused.heading_rad)
 
 
+@pytest.mark.long
 def test_trust_ends_where_the_field_is_another() -> None:
     """Half the walk in a clean field, half beside a machine that turns it by a radian and makes it stronger: it is not followed there."""
     t = walked("walking", EARTH, 4)[0]

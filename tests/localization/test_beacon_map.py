@@ -60,6 +60,7 @@ def walk() -> Walk:
     return Walk()
 
 
+@pytest.mark.long
 def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> None:
     live, replayed = walk.tracker(), walk.tracker()
     one = [e for chunk in walk.chunks for e in live.feed(chunk)]
@@ -124,6 +125,7 @@ def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, st
     return {tracker.gateway.numbers[p.slot]: p.state.value for p in found}
 
 
+@pytest.mark.long
 def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> None:
     there_and_back = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.6), (9.5, 7.5), (4.0, 7.5), (9.0, 7.5), (4.0, 7.5), (6.0, 7.5))
     assert states_at_the_end(there_and_back, 19.0) == {1: "well", 2: "silent", 3: "well"}
@@ -165,6 +167,7 @@ def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> N
     assert not guided.news()
 
 
+@pytest.mark.long
 def test_cues_of_a_run_and_of_its_replay_are_the_same(walk: Walk) -> None:
     """The gateway is silent in the middle: who waits for the end of a portion does not see that."""
     first_ns = walk.chunks[0].t_arrival_ns

@@ -95,6 +95,7 @@ def test_a_cloud_is_fine_when_nearly_all_of_its_weight_is_in_one_place(
     assert cloud.is_coarse == is_coarse
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("share", "path_m", "is_kept", "doubts_plan"),
     [

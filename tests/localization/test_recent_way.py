@@ -98,6 +98,7 @@ def tracked(where: Building) -> list[Estimate]:
     return [filtered.update(measured) for measured in segments(WALKED_M)]
 
 
+@pytest.mark.long
 def test_levels_that_are_alike_are_about_as_probable_after_the_second_pass() -> None:
     assert level_shares(alike()) == pytest.approx([1.0 / STOREYS] * STOREYS, abs=0.25)
 
@@ -123,6 +124,7 @@ def test_standing_does_not_lengthen_the_way_for_ever() -> None:
     assert len(way) == MOST_PIECES
 
 
+@pytest.mark.long
 def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
     """A coarse cloud's few particles made one of them sure by chance."""
     last = tracked(alike())[-10:]
@@ -133,6 +135,7 @@ def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
     assert np.hypot(last[-1].x_m - true.x_m, last[-1].y_m - true.y_m) < 0.5
 
 
+@pytest.mark.long
 def test_on_levels_that_differ_the_right_one_is_tracked() -> None:
     last = tracked(different())[-1]
     assert (last.level, last.status) == (TRUE, TrackStatus.TRACKING)

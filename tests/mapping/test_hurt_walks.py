@@ -54,6 +54,7 @@ def length_m(walls: Floats) -> float:
     return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
 
 
+@pytest.mark.long
 def test_a_walk_killed_at_any_moment_leaves_a_drawing_of_what_was_walked(whole: bytes, tmp_path: Path) -> None:
     """Cut at eight places, in the middle of records: a short beginning has no walk in it, every longer one more walls, all of them true."""
     drawn = []

@@ -82,6 +82,7 @@ def turned(segments: tuple[MeasuredSegment, ...], by_rad: float) -> list[Measure
     return found
 
 
+@pytest.mark.long
 def test_the_second_walk_finds_its_place_on_the_first(
     walks: tuple[SimulatedWalk, ...], solved: tuple[Mapped, Mapped]
 ) -> None:
@@ -109,6 +110,7 @@ def test_a_place_is_the_same_in_any_frame(walks: tuple[SimulatedWalk, ...], solv
     assert np.hypot(*(a - b)[0]) < 0.4
 
 
+@pytest.mark.long
 def test_walks_of_two_buildings_are_refused(solved: tuple[Mapped, Mapped]) -> None:
     """The office, and a loop of corridors: the error says what it may be, and what to do."""
     strange = solve_walk(simulate(corridors(1, 0.4 * LENGTH_M), 1).segments)
@@ -133,6 +135,7 @@ def test_the_study_judges_two_walks(walks: tuple[SimulatedWalk, ...]) -> None:
     assert (row.joined, row.misplaced, row.wrong) == (1, 0, 0)
 
 
+@pytest.mark.long
 def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:
     """`echostep map A B`: the place and its odds are printed; a walk given twice is refused."""
     assert walks
@@ -144,6 +147,7 @@ def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder
     assert (twice.returncode, "given twice" in twice.stderr) == (2, True)
 
 
+@pytest.mark.long
 def test_an_old_plan_is_completed_and_corrected(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:
     """A plan without two of its walls, and with one across the corridor that was never built: the two come back, the third is doubtful."""
     built = walks[0].built

@@ -44,6 +44,7 @@ def mapped(walk: SimulatedWalk) -> Mapped:
     return map_walk(walk.segments)
 
 
+@pytest.mark.long
 def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     """Every drawn wall is one, within 0.2 m at nine of ten places; both corridors are there; the plan has no faults."""
     plan, ((path,),) = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
@@ -168,6 +169,7 @@ def beside(span_s: float) -> list[MeasuredSegment]:
     return found
 
 
+@pytest.mark.long
 def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
     """`echostep map` of a recorded demo; the same walk is tracked on the drawing, and never lost."""
     scenario = demo_scenario(PLAN, 4, PythonBoard(4))

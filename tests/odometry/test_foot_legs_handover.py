@@ -134,6 +134,7 @@ def test_blocks_of_any_size_give_the_same_way() -> None:
 # Walks, simulated
 
 
+@pytest.mark.long
 def test_the_track_goes_on_without_the_foot() -> None:
     """For good, from half a minute on."""
     scenario, chunks = walked(1)
@@ -155,6 +156,7 @@ def test_the_foot_takes_over_again() -> None:
     assert max(b.t_s - a.t_s for a, b in zip(estimates, estimates[1:], strict=False)) < 3.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [2, 3, 6, 9])
 def test_the_board_alone_is_enough(seed: int) -> None:
     """No MTx at all: one cable. Never a wrong place that is shown as sure."""
@@ -190,6 +192,7 @@ def test_without_foot_and_legs_he_is_lost() -> None:
     assert any(e.t_s > 40.0 for e in estimates)
 
 
+@pytest.mark.long
 def test_it_does_not_matter_how_many_chunks_come_at_once() -> None:
     scenario, chunks = walked(1)
     some = [c for c in without(chunks, MTX, 20.0, 30.0) if c.t_arrival_ns < BEGIN_NS + 45_000_000_000]

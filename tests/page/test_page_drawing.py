@@ -88,6 +88,7 @@ def test_the_walls_grow_on_the_page(browser: Any, tmp_path: Path, size: str, how
     assert 0.3 < np.median(away) < 2.0  # beside the path, not on it
 
 
+@pytest.mark.process
 def test_a_page_that_draws_leaves_the_estimates_as_they_are() -> None:
     start, chunks = demo_walk(beacons=False)
     portions = [portion_of(chunks[begin : begin + PORTION]) for begin in range(0, len(chunks) // 2, PORTION)]
@@ -101,6 +102,7 @@ def test_a_page_that_draws_leaves_the_estimates_as_they_are() -> None:
     assert found == expected
 
 
+@pytest.mark.process
 def test_a_replay_shows_what_was_drawn_by_then_and_draws_the_same_again() -> None:
     start, chunks = demo_walk(beacons=False)
     drawn = []
@@ -135,6 +137,7 @@ def test_a_stretch_is_eight_metres_and_a_live_run_takes_all_that_wait() -> None:
     assert not live.ready
 
 
+@pytest.mark.process
 def test_a_drawing_that_cannot_go_on_is_said_once_and_nothing_waits_for_it() -> None:
     """A segment that no process can read."""
     said: list[str] = []
@@ -166,6 +169,7 @@ def test_the_drawing_meets_the_wearer() -> None:
     assert shown.trail_count == 7
 
 
+@pytest.mark.process
 def test_the_greatest_drawing_is_a_bounded_message() -> None:
     most = ShownDrawing(1.0, np.ones((MOST_WALLS, 5), np.float32), np.ones((MOST_POINTS, 2), np.float32), 5)
     mailbox = Mailbox(NO_PLAN, "test", replay=False)

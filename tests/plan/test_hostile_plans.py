@@ -77,6 +77,7 @@ def test_an_obstacle_of_a_million_corners_is_named(tmp_path: Path) -> None:
         load_plan(plan_file(tmp_path / "a.json", corners))
 
 
+@pytest.mark.process
 def test_an_import_in_its_own_process_gives_the_same_plan_and_the_same_errors(tmp_path: Path) -> None:
     file = drawing(tmp_path / "a.dxf")
     assert plan_json(open_limited(file)) == plan_json(import_plan(file))
@@ -84,6 +85,7 @@ def test_an_import_in_its_own_process_gives_the_same_plan_and_the_same_errors(tm
         open_limited(tmp_path / "b.osm")
 
 
+@pytest.mark.process
 def test_an_import_that_takes_too_long_or_crashes_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limited, "CHILD", "import time; time.sleep(60)")
     monkeypatch.setattr(limited, "LONGEST_S", 0.2)
@@ -100,6 +102,7 @@ def test_an_import_that_takes_too_long_or_crashes_ends(tmp_path: Path, monkeypat
         import_limited(tmp_path / "a.dxf")
 
 
+@pytest.mark.process
 def test_ctrl_c_ends_an_import_and_its_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limited, "CHILD", "import time; time.sleep(600)")
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)

@@ -246,6 +246,7 @@ def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> No
     assert import_plan(folder(tmp_path / "a", files()), Hints(doors_m=0.9)).levels[0].doors == mall.levels[0].doors
 
 
+@pytest.mark.process
 def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
     source, out = folder(tmp_path / "a", without_openings()), tmp_path / "plan.json"
     done = command_line.echostep("plan", "import", source, "-o", out)

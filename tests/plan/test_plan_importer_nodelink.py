@@ -39,6 +39,7 @@ def test_a_small_building(tmp_path: Path) -> None:
     assert plan.start is None
 
 
+@pytest.mark.process
 def test_a_source_without_doors_and_rooms_is_named(tmp_path: Path) -> None:
     done = command_line.echostep("plan", "import", write(tmp_path) / "core.txt", "-o", tmp_path / "plan.json")
     assert "neither door openings nor rooms: ways are the gaps" in done.stdout

@@ -222,6 +222,7 @@ def test_any_tree_is_refused_in_words(tree: Any) -> None:
             assert "\n" not in str(error)  # noqa: PT017
 
 
+@pytest.mark.long
 def test_a_million_walls_open(tmp_path: Path) -> None:
     rows = ",\n".join(str(row) for row in np.random.default_rng(1).uniform(0, 1000, (1000, 4)).round(3).tolist())
     text = '{"echostep_plan": 1, "levels": [{"walls": [' + ",".join([rows] * 1000) + "]}]}"

@@ -8,9 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from waiting import PATIENCE_S
 
 
+@pytest.mark.process
 def test_a_tiny_benchmark(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "echostep_studies.speed.bench", "--tiny", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=10.0 * PATIENCE_S, check=False)

@@ -61,6 +61,7 @@ def test_the_picture_is_of_the_present_source(name: str) -> None:
         assert image.info["Source"] == boxes.sources(name)
 
 
+@pytest.mark.process
 @needs_openscad
 @pytest.mark.parametrize("name", boxes.NAMES)
 def test_a_box_and_its_lid_are_closed_fit_the_printer_and_hold_their_boards(name: str, tmp_path: Path) -> None:

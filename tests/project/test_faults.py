@@ -6,6 +6,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from board_runs import ROOT, Bench, needs_twin
 from echostep.ports.chunks import BOARD, MTX
 from echostep.recording.reading import open_recording
@@ -54,6 +56,7 @@ def test_gaps_are_judged() -> None:
     assert "| `x=y` | 0 | all 30.0 s | never |" in table([outcome])
 
 
+@pytest.mark.long
 def test_a_computer_that_sleeps_leaves_a_gap_and_no_false_claim() -> None:
     asleep = faults.Fault((), (), 10.0, (BOARD, MTX), "the computer sleeps")
     outcome = faults.run(asleep, PythonBoard(1))

@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import echostep
 from echostep.jit import kernel
 from echostep.kernel_cache import PACKAGE, cache_folder
@@ -46,6 +48,7 @@ def run(package: Path, name: str, unit: float) -> str:
     return done.stdout
 
 
+@pytest.mark.process
 def test_an_update_in_place_is_compiled_anew_and_the_old_kernels_go(tmp_path: Path) -> None:
     package = tmp_path / "echostep"
     package.mkdir()

@@ -42,6 +42,7 @@ def test_each_source_file_names_its_licence() -> None:
         assert f"SPDX-License-Identifier: {licence}" in first_lines, path
 
 
+@pytest.mark.long
 def test_a_module_keeps_its_docstring_below_the_licence() -> None:
     for path in (path for path in all_sources() if path.suffix == ".py"):
         assert ast.get_docstring(ast.parse(path.read_text())), path

@@ -38,6 +38,7 @@ def metadata(wheel: Path) -> Message:
         return message_from_string(archive.read(name).decode())
 
 
+@pytest.mark.process
 def test_pypi_takes_the_wheel_without_a_warning(built: Path) -> None:
     pytest.importorskip("twine")
     done = subprocess.run(
@@ -81,6 +82,7 @@ def test_the_licence_that_the_package_takes_along_is_the_projects(built: Path) -
         assert archive.read(name) == (ROOT / "LICENSE").read_bytes()
 
 
+@pytest.mark.process
 def test_without_a_public_address_none_is_invented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("hatchling")
     monkeypatch.delenv("ECHOSTEP_URL", raising=False)

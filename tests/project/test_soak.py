@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from board_runs import ROOT, needs_twin
 from echostep.board.frames import encode
@@ -50,6 +51,7 @@ def test_seconds_of_the_real_firmware(tmp_path: Path) -> None:
     check(soak.run(5.0, tmp_path), tmp_path, 0)
 
 
+@pytest.mark.process
 def test_seconds_around_the_wrap_of_the_boards_clock(tmp_path: Path) -> None:
     began_ms = int(1e3 * WRAP_S) - 4000
     check(soak.run(8.0, tmp_path, LateBoard(began_ms), 1e-3 * began_ms), tmp_path, 1)

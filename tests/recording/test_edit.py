@@ -206,6 +206,7 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         repair(tmp_path / "a.mcap", tmp_path / "file" / "b.mcap")
 
 
+@pytest.mark.process
 def test_a_full_disk_under_a_piece_is_named(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap")
     limited = (

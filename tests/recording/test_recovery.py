@@ -41,6 +41,7 @@ print(*recorder.notices, sep="\\n")
 """
 
 
+@pytest.mark.process
 def test_a_killed_recorder_has_lost_less_than_a_second_and_no_earlier_recording(tmp_path: Path) -> None:
     """The small version of `make kill`."""
     rng = random.Random(7)
@@ -64,6 +65,7 @@ def run_on_a_full_disk(path: Path, *more: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.process
 def test_a_full_disk_is_announced_and_keeps_what_it_has(tmp_path: Path) -> None:
     said = run_on_a_full_disk(tmp_path / "a.mcap")
     assert "the disk takes no more" in said[0]
@@ -102,6 +104,7 @@ def test_a_disk_that_stands_still_does_not_keep_the_tracker_waiting(
     assert list(open_recording(tmp_path / "a.mcap").chunks()) == chunks
 
 
+@pytest.mark.process
 def test_when_there_is_room_again_nothing_is_missing(tmp_path: Path) -> None:
     said = run_on_a_full_disk(tmp_path / "a.mcap", "room again")
     assert any("takes bytes again" in line for line in said)

@@ -108,6 +108,7 @@ def test_the_page_in_a_browser(browser: Any, folder: Path, tmp_path: Path, width
     assert found.violations_count == 0, found.generate_report()
 
 
+@pytest.mark.process
 def test_the_same_files_give_the_same_page(folder: Path, tmp_path: Path) -> None:
     pages = []
     for name in ("a.html", "b.html"):

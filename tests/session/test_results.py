@@ -47,6 +47,7 @@ def test_a_picture_that_cannot_be_written_is_one_error_after_the_summary(
     assert (tmp_path / "track.csv").exists()
 
 
+@pytest.mark.process
 def test_a_replay_without_a_page_loads_no_server() -> None:
     code = "import sys, echostep.session.runs.replay; print({'uvicorn', 'starlette', 'pydantic', 'matplotlib'} & sys.modules.keys())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=True)

@@ -176,6 +176,7 @@ while True:
 )
 
 
+@pytest.mark.process
 def test_a_board_process_advances_in_lockstep() -> None:
     board = BoardProcess([sys.executable, "-c", ECHO_BOARD])
     try:
@@ -187,6 +188,7 @@ def test_a_board_process_advances_in_lockstep() -> None:
         board.close()
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     "program",
     [
@@ -204,6 +206,7 @@ def test_a_board_that_fails_is_named(program: str) -> None:
         board.close()
 
 
+@pytest.mark.process
 def test_a_board_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("echostep.simulation.devices.board.TIMEOUT_S", 0.5)
     board = BoardProcess([sys.executable, "-c", "import sys; sys.stdin.buffer.read()"])

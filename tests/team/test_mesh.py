@@ -142,6 +142,7 @@ class Channel:
             self.heard.append((self.free_s, payload))
 
 
+@pytest.mark.long
 def test_twenty_wearers_for_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     """On one channel, a packet in ten lost: the position at the commander is at most 20 s old but when two in a row are lost."""
     clock = Clock()
@@ -248,6 +249,7 @@ def test_a_report_goes_from_node_to_node(air: Air) -> None:
     assert POSITION_EVERY > 1
 
 
+@pytest.mark.long
 def test_twenty_wearers_on_pseudo_terminals(air: Air) -> None:
     """Twenty nodes and the commander's: three reports of each; never more than 20 s between two of one wearer."""
     inbox, words = Inbox(), list[str]()
