@@ -138,6 +138,7 @@ def test_every_field_of_plan_and_report_is_explained() -> None:
     assert all(row.rstrip("| ").count("|") >= 4 for row in rows), "a field without a meaning"
 
 
+@pytest.mark.process
 def test_the_example_in_python_runs(tmp_path: Path) -> None:
     (example,) = blocks(ROOT / "host/README.md", "python")
     (tmp_path / "board.bin").write_bytes((ROOT / "tests/captures/board.bin").read_bytes())
