@@ -111,6 +111,7 @@ def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pyt
     assert re.search(r"^numpy==[\d.]+$", (tmp_path / "versions.txt").read_text(), flags=re.M)
 
 
+@pytest.mark.process
 def test_same_bits_are_digests(
     start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -145,6 +146,7 @@ def test_flips(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     assert "1 flips of" in capsys.readouterr().out
 
 
+@pytest.mark.process
 def test_kills(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     assert start("reliability.kill_recorder", "--kills", 1, "--longest", 0.3) == 0
     assert capsys.readouterr().out.count("PASS") == 3
@@ -168,6 +170,7 @@ def test_mutated_inputs_go_on_where_they_stopped(
     assert all(run["executions"]["drawing"] > 10 for run in runs)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not shutil.which("clang"), reason="clang is missing (make test installs it when it may)")
 def test_the_codecs_corpus_is_kept(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
