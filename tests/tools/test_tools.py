@@ -24,23 +24,23 @@ from reliability.fuzz import codec, host
 from team.team_broker import needs_broker
 from walks import walk_chunks
 
-HERE = "project/test_tools.py"
+HERE = "tools/test_tools.py"
 STARTED_BY = {
     "docs.generate": HERE,
-    "hardware.boxes": "project/test_boxes.py",
-    "release.licences": "project/test_licences.py",
+    "hardware.boxes": "tools/test_boxes.py",
+    "release.licences": "tools/test_licences.py",
     "release.same_bits": HERE,
     "release.tested_versions": HERE,
-    "release.wheel": "project/test_wheel.py",
+    "release.wheel": "tools/test_wheel.py",
     "reliability.faults": HERE,
     "reliability.flip_recording": HERE,
     "reliability.fuzz.codec": HERE,
     "reliability.fuzz.host": HERE,
     "reliability.fuzz.mtx": HERE,
     "reliability.kill_recorder": HERE,
-    "reliability.soak": "project/test_soak.py",
+    "reliability.soak": "tools/test_soak.py",
     "reliability.team_load": HERE,
-    "reliability.team_operation": "project/test_operation_tool.py",
+    "reliability.team_operation": "tools/test_operation_tool.py",
     "twin.measure": HERE,
     "twin.run": "commands/test_live.py",
 }
