@@ -26,6 +26,7 @@ from echostep.extras import EXTRAS
 from foot_walks import MANNERS, course, samples
 from walks import DEMO
 
+pytestmark = pytest.mark.process
 PACKAGE = ROOT / "host/echostep"
 PROJECT = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
 OPTIONAL = PROJECT["optional-dependencies"]

@@ -145,11 +145,7 @@ def _chain_joint(later: Floats, earlier: Floats) -> Floats:
     for s in range(len(total)):
         if total[s] > 0.0:
             conditional[s] = earlier[s] / total[s]
-    joint = np.zeros_like(earlier)  # no matrix product: numba's needs BLAS of scipy
-    for now in range(len(later)):
-        for s in range(len(total)):
-            joint[now] += later[now, s] * conditional[s]
-    return joint
+    return later @ conditional
 
 
 @kernel

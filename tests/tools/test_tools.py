@@ -24,23 +24,23 @@ from reliability.fuzz import codec, host
 from team.team_broker import needs_broker
 from walks import walk_chunks
 
-HERE = "project/test_tools.py"
+HERE = "tools/test_tools.py"
 STARTED_BY = {
     "docs.generate": HERE,
-    "hardware.boxes": "project/test_boxes.py",
-    "release.licences": "project/test_licences.py",
+    "hardware.boxes": "tools/test_boxes.py",
+    "release.licences": "tools/test_licences.py",
     "release.same_bits": HERE,
     "release.tested_versions": HERE,
-    "release.wheel": "project/test_wheel.py",
+    "release.wheel": "tools/test_wheel.py",
     "reliability.faults": HERE,
     "reliability.flip_recording": HERE,
     "reliability.fuzz.codec": HERE,
     "reliability.fuzz.host": HERE,
     "reliability.fuzz.mtx": HERE,
     "reliability.kill_recorder": HERE,
-    "reliability.soak": "project/test_soak.py",
+    "reliability.soak": "tools/test_soak.py",
     "reliability.team_load": HERE,
-    "reliability.team_operation": "project/test_operation_tool.py",
+    "reliability.team_operation": "tools/test_operation_tool.py",
     "twin.measure": HERE,
     "twin.run": "commands/test_live.py",
 }
@@ -111,6 +111,7 @@ def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pyt
     assert re.search(r"^numpy==[\d.]+$", (tmp_path / "versions.txt").read_text(), flags=re.M)
 
 
+@pytest.mark.process
 def test_same_bits_are_digests(
     start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -145,6 +146,7 @@ def test_flips(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     assert "1 flips of" in capsys.readouterr().out
 
 
+@pytest.mark.process
 def test_kills(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     assert start("reliability.kill_recorder", "--kills", 1, "--longest", 0.3) == 0
     assert capsys.readouterr().out.count("PASS") == 3
@@ -168,6 +170,7 @@ def test_mutated_inputs_go_on_where_they_stopped(
     assert all(run["executions"]["drawing"] > 10 for run in runs)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not shutil.which("clang"), reason="clang is missing (make test installs it when it may)")
 def test_the_codecs_corpus_is_kept(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
