@@ -194,6 +194,7 @@ def test_who_watches_changes_nothing(chunks: list[Chunk]) -> None:
     assert health["lost"] == 0
 
 
+@pytest.mark.long
 def test_without_bytes_the_page_says_lost(chunks: list[Chunk]) -> None:
     tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
     with LivePage(tracker, "test", LOCAL) as page, opened_url(page.url) as looking:
