@@ -42,7 +42,8 @@ def pytest_configure(config: pytest.Config) -> None:
         subprocess.Popen([sys.executable, COMPILER, part], env=environment)
         for part in ("front-end", "filter", "heights")
     ]
-    if not any([part.wait() for part in parts]):
+    ends = [part.wait() for part in parts]
+    if not any(ends):
         config.cache.set(COMPILED, state)
 
 
