@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
+import foot_walks as fw
 import numpy as np
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step, Track
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import math
 
+import foot_walks as fw
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
 from foot.navigation import moves, same, walking

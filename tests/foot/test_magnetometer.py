@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
+import foot_walks as fw
 import numpy as np
 import pytest
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
 from echostep_studies.bench.recordings.feet import SETS

@@ -7,10 +7,10 @@ import itertools
 import math
 from dataclasses import replace
 
+import foot_walks as fw
 import numpy as np
 import pytest
 
-import foot_walks as fw
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.foot.alignment import Alignment, aligned

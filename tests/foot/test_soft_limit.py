@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import foot_walks as fw
 import numpy as np
 import pytest
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import walk_track
 from echostep_studies.bench.recordings.feet import SETS, FootRecording

@@ -17,8 +17,8 @@ from echostep.recording.reading import open_recording
 from echostep.xsens import PROJECT, MtxReader, OutputFormat
 from echostep.xsens.configuration.startup import MtxStart
 from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
-from mt_lines import on_a_terminal
 from waiting import PATIENCE_S
+from xsens.mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 
