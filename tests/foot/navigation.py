@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-import foot_walks as fw
 import numpy as np
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step, Track
+from foot import foot_walks as fw
 
 Samples = tuple[Floats, Floats, Floats]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import foot_walks as fw
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
+from foot import foot_walks as fw
 from foot.navigation import moves, same, walking
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import math
 
-import foot_walks as fw
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.foot.steps import Foot, FootSettings, Stance, Step, walk_track
+from foot import foot_walks as fw
 from foot.navigation import moves, same, walking
 
 LATENCY_S = 0.05

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import foot_walks as fw
 import numpy as np
 import pytest
 
@@ -11,6 +10,7 @@ from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
+from foot import foot_walks as fw
 from needs_data import needs_data
 from places import DATA
 

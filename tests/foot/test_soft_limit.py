@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import foot_walks as fw
 import numpy as np
 import pytest
 
@@ -14,6 +13,7 @@ from echostep.foot.steps import walk_track
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import recordings_in
+from foot import foot_walks as fw
 from needs_data import needs_data
 from places import DATA
 
