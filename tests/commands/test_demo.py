@@ -146,6 +146,7 @@ def with_rooms(plan: Plan) -> Plan:
     return replace(plan, levels=tuple(levels))
 
 
+@pytest.mark.long
 def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
     tree = json.loads((ROOT / "host/echostep/plans/demo.json").read_text())
     tree["levels"][0]["rooms"] = [r for r in tree["levels"][0]["rooms"] if r["name"] in ("Office 1", "Store")]

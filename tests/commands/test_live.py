@@ -129,6 +129,7 @@ def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
     assert "No estimate" in out
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

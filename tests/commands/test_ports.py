@@ -94,6 +94,7 @@ def test_the_second_program_on_a_port_is_told_who_has_it(tmp_path: Path) -> None
     assert third.returncode == 0, third.stderr
 
 
+@pytest.mark.long
 def test_live_finds_both_ports_by_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The board's identifiers are another program's, the adapter of the MTx is unknown, a third device talks nonsense."""
     with board_and_mtx() as (board, mtx), babbling_port(b"$GPGGA,123519,4807.038,N\r\n") as other:

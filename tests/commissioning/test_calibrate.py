@@ -58,6 +58,7 @@ def turn(seconds: float, degrees: float, reversed_: bool = False) -> ProbeResult
     return heard(rate, np.minimum(np.floor(bearing), 3599))
 
 
+@pytest.mark.long
 def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
     out = tmp_path / "me.toml"
     out.write_text("[foot]\nheight_m = 1.8\n\n[gyro]\nbelt_reversed = true\n")

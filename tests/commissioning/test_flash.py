@@ -144,6 +144,7 @@ def test_make_flash_writes_without_an_environment(tmp_path: Path) -> None:
     assert "$(READY)" not in re.findall(r"^flash:.*", (ROOT / "Makefile").read_text(), flags=re.M)[0]
 
 
+@pytest.mark.process
 def test_make_flash_checks_port_and_avrdude_before_it_builds(tmp_path: Path) -> None:
     """On a PATH with the programs of a shell, and with a compiler that would leave a trace."""
     built = tmp_path / "built"

@@ -41,6 +41,7 @@ def end_error(manner: str, t: Floats, accel: Floats, gyro: Floats, mag: Floats |
     return float(abs(np.angle(np.exp(1j * turned)))), track.compass
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("manner", "unit"), [("walking", 1.0), ("turning", 100.0), ("turning", 1e-4)])  # gauss, uT, T
 def test_a_clean_field_holds_the_heading_in_any_unit(manner: str, unit: float) -> None:
     t, accel, gyro, mag = walked(manner, EARTH, 1)
@@ -76,6 +77,7 @@ def test_trust_ends_where_the_field_is_another() -> None:
     assert abs(track.heading_rad[-1] - track.heading_rad[k]) < 1.3 * drift + 0.05
 
 
+@pytest.mark.long
 def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> None:
     t, accel, gyro, mag = walked("walking", EARTH, 5)
     mag[::7] = np.nan
@@ -91,6 +93,7 @@ def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> 
         foot.feed(t, accel, gyro, mag[1:])
 
 
+@pytest.mark.long
 @needs_data()
 def test_on_the_hallways_headings_are_never_worse_than_without() -> None:
     """Stride headings against the survey's, with and without."""

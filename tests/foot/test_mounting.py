@@ -94,6 +94,7 @@ def live() -> tuple[Plan, Scenario, list[Chunk]]:
     return plan, scenario, list(scenario.chunks())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", [0, 5, 11, 18, 22])
 def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]], which: int) -> None:
     """The same bytes with the sensor's axes turned: as good a track."""
@@ -137,6 +138,7 @@ def test_nobody_who_stops_after_one_step_is_kept_waiting() -> None:
     assert alignment.feed([], 6.0) == [step]
 
 
+@pytest.mark.long
 @needs_data()
 def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
     """Thirty feet, mounted as their owners liked, turned once more: long steps go within a toe-out angle of the toe's direction."""

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import pytest
 
 from echostep.guidance.guided_return import GuidedReturn
 from echostep.localization.estimate import Estimate, TrackStatus
@@ -88,5 +89,6 @@ def comes_back(seed: int) -> bool:
     return False
 
 
+@pytest.mark.long
 def test_nearly_all_come_back_to_the_door() -> None:
     assert sum(comes_back(seed) for seed in range(RETURNS)) >= 0.97 * RETURNS

@@ -103,6 +103,7 @@ def test_levels_that_are_alike_are_about_as_probable_after_the_second_pass() -> 
     assert level_shares(alike()) == pytest.approx([1.0 / STOREYS] * STOREYS, abs=0.25)
 
 
+@pytest.mark.long
 def test_doors_tell_the_true_level_by_the_second_pass() -> None:
     assert level_shares(different())[TRUE] > SURE_OF_LEVEL
 

@@ -33,6 +33,8 @@ from echostep_studies.noplan.joined import JoinedRun, again, joined_row
 from echostep_studies.noplan.judgement import known_start, path_columns, true_path
 from echostep_studies.noplan.sites import corridors, office
 
+pytestmark = pytest.mark.long
+
 LENGTH_M = 280.0  # of a walk
 SEEDS = {"a": 901, "b": 1901}
 
@@ -82,7 +84,6 @@ def turned(segments: tuple[MeasuredSegment, ...], by_rad: float) -> list[Measure
     return found
 
 
-@pytest.mark.long
 def test_the_second_walk_finds_its_place_on_the_first(
     walks: tuple[SimulatedWalk, ...], solved: tuple[Mapped, Mapped]
 ) -> None:
@@ -110,7 +111,6 @@ def test_a_place_is_the_same_in_any_frame(walks: tuple[SimulatedWalk, ...], solv
     assert np.hypot(*(a - b)[0]) < 0.4
 
 
-@pytest.mark.long
 def test_walks_of_two_buildings_are_refused(solved: tuple[Mapped, Mapped]) -> None:
     """The office, and a loop of corridors: the error says what it may be, and what to do."""
     strange = solve_walk(simulate(corridors(1, 0.4 * LENGTH_M), 1).segments)
@@ -135,7 +135,6 @@ def test_the_study_judges_two_walks(walks: tuple[SimulatedWalk, ...]) -> None:
     assert (row.joined, row.misplaced, row.wrong) == (1, 0, 0)
 
 
-@pytest.mark.long
 def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:
     """`echostep map A B`: the place and its odds are printed; a walk given twice is refused."""
     assert walks
@@ -147,7 +146,6 @@ def test_two_recordings_become_one_plan(walks: tuple[SimulatedWalk, ...], folder
     assert (twice.returncode, "given twice" in twice.stderr) == (2, True)
 
 
-@pytest.mark.long
 def test_an_old_plan_is_completed_and_corrected(walks: tuple[SimulatedWalk, ...], folder: Path) -> None:
     """A plan without two of its walls, and with one across the corridor that was never built: the two come back, the third is doubtful."""
     built = walks[0].built

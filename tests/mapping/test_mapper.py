@@ -63,6 +63,7 @@ def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     assert 0.01 < plan.uncertainty_m < 0.2
 
 
+@pytest.mark.long
 def test_walls_are_known_as_well_as_the_path_that_drew_them(mapped: Mapped) -> None:
     """The same walk by a foot that errs ten times as much, without its returns: more than twice as uncertain; the walls stay where they are."""
     graph, nodes = mapped.graph, mapped.graph.nodes
@@ -107,6 +108,7 @@ def test_a_closure_that_the_walk_contradicts_is_known_by_it(mapped: Mapped) -> N
     assert contradicted(graph, Closure(10, 11, graph.pose[11] - graph.pose[10], np.eye(3), 10.0)) == pytest.approx(10.0)
 
 
+@pytest.mark.long
 def test_walls_at_any_angle_are_no_building_with_two_directions(mapped: Mapped, walk: SimulatedWalk) -> None:
     """The evidence of the office is overwhelming; with a heading that turns by a degree each decimetre there is none."""
     assert mapped.directions.evidence > math.log(1e6)

@@ -24,6 +24,8 @@ from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario
 from echostep.simulation.stimulus import BoardSensors
 from echostep.tracker import Tracker
 
+pytestmark = pytest.mark.long
+
 BEGIN_NS = 1_000_000_000
 PLAN = load_plan(Path(str(files("echostep"))) / "plans" / "demo.json")
 
@@ -134,7 +136,6 @@ def test_blocks_of_any_size_give_the_same_way() -> None:
 # Walks, simulated
 
 
-@pytest.mark.long
 def test_the_track_goes_on_without_the_foot() -> None:
     """For good, from half a minute on."""
     scenario, chunks = walked(1)
@@ -156,7 +157,6 @@ def test_the_foot_takes_over_again() -> None:
     assert max(b.t_s - a.t_s for a, b in zip(estimates, estimates[1:], strict=False)) < 3.5
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("seed", [2, 3, 6, 9])
 def test_the_board_alone_is_enough(seed: int) -> None:
     """No MTx at all: one cable. Never a wrong place that is shown as sure."""
@@ -192,7 +192,6 @@ def test_without_foot_and_legs_he_is_lost() -> None:
     assert any(e.t_s > 40.0 for e in estimates)
 
 
-@pytest.mark.long
 def test_it_does_not_matter_how_many_chunks_come_at_once() -> None:
     scenario, chunks = walked(1)
     some = [c for c in without(chunks, MTX, 20.0, 30.0) if c.t_arrival_ns < BEGIN_NS + 45_000_000_000]

@@ -71,6 +71,7 @@ def closed(schema: Any) -> Any:
     return schema
 
 
+@pytest.mark.long
 def test_every_message_is_what_its_schema_says(recorded: tuple[Path, list[Estimate]]) -> None:
     checks: dict[str, Any] = {}
     for channel, schema, _, body in derived_of(recorded[0]):
@@ -120,6 +121,7 @@ def test_steps_echoes_and_pressure_are_plausible(recorded: tuple[Path, list[Esti
     assert sum(name.startswith("plan") for name in names) == 1
 
 
+@pytest.mark.long
 def test_a_recording_with_derived_messages_replays_to_the_same_estimates(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     assert tuple(open_recording(path).chunks()) == walk_chunks()

@@ -75,6 +75,7 @@ def test_csv_and_parquet_hold_every_bit(folder: Path, estimates: list[Estimate])
     assert {f.name for f in dataclasses.fields(Estimate)} < columns.keys()
 
 
+@pytest.mark.long
 def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: list[Estimate]) -> None:
     georeference = load_plan(folder / "plan.json").georeference
     assert georeference is not None

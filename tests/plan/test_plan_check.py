@@ -201,6 +201,7 @@ def test_walls_of_a_rectangle() -> None:
     assert not len(within(walls, (100, 100, 101, 101)))
 
 
+@pytest.mark.long
 def test_pictures(tmp_path: Path) -> None:
     plan = load_plan(DEMO)
     draw_plan(plan, tmp_path / "plan.png", [0])
@@ -236,6 +237,7 @@ def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
     ET.parse(tmp_path / "plan.svg")
 
 
+@pytest.mark.long
 def test_many_walls_become_pixels(tmp_path: Path) -> None:
     at = np.arange(30_000) * 0.01
     walls = np.column_stack((at, at, at + 0.01, at + 0.01))

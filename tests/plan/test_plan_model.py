@@ -194,12 +194,14 @@ PLANS = st.builds(
 )
 
 
+@pytest.mark.long
 @given(PLANS)
 @settings(max_examples=100, deadline=None)
 def test_any_plan_is_read_back(plan: Plan) -> None:
     same(plan, parse_plan(plan_json(plan).encode()))
 
 
+@pytest.mark.long
 @given(
     st.recursive(
         st.none() | st.booleans() | st.floats() | TEXTS,

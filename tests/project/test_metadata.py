@@ -19,6 +19,8 @@ import yaml
 from board_runs import ROOT
 from release import wheel as wheels
 
+pytestmark = pytest.mark.process
+
 PUBLIC = "https://example.org/owner/echostep"
 PROJECT = tomllib.loads((ROOT / "host/pyproject.toml").read_text())["project"]
 
@@ -38,7 +40,6 @@ def metadata(wheel: Path) -> Message:
         return message_from_string(archive.read(name).decode())
 
 
-@pytest.mark.process
 def test_pypi_takes_the_wheel_without_a_warning(built: Path) -> None:
     pytest.importorskip("twine")
     done = subprocess.run(
@@ -82,7 +83,6 @@ def test_the_licence_that_the_package_takes_along_is_the_projects(built: Path) -
         assert archive.read(name) == (ROOT / "LICENSE").read_bytes()
 
 
-@pytest.mark.process
 def test_without_a_public_address_none_is_invented(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("hatchling")
     monkeypatch.delenv("ECHOSTEP_URL", raising=False)

@@ -16,6 +16,8 @@ import pytest
 from board_runs import ROOT
 from waiting import PATIENCE_S
 
+pytestmark = pytest.mark.process
+
 LOADED = re.compile(r"<(?:script|img|source|iframe|link(?! rel=\"canonical\"))\b[^>]*?\b(?:src|href)=\"([^\"]+)\"")
 
 
@@ -47,7 +49,6 @@ def test_make_site_builds_as_this_test_does() -> None:
     assert " out/site" in recipe
 
 
-@pytest.mark.process
 def test_each_page_of_the_manual_is_in_the_contents(site: Path) -> None:
     contents = (site / "index.html").read_text()
     listed = re.findall(r"^\| \[[^]]+\]\(([^)]+)\.md\)", (ROOT / "host/docs/README.md").read_text(), flags=re.M)
@@ -86,7 +87,6 @@ def test_the_python_api_is_in_the_site(site: Path) -> None:
         assert re.search(rf"<h3>{name}<", api), name
 
 
-@pytest.mark.process
 def test_a_dead_link_fails(tmp_path: Path) -> None:
     pytest.importorskip("furo", reason="sphinx is not installed: no site is built")
     (tmp_path / "in").mkdir()

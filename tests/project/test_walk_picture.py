@@ -17,6 +17,8 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep_studies.figures import walk_picture
 
+pytestmark = pytest.mark.long
+
 PLAN = load_plan(walk_picture.PLAN)
 
 
@@ -49,7 +51,6 @@ def test_the_picture_in_the_manual_moves_is_small_and_is_of_this_walk() -> None:
         assert pixels_of(middle, colour, about=40) > 30, colour  # lossy
 
 
-@pytest.mark.long
 def test_each_frame_shows_truth_estimate_ellipse_and_particles(walk: list[walk_picture.Moment]) -> None:
     first, last = walk_picture.frames([walk[0], walk[-1]], PLAN)
     assert first.size == last.size

@@ -111,6 +111,7 @@ def test_a_whole_recording_says_nothing(tmp_path: Path) -> None:
     assert skipped(recording, Tracker(load_plan(DEMO)).streams) == []
 
 
+@pytest.mark.long
 def test_no_flip_ends_a_track_early_without_a_word(tmp_path: Path) -> None:
     """The small version of `make flips`."""
     with Recorder(tmp_path / "walk.mcap", {"seed": "1"}) as recorder:

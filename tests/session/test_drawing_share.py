@@ -93,9 +93,12 @@ def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: 
     wearer = Tracker(plan, plan.start, seed=7)
     estimates = list[Estimate]()
     with start_recording(tmp_path / "bo/walk.mcap", run_metadata(plan, plan.start, 7, "on a drawing")) as recorder:
-        for chunk in scenario.chunks():
-            recorder.write(chunk)
-            estimates += wearer.feed(chunk)
+        chunks = list(scenario.chunks())
+        for begin in range(0, len(chunks), PORTION):
+            portion = chunks[begin : begin + PORTION]
+            for chunk in portion:
+                recorder.write(chunk)
+            estimates += wearer.take(portion_of(portion))
     found = errors(estimates, Truth(scenario.truth[:, 0], scenario.truth[:, 1:3]))
     assert found is not None
     assert found.mean_m < 0.2

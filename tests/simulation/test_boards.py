@@ -217,6 +217,7 @@ def test_a_board_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None
         board.close()
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("command", [[], ["/no/such/board"]])
 def test_a_board_that_cannot_start_is_named(command: list[str]) -> None:
     with pytest.raises(EchostepError, match="cannot start"):

@@ -12,6 +12,8 @@ import pytest
 from board_runs import ROOT
 from release import wheel as wheels
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture(scope="module")
 def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
@@ -27,7 +29,6 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     return programs, wheels.environment_variables(programs, folder)
 
 
-@pytest.mark.process
 def test_an_installed_wheel_decodes_and_looks_into_recordings(
     fresh: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
@@ -41,7 +42,6 @@ def test_an_installed_wheel_decodes_and_looks_into_recordings(
     assert told.rstrip().endswith("whole")
 
 
-@pytest.mark.process
 def test_an_installed_wheel_has_what_the_demo_needs(fresh: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
     programs, env = fresh
     code = (

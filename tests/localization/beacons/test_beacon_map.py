@@ -81,6 +81,7 @@ def test_live_and_replay_agree_bit_for_bit_and_beacons_are_found(walk: Walk) -> 
     assert np.hypot(one[-1].x_m - end[0], one[-1].y_m - end[1]) < 0.3
 
 
+@pytest.mark.long
 def test_another_cloud_that_is_tracked_from_now_on_locates_the_beacons_anew(walk: Walk) -> None:
     """A search that is followed has placed no beacon, and those of the wrong cloud are not where it put them."""
     tracker = walk.tracker()

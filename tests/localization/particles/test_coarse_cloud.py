@@ -58,6 +58,7 @@ def told(way_m: float) -> float:
     return float(np.ptp(cloud.log_weight))
 
 
+@pytest.mark.long
 def test_a_ping_tells_by_the_way_since_the_one_before() -> None:
     whole = told(INDEPENDENT_M)
     assert told(0.5 * INDEPENDENT_M) == pytest.approx(0.5 * whole, rel=0.05)

@@ -241,6 +241,7 @@ def test_a_run_with_a_teammates_beacons_is_the_same_in_any_portions(two: Two) ->
     assert tracker.state.team_beacons == {"kim": two.beacons}
 
 
+@pytest.mark.long
 def test_a_page_shows_the_teammates_beacons_that_are_not_its_own(two: Two) -> None:
     far = SharedBeacon(99, 20.0, 2.0, 0, 0.04, 0.0, 0.01)
     tracker, estimates = two.run(told(*two.beacons, far))

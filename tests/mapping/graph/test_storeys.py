@@ -28,6 +28,8 @@ from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import CORRIDOR_Y, STOREY_M, stairs_from, tower
 
+pytestmark = pytest.mark.long
+
 NO_PINGS = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 
 
@@ -57,7 +59,6 @@ def drawn(walk: SimulatedWalk, mapped: Mapped) -> tuple[Plan, Walked]:
     return plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "tower")
 
 
-@pytest.mark.long
 def test_each_storey_has_its_walls(drawn: tuple[Plan, Walked]) -> None:
     plan, _ = drawn
     assert [level.name for level in plan.levels] == ["0", "1"]
