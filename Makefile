@@ -82,7 +82,7 @@ bench: $(VENV)/peers ## speed of the host as ratios against others, in the same 
 
 page-speed: $(READY) ## latency and frame rate of the live page and of the commander's page in Chromium
 	@tools/apt.sh chromium || echo "Chromium is not installed."
-	$(BIN)/python -m pytest -q -s -m speed tests/page/test_page_speed.py tests/operation/test_table_speed.py
+	$(BIN)/python -m pytest -q -s -m speed tests/page/web/test_page_speed.py tests/operation/test_table_speed.py
 
 operation: $(READY) ## 20 wearers on one broker, two with the real firmware, one lost, one fallen, one rescuer, one commander
 	@tools/apt.sh $(APT_PACKAGES) mosquitto

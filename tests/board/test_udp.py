@@ -16,9 +16,8 @@ from echostep.board.frames import encode
 from echostep.board.gateway import FEW_S, MOST_BEACONS, Gateway
 from echostep.commands.actions.beacon_player import _open_sender
 from echostep.errors import EchostepError
-from echostep.ports import chunk_queue, udp
-from echostep.ports.chunk_queue import ChunkQueue
-from echostep.ports.chunks import GATEWAY, MTX, Chunk
+from echostep.ports import chunks, udp
+from echostep.ports.chunks import GATEWAY, MTX, Chunk, ChunkQueue
 from echostep.ports.datagram_key import Opener, read_key, seal
 from echostep.ports.udp import UdpPort
 from echostep.simulation.devices.beacon_gateway import message
@@ -117,7 +116,7 @@ def test_a_query_that_is_not_a_key_is_refused(query: str) -> None:
 
 
 def test_a_queue_drops_and_counts_what_finds_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunk_queue, "MOST_BYTES", 10_000)
+    monkeypatch.setattr(chunks, "MOST_BYTES", 10_000)
     queue = ChunkQueue()
     for k in range(100):
         queue.put(Chunk(GATEWAY, k, bytes(900)))

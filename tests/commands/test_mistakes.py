@@ -20,10 +20,10 @@ from echostep.board.frames import encode
 from echostep.recording.background_writer import BackgroundWriter
 from echostep.session.console import print_notices
 from echostep.team.outbox import Outbox
-from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
-from mt_lines import on_a_terminal
+from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from players import babbling_port, pseudo_terminal, python_board
 from waiting import PATIENCE_S
+from xsens.mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 PAGE = ROOT / "host/docs/mistakes.md"

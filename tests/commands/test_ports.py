@@ -24,10 +24,10 @@ from echostep.ports.chunks import Chunk
 from echostep.recording.device import sender
 from echostep.recording.reading import open_recording
 from echostep.xsens import PROJECT
-from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
-from mt_lines import on_a_terminal
+from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from players import babbling_port, pseudo_terminal, python_board
 from waiting import PATIENCE_S
+from xsens.mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 

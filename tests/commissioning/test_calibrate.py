@@ -29,7 +29,7 @@ from echostep.settings import Settings, parse_settings
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.devices.board_sensors import Adis16100Model
 from echostep.simulation.people.walker import Person, walk
-from echostep_studies.simulation.rehearsal import Act, Rehearsal
+from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
 from players import pseudo_terminal, python_board
 
 COUNT_RAD_S = math.radians(0.2439)

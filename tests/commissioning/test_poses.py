@@ -36,7 +36,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
 from echostep.simulation.devices.board import BoardProcess
-from echostep_studies.simulation.poses import LyingParts
+from echostep_studies.simulation.devices.poses import LyingParts
 from waiting import PATIENCE_S
 
 G = 9.81

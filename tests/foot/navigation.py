@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step, Track
+from foot import foot_walks as fw
 
 Samples = tuple[Floats, Floats, Floats]
 

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
+from foot import foot_walks as fw
 from foot.navigation import moves, same, walking
 
 

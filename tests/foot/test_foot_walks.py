@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import foot_walks as fw
 from echostep.foot.steps import Foot, FootSettings, Stance, Step, walk_track
+from foot import foot_walks as fw
 from foot.navigation import moves, same, walking
 
 LATENCY_S = 0.05

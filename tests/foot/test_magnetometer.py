@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
+from foot import foot_walks as fw
 from needs_data import needs_data
 from places import DATA
 

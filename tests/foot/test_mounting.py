@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import foot_walks as fw
 from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.foot.alignment import Alignment, aligned
@@ -24,6 +23,7 @@ from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
 from echostep_studies.bench.recordings.feet import SETS
 from echostep_studies.frame.recordings import read_sets
+from foot import foot_walks as fw
 from needs_data import needs_data
 from places import DATA
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import foot_walks as fw
 from echostep.arrays import Floats
 from echostep.foot.steps import walk_track
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
 from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import recordings_in
+from foot import foot_walks as fw
 from needs_data import needs_data
 from places import DATA
 

@@ -19,7 +19,7 @@ from echostep.legs.walking_bout import Swing, leaving_share, stairs_flag
 from echostep.offline.leg_csv import LegSamples
 from echostep.offline.leg_track import track_default
 from echostep.simulation.people.walker import Person, Walk, Waypoint, walk
-from foot_walks import any_rotation
+from foot.foot_walks import any_rotation
 
 CORNER: list[Waypoint] = [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)]
 

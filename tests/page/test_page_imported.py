@@ -13,12 +13,12 @@ import pytest
 from echostep.page.mailbox import Mailbox
 from echostep.plan.importers.formats import import_plan
 from echostep.plan.model import Plan
-from imported_plans import seven_floors, write_seven_floors
 from page.browser import NAMES, looking, wait_for
 from page.frames import scene, served, told
 from plan import test_plan_importer_dxf as dxf
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
+from plan.imported_plans import seven_floors, write_seven_floors
 
 
 def from_dxf(folder: Path) -> Plan:

@@ -13,7 +13,7 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.plan.check import check_plan
 from echostep.plan.importers.formats import import_plan
-from echostep.plan.importers.osm.levels import levels_of
+from echostep.plan.importers.osm.elements import levels_of
 from echostep.plan.model import Plan
 
 LON, LAT = 8.85, 53.11

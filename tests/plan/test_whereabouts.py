@@ -15,7 +15,7 @@ from echostep.plan.model import Level, Plan, Pose, Room, load_plan
 from echostep.plan.places.gaps import door_gaps
 from echostep.plan.places.standing import StandingGround, refuse_impossible
 from echostep.plan.places.whereabouts import Whereabouts
-from imported_plans import seven_floors
+from plan.imported_plans import seven_floors
 
 DEMO = load_plan(ROOT / "host/echostep/plans/demo.json")
 

@@ -23,7 +23,7 @@ from board_runs import ROOT
 from command_line import PROGRAM, echostep
 from echostep import cli
 from echostep.extras import EXTRAS
-from foot_walks import MANNERS, course, samples
+from foot.foot_walks import MANNERS, course, samples
 from walks import DEMO
 
 pytestmark = pytest.mark.process

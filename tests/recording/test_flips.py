@@ -18,7 +18,7 @@ from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
 from echostep.recording.repair.contents import info
 from echostep.recording.repair.edit import repair
-from echostep.session.skipped import skipped
+from echostep.session.losses import skipped
 from echostep.tracker import Tracker
 from reliability.flip_recording import Replayed, arrival_offsets, compare, draw_flips, flip_once, replay
 from walks import DEMO, walk_chunks

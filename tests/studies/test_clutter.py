@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import shapely
 
-from carmen_logs import CUPBOARD, FAR_M, WALLS, poses, write_log
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
@@ -30,6 +29,7 @@ from echostep_studies.bench.laser.scan_pings import hear
 from echostep_studies.bench.laser.wall_lines import straight_pieces, wall_segments
 from echostep_studies.clutter import study
 from echostep_studies.frame.report import as_dicts
+from studies.carmen_logs import CUPBOARD, FAR_M, WALLS, poses, write_log
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from echostep_studies.feet import leave_one_out
 from echostep_studies.feet.rows import FigureRow
 from echostep_studies.feet.study import track_of
 from echostep_studies.frame.recordings import recordings_in
-from foot_walks import any_rotation
+from foot.foot_walks import any_rotation
 from needs_data import needs_data
 from places import DATA
 

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 
 from board_runs import ROOT
-from carmen_logs import WALLS as WALLS_OF_LOG
-from carmen_logs import write_log
 from echostep.errors import EchostepError
 from echostep.mapping.graph.graph import Closure
 from echostep.mapping.graph.nodes import Nodes
@@ -31,6 +29,8 @@ from echostep_studies.noplan.sites import furnished, loop_walls
 from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run
 from needs_data import needs_data
 from places import DATA
+from studies.carmen_logs import WALLS as WALLS_OF_LOG
+from studies.carmen_logs import write_log
 
 WALLS = np.array([[0.0, 0.0, 10.0, 0.0], [0.0, 3.0, 10.0, 3.0], [0.0, 6.0, 10.0, 6.0]])
 

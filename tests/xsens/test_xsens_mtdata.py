@@ -25,7 +25,7 @@ from echostep.xsens import (
     pack_mtdata,
 )
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata
-from echostep_studies.simulation.mtx_setup import pack
+from echostep_studies.simulation.devices.mtx_setup import pack
 from reliability.fuzz.mtx import fuzz
 
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from echostep.xsens import PROJECT, MtxReader, OutputFormat, encode_frame
 from echostep.xsens.configuration.requests import project_requests, reset_heading, set_rate
 from echostep.xsens.configuration.setup import TIMEOUT_S, TRIES, MtxSetup, State
-from echostep_studies.simulation.mtx_setup import FACTORY, DeviceState, MtxDevice
-from mt_lines import SAMPLE, STEP_S, Line
+from echostep_studies.simulation.devices.mtx_setup import FACTORY, DeviceState, MtxDevice
+from xsens.mt_lines import SAMPLE, STEP_S, Line
 
 
 def device(state: DeviceState, output: OutputFormat) -> MtxDevice:

@@ -16,9 +16,9 @@ from echostep.ports.chunks import Chunk
 from echostep.recording.reading import open_recording
 from echostep.xsens import PROJECT, MtxReader, OutputFormat
 from echostep.xsens.configuration.startup import MtxStart
-from echostep_studies.simulation.mtx_setup import FACTORY, MtxDevice
-from mt_lines import on_a_terminal
+from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from waiting import PATIENCE_S
+from xsens.mt_lines import on_a_terminal
 
 PLAN = ROOT / "host/echostep/plans/demo.json"
 

@@ -14,9 +14,9 @@ from echostep.xsens import MtxReader
 from echostep.xsens.configuration.products import force_range_g, product_text
 from echostep.xsens.configuration.requests import successor_requests
 from echostep.xsens.configuration.setup import State
-from echostep_studies.simulation.mti_setup import MTI_1, MTI_3, MTI_630, Model, MtiDevice
-from mt_lines import SAMPLE, Line, on_a_terminal
+from echostep_studies.simulation.devices.mti_setup import MTI_1, MTI_3, MTI_630, Model, MtiDevice
 from players import python_board
+from xsens.mt_lines import SAMPLE, Line, on_a_terminal
 
 
 @pytest.mark.parametrize("model", [MTI_3, MTI_630, MTI_1])

@@ -26,9 +26,9 @@ from echostep.recording.mcap_records import HEAD_SIZE, LOG_TIME_OFFSET, MCAP_MAG
 from echostep.recording.reading import open_recording
 from echostep.recording.recorder import Recorder
 from echostep.recording.repair.edit import repair
+from echostep.session.losses import skipped
 from echostep.session.options import TrackingOptions
 from echostep.session.runs.replay import tracker_of
-from echostep.session.skipped import skipped
 from places import PLAN
 from reliability.campaign import Figure, none, options, report, track
 from walks import walk_chunks

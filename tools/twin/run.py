@@ -37,9 +37,9 @@ from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, demo_scenario
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC, ROW
 from echostep.xsens import MtxReader
 from echostep.xsens.reader import warm_up
-from echostep_studies.simulation.mtx_setup import MtxDevice
-from echostep_studies.simulation.poses import LyingParts
-from echostep_studies.simulation.rehearsal import Act, Rehearsal
+from echostep_studies.simulation.devices.mtx_setup import MtxDevice
+from echostep_studies.simulation.devices.poses import LyingParts
+from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
 from places import OUT, TWIN
 
 BLOCK_MS, IDLE_MS = 10, 50

@@ -73,7 +73,7 @@ void bench_reset(void);
 bool bench_swap(const char *value); /* false: there are no such sensors */
 void bench_run(int in, int out);
 
-/* usb_device.c: the device controller, from the cable's side. */
+/* usb_device.c, usb_transactions.c: the device controller, from the cable's side. */
 enum usb_answer { USB_ACK = 0, USB_NAK = -1, USB_STALL = -2, USB_SILENCE = -3, USB_REPEATED = -4 };
 void usb_device_init(void);
 void usb_device_reset(void);

@@ -100,6 +100,14 @@ Host = Annotated[
 Port = Annotated[
     int | None, typer.Option("--port", help="TCP port of the page [8420, or a free one].", min=0, max=65535)
 ]
+BoardCommand = Annotated[
+    str | None,
+    typer.Option(
+        "--board-command",
+        metavar="COMMAND",
+        help="Program that simulates the sensor board; without it the board is simulated in Python.",
+    ),
+]
 BoardPort = Annotated[
     str | None,
     typer.Option("--board", metavar="PORT", help="Serial port of the sensor board; without it, both are searched for."),

@@ -15,6 +15,7 @@ import typer
 from echostep.commands.options import (
     LOCAL,
     BeaconsPort,
+    BoardCommand,
     BoardPort,
     FootPort,
     Foxglove,
@@ -57,14 +58,7 @@ def demo(
     publish: Publish = None,
     name: Name = "",
     team: Team = "team",
-    board_command: Annotated[
-        str | None,
-        typer.Option(
-            "--board-command",
-            metavar="COMMAND",
-            help="Program that simulates the sensor board; without it the board is simulated in Python.",
-        ),
-    ] = None,
+    board_command: BoardCommand = None,
     guide: Annotated[bool, typer.Option("--guide", help="Simulate beacons, and guide to the end of the walk.")] = False,
     page: Page = None,
     host: Host = LOCAL,

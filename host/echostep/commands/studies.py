@@ -7,6 +7,7 @@ Owns nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
@@ -32,10 +33,17 @@ def add_studies(app: typer.Typer) -> None:
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
     for name in NAMES:
         loaded = entries[name].load() if name in entries else _missing()
-        if isinstance(loaded, typer.Typer):
-            app.add_typer(loaded, name=name)
+        if not isinstance(loaded, typer.Typer):
+            app.add_typer(_alone(name, loaded))  # a command of its own would be listed before those of the core
         else:
-            app.command(name)(loaded)
+            app.add_typer(loaded, name=name)
+
+
+def _alone(name: str, function: Callable[..., Any]) -> typer.Typer:
+    """A nameless group of one command."""
+    alone = typer.Typer()
+    alone.command(name)(function)
+    return alone
 
 
 def _missing() -> typer.Typer:

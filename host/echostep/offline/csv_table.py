@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """One reader for CSV files of samples: named columns of numbers, in any of three dialects.
 
-In: a text file whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable` with the wanted
-columns, NaN where there is no number; ValueError for a file that is not such a table. Owns nothing.
+In: a text file from anybody, whose first line names the columns, separated by comma, semicolon (then with decimal commas) or tab. Out: `CsvTable`
+with the wanted columns, NaN where there is no number; ValueError for a file that is not such a table, or a line that is too long. Owns nothing.
 """
 
 from __future__ import annotations
@@ -18,13 +18,45 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
-from echostep.offline.csv_lines import CsvLimits
 
+LONGEST_LINE = 10_000  # characters; by reason: no line of numbers is longer
+EARLY_ROWS = 2000  # rows after which a file of garbage is given up
+SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number; by reason: nanoseconds since 1970 have 19 digits
 TIME_UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))  # per second
 
 Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class CsvLimits:
+    """`line_chars`: a longer line is an error. `lines`: reading stops after so many. `early_rows`: rows after which garbage is given up, or None."""
+
+    line_chars: int = LONGEST_LINE
+    lines: int | None = None
+    early_rows: int | None = EARLY_ROWS
+
+
+def separator_of(first_line: str) -> str:
+    """The most frequent of comma, semicolon and tab."""
+    return max(SEPARATORS, key=first_line.count)
+
+
+def header_of(first_line: str) -> tuple[list[str], str]:
+    """Names of the columns in the first line, and the separator."""
+    separator = separator_of(first_line)
+    return [name.strip().strip('"') for name in first_line.split(separator)], separator
+
+
+def lines_of(file: TextIO, limits: CsvLimits, first: int = 1) -> Iterator[str]:
+    """Lines of bounded length, the next one being number `first`; raises ValueError for a longer one."""
+    number = first - 1
+    while (limits.lines is None or number < limits.lines) and (line := file.readline(limits.line_chars)):
+        number += 1
+        if len(line) == limits.line_chars:
+            raise ValueError(f"line {number} is longer than {limits.line_chars} characters: is this a CSV file?")
+        yield line
 
 
 @dataclass(frozen=True, slots=True)

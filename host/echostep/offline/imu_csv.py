@@ -19,8 +19,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
-from echostep.offline.csv_lines import CsvLimits, header_of, lines_of
-from echostep.offline.csv_table import number_of, open_samples, read_rows
+from echostep.offline.csv_table import CsvLimits, header_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")

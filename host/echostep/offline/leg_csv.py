@@ -21,8 +21,15 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.legs.clipping import find_clipping_limits, repair_clipping
 from echostep.legs.mounting import walking_axis
-from echostep.offline.csv_lines import LONGEST_LINE, CsvLimits, header_of, lines_of
-from echostep.offline.csv_table import open_samples, rate_complaint, read_rows
+from echostep.offline.csv_table import (
+    LONGEST_LINE,
+    CsvLimits,
+    header_of,
+    lines_of,
+    open_samples,
+    rate_complaint,
+    read_rows,
+)
 from echostep.offline.imu_checks import BACK_SHARE, MISSING_SHARE, RATE_RANGE_HZ, missing_share, sorted_by_time
 
 COLUMNS = ("t_s", "thigh_rad_s", "shank_rad_s")

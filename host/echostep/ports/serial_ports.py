@@ -18,8 +18,7 @@ import serial
 from echostep.errors import EchostepError
 from echostep.ports.access import holders, refusal
 from echostep.ports.arrival_clock import now_ns
-from echostep.ports.chunk_queue import ChunkQueue
-from echostep.ports.chunks import Chunk
+from echostep.ports.chunks import Chunk, ChunkQueue
 from echostep.ports.port_faults import PORT_FAULTS
 from echostep.ports.udp import UdpPort
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""How much of a walk was lost, and why: for the last lines of a run.
+"""How much of a walk was lost, and why, and what a replay did not use of a recording: for the last lines of a run.
 
-In: the tracker's estimates as they are published. Out: a sentence. Owns the time spent in each condition.
+In: the tracker's estimates as they are published, its counts, a recording that was read to its end. Out: sentences. Owns the time spent in each
+condition.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from collections import Counter
 from echostep.localization.belief import DOUBTED
 from echostep.localization.estimate import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
+from echostep.recording.reading import Recording
 from echostep.tracker import Tracker
-from echostep.tracker.state import TrackerState
+from echostep.tracker.state import StreamState, TrackerState
 
 ECHOLESS_S = 5.0  # without a ping for so long there are no echoes; by reason: ten pings of each ranger at the slowest
 LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long. By reason: estimates come twice a second
@@ -83,3 +85,39 @@ def _by_hand(state: TrackerState) -> str:
     undone = f", {state.undone} of them undone" if state.undone else ""
     times = "once" if state.check_ins == 1 else f"{state.check_ins} times"
     return f"; position set by hand {times}{undone}"
+
+
+def skipped(recording: Recording, streams: StreamState) -> list[str]:
+    """One line for each kind of damage; none for a whole recording of undisturbed ports."""
+    front_end = streams.front_end
+    facts = [
+        (recording.altered, "its checksum is wrong: bytes have changed since it was recorded"),
+        (
+            recording.damaged_bytes,
+            f"{recording.damaged_bytes} damaged bytes in {recording.damaged_places} places were skipped",
+        ),
+        (recording.unreadable_chunks, f"{recording.unreadable_chunks} compressed chunks cannot be opened"),
+        (
+            recording.truncated,
+            "the recording ends without an end record: it was not closed; all before was used",
+        ),
+        (
+            front_end.bad_arrivals,
+            f"{front_end.bad_arrivals} arrival times contradict the devices' counters and were not used",
+        ),
+        (front_end.clock_steps, f"the host's clock stepped or stood still {front_end.clock_steps} times"),
+        (front_end.bad_times, f"{front_end.bad_times} messages had impossible times and were dropped"),
+        (front_end.unknown_ports, f"{front_end.unknown_ports} chunks came from unknown ports"),
+        (streams.board.rejected, f"{streams.board.rejected} damaged frames of the board were dropped"),
+        (
+            streams.mtx.bad_checksum,
+            f"{streams.mtx.bad_checksum} damaged messages of the {streams.foot_name} were dropped",
+        ),
+    ]
+    lines = [f"{recording.path}: {text}" for applies, text in facts if applies]
+    damaged = recording.altered or recording.damaged_bytes or recording.truncated
+    return (
+        [*lines, f"  echostep repair {recording.path} -o OUT makes a whole file of what is readable"]
+        if damaged
+        else lines
+    )

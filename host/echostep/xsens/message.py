@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Every valid frame of an MT as a message that a person can read: nothing is dropped, gated or turned.
 
-In: bytes of a captured port. Out: `MtMessage`s in order. Owns the unfinished frame, the formats of MTData and the counts.
-The tracker does not use it: its samples pass the gates of reader.py.
+In: bytes of a captured port. Out: `MtMessage`s in order, and how many counters of 16 bits never came. Owns the unfinished frame, the formats of
+MTData, the last counter and the counts. The tracker does not use it: its samples pass the gates of reader.py.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.xsens.axes import ENU, NED, NWU, from_euler, from_matrix
-from echostep.xsens.counter_gaps import CounterGaps
 from echostep.xsens.frames import BUS_ID, CONFIGURATION, MTDATA, MTDATA2, Frame, FrameReader, MtFrameCounts
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata, rest_of
 from echostep.xsens.output_formats import OutputFormats, configured_devices
 from echostep.xsens.packets import Packet, read_packets
 from echostep.xsens.sample import Quaternion, Vector
 
+SHARED_GAP = 500  # counters; a longer step is called a jump, not lost messages; by reason
 WORLDS = {ENU: "east, north, up", NED: "north, east, down", NWU: "north, west, up"}
 NAMES = {  # of messages without a measurement [LLCP, message identifiers]
     0x01: "DeviceID", 0x05: "SetPeriodAck", 0x0D: "Configuration", 0x11: "GoToMeasurementAck", 0x13: "FirmwareRevision", 0x31: "GoToConfigAck",
@@ -31,6 +31,30 @@ NAMES = {  # of messages without a measurement [LLCP, message identifiers]
 # The packets that become fields of a message: name, field.
 _VECTORS = {"Acceleration": "accel", "RateOfTurn": "gyro", "MagneticField": "mag"}
 _ORIENTATIONS = ("Quaternion", "RotationMatrix", "EulerAngles")
+
+
+@dataclass(slots=True)
+class CounterGaps:
+    """Counters of one device: those that never came, and steps that are no gap (a restart, or a long silence)."""
+
+    lost: int = 0
+    jumps: int = 0
+    _last: int = -1
+    _others: set[int] = field(default_factory=set)
+
+    def note(self, counter: int, *, sample: bool) -> None:
+        """Count the step from the last sample. Other messages share the counter or have their own: they only explain a gap."""
+        if not sample:
+            if len(self._others) <= SHARED_GAP:
+                self._others.add(counter)
+            return
+        step = (counter - self._last) & 0xFFFF
+        if self._last >= 0 and step > SHARED_GAP:
+            self.jumps += 1
+        elif self._last >= 0 and step > 1:
+            self.lost += sum((self._last + k) & 0xFFFF not in self._others for k in range(1, step))
+        self._last = counter
+        self._others.clear()
 
 
 class MtMessage(NamedTuple):

@@ -22,7 +22,7 @@ from echostep.foot import steps as foot
 from echostep.simulation.devices import onboard_filter as onboard
 from echostep_studies.papers import fischer2008
 from echostep_studies.papers.fischer2008 import Fischer2008
-from foot_walks import MANNERS, any_rotation, course, felt
+from foot.foot_walks import MANNERS, any_rotation, course, felt
 from needs_data import needs_data
 from places import DATA
 

@@ -18,7 +18,7 @@ from echostep.xsens.configuration.requests import project_requests
 from echostep.xsens.configuration.setup import MtxSetup
 from echostep.xsens.frames import MAX_LENGTH
 from echostep.xsens.packets import read_packets
-from echostep_studies.simulation.mtx_setup import pack
+from echostep_studies.simulation.devices.mtx_setup import pack
 from reliability.campaign import Figure, options, report
 
 BLOCK = 20_000  # frames mutated together

@@ -34,7 +34,7 @@ from echostep.team.messages.shared_drawings import checked_drawing
 from echostep.tracker import Tracker
 from echostep.xsens.message import MessageReader
 from echostep_studies.barometer.pressure_csv import load_pressures
-from imported_plans import write_seven_floors
+from plan.imported_plans import write_seven_floors
 from team.team_reports import report
 from walks import DEMO, walk_chunks
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: registers on one side, the cable on the other.
+ * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: its registers; the cable's side is in usb_transactions.c.
  *
  * Endpoints with two banks. Interrupts depend on levels, as in the chip: they are computed on every access and after every interrupt. */
 #include <string.h>
@@ -7,46 +7,14 @@
 #include <simavr/sim_interrupts.h>
 
 #include "twin.h"
+#include "usb/usb_endpoints.h"
 
-enum {
-	UHWCON = 0xD7, USBCON, USBSTA, USBINT, UDCON = 0xE0, UDINT, UDIEN, UDADDR, UDFNUML, UDFNUMH, UDMFN,
-	UEINTX = 0xE8, UENUM, UERST, UECONX, UECFG0X, UECFG1X, UESTA0X, UESTA1X, UEIENX, UEDATX, UEBCLX, UEBCHX, UEINT,
-};
-enum { TXINI = 1, STALLEDI = 2, RXOUTI = 4, RXSTPI = 8, NAKOUTI = 16, RWAL = 32, NAKINI = 64, FIFOCON = 128 };
-enum { USBE = 0x80, FRZCLK = 0x20, OTGPADE = 0x10, VBUS = 1, VBUSTI = 1, VBUSTE = 1, DETACH = 1, SUSPI = 1, SOFI = 4, EORSTI = 8, WAKEUPI = 16 };
-enum { PLLCSR = 0x49, PLOCK = 1, UVREGE = 1 };
-enum { EPEN = 1, RSTDT = 8, STALLRQC = 16, STALLRQ = 32, ALLOC = 2, ADDEN = 0x80 };
-#define ENDPOINTS 7
-#define BANK_SIZE 64 /* maximum of full speed for control and bulk */
 #define VECTOR_GENERAL 10
 #define VECTOR_ENDPOINT 11
 
-struct bank {
-	uint8_t bytes[BANK_SIZE];
-	int length, read;
-	bool full; /* holds a packet, which the cable (IN) or the program (OUT) has to fetch */
-};
+struct endpoint usb_endpoints[ENDPOINTS];
 
-static struct endpoint {
-	uint8_t conx, cfg0, cfg1, enabled, flags;
-	bool stalled;
-	bool toggle; /* of the next packet, sent or expected; a control endpoint: of IN */
-	struct bank bank[2]; /* of a control endpoint: 0 is OUT and SETUP, 1 is IN */
-	int cpu, cable;      /* bank on which each side works */
-} endpoints[ENDPOINTS];
-static bool control_out_toggle;
-static uint8_t target; /* address of the transactions on the cable */
-
-static bool is_in(const struct endpoint *e) { return e->cfg0 & 1; }
-static bool is_control(const struct endpoint *e) { return (e->cfg0 >> 6) == 0; }
-static int size_of(const struct endpoint *e)
-{
-	int size = 8 << ((e->cfg1 >> 4) & 7);
-
-	return size < BANK_SIZE ? size : BANK_SIZE;
-}
-static int banks_of(const struct endpoint *e) { return (e->cfg1 >> 2) & 3 ? 2 : 1; }
-static struct endpoint *selected(void) { return &endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
+static struct endpoint *selected(void) { return &usb_endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
 static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control(e) ? 0 : e->cpu]; }
 
 static uint8_t interrupts_of(struct endpoint *e)
@@ -71,12 +39,12 @@ static void set_level(int number, bool level)
 		avr_clear_interrupt(avr, v);
 }
 
-static void refresh(void)
+void usb_refresh(void)
 {
 	uint8_t raised = 0;
 
 	for (int i = 0; i < ENDPOINTS; i++)
-		if (interrupts_of(&endpoints[i]) & endpoints[i].enabled & (uint8_t)~RWAL)
+		if (interrupts_of(&usb_endpoints[i]) & usb_endpoints[i].enabled & (uint8_t)~RWAL)
 			raised |= (uint8_t)(1 << i);
 	avr->data[UEINT] = raised;
 	bool bus = avr->data[UDINT] & avr->data[UDIEN] & 0x7D;
@@ -85,7 +53,7 @@ static void refresh(void)
 	set_level(VECTOR_ENDPOINT, raised != 0);
 }
 
-static void offer_bank(struct endpoint *e)
+void usb_offer_bank(struct endpoint *e)
 {
 	struct bank *b = &e->bank[e->cpu];
 
@@ -152,7 +120,7 @@ static void clear_flags(struct endpoint *e, uint8_t cleared)
 		if (!is_in(e))
 			b->length = b->read = 0;
 		e->cpu = (e->cpu + 1) % banks_of(e);
-		offer_bank(e);
+		usb_offer_bank(e);
 	}
 }
 
@@ -166,7 +134,7 @@ static void kill_bank(struct endpoint *e)
 	e->bank[last].full = false;
 	e->bank[last].length = 0;
 	e->cpu = last;
-	offer_bank(e);
+	usb_offer_bank(e);
 }
 
 static void reset_fifo(struct endpoint *e)
@@ -177,7 +145,7 @@ static void reset_fifo(struct endpoint *e)
 	if (is_control(e))
 		e->flags = TXINI;
 	else
-		offer_bank(e);
+		usb_offer_bank(e);
 }
 
 /* Registers of the whole device. */
@@ -193,7 +161,7 @@ static void write_device_register(avr_io_addr_t address, uint8_t value)
 			avr->data[USBINT] |= VBUSTI;
 		}
 		if (!(value & USBE))
-			memset(endpoints, 0, sizeof endpoints);
+			memset(usb_endpoints, 0, sizeof usb_endpoints);
 		break;
 	case USBINT:
 	case UDINT: avr->data[address] &= value; break;
@@ -201,7 +169,7 @@ static void write_device_register(avr_io_addr_t address, uint8_t value)
 	case UERST:
 		for (int i = 1; i < ENDPOINTS; i++)
 			if ((old & ~value) & (1 << i))
-				reset_fifo(&endpoints[i]);
+				reset_fifo(&usb_endpoints[i]);
 		avr->data[address] = value;
 		break;
 	case UEINT:
@@ -254,7 +222,7 @@ static void write_register(avr_t *a, avr_io_addr_t address, uint8_t value, void 
 	case UESTA1X: break; /* read only */
 	default: write_device_register(address, value);
 	}
-	refresh();
+	usb_refresh();
 }
 
 static void after_interrupt(struct avr_irq_t *irq, uint32_t running, void *param)
@@ -262,7 +230,7 @@ static void after_interrupt(struct avr_irq_t *irq, uint32_t running, void *param
 	(void)irq;
 	(void)param;
 	if (!running)
-		refresh();
+		usb_refresh();
 }
 
 void usb_device_init(void)
@@ -275,7 +243,7 @@ void usb_device_init(void)
 
 void usb_device_reset(void)
 {
-	memset(endpoints, 0, sizeof endpoints);
+	memset(usb_endpoints, 0, sizeof usb_endpoints);
 	avr->data[UDCON] = DETACH;
 	avr->data[USBCON] = FRZCLK;
 }
@@ -289,27 +257,22 @@ bool usb_device_attached(void)
 
 void usb_bus_reset(void)
 {
-	memset(endpoints, 0, sizeof endpoints);
+	memset(usb_endpoints, 0, sizeof usb_endpoints);
 	avr->data[UDADDR] = 0;
 	avr->data[UDINT] |= EORSTI;
-	refresh();
+	usb_refresh();
 }
 
 void usb_bus_suspend(void)
 {
 	avr->data[UDINT] |= SUSPI;
-	refresh();
+	usb_refresh();
 }
 
 void usb_bus_resume(void)
 {
 	avr->data[UDINT] |= WAKEUPI;
-	refresh();
-}
-
-void usb_target(uint8_t address)
-{
-	target = address;
+	usb_refresh();
 }
 
 void usb_frame(uint16_t number)
@@ -317,121 +280,5 @@ void usb_frame(uint16_t number)
 	avr->data[UDFNUML] = (uint8_t)number;
 	avr->data[UDFNUMH] = (number >> 8) & 7;
 	avr->data[UDINT] |= SOFI;
-	refresh();
-}
-
-/* The endpoint with this number; NULL: not enabled, or the device has another address. */
-static struct endpoint *enabled_endpoint(uint8_t number)
-{
-	uint8_t own = avr->data[UDADDR] & ADDEN ? avr->data[UDADDR] & 0x7F : 0;
-
-	if (own != target)
-		return NULL;
-	if (!usb_device_attached() || number >= ENDPOINTS || !(endpoints[number].conx & EPEN) || !(endpoints[number].cfg1 & ALLOC))
-		return NULL;
-	return &endpoints[number];
-}
-
-int usb_setup(const uint8_t *request)
-{
-	struct endpoint *e = enabled_endpoint(0);
-
-	if (!e)
-		return USB_SILENCE;
-	e->stalled = false; /* a SETUP is always accepted */
-	e->toggle = control_out_toggle = true;
-	memcpy(e->bank[0].bytes, request, 8);
-	e->bank[0].length = 8;
-	e->bank[0].read = 0;
-	e->flags = (uint8_t)((e->flags & ~RXOUTI) | RXSTPI);
-	refresh();
-	return USB_ACK;
-}
-
-static struct bank *bank_for_host(struct endpoint *e)
-{
-	return &e->bank[is_control(e) ? 1 : e->cable];
-}
-
-int usb_in(uint8_t endpoint, uint8_t *bytes, bool *toggle)
-{
-	struct endpoint *e = enabled_endpoint(endpoint);
-
-	if (!e)
-		return USB_SILENCE;
-
-	struct bank *b = bank_for_host(e);
-
-	if (e->stalled) {
-		e->flags |= STALLEDI;
-		refresh();
-		return USB_STALL;
-	}
-	if ((is_control(e) && (e->flags & RXSTPI)) || !b->full) {
-		e->flags |= NAKINI;
-		refresh();
-		return USB_NAK;
-	}
-	memcpy(bytes, b->bytes, (size_t)b->length);
-	*toggle = e->toggle;
-	return b->length;
-}
-
-/* The host has the packet: its bank is free. */
-void usb_in_acknowledged(uint8_t endpoint)
-{
-	struct endpoint *e = &endpoints[endpoint];
-	struct bank *b = bank_for_host(e);
-
-	b->length = b->read = 0;
-	b->full = false;
-	e->toggle = !e->toggle;
-	if (is_control(e)) {
-		e->flags |= TXINI;
-	} else {
-		e->cable = (e->cable + 1) % banks_of(e);
-		offer_bank(e);
-	}
-	refresh();
-}
-
-int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length, bool toggle)
-{
-	struct endpoint *e = enabled_endpoint(endpoint);
-
-	if (!e || length > (unsigned)size_of(e))
-		return USB_SILENCE;
-
-	struct bank *b = &e->bank[is_control(e) ? 0 : e->cable];
-
-	if (e->stalled) {
-		e->flags |= STALLEDI;
-		refresh();
-		return USB_STALL;
-	}
-	if ((is_control(e) && (e->flags & (RXSTPI | RXOUTI))) || b->full) {
-		e->flags |= NAKOUTI;
-		refresh();
-		return USB_NAK;
-	}
-	bool *expected = is_control(e) ? &control_out_toggle : &e->toggle;
-
-	if (toggle != *expected) {
-		bench_trace("usb: the device drops a repeated packet of %u bytes", length);
-		return USB_ACK;
-	}
-	*expected = !toggle;
-	if (length)
-		memcpy(b->bytes, bytes, length);
-	b->length = (int)length;
-	b->read = 0;
-	if (is_control(e)) {
-		e->flags |= RXOUTI;
-	} else {
-		b->full = true;
-		e->cable = (e->cable + 1) % banks_of(e);
-		offer_bank(e);
-	}
-	refresh();
-	return USB_ACK;
+	usb_refresh();
 }

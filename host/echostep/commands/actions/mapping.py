@@ -27,11 +27,11 @@ from echostep.plan.model import NO_PLAN, Plan, Pose
 from echostep.plan.writer import save_plan
 from echostep.recording.reading import Recording, open_recording
 from echostep.session.console import console
+from echostep.session.losses import skipped
 from echostep.session.metadata import recorded_start
 from echostep.session.options import TrackingOptions
 from echostep.session.progress import bar, with_bar
 from echostep.session.runs.replay import tracker_of
-from echostep.session.skipped import skipped
 
 PLAN_SD_M = 0.05  # of the walls of a plan that does not state it
 LEAST_WAY_M = 3.0  # of path that shows a wall

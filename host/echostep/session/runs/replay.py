@@ -14,13 +14,13 @@ from echostep.recording.reading import Recording, open_recording
 from echostep.scorecard.truth import load_truth
 from echostep.session.chunk_streams import paced, portions_of
 from echostep.session.console import console
+from echostep.session.losses import skipped
 from echostep.session.metadata import CHECK_IN_START, SIMULATED, plan_of, recorded_seed, recorded_start, start_given
 from echostep.session.options import OutputOptions, TrackingOptions
 from echostep.session.progress import with_bar
 from echostep.session.results import output_folder
 from echostep.session.runs.starts import check_start
 from echostep.session.session import Session
-from echostep.session.skipped import skipped
 from echostep.settings import parse_settings, read_settings
 from echostep.tracker import Tracker
 

@@ -18,8 +18,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
-from echostep.offline.csv_lines import CsvLimits, header_of, lines_of
-from echostep.offline.csv_table import MOST_BAD, open_samples, rate_complaint, read_rows
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, header_of, lines_of, open_samples, rate_complaint, read_rows
 from echostep_studies.barometer.altitude import COLDEST_C, HIGHEST_PA, LOWEST_PA, WARMEST_C, Pressures
 from echostep_studies.barometer.floor_filter import Floors
 

@@ -20,8 +20,7 @@ from echostep.errors import EchostepError
 from echostep.plan.georeference import EarthTransform
 from echostep.plan.importers.connector_shapes import join_connectors
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
-from echostep.plan.importers.osm.elements import Elements, Tags, read_osm
-from echostep.plan.importers.osm.levels import levels_of
+from echostep.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Nodes, ways and multipolygons of an OpenStreetMap file.
+"""Nodes, ways and multipolygons of an OpenStreetMap file, and the numbers of its level tags.
 
-In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`). Out: `Elements`. Owns nothing. XML with an entity or a DTD is refused.
+In: XML, or the JSON of Overpass (`out body; >; out skel;` or `out geom;`); tags (`level=0;1`, `level=-1-2`, `repeat_on=3-5`). Out: `Elements`; level
+numbers, ascending. Owns nothing. XML with an entity or a DTD is refused.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +24,29 @@ from echostep.errors import EchostepError
 from echostep.plan.importers.parsing import FORMATS, parse_json, read_text
 from echostep.plan.json_fields import number, typed
 
+RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
+MOST = 300  # greatest level number, and most levels in a range
 Tags = dict[str, str]
+
+
+def levels_of(tags: Mapping[str, str], where: str = "") -> list[float]:
+    """The level numbers of an element; empty when no tag can be read. Raises EchostepError for an impossible range."""
+    texts = f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";")
+    found: set[float] = set()
+    for text in (text.strip() for text in texts):
+        if match := RANGE.match(text):
+            low, high = float(match[1]), float(match[2])
+            if not 0 <= high - low <= MOST:
+                raise EchostepError(f"{where}: level {text[:40]!r} is no range of levels: expected LOW-HIGH, as 0-5")
+            found |= {low + step for step in range(int(high - low) + 1)}
+        else:
+            try:
+                level = float(text)
+            except ValueError:
+                continue
+            if math.isfinite(level) and abs(level) <= MOST:
+                found.add(level)
+    return sorted(found)
 
 
 @dataclass(slots=True)

@@ -15,7 +15,7 @@ import numpy as np
 from echostep.xsens import MtSample
 from echostep.xsens.configuration.requests import project_requests
 from echostep.xsens.configuration.setup import MtxSetup
-from echostep_studies.simulation.mtx_setup import MtxDevice
+from echostep_studies.simulation.devices.mtx_setup import MtxDevice
 
 SAMPLE = MtSample(7, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
 STILL = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.5, 0.0, -0.875), (1.0, 0.0, 0.0, 0.0))

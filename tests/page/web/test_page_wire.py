@@ -14,8 +14,8 @@ from echostep.page import protocol
 from echostep.page.elements.echo_lines import EchoLine
 from echostep.page.mailbox import Mailbox
 from echostep.plan.model import Plan
-from imported_plans import seven_floors
 from page.frames import PLAN, fetched, next_frame, opened, scene, served
+from plan.imported_plans import seven_floors
 from waiting import PATIENCE_S
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from echostep.page import protocol
 from echostep.page.mailbox import Mailbox
-from imported_plans import seven_floors
 from page.browser import LOOKS, NAMES, looking, opened_page, wait_for
 from page.frames import PLAN, scene, served, told
+from plan.imported_plans import seven_floors
 
 BOX = "(({ left, top, right, bottom }) => [left, top, right, bottom])(document.querySelector('%s').getBoundingClientRect())"
 OFF_PX = """[...document.querySelectorAll('#rooms text')].filter((e) => e.getAttribute('visibility') === 'visible').map((e) => {

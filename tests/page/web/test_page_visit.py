@@ -21,8 +21,8 @@ from echostep.ports.people.check_in import PERSON
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import Scenario
 from echostep.tracker import Tracker
-from imported_plans import seven_floors
 from page.browser import LOCAL, PHONE, PLAN, READY, opened_page, spot, wait_for
+from plan.imported_plans import seven_floors
 from waiting import until
 
 SIZES: dict[str, dict[str, Any]] = {"desk": {"viewport": {"width": 1280, "height": 800}}, "phone": PHONE}

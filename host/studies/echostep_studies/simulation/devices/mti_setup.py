@@ -11,7 +11,7 @@ import struct
 from typing import NamedTuple
 
 from echostep.xsens import MTDATA2, MtSample, encode_frame
-from echostep_studies.simulation.mtx_setup import DeviceState, MtxDevice
+from echostep_studies.simulation.devices.mtx_setup import DeviceState, MtxDevice
 
 COUNTER, QUATERNION, ACCEL, GYRO, MAG, EULER = 0x1020, 0x2010, 0x4020, 0x8020, 0xC020, 0x2030
 LEGACY = (0x04, 0xD0, 0xD2, 0xD4, 0xD8)  # requests of an MTx that it does not know

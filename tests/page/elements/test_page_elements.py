@@ -26,8 +26,8 @@ from echostep.plan.routing import RoutePlace
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker
-from imported_plans import seven_floors
 from page.frames import PLAN, scene, told
+from plan.imported_plans import seven_floors
 
 
 def test_a_cursor_plays_stops_seeks_and_steps() -> None:
