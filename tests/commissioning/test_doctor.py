@@ -30,6 +30,7 @@ def doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
     return echostep("doctor", *arguments)
 
 
+@pytest.mark.long
 def test_a_board_that_is_well_gets_status_0() -> None:
     with python_board() as port:
         done = doctor("--board", port, "--seconds", 4)

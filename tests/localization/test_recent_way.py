@@ -108,6 +108,7 @@ def test_doors_tell_the_true_level_by_the_second_pass() -> None:
     assert level_shares(different())[TRUE] > SURE_OF_LEVEL
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("start", [Start(level=WRONG), Start(air=Air(0.0, 1.0))])
 def test_a_level_that_is_known_stays(start: Start) -> None:
     assert level_shares(alike(), start)[WRONG] == pytest.approx(1.0)

@@ -105,6 +105,7 @@ def test_a_damaged_start_does_not_stop_the_drawing(chunks: list[Chunk], tmp_path
     assert ("begins at the origin" in done.stdout) == (not start.endswith("6"))
 
 
+@pytest.mark.long
 def test_a_silent_part_is_named(chunks: list[Chunk], tmp_path: Path) -> None:
     """Without the board there are no echoes; without the foot the leg gyros draw."""
     for port, said in (("mtx", "no echo in it"), ("board", "")):

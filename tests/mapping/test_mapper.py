@@ -75,6 +75,7 @@ def test_walls_are_known_as_well_as_the_path_that_drew_them(mapped: Mapped) -> N
     assert np.sqrt(np.mean(drawing.sd_m**2)) > 2.0 * np.sqrt(np.mean(mapped.drawing.sd_m**2))
 
 
+@pytest.mark.long
 def test_the_plans_uncertainty_is_that_of_its_length(mapped: Mapped) -> None:
     """Eight metres known to 10 cm, one metre to 50 cm, and a piece too short to be drawn."""
     walls = np.array([[0.0, 2.0, 8.0, 2.0], [9.0, 2.0, 9.0, 3.0], [0.0, 0.0, 0.05, 0.0]])

@@ -83,6 +83,7 @@ def test_every_message_is_what_its_schema_says(recorded: tuple[Path, list[Estima
     assert checks.keys() == {t.name for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION)}
 
 
+@pytest.mark.long
 def test_estimates_and_poses_are_the_trackers(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     found = derived_of(path)

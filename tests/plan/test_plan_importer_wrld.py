@@ -23,6 +23,7 @@ def westport() -> Plan:
     return import_plan(data_or_skip("maps/westport-house"))
 
 
+@pytest.mark.long
 def test_westport_has_seven_floors(westport: Plan) -> None:
     assert [level.height_m for level in westport.levels] == [0, 3.5, 7, 10.5, 14, 17.5, 21]
     assert westport.levels[2].name == "Second Floor"

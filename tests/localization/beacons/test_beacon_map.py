@@ -147,6 +147,7 @@ def test_moments_are_those_of_the_mixture() -> None:
         assert axis == pytest.approx(math.atan2(weight @ np.sin(m[:, 2]), weight @ np.cos(m[:, 2])))
 
 
+@pytest.mark.long
 def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     rng = random.Random(SEED)
     noise = [Chunk(GATEWAY, c.t_arrival_ns, rng.randbytes(200) + b"\0") for c in walk.alone[::200]]
