@@ -126,6 +126,7 @@ def test_a_port_that_is_none_is_named(port: str, words: str) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sent", "words"),
     [
@@ -141,6 +142,7 @@ def test_a_port_that_is_not_the_board_says_so(sent: bytes, words: str) -> None:
     assert not report.fine
 
 
+@pytest.mark.long
 def test_an_mtx_that_is_silent_is_a_finding() -> None:
     with pseudo_terminal() as (_, port):
         report = examine(None, port, 2.5)

@@ -157,6 +157,7 @@ def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     assert disturbed.gateway.counts.broken >= len(noise)
 
 
+@pytest.mark.long
 def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> None:
     tracker = walk.tracker()
     guided = GuidedRun(tracker, RoutePlace(*walk.truth[-1, 1:3].tolist()))
