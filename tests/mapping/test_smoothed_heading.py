@@ -76,12 +76,17 @@ def test_ways_turn_with_the_headings_and_segments_join() -> None:
         assert abs(wrap(way - heading)) < 3.0 * DRIFT_RAD
 
 
+def paths(measured: list[MeasuredSegment]) -> list[PathSegment]:
+    """The segments without their pings, whose arrays no `==` compares."""
+    return [m.segment for m in measured]
+
+
 def test_without_a_belt_or_with_one_that_does_not_turn_nothing_changes() -> None:
     walker = Walker(1, 100)
     numbed = segments_of(walker, numb)
-    assert with_smoothed_headings(numbed) == numbed
+    assert paths(with_smoothed_headings(numbed)) == paths(numbed)
     without = [replace(m, segment=replace(m.segment, belt=None)) for m in numbed]
-    assert with_smoothed_headings(without) == without
+    assert paths(with_smoothed_headings(without)) == paths(without)
     assert with_smoothed_headings([]) == []
 
 

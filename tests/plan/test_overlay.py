@@ -75,7 +75,7 @@ def test_the_archive_holds_a_document_and_a_picture_a_storey(tmp_path: Path) -> 
     assert [ground.findtext("{*}name") for ground in found] == ["tower: 0", "tower: 1", "tower: 2"]
     assert [ground.findtext("{*}visibility") for ground in found] == ["1", "0", "0"]
     for ground, overlay in zip(found, made, strict=True):
-        box = {side.tag.rpartition("}")[2]: float(side.text or "") for side in ground.find("{*}LatLonBox") or ()}
+        box = {side.tag.rpartition("}")[2]: float(side.text or "") for side in ground.findall("{*}LatLonBox/*")}
         assert box == pytest.approx({k: getattr(overlay, k) for k in ("north", "south", "east", "west")}, abs=1e-9)
         assert [child.tag.rpartition("}")[2] for child in ground] == [
             "name",
