@@ -46,7 +46,7 @@ demo: $(READY) ## track a simulated walk through the real firmware in the simula
 real: $(READY) ## a real recorded foot on a plan drawn around its surveyed path, echoes simulated; prints the error
 	$(BIN)/python -m echostep_studies.figures.real_walk --out out/real
 
-quick: $(READY) ## run the tests that need no twin, browser, process, study or more than a second
+quick: $(READY) ## run the tests that need no twin, browser, process, study or more than half a second
 	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not (twin or browser or process or study or long or speed)"
 
 test: $(READY) ## run every test

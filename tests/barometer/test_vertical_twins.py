@@ -124,6 +124,7 @@ def test_smoothing_is_the_sum_over_all_paths(seed: int, n: int) -> None:
     assert smooth_backward(joint, last) == pytest.approx(smoothed(joint, last))
 
 
+@pytest.mark.long
 def test_blocks_of_a_record_are_smoothed_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint weights of five samples at once, against those of the whole record."""
     monkeypatch.setattr(vertical_filter, "BLOCK", 5)

@@ -228,6 +228,7 @@ def test_record_keeps_the_bytes_of_both_ports(tmp_path: Path) -> None:
     assert "bytes from the board" in out
 
 
+@pytest.mark.long
 def test_a_port_that_goes_away_is_opened_again(tmp_path: Path) -> None:
     link = tmp_path / "port"
     first, theirs = os.openpty()

@@ -135,6 +135,7 @@ MISTAKES: dict[str, Mistake] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_what_a_mistake_prints_stands_in_the_manual(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mistake: str

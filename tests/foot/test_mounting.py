@@ -48,6 +48,7 @@ def off_rad(a: Floats | float, b: Floats | float) -> float:
     return float(np.abs(np.angle(np.exp(1j * (np.asarray(a) - np.asarray(b))))).max())
 
 
+@pytest.mark.long
 def test_every_axis_mounting_and_random_ones_give_the_toes_direction() -> None:
     mountings = [*axis_mountings(), *(fw.any_rotation(np.random.default_rng(k)) for k in range(10))]
     assert len(mountings) == 34
@@ -59,6 +60,7 @@ def test_every_axis_mounting_and_random_ones_give_the_toes_direction() -> None:
         assert [step.move_m[1] for step in track.steps] == pytest.approx([0.0] * 10, abs=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "manner", ["backward", "sideways", "running", "upstairs", "downstairs", "turning", "strolling"]
 )

@@ -27,6 +27,8 @@ from echostep_studies.bench import sites
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.simulation.tower import STOREY_M, tower
 
+pytestmark = pytest.mark.long
+
 STOREYS, TRUE, WRONG = 3, 1, 2
 SEED = 5
 WALKED_M = 30.0
@@ -98,12 +100,10 @@ def tracked(where: Building) -> list[Estimate]:
     return [filtered.update(measured) for measured in segments(WALKED_M)]
 
 
-@pytest.mark.long
 def test_levels_that_are_alike_are_about_as_probable_after_the_second_pass() -> None:
     assert level_shares(alike()) == pytest.approx([1.0 / STOREYS] * STOREYS, abs=0.25)
 
 
-@pytest.mark.long
 def test_doors_tell_the_true_level_by_the_second_pass() -> None:
     assert level_shares(different())[TRUE] > SURE_OF_LEVEL
 
@@ -125,7 +125,6 @@ def test_standing_does_not_lengthen_the_way_for_ever() -> None:
     assert len(way) == MOST_PIECES
 
 
-@pytest.mark.long
 def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
     """A coarse cloud's few particles made one of them sure by chance."""
     last = tracked(alike())[-10:]
@@ -136,7 +135,6 @@ def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
     assert np.hypot(last[-1].x_m - true.x_m, last[-1].y_m - true.y_m) < 0.5
 
 
-@pytest.mark.long
 def test_on_levels_that_differ_the_right_one_is_tracked() -> None:
     last = tracked(different())[-1]
     assert (last.level, last.status) == (TRUE, TrackStatus.TRACKING)

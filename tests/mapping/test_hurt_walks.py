@@ -25,6 +25,8 @@ from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
 from echostep_studies.bench.tours import clearance_m
 
+pytestmark = pytest.mark.long
+
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 HEADING_RAD = 0.5 * math.pi
 
@@ -54,7 +56,6 @@ def length_m(walls: Floats) -> float:
     return float(np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum())
 
 
-@pytest.mark.long
 def test_a_walk_killed_at_any_moment_leaves_a_drawing_of_what_was_walked(whole: bytes, tmp_path: Path) -> None:
     """Cut at eight places, in the middle of records: a short beginning has no walk in it, every longer one more walls, all of them true."""
     drawn = []
@@ -78,7 +79,6 @@ def test_a_walk_killed_at_any_moment_leaves_a_drawing_of_what_was_walked(whole: 
     assert all(later > 0.9 * earlier for earlier, later in zip(drawn, drawn[1:], strict=False))
 
 
-@pytest.mark.long
 def test_damage_in_the_middle_is_said_and_the_rest_is_drawn(whole: bytes, tmp_path: Path) -> None:
     """Two kilobytes of zeros at three places."""
     hurt = bytearray(whole)
@@ -92,7 +92,6 @@ def test_damage_in_the_middle_is_said_and_the_rest_is_drawn(whole: bytes, tmp_pa
     assert length_m(load_plan(tmp_path / "plan.json").levels[0].walls) > 60.0
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("start", ["1,2", "nan,0,0,0", "1e300,0,0,0", "2.0,7.5,0.0,6"])
 def test_a_damaged_start_does_not_stop_the_drawing(chunks: list[Chunk], tmp_path: Path, start: str) -> None:
     """The drawing begins at the origin; a start on a level that the drawing has not begins on its only one."""

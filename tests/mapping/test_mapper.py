@@ -29,6 +29,8 @@ from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.noplan.judgement import known_start, path_columns
 
+pytestmark = pytest.mark.long
+
 PLAN = load_plan(ROOT / "host/echostep/plans/demo.json")
 
 
@@ -44,7 +46,6 @@ def mapped(walk: SimulatedWalk) -> Mapped:
     return map_walk(walk.segments)
 
 
-@pytest.mark.long
 def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     """Every drawn wall is one, within 0.2 m at nine of ten places; both corridors are there; the plan has no faults."""
     plan, ((path,),) = plan_of(mapped, walk.pose_at(walk.segments[0].segment.t0_s), "drawn")
@@ -63,7 +64,6 @@ def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     assert 0.01 < plan.uncertainty_m < 0.2
 
 
-@pytest.mark.long
 def test_walls_are_known_as_well_as_the_path_that_drew_them(mapped: Mapped) -> None:
     """The same walk by a foot that errs ten times as much, without its returns: more than twice as uncertain; the walls stay where they are."""
     graph, nodes = mapped.graph, mapped.graph.nodes
@@ -108,7 +108,6 @@ def test_a_closure_that_the_walk_contradicts_is_known_by_it(mapped: Mapped) -> N
     assert contradicted(graph, Closure(10, 11, graph.pose[11] - graph.pose[10], np.eye(3), 10.0)) == pytest.approx(10.0)
 
 
-@pytest.mark.long
 def test_walls_at_any_angle_are_no_building_with_two_directions(mapped: Mapped, walk: SimulatedWalk) -> None:
     """The evidence of the office is overwhelming; with a heading that turns by a degree each decimetre there is none."""
     assert mapped.directions.evidence > math.log(1e6)
@@ -171,7 +170,6 @@ def beside(span_s: float) -> list[MeasuredSegment]:
     return found
 
 
-@pytest.mark.long
 def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
     """`echostep map` of a recorded demo; the same walk is tracked on the drawing, and never lost."""
     scenario = demo_scenario(PLAN, 4, PythonBoard(4))

@@ -109,6 +109,7 @@ def test_the_recorded_walk_has_all_that_matters() -> None:
     assert ours.identity is not None
 
 
+@pytest.mark.long
 @given(st.lists(st.integers(0, 1 << 20), max_size=40))
 @settings(max_examples=25, deadline=None)
 def test_any_portions_tell_the_same(cuts: list[int]) -> None:

@@ -83,6 +83,7 @@ def test_every_message_is_what_its_schema_says(recorded: tuple[Path, list[Estima
     assert checks.keys() == {t.name for t in (*TOPICS, POSE, FRAME, SCENE, LOCATION)}
 
 
+@pytest.mark.long
 def test_estimates_and_poses_are_the_trackers(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     found = derived_of(path)
@@ -96,6 +97,7 @@ def test_estimates_and_poses_are_the_trackers(recorded: tuple[Path, list[Estimat
         assert 2.0 * math.atan2(pose["orientation"]["z"], pose["orientation"]["w"]) == pytest.approx(e.heading_rad)
 
 
+@pytest.mark.long
 def test_messages_stand_at_their_own_time(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     chunks = list(open_recording(path).chunks())

@@ -63,6 +63,7 @@ def export(folder: Path, name: str, plan: Path | None = None) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_csv_and_parquet_hold_every_bit(folder: Path, estimates: list[Estimate]) -> None:
     with export(folder, "track.csv").open() as file:
         written = list(csv.DictReader(file))

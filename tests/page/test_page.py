@@ -41,6 +41,7 @@ kinds = st.sampled_from(
 )
 
 
+@pytest.mark.long
 @given(kinds, st.dictionaries(fields, json_like, max_size=6))
 def test_no_request_breaks_the_parser(kind: str, rest: dict[str, object]) -> None:
     requests.parse_request(json.dumps({"kind": kind, **rest}))

@@ -224,6 +224,7 @@ def test_pictures(tmp_path: Path) -> None:
         draw_plan(plan, tmp_path / "none" / "plan.png", [0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["$x^$", "$\\frac{1}", "a\x00b\nc", "x" * 5000, "\U0001f600", "$$", "&<>"])
 def test_any_name_is_drawn(tmp_path: Path, name: str) -> None:
     plan = house(
@@ -266,6 +267,7 @@ def test_commands(tmp_path: Path) -> None:
         assert isinstance(failed.exception, EchostepError)
 
 
+@pytest.mark.long
 def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rooms too close for their names, findings on one spot: what is drawn is apart, and the title counts the names left out."""
     rooms = [{"name": f"a long name of a room {k}", "at": [4 + 0.3 * (k % 5), 4 + 0.2 * (k // 5)]} for k in range(40)]

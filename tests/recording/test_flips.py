@@ -42,6 +42,7 @@ def nth(port: str, n: int) -> int:
     return [k for k, chunk in enumerate(walk_chunks(SECONDS)) if chunk.port == port][n]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("port", "n", "bit"),
     [("board", 0, 41), ("mtx", 5, 41), ("board", 1500, 31), ("board", 1500, 41), ("mtx", 305, 42), ("board", 1500, 55)],

@@ -219,6 +219,7 @@ def air() -> Iterator[Air]:
         yield air
 
 
+@pytest.mark.long
 def test_a_report_goes_from_node_to_node(air: Air) -> None:
     """By the package's serial API: outbox, two pseudo terminals, and into the commander's inbox. Positions are Meshtastic's own too."""
     mine, theirs = air.node(), air.node()
@@ -296,6 +297,7 @@ def test_a_node_that_is_unplugged_is_an_os_error(air: Air) -> None:
         transport.open()
 
 
+@pytest.mark.long
 def test_a_port_that_the_package_closes_under_a_write_is_an_os_error(air: Air) -> None:
     node = MeshNode(air.node().port)
     interface = node._interface

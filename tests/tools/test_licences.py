@@ -59,6 +59,7 @@ def test_the_licence_of_every_dependency_is_listed() -> None:
         assert "GPL" not in licences.licence(package).replace("LGPL", ""), f"{name} would bind a program that is MIT"
 
 
+@pytest.mark.long
 def test_make_licences_prints_a_row_for_each(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,6 +105,7 @@ def test_the_pages_are_compared(start: Start) -> None:
     assert start("docs.generate", "--check") == 0
 
 
+@pytest.mark.long
 def test_the_versions_are_written(tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tested_versions, "FILE", tmp_path / "versions.txt")
     assert start("release.tested_versions") == 0

@@ -147,6 +147,7 @@ def test_moments_are_those_of_the_mixture() -> None:
         assert axis == pytest.approx(math.atan2(weight @ np.sin(m[:, 2]), weight @ np.cos(m[:, 2])))
 
 
+@pytest.mark.long
 def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     rng = random.Random(SEED)
     noise = [Chunk(GATEWAY, c.t_arrival_ns, rng.randbytes(200) + b"\0") for c in walk.alone[::200]]
@@ -156,6 +157,7 @@ def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     assert disturbed.gateway.counts.broken >= len(noise)
 
 
+@pytest.mark.long
 def test_guided_walk_gives_cues_and_writes_them(walk: Walk, tmp_path: Path) -> None:
     tracker = walk.tracker()
     guided = GuidedRun(tracker, RoutePlace(*walk.truth[-1, 1:3].tolist()))

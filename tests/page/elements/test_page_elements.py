@@ -112,6 +112,7 @@ def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) ->
     return bool(len(walls.query(shapely.LineString(line_m), predicate="intersects")))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
 def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
     """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""

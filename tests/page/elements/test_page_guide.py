@@ -130,6 +130,7 @@ def test_all_pages_are_guided_by_the_run_until_one_of_them_chooses_a_destination
             assert until(late, lambda frame: bool(frame["goal"]))["guidance"]["own"]
 
 
+@pytest.mark.long
 def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk]) -> None:
     tracker, guided = guided_tracker()
     with LivePage(tracker, "A replay", LOCAL, guided, replay=True) as replay_page:
