@@ -26,6 +26,7 @@ include_patterns = [
     "README.md",
     "host/*.md",
     "host/docs/*.md",
+    "host/studies/*.md",
     "firmware/*.md",
     "firmware/hardware/*.md",
     "protocol/*.md",
