@@ -15,7 +15,7 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 
-# How much of an arc the way in a turn is. By reason: the simulated wearers walk whole arcs; in the one turn at hand with motion capture, on the spot,
+# How much of an arc the way in a turn is. The simulated wearers walk whole arcs; in the one turn at hand with motion capture, on the spot,
 # the pelvis went 0 to 0.4 of it [Sy 2020]
 BENT = 0.5
 Share = TypeVar("Share", float, Floats)

@@ -16,7 +16,7 @@ from typing import Protocol
 from echostep.arrays import record_dtype
 from echostep.jit import kernel
 
-# All constants here are by reason.
+# Assumed, not measured.
 PERIODS = 1.5  # silence at least, in the times between measurements that were usual: one may be missing
 PERIOD_KEPT = 0.9  # share of the usual time between measurements that stays after a shorter one
 SAFE_S = 15.0  # of contact after which the allowed silence is the first one again

@@ -17,9 +17,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-STEP_M = 0.5  # least distance between two positions; by reason: corners of corridors are kept
-JOIN_M = 1.0  # positions so near on one storey are the same place; by reason: less than a wall between two people in the middle of their ways
-STOREY_M = 1.5  # less than this between their heights; by reason: half a storey
+STEP_M = 0.5  # least distance between two positions: corners of corridors are kept
+JOIN_M = 1.0  # positions so near on one storey are the same place: less than a wall between two people in the middle of their ways
+STOREY_M = 1.5  # less than this between their heights: half a storey
 
 
 class OwnWay:

@@ -16,8 +16,8 @@ from echostep.arrays import Floats
 from echostep.legs.stride import LegCounts
 from echostep.legs.swing_detection import GRID_HZ
 
-LONGEST_GAP_S = 0.25  # integrated over; by reason: a quarter of a stride
-FASTEST_RAD_S = 35.0  # a larger rate is impossible; by reason: nearly twice a sprinter's shank
+LONGEST_GAP_S = 0.25  # integrated over: a quarter of a stride
+FASTEST_RAD_S = 35.0  # a larger rate is impossible: nearly twice a sprinter's shank
 
 
 class Sample(enum.Enum):

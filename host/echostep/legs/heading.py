@@ -36,7 +36,7 @@ BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose mean rates di
 CALM_BINS = 7
 CALM_RAD_S = math.radians(1.0)
 
-# Fit of the compass errors; by reason, all of them.
+# Fit of the compass errors, assumed, all of them.
 FULL_TURN_RAD = math.radians(330.0)  # to be turned: second harmonics bridge the rest
 FEWEST_READINGS = 20  # three for each of the six unknowns, and more
 LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as that of the earth

@@ -33,7 +33,7 @@ MEAN_SD_RAD = math.radians(
 STRIDE_SD_RAD = math.radians(1.5)  # growth in a stride: soft tissue
 UNKNOWN_SD_RAD = math.radians(20.0)  # before anything is known
 Signs = tuple[float, float]
-# Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one; by reason.
+# Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one, assumed.
 CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
 # Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)

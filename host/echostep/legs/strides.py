@@ -29,10 +29,8 @@ from echostep.legs.walking_bout import SPEED_S, Bout, Swing, leaving_share, pace
 
 # The source of a value without a citation is not recorded.
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
-UNWATCHED_M_S, LONGEST_DOUBT_S = (
-    0.4,
-    600.0,
-)  # growth of the sd in a gap or without a swing, and for how long it grows in a gap
+# Growth of the sd in a gap or without a swing, and for how long it grows in a gap
+UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0
 FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; people run above [Alexander 1989]
 SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
@@ -48,10 +46,10 @@ LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
 STAYS = 0.44  # last phase of a foot that stays on the floor
-FEWEST_SPEED = 6  # grid samples that give a speed; by reason
-CALM = 6  # grid samples without motion at either end of a record, which show that it begins or ends with standing; by reason
+FEWEST_SPEED = 6  # grid samples that give a speed, assumed
+CALM = 6  # grid samples without motion at either end of a record, which show that it begins or ends with standing, assumed
 FORGET = 500  # grid samples no longer needed, from which on they are dropped
-# Strides in a row that confirm the signs, or contradict them; by reason: motion before a walk is seldom so regular.
+# Strides in a row that confirm the signs, or contradict them: motion before a walk is seldom so regular.
 CONFIRMING = 3
 
 

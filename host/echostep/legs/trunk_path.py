@@ -114,9 +114,8 @@ class LegPath:
         self._covered_s = t1
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
-        begun = (
-            t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
-        )  # no way before: the wearer may turn on the spot
+        # No way before: the wearer may turn on the spot
+        begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
         ahead, aside = self._direction(max(t0, begun), t1)
         length = share * stride.length_m
         if Flag.EDGE not in stride.flags and length > 0.0:

@@ -31,7 +31,7 @@ from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall
 
-# All constants here are by reason.
+# Assumed, not measured.
 SILENT_S = 8.0  # without a reading, while it is expected to be heard and others are: the beacon is silent
 EXPECTED_SHARE = 0.6  # of the greatest range at which a beacon was heard: within it, and without a wall between, it is expected to be heard
 

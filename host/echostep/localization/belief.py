@@ -26,17 +26,15 @@ from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan.model import Pose
 
-# All by reason.
+# Assumed, not measured.
 WRONG_PER_M = 2e-5  # probability that a right cloud becomes wrong on a metre of the path: once in 50 km
 STATED = 0.99  # prior probability of a stated start
 # Of a ping's log-ratio, up to which it tells nothing: an error of one standard deviation that stays along a wall (plan, sway, speed of sound) is the
 # cloud's alone, for a rival that follows the wall learns it
 STAYS = 0.5
-LEAST, MOST = (
-    -6.0,
-    12.0,
-)  # log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
-# All by reason.
+# Log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
+LEAST, MOST = -6.0, 12.0
+# Assumed, not measured.
 PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
 GRAZED = 0.2  # of a wall on a plan that states an error: its end is in the way of a right cloud by as much, on 100 m once or so
@@ -46,9 +44,8 @@ ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in
 MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
 NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
-CROSSED_M = (
-    4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
-)
+# From one way through a wall, within which another is through the same one; path on which a cloud goes through
+CROSSED_M = 4.0
 THROUGH = math.log(
     1 / 100
 )  # share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more

@@ -23,19 +23,19 @@ from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.places import Hypothesis
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
-TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter, by reason: a door, a room
-SURE = 0.95  # probability of an error below TRACKING_M while tracking, by reason
-# Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, by reason
+TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter: a door, a room
+SURE = 0.95  # probability of an error below TRACKING_M while tracking, assumed
+# Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
 MUCH_LIKELIER = 2.0
-UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, by reason
+UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, assumed
 RISK = 1e-3  # probability of an error beyond the protection radius
-# Of the protection radius of a normal distribution, by reason: errors of echoes and steps have heavier tails.
+# Of the protection radius of a normal distribution: errors of echoes and steps have heavier tails.
 TAIL = 1.5
-SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, by reason
-UNFIT = 0.5  # probability of the plan below which it is said not to fit, by reason
-OUTSIDE = 0.5  # probability of being outside of the building above which it is said, by reason
-SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, by reason
-WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
+SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, assumed
+UNFIT = 0.5  # probability of the plan below which it is said not to fit, assumed
+OUTSIDE = 0.5  # probability of being outside of the building above which it is said, assumed
+SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, assumed
+WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
 
 
 class Moments(NamedTuple):

@@ -18,8 +18,8 @@ from echostep.path import MeasuredSegment, PathSegment
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
 HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
 HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
-AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce, by reason: draughts
-# All by reason.
+AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce: draughts
+# Assumed, not measured.
 PAUSE_S = 1.0  # between two segments: nothing was received
 LONG_S = 5.0  # of an unobserved segment: a walk out of the room
 MUTE_S = 10.0  # of standing without a ping, where there were pings before: rangers measure whatever the wearer does

@@ -18,8 +18,8 @@ from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.walls.echo_sources import Walls
 
-PAST_M = 40.0  # path that is passed again, by reason: that on which a place is found
-MOST_PIECES = 1_000  # of it, by reason: eight minutes of standing
+PAST_M = 40.0  # path that is passed again: that on which a place is found
+MOST_PIECES = 1_000  # of it: eight minutes of standing
 
 
 class RecentWay:

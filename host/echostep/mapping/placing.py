@@ -23,10 +23,8 @@ SIDES = 4  # directions from which a wall is seen, a right angle apart
 OFF_SD_M = 0.15  # of one wall in two drawings: both bend
 BAND_M = np.array([-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])  # across a wall, where its ratio is above 1
 CHANCE_M = 1.5  # half width within which another wall would lie anywhere
-OUTLIER, FREE_RATIO = (
-    0.1,
-    math.log(0.15),
-)  # share of unexplained walls; ratio of a wall in space that was free [as in matching.py]
+# Share of unexplained walls; ratio of a wall in space that was free [as in matching.py]
+OUTLIER, FREE_RATIO = 0.1, math.log(0.15)
 FREE_M = 0.35  # before a wall, from which the floor is free
 POWER = 0.5  # of each metre of wall: errors of a stretch are shared
 LEAST_HALF_M = 0.25  # of a fragment

@@ -16,7 +16,7 @@ from echostep.arrays import Floats
 from echostep.mapping.graph.storeys import Storeys
 from echostep.plan.model import Connector, Door, Level
 
-HALF_M = 0.6  # of a flight's width; by reason
+HALF_M = 0.6  # of a flight's width, assumed
 DOOR_M = 1.0  # width of the way in
 CLEAR_M = 0.15  # about the well, in which other walls end: nearer ones are taken for its own
 LEAST_M = 0.1  # a shorter piece is no wall

@@ -13,7 +13,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-GAP_S = 0.05  # ten samples; a longer gap may hide a turn, by reason
+GAP_S = 0.05  # ten samples; a longer gap may hide a turn, assumed
 KEPT_S = 30.0  # longest standing that tells a bias
 
 

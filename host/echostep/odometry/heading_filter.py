@@ -28,7 +28,7 @@ GYRO = HeadingSettings()
 # turns of 60 to 170 degrees a stride (motion capture, legs_gaittoolbox).
 JITTER_RAD, TWIST_SHARE = math.radians(1.2), 0.3
 GATE_SD = 3.0  # a normal innovation exceeds it in 0.3 % of stances
-# All by reason.
+# Assumed, not measured.
 FIRST_SCALE_SD = 1.0  # a dead gyro (-1) is possible, and a reversed one (-2) not excluded
 SURE_SCALE = 0.03  # sd, two right angles; real belts err by 1 to 2 %
 LARGEST_SCALE = 0.1  # sensitivity, and 20 degrees of tilt of the axis, which cost 6 %

@@ -22,8 +22,8 @@ from echostep.scorecard.track_columns import ScoredPath
 from echostep.scorecard.zones import NO_ZONE, Zones
 
 FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
-CELL_M = 1.0  # side of the squares of which coverage is the share, by reason: a person's room
-TICK_S = 0.1  # of the moments of which availability is the share, by reason
+CELL_M = 1.0  # side of the squares of which coverage is the share: a person's room
+TICK_S = 0.1  # of the moments of which availability is the share, assumed
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import CsvLimits, lines_of, separator_of
 
-MOST_ROWS = 1_000_000  # of a track, by reason: eight hours at 30 positions a second
+MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
 SHOWN = 40  # characters of a wrong cell that an error repeats
 
 

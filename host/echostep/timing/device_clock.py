@@ -23,7 +23,7 @@ from echostep.jit import kernel
 from echostep.timing import arrival_envelope as arrival
 from echostep.timing.arrival_envelope import CONFIRMING, KEPT_BUCKETS, ArrivalClock
 
-# All by reason.
+# Assumed, not measured.
 AHEAD_S = 1.0  # a counter further ahead of its arrival contradicts it; the arrivals of a run agree to this
 BEHIND_S = 1.0  # greatest age of a message relative to the newest one: a ping is sent after its ranging
 SMOOTH_S = 1.0  # a counter that is at most this far from the newest goes on from it

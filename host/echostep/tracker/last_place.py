@@ -18,7 +18,7 @@ from echostep.localization.height.levels import ClimbSettings, drift_m
 from echostep.localization.particles.start import Air, Start
 from echostep.plan.model import Pose
 
-MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot, by reason: a stride
+MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot: a stride
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,8 +33,8 @@ __all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
 
 
 WALL = 0.0  # kind, beside EDGE and CORNER
-MOST_SOURCES = 8  # of one ping, by reason: the nearest ones mask the others
-FARTHEST_M = 3.0  # greatest `reach_m`, by reason: it bounds the tiles made at once
+MOST_SOURCES = 8  # of one ping: the nearest ones mask the others
+FARTHEST_M = 3.0  # greatest `reach_m`: it bounds the tiles made at once
 FOOT_M = 1e-3  # a wall so close before another does not hide it: walls drawn twice
 NEAREST_M = 1e-6  # a source no further away has no direction
 CONE = math.cos(CONE_RAD)

@@ -17,7 +17,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
 from echostep.plan.routing import mark_near_walls
 
-# All by reason.
+# Assumed, not measured.
 CELL_M = 0.25  # side of a cell
 BODY_M = 0.25  # half a person's width
 DIRECTIONS = 32  # in which walls are looked for

@@ -23,9 +23,8 @@ from echostep.jit import kernel
 from echostep.plan.model import Plan
 from echostep.walls.echo_sources import Walls
 
-MARGIN_M = (
-    50.0  # on either side of a level on the sheet, by reason: particles do not go so far beyond the outermost walls
-)
+# On either side of a level on the sheet: particles do not go so far beyond the outermost walls
+MARGIN_M = 50.0
 STAIRS, LIFT, RAMP = 0, 1, 2
 KINDS = {"stairs": STAIRS, "lift": LIFT, "ramp": RAMP}
 

@@ -17,8 +17,8 @@ from echostep.walls.index import EAR_REACH_M, JOIN_M, POINT, TILE_M, SourceTable
 from echostep.walls.tile_geometry import SLACK_M, by_bearing, covered, frame
 
 EDGE, CORNER = 1.0, 2.0  # kinds of points
-FLAT_RAD = math.radians(3.0)  # two walls that turn by less continue each other, by reason: drawing accuracy
-# Greatest deviation from a right angle at which two reflections still send sound back, by reason.
+FLAT_RAD = math.radians(3.0)  # two walls that turn by less continue each other: drawing accuracy
+# Greatest deviation from a right angle at which two reflections still send sound back, assumed.
 CORNER_RAD = math.radians(30.0)
 
 

@@ -16,14 +16,10 @@ from echostep.arrays import Floats
 from echostep.jit import kernel
 from echostep.localization.beacons.beliefs import wrap_angle
 
-X, Y, RANGE, BEARING = (
-    0,
-    1,
-    2,
-    3,
-)  # columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)
+# Columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)
+X, Y, RANGE, BEARING = 0, 1, 2, 3
 
-# All constants here are by reason.
+# Assumed, not measured.
 FEWEST = 12  # readings
 PATH_M = 3.0  # between the outermost places of the boot
 GRID_M = 0.25

@@ -34,7 +34,7 @@ from echostep.localization.beacons.model import BeaconModel
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex, crosses_wall
 
-# All constants here are by reason.
+# Assumed, not measured.
 GREATEST_ODDS = math.exp(3.0)  # of a particle, that a beacon was moved
 LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, in terms of a beacon that has just been placed
 CLOSE_BEARING_M2 = 0.25  # squared distance below which a bearing carries no information: half a metre

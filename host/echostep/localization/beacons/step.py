@@ -26,7 +26,7 @@ from echostep.localization.beacons.slam import IN_PLACE, RECOVERIES, SUSPECT, Be
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex
 
-# All constants here are by reason.
+# Assumed, not measured.
 MOST_WAITING = 48  # readings kept of a beacon without a place
 FIRST = 4  # readings of a beacon, among which a near one says that it was just dropped
 LOCATE_EVERY = 4  # readings of a beacon without a place

@@ -19,7 +19,7 @@ from echostep.arrays import Floats
 from echostep.jit import inline_kernel, lean_kernel
 from echostep.walls.tile_points import CORNER, EDGE
 
-# All by reason.
+# Assumed, not measured.
 # Pings: a ranger in order misses one echo in two hundred; one that is not is known after two seconds
 PRIOR_MISSED, PRIOR_HEARD = 0.1, 20.0
 LIKE_M = 0.15  # difference of two echoes from one wall: three errors of their difference
@@ -28,11 +28,10 @@ MOST_SILENT = 8  # pings between two such echoes: more are a door
 REMEMBERED = 200.0  # pings: tens of metres of path
 ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
-NEGLIGIBLE = (
-    1e-4  # probability that no source so far was detected below which sources further away are left out, by reason
-)
-SILENT = 0.2  # share of outliers and of hidden views that are "no echo", by reason
-HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source, by reason: more is added to a room than removed
+# Probability that no source so far was detected below which sources further away are left out, assumed
+NEGLIGIBLE = 1e-4
+SILENT = 0.2  # share of outliers and of hidden views that are "no echo", assumed
+HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source: more is added to a room than removed
 LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
 GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
 

@@ -23,14 +23,12 @@ from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.index import WallIndex
 
-# All by reason.
+# Assumed, not measured.
 SECTORS = 24  # of 15 degrees
 UNIT_M = 0.025  # of a range in the table, one byte
 COARSE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
-FAR_SHARE, FAR_FACTOR = (
-    0.2,
-    3.0,
-)  # of the expected ranges are off by so many times as much: edges, corners, the next wall
+# Of the expected ranges are off by so many times as much: edges, corners, the next wall
+FAR_SHARE, FAR_FACTOR = 0.2, 3.0
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
 CHANCES = 8  # steps of the probability that an echo is heard
 RANGES = 256  # steps of the expected range
@@ -42,8 +40,8 @@ AFTER_ECHO, AFTER_SILENCE = 0, 1
 MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
-USED_M = 0.25  # path between two pings of one ranger that are used, by reason: a cell of the table
-INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
+USED_M = 0.25  # path between two pings of one ranger that are used: a cell of the table
+INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one: walls go on
 
 
 class CoarseField(NamedTuple):

@@ -28,17 +28,17 @@ from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
 
-# All by reason.
+# Assumed, not measured.
 AXIS_SD_RAD = math.radians(
     20.0
 )  # of a new wall's normal about the ranger's axis: half of the angle at which walls answer
 SEEN_RAD = math.radians(50.0)  # of the normal from the axis: the angle at which near walls answer, and the axis' error
 TURN_SD_RAD = 0.05  # change of the normal on a metre of path
-VIEW_M = 2.5  # mean length of the path between two changes of a view, by reason: walls, doors, corners
-POSES = 400  # drawn on the floor, by reason: their mean is then good to 5 %
+VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
+POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
-LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
-# Turns on a segment at which its pings count half, by reason: headings between its ends are interpolated
+LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
+# Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
 JUDGING_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
 

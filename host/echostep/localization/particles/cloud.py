@@ -55,23 +55,22 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet
 
-SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by reason: a gathered one is never so large
-SMALL = 2  # times the least size, by reason: a cloud has contracted
-# Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
+SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
+SMALL = 2  # times the least size: a cloud has contracted
+# Bend of a move, as a share of its chord, above which a coarse cloud hears no ping: an uncertain turn of 45 degrees
 COARSE_BEND = bend_of(math.radians(45.0))
-COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
-START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
-WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
-COARSE_WALL_COST = (
-    5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
-)
-# The same where there are several levels, after so many metres, by reason: only exact likelihoods tell storeys apart that are alike
+COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, assumed
+START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
+WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse: a room
+# Log-weight that crossing a wall costs a coarse cloud: its particles are a step apart
+COARSE_WALL_COST = 5.0
+# The same where there are several levels, after so many metres: only exact likelihoods tell storeys apart that are alike
 LEVELS_REST, LEVELS_M = 0.1, 10.0
-COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
-LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, by reason
-# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much; by reason
+COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud: half its distances
+LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much, assumed
 PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
-# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle; by reason: people turn on the spot, and walk
+# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle; people turn on the spot, and walk
 # round the end of a wall more sharply than an arc
 BENDS = (-1.0, 3.0)
 

@@ -18,7 +18,7 @@ from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatc
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex, crosses_wall
 
-NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed, by reason: the next resampling drops such particles
+NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed: the next resampling drops such particles
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 0 and 1 are x and y
 

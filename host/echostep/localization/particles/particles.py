@@ -14,10 +14,8 @@ from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.places import Hypothesis, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-GATHERED_M, GATHERED_REST = (
-    2.5,
-    1e-4,
-)  # a cloud has gathered when no more than this weight is further from its mean, by reason
+# A cloud has gathered when no more than this weight is further from its mean, assumed
+GATHERED_M, GATHERED_REST = 2.5, 1e-4
 
 
 class Particles:

@@ -15,7 +15,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 
-# All by reason.
+# Assumed, not measured.
 REACH_M = 2.5  # particles so near to the heaviest square are one hypothesis: a room
 MOST = 5  # hypotheses that are listed
 LEAST = 0.02  # probability of one that is listed

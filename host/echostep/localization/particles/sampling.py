@@ -13,9 +13,9 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.localization.settings import CloudSettings
 
-# Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
+# Until a cloud has gathered, particles in one cell of these sizes are one mode: a doorway, a turn into a room
 MODE_M, MODE_RAD = 2.0, math.radians(45.0)
-LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, by reason
+LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, assumed
 MOST_MODES = 1_000_000  # cells beyond which no modes are told apart: memory
 KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 

@@ -38,7 +38,7 @@ from echostep.path import PathSegment
 from echostep.ports.people.check_in import MOST_SD_M, CheckIn
 from echostep.ports.people.meeting import Meeting, parse_meeting
 
-# All by reason.
+# Assumed, not measured.
 SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
 MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
 WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which it tells no more than the building does
@@ -50,7 +50,7 @@ LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
 FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
 FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
-# By reason: in so much of the path a wearer's own echoes, or drift, have renewed what the filter knows.
+# In so much of the path a wearer's own echoes, or drift, have renewed what the filter knows.
 RENEWED_M = 10.0
 CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
 PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, as after a tap; reflections are longer, hardly ever shorter

@@ -21,9 +21,9 @@ from echostep.localization.particles.cloud import Cloud
 from echostep.localization.team.meetings import PreparedMeeting, TimedMeeting
 from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
-MOST_TEAMMATES = 64  # whose beacons are kept, the newest; by reason
+MOST_TEAMMATES = 64  # whose beacons are kept, the newest, assumed
 TEAM_RANGE_SD_M = 0.4  # of a range to the trunk: BeaconSettings.range_sd_m, for the same reasons
-SHARED_SD_M = 1.0  # per axis, of a place above which a beacon is not shared, by reason: it says less than the echoes
+SHARED_SD_M = 1.0  # per axis, of a place above which a beacon is not shared: it says less than the echoes
 ROUNDING_M2 = 2e-4  # added to the variances of a shared place, which is rounded to 0.01 m
 
 

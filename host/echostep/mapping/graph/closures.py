@@ -33,7 +33,7 @@ KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
 NEW_SHARE = 0.5  # of the graph's variance on an axis: what is left of it, up to which the match counts
 LEAST_OLD = 4
 LEAST_COVARIANCE = np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
-PASSAGES = 4  # that are tried for one stretch, by reason: two of them mostly
+PASSAGES = 4  # that are tried for one stretch: two of them mostly
 
 
 def pieces(graph: Graph, which: Ints) -> Pieces:

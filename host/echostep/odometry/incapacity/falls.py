@@ -24,10 +24,8 @@ from echostep.odometry.incapacity.standing_direction import StandingDirection, V
 from echostep.odometry.incapacity.tenths import TENTH_S, Tenth
 
 # By reason, where no source is named.
-STRIDE_M, STRIDE_S = (
-    0.9,
-    2.0,
-)  # a stride of a wearer on foot is longer and takes less time; on the knees it is half as long
+# A stride of a wearer on foot is longer and takes less time; on the knees it is half as long
+STRIDE_M, STRIDE_S = 0.9, 2.0
 CALM_M_S2, CALM_RAD_S = 1.0, 1.0  # unrest and turning of a standing foot in mid-stance
 QUIET_M_S2, QUIET_RAD_S = 0.5, 0.25  # of a wearer who moves little: five times noise and breath, a third of crawling
 AROUND_GRAVITY_M_S2 = 3.5  # of a mean force that shows a posture

@@ -22,7 +22,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
 
 SHORT, GROUPS = 25, 5  # short means of 0.02 s in a window of half a second, long means of 0.1 s
-# Ratio of the long means' variance to that of white noise. By reason: a pair of leg gyros, the least that is judged, exceeds 2.5 by chance in 3 % of
+# Ratio of the long means' variance to that of white noise. A pair of leg gyros, the least that is judged, exceeds 2.5 by chance in 3 % of
 # all windows, hence never in most of ten. Where recorded feet are stillest it is 0.6 to 2.
 LEAST_RATIO = 2.5
 # rad/s, standard deviation of the long means, all channels: in public recordings of quiet standing 40-100 % of the half seconds of shanks and
