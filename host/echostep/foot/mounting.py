@@ -21,7 +21,8 @@ from echostep.jit import lean_kernel
 ENOUGH_RAD2_S = 0.1
 # Of the second moment: 1 is a tilt about one axis, 0 one about all axes alike. 0.6 is a tilt twice as large (rms) along as across.
 LEAST_ANISOTROPY = 0.6
-MEMORY = 0.95  # weight of the sums of earlier swings, per swing: a mean over 20, so that a sensor that slips is followed
+# Weight of the sums of earlier swings, per swing: a mean over 20, so that a sensor that slips is followed
+MEMORY = 0.95
 
 
 @lean_kernel

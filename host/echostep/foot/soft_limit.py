@@ -16,7 +16,7 @@ from echostep.foot.ins import TILT, VEL, YAW, Nav, Vector
 from echostep.foot.stance import RING, SampleWindow
 from echostep.jit import lean_kernel
 
-# All by reason; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
+# Assumed; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
 HIGH_RAD_S = 4.0  # no limit of a gyro for feet is lower
 FLAT_PER_S = 2.0  # greatest change of a flat rate, as a share of it per second: 1 % in 5 ms
 STEP_S = 0.005  # over which the change of a rate is measured, so that noise at high sample rates is none

@@ -19,7 +19,7 @@ from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.ports.people.teammate import Teammate, parse_teammate
 from echostep.tracker import Tracker
 
-# By reason:
+# Assumed, not measured.
 MOVED_M = 1.5  # of the other wearer: then there is a new way
 AGAIN_S = 2.0  # shortest time between two searches for a way
 PREFIX = "wearer:"

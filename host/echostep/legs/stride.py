@@ -24,9 +24,7 @@ HALF_PELVIS_M = 0.09  # of a leg from the middle of the trunk, as in `WearerSett
 # Phase after mid swing at which the pelvis is turned farthest: between the strike (0.18, half of the swing) and the other foot's toe off
 # (0.30), until which the pelvis is carried on. Four legs of two people have it at 0.29 to 0.37, the simulated ones at the strike.
 LANDS, TWIST_POINTS = 0.25, 50
-TWIST_RAD = math.radians(
-    3.0
-)  # either way: 4 degrees of the pelvis [Perry 1992], less what a belt does not follow
+TWIST_RAD = math.radians(3.0)  # either way: 4 degrees of the pelvis [Perry 1992], less what a belt does not follow
 PERSON_SD_RAD = math.radians(1.5)  # of it from person to person and by the belt's seat, assumed
 STRIDE_SD_RAD = math.radians(3.0)  # of it from stride to stride, before that is seen, assumed
 LEAST_STRIDE_M = 0.5  # of a stride whose pelvis turns visibly

@@ -47,7 +47,8 @@ SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
 STAYS = 0.44  # last phase of a foot that stays on the floor
 FEWEST_SPEED = 6  # grid samples that give a speed, assumed
-CALM = 6  # grid samples without motion at either end of a record, which show that it begins or ends with standing, assumed
+# Grid samples without motion at either end of a record, which show that it begins or ends with standing, assumed
+CALM = 6
 FORGET = 500  # grid samples no longer needed, from which on they are dropped
 # Strides in a row that confirm the signs, or contradict them: motion before a walk is seldom so regular.
 CONFIRMING = 3

@@ -34,7 +34,7 @@ STATED = 0.99  # prior probability of a stated start
 STAYS = 0.5
 # Log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
 LEAST, MOST = -6.0, 12.0
-# Assumed, not measured.
+# Of the plan; assumed, not measured.
 PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
 GRAZED = 0.2  # of a wall on a plan that states an error: its end is in the way of a right cloud by as much, on 100 m once or so
@@ -46,10 +46,9 @@ EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the firs
 NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
 # From one way through a wall, within which another is through the same one; path on which a cloud goes through
 CROSSED_M = 4.0
-THROUGH = math.log(
-    1 / 100
-)  # share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
-# Probabilities that a cloud is right, by reason:
+# Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
+THROUGH = math.log(1 / 100)
+# Probabilities that a cloud is right; assumed, not measured.
 DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
 BELIEVED = 0.99  # of the tracked one, above which the plan supports it

@@ -61,7 +61,8 @@ from echostep.ports.people.meeting import Meeting
 
 SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
 EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact
-HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden: a plan that explains few echoes may be so far off
+# Standard deviation per axis when all views are hidden: a plan that explains few echoes may be so far off
+HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 

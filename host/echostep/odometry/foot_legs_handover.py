@@ -24,7 +24,7 @@ from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.path import UNOBSERVED_SD_M, PathSegment
 
-# All by reason, unless a source is named.
+# Assumed, not measured, unless a source is named.
 SILENT_S = 0.5  # the foot is silent when its newest sample is older than the leg samples by this
 KEPT_S = 30.0  # of leg samples and foot segments
 MAX_LENGTH_ERROR = 0.35  # share by which the legs' length may differ from the foot's; beyond it no leg gyros are worn

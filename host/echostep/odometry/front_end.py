@@ -61,7 +61,7 @@ _REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
 
 @dataclass(slots=True)
 class FrontEndCounts:
-    """Input that became neither a segment nor a ping, by reason."""
+    """Counts of input that became neither a segment nor a ping, by cause."""
 
     unknown_ports: int = 0
     late_pings: int = 0

@@ -30,11 +30,11 @@ REST_S = 1.0  # a longer stance is standing [foot.trunk_path], which is measured
 EDGE_S = 0.25  # half a stance from them
 # Walking adds to the bias by turns about the other axes: two belts on one pelvis differ by 0.08 deg/s more in walking than at rest [legs_qmt].
 WALKING_RAD_S = math.radians(0.06)
-RECENT_S = 10.0  # by reason: some strides, in which jitter lets the filter find an error of the foot; what is older is no longer sought
-REFUSALS = 3  # by reason
-LOST_RAD = math.radians(
-    10.0
-)  # by reason: a stride's turn is known to a degree; beyond it the foot's samples were missing, and its frame is a new one
+# Some strides, in which jitter lets the filter find an error of the foot; what is older is no longer sought
+RECENT_S = 10.0
+REFUSALS = 3  # stances in a row, assumed
+# A stride's turn is known to a degree; beyond this the foot's samples were missing, and its frame is a new one
+LOST_RAD = math.radians(10.0)
 
 
 class HeadingFusion:

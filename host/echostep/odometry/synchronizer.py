@@ -19,7 +19,8 @@ from echostep.path import Dropout, MeasuredSegment, PathSegment
 PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report: a cycle of both rangers takes 71 ms [faults/health.py, PINGS_HZ]
 SILENCE_S = 0.5  # a port that lags the other one by more is not waited for, assumed
 BLIND_S = 1.0  # time without any observation that makes a dropout: twice a standing segment [path.STANDING_PIECE_S]
-MAX_WAITING = 4096  # pings and heights that wait; beyond it the oldest are dropped and counted: nearly two minutes of both
+# Pings and heights that wait; beyond it the oldest are dropped and counted: nearly two minutes of both
+MAX_WAITING = 4096
 HEIGHT = 2  # in the ranger column of a ping: the value is a height by pressure, not a range
 PART = 4  # factor of the ranger's part in that column; of a height: of the number of the board's restarts before it
 DROPOUT = -1  # in the segment column of the output: a dropout, no segment

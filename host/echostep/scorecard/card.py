@@ -140,9 +140,8 @@ def _ellipse_holds(track: ScoredPath, at: Matched, error_m: Floats) -> float | N
     dx, dy = error_m.T
     determinant = xx * yy - xy**2
     inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant
-    held = np.where(
-        determinant > 0.0, inside, (dx == 0.0) & (dy == 0.0)
-    )  # an ellipse without area has its centre alone
+    # An ellipse without area has its centre alone
+    held = np.where(determinant > 0.0, inside, (dx == 0.0) & (dy == 0.0))
     return _share(held, np.isfinite(determinant))
 
 

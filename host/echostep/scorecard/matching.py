@@ -18,7 +18,8 @@ from echostep.errors import EchostepError
 from echostep.scorecard.track_columns import ScoredPath
 
 PATH_S = 0.5  # median distance of a path's rows, more than which they are surveyed points: less than a step
-GAP_S = 2.5  # without a row, after which a track has no position: rows come at each step, and twice a second while standing
+# Without a row, after which a track has no position: rows come at each step, and twice a second while standing
+GAP_S = 2.5
 
 
 @dataclass(frozen=True, slots=True)

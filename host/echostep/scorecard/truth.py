@@ -17,7 +17,7 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.scorecard.error_statistics import error_statistics
 
-NEARBY_S = 2.5  # by reason: estimates come at each step, and twice a second while standing
+NEARBY_S = 2.5  # estimates come at each step, and twice a second while standing
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,7 @@ from echostep.tracker.state import Particles, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
-LATE_S = 0.5  # behind a published time: an older estimate no longer says where the wearer is; half a stride, a third of the claimed 1 m
+LATE_S = 0.5  # behind a published time: an older estimate no longer says where the wearer is: half a stride, a third of the claimed 1 m
 KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over, assumed
 KNOWN = 0.9  # probability of the estimate whose heading it is: a tap where the wearer is not says that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))

@@ -83,9 +83,8 @@ def _walls_in_sight(blocked: Bools, sight: int) -> Ints:
     """For each cell, in how many directions a blocked cell is met within so many cells; 0 for blocked cells."""
     rows, columns = blocked.shape
     in_sight = np.zeros((rows, columns), np.int64)
-    aside = np.full(
-        columns, sight, np.int64
-    )  # columns to the nearest one with a wall: others are between two levels of the sheet
+    # Columns to the nearest one with a wall: others are between two levels of the sheet
+    aside = np.full(columns, sight, np.int64)
     for c in range(columns):
         if blocked[:, c].any():
             for k in range(max(c - sight, 0), min(c + sight, columns)):

@@ -139,9 +139,8 @@ def moments(beliefs: BeaconBeliefs, weight: Floats) -> Floats:
     """
     mean, cov, _ = beliefs
     beacons = mean.shape[1]
-    sums = np.zeros(
-        (beacons, 5)
-    )  # of offset x, offset y, their squares with the variances, sine and cosine of the axis
+    # Of offset x, offset y, their squares with the variances, sine and cosine of the axis
+    sums = np.zeros((beacons, 5))
     for i in range(len(mean)):
         w = weight[i]
         for k in range(beacons):

@@ -29,9 +29,8 @@ from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
 
 # Assumed, not measured.
-AXIS_SD_RAD = math.radians(
-    20.0
-)  # of a new wall's normal about the ranger's axis: half of the angle at which walls answer
+# Of a new wall's normal about the ranger's axis: half of the angle at which walls answer
+AXIS_SD_RAD = math.radians(20.0)
 SEEN_RAD = math.radians(50.0)  # of the normal from the axis: the angle at which near walls answer, and the axis' error
 TURN_SD_RAD = 0.05  # change of the normal on a metre of path
 VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners

@@ -36,11 +36,11 @@ from echostep.walls.level_sheet import (
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
 SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
-WEATHER_M_S = 1e-3  # standard deviation of the height by pressure's speed: a front changes the pressure by 0.4 hPa in an hour
+# Standard deviation of the height by pressure's speed: a front changes the pressure by 0.4 hPa in an hour
+WEATHER_M_S = 1e-3
 LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
-# By reason:
 ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is none of an upper storey
-FALL_PER_M = 1.0  # log-weight lost on a metre of path: a corner that the plan lacks is passed
+FALL_PER_M = 1.0  # log-weight lost on a metre of path, assumed: a corner that the plan lacks is passed
 
 
 @dataclass(frozen=True, slots=True)

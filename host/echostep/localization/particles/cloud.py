@@ -68,9 +68,9 @@ COARSE_WALL_COST = 5.0
 LEVELS_REST, LEVELS_M = 0.1, 10.0
 COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud: half its distances
 LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
-# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much, assumed
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much
 PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
-# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle; people turn on the spot, and walk
+# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle: a person turns on the spot, or walks
 # round the end of a wall more sharply than an arc
 BENDS = (-1.0, 3.0)
 

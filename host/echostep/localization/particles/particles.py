@@ -14,7 +14,7 @@ from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.places import Hypothesis, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-# A cloud has gathered when no more than this weight is further from its mean, assumed
+# A cloud has gathered when less than this weight is farther than this from its mean; assumed: a room, and a hundredth of a place's weight
 GATHERED_M, GATHERED_REST = 2.5, 1e-4
 
 

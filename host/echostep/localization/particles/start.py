@@ -17,10 +17,10 @@ from echostep.walls.floor import Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
-# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. By reason:
-WIDE_SHARE = 0.07  # of the particles have these standard deviations beside those stated:
+# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point
+WIDE_SHARE = 0.07  # of the particles have these standard deviations beside those stated, assumed:
 WIDE_M, WIDE_RAD = 0.9, math.radians(30.0)  # a stride, a foot that is set down turned
-# Of a search, this share is drawn about where the wearer was believed: errors are mostly small. By reason:
+# Of a search, this share is drawn about where the wearer was believed: errors are mostly small; assumed
 NEAR_SHARE, NEAR_M, NEAR_RAD = 0.6, 2.0, math.radians(20.0)
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
 

@@ -17,7 +17,7 @@ from echostep.mapping.graph.fragments import Fragments
 from echostep.mapping.graph.nodes import Nodes
 
 PEOPLE = 0.05  # share of the path with echoes of a person beside a ranger, assumed
-MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too, assumed
+MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too
 ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from that of the path, assumed
 NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
 LEAST_HALF_M = 0.3  # of path to either side of a fragment's middle, at least, over which its direction is taken

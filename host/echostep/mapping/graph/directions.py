@@ -23,7 +23,7 @@ from echostep.mapping.graph.nodes import Nodes
 
 RIGHT_RAD = 0.5 * math.pi
 ALIGNED = 0.7  # share of fragments along the building's directions, at first, assumed
-DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction [by reason: 6 cm on 5 m]
+DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction (6 cm on 5 m)
 LEAST_EVIDENCE = math.log(1000.0)  # odds from which the building is thought to have such directions
 CELLS = 180  # of a right angle, half a degree each: less than DIRECTION_SD_RAD
 CELL_RAD = RIGHT_RAD / CELLS

@@ -23,12 +23,11 @@ from echostep.mapping.graph.nodes import Nodes
 from echostep.mapping.graph.storeys import Storeys
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
-ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within:
-APART_M, TURNED_RAD = 0.5, math.radians(20.0)  # by reason
+ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within
+APART_M, TURNED_RAD = 0.5, math.radians(20.0)  # this distance and turn, assumed
 START_SD_M, START_SD_RAD = 0.001, 0.0005  # the first node is the origin
-FREE_SD_RAD = math.radians(
-    30.0
-)  # of its heading where the building's directions hold the map: until a wall is heard it is not known against them
+# Of its heading where the building's directions hold the map: until a wall is detected it is not known against them
+FREE_SD_RAD = math.radians(30.0)
 
 
 @dataclass(frozen=True, slots=True)

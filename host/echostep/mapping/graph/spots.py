@@ -22,9 +22,8 @@ LEAST, MISSED = 5, 1  # pings of a ranger, and how many may be none of the spot 
 SWEEP_RAD = math.radians(25.0)  # of the axis, with the same range: half of the cone
 FITS_M = 0.08  # of a range from the mean: three standard deviations
 SPOT_M = 0.15  # from the first ping to the last: the trunk moves over the feet
-ACROSS_RAD = math.radians(
-    20.0
-)  # of the middle of the sweep from a direction of the building; also its standard deviation: it turns nothing
+# Of the middle of the sweep from a direction of the building; also its standard deviation: it turns nothing
+ACROSS_RAD = math.radians(20.0)
 # Of the range: mean of 1 - cos, by which a corner within ACROSS_RAD is farther than its wall
 CORNER = ACROSS_RAD**2 / 6.0
 SPOT_HALF_M = 0.1  # half the width that reflects: the first Fresnel zone at 2.5 m, sqrt(wavelength * range / 2), wavelength 8.6 mm

@@ -18,7 +18,7 @@ from echostep.arrays import Floats, Ints, spans
 from echostep.mapping.graph.nodes import Nodes
 from echostep.path import MeasuredSegment
 
-# By reason:
+# Assumed, not measured.
 WINDOW_M = 2.5  # of path to either side of a node: longer than the landing between two flights
 FLAT_M = 0.5  # of rise in both windows, from which it is no level ground: steeper than a wheelchair's ramp (8 %)
 STRETCH_M = 4.0  # of level path that is a storey; a shorter one is a landing

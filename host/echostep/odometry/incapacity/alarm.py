@@ -24,7 +24,7 @@ from echostep.odometry.incapacity.wearer_signs import Sign, StepTaken
 
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion
-WALKED_STEPS = 3  # of the foot: the wearer walks. A helper who turns a wearer over makes fewer
+WALKED_STEPS = 3  # of the foot: the wearer walks; a helper who turns a wearer over makes fewer
 OVER_S = 30.0  # an alarm that has ended is told as over for so long
 SWAY_S = 120.0  # so long after the last movement sway alone keeps the question back: longer than a foot is not moved by chance
 GAP_S = 2.0  # a longer time without samples is no time without motion

@@ -23,7 +23,7 @@ from echostep.foot.ins import GRAVITY_M_S2
 from echostep.odometry.incapacity.standing_direction import StandingDirection, Vector
 from echostep.odometry.incapacity.tenths import TENTH_S, Tenth
 
-# By reason, where no source is named.
+# Assumed, not measured, where no source is named.
 # A stride of a wearer on foot is longer and takes less time; on the knees it is half as long
 STRIDE_M, STRIDE_S = 0.9, 2.0
 CALM_M_S2, CALM_RAD_S = 1.0, 1.0  # unrest and turning of a standing foot in mid-stance

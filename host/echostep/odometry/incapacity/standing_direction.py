@@ -18,9 +18,7 @@ from echostep.foot.ins import GRAVITY_M_S2
 
 Vector = tuple[float, float, float]
 
-AROUND_GRAVITY_M_S2 = (
-    2.0  # of a stride's mean force from gravity's size: more is a damaged or saturated sensor
-)
+AROUND_GRAVITY_M_S2 = 2.0  # of a stride's mean force from gravity's size: more is a damaged or saturated sensor
 LEAST_STRIDES = 3  # before a direction is known
 MEMORY = 0.95  # weight of the earlier strides, per stride: a mean over 20
 

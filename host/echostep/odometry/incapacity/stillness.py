@@ -29,7 +29,7 @@ LEAST_RATIO = 2.5
 # thighs exceed it, 0-80 % of those of feet; breathing turns neither.
 LEAST_RAD_S = 0.004
 WINDOW_S = 0.5
-# Limits by reason: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
+# Limits: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
 # public recordings: 0.04 rad/s, 0.16 m/s2). A foot that is lifted, turned or shifted exceeds them several times; breathing turns no shoe.
 FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
 LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range of 0.05 rad/s, breathing turns a belt by less than 0.03 rad/s
