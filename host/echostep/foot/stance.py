@@ -30,9 +30,8 @@ CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a f
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
-GRAVITY_ALONE_M_S2 = (
-    1.0  # of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
-)
+# Of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
+GRAVITY_ALONE_M_S2 = 1.0
 # At most, of a foot that stands on a floor which accelerates: people shift, a lift takes up to 1.2 m/s2.
 RIDING_RAD_S, RIDING_M_S2 = 0.15, 2.0
 LASTING_S = 0.15  # no swing is calm for so long: the stance is accepted, the velocity is corrected

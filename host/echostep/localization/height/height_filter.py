@@ -18,9 +18,8 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.height.levels import HeightChange
 
-STARTING_M2_S3 = (
-    0.2  # spectral density of the acceleration: 0.8 m/s2 for 1.25 s at either end of a ride [ISO 8100-32, typical]
-)
+# Spectral density of the acceleration: 0.8 m/s2 for 1.25 s at either end of a ride [ISO 8100-32, typical]
+STARTING_M2_S3 = 0.2
 RATE_SD_M_S = 0.5  # of the rate at first: stairs, or a lift
 HEIGHT, LAG = range(2)
 MEASURED = np.array([1.0, 1.0])  # the height by pressure is their sum
