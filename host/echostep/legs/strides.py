@@ -19,7 +19,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs import swing_detection as leg_swings
-from echostep.legs.angle_grid import AngleGrid, Sample
+from echostep.legs.angle_grid import AngleGrid, GridSample
 from echostep.legs.gyro_bias import GyroBias
 from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, Travel, travel
 from echostep.legs.leg_angles import LegAngles, knees
@@ -109,11 +109,11 @@ class StrideEstimator:
         """Take one sample; search the grid that it fills once the signs are known."""
         before = len(self._grid)
         kind = self._grid.add(t_s, thigh, shank, belt)
-        if kind is Sample.AFTER_GAP:
+        if kind is GridSample.AFTER_GAP:
             self._bridge_gap(t_s)
             self._grid.restart(t_s, thigh, shank, belt)
             return
-        if kind is Sample.SKIPPED or len(self._grid) == before:
+        if kind is GridSample.SKIPPED or len(self._grid) == before:
             return
         if self.swings.known:
             self._advance(len(self._grid) - LOOK)

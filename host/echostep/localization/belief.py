@@ -43,7 +43,7 @@ FOUND_WITHIN_M = 40.0  # path on which an unknown start is found on one level
 ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in the mean (20 to 50 m were seen): symmetric wings, storeys
 MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
-NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
+START_ERROR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
 # From one way through a wall, within which another is through the same one; path on which a cloud goes through
 CROSSED_M = 4.0
 # Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
@@ -52,14 +52,14 @@ THROUGH = math.log(1 / 100)
 DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
 BELIEVED = 0.99  # of the tracked one, above which the plan supports it
-GATHERED = 0.7  # of one that has just gathered anywhere, if the plan fits: it has yet to foretell echoes
+UNSTATED = 0.7  # of one that has just gathered anywhere, if the plan fits: it has yet to foretell echoes
 UNDECIDED = 0.8  # at most of the tracked one, while a search that has not gathered is of another mind: the true place dies in one of five by chance
 FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
 REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
 WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
 REFUTED = -5.0  # log-odds of a doubted cloud below which it was wrong, even if a search agrees with it later
 ALIKE_NATS = 8.0  # of evidence that a wrong place gains by being alike, before a search has found another
-JUDGED_M = 20.0  # path on which a search's place is judged before it counts against the tracked one
+EVIDENCE_M = 20.0  # path on which a search's place is judged before it counts against the tracked one
 ELSEWHERE = 0.05  # weight of a search about the tracked cloud, below which it is of another mind
 LEVEL_M = 20.0  # the same for each level more: storeys are often alike but for their doors
 
@@ -175,7 +175,7 @@ class PlanVerdict:
         Soon and near, it was the stated start that was a little wrong.
         """
         if self._start_rejected:
-            self._gain(self._taken if after_m < EARLY_M and off_m < NEAR_M else math.log(FAR))
+            self._gain(self._taken if after_m < EARLY_M and off_m < START_ERROR_M else math.log(FAR))
         self._log_passed = 0.0
         self._forget_rejection()
 
@@ -210,25 +210,25 @@ class PlanVerdict:
 
 
 @dataclass(slots=True)
-class Hypothetical:
+class CloudHypothesis:
     """A cloud, the probability that it is right, and whether it has contracted once: before that, echoes tell little of it.
 
     `is_stated`: it began where it was said to begin, so it should explain the echoes from the first on. `doubts`: log-odds that ranges to beacons of
-    each teammate have taken from it. `judged_m`: length of the path on which it was judged by the echoes that it foretold.
+    each teammate have taken from it. `evidence_m`: length of the path on which it was judged by the echoes that it foretold.
     """
 
     cloud: Cloud
     plausibility: Plausibility
     is_stated: bool = False
     has_contracted: bool = False
-    judged_m: float = 0.0
+    evidence_m: float = 0.0
     doubts: dict[str, float] = field(default_factory=dict)
 
 
-def right_against(tracked: Hypothetical, search: Hypothetical, log_odds_before: float) -> float:
+def right_against(tracked: CloudHypothesis, search: CloudHypothesis, log_odds_before: float) -> float:
     """Probability that the tracked cloud is right where a search disagrees with it, or has not gathered; `log_odds_before`: when the search began."""
     log_odds, alike = tracked.plausibility.log_odds, ALIKE_NATS
-    if search.judged_m > JUDGED_M:
+    if search.evidence_m > EVIDENCE_M:
         return probability_of(log_odds - search.plausibility.log_odds)
     if search.cloud.is_coarse:  # there is no rival yet: what the tracked one had before is its own
         alike = min(max(log_odds - log_odds_before, 0.0), ALIKE_NATS)

@@ -20,7 +20,7 @@ from echostep.arrays import Floats
 from echostep.jit import lean_kernel
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.places import Hypothesis
+from echostep.localization.particles.places import LikelyPlace
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
 TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter: a door, a room
@@ -122,7 +122,7 @@ class Estimate:
     z_sd_m: float = 0.0
     protection_m: float = math.inf
     right: float = 1.0
-    hypotheses: tuple[Hypothesis, ...] = ()
+    hypotheses: tuple[LikelyPlace, ...] = ()
     plan_fits: float = 1.0
     outside: float = 0.0
 
@@ -180,7 +180,7 @@ def estimate(
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
-    places: tuple[Hypothesis, ...] = ()
+    places: tuple[LikelyPlace, ...] = ()
     if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
         places = (search or cloud).places(walk_heading_rad)
     if search is None and places and places[0].probability > UNSURE:
@@ -200,7 +200,7 @@ def estimate(
     )  # fmt: skip
 
 
-def _moments_at(place: Hypothesis, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
+def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
     """The moments about a place, with its heading; those about the mean, if they have half as much weight near them."""
     distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
     near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))

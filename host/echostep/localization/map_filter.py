@@ -22,11 +22,11 @@ from echostep.localization.belief import (
     DOUBTED,
     ELSEWHERE,
     FOUND,
-    GATHERED,
     REFUTED,
     STATED,
+    UNSTATED,
     WIDE_DOUBTED,
-    Hypothetical,
+    CloudHypothesis,
     PlanVerdict,
     Plausibility,
     away_m,
@@ -35,7 +35,7 @@ from echostep.localization.belief import (
 )
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.echoes.unplanned import UnplannedDensities, UsablePings, judged_share
+from echostep.localization.echoes.unplanned import UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate, weight_about
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
@@ -84,9 +84,9 @@ class MapFilter:
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
         self._plan = PlanVerdict(self._settings.plan_sd_m)
-        prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
-        self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
-        self.search: Hypothetical | None = None
+        prior = (STATED if stated else UNSTATED) if building.has_walls else BY_DEFINITION
+        self.tracked = CloudHypothesis(cloud, Plausibility(prior), stated)
+        self.search: CloudHypothesis | None = None
         self._progress = SearchProgress(building.levels, self.tracked.plausibility.log_odds)
         self._is_refuted = False  # whether the tracked cloud was as good as wrong since it was doubted
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
@@ -106,12 +106,12 @@ class MapFilter:
         """What the rangers may report."""
         return self._settings.echo
 
-    def hear_by(self, echo: EchoSettings) -> None:
+    def set_ranger_model(self, echo: EchoSettings) -> None:
         """From now on the pings are those of rangers with these settings."""
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = echo_models(self._settings)
-            self._pings.hear_by(self._building.background(self._model), with_plan_error(self._settings))
+            self._pings.set_ranger_model(self._building.background(self._model), with_plan_error(self._settings))
 
     @property
     def cloud(self) -> Cloud:
@@ -172,7 +172,7 @@ class MapFilter:
         else:
             at = start_at(meeting)
             start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
-            self.tracked = Hypothetical(self._new_cloud(start, 0.0), Plausibility(right), is_stated=True)
+            self.tracked = CloudHypothesis(self._new_cloud(start, 0.0), Plausibility(right), is_stated=True)
         self.search, self._is_elsewhere = None, False
 
     def turn_walk_frame(self, by_rad: float) -> None:
@@ -234,7 +234,7 @@ class MapFilter:
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
         for each in self._clouds():
-            self._follow_with(each, move, pings, unplanned, judged_share(segment.turn_rad))
+            self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
@@ -243,7 +243,7 @@ class MapFilter:
             self._plan.confirm(path_m)
 
     def _follow_with(
-        self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
+        self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
     ) -> None:
         """Propagate and reweight one cloud, and judge it by this share of how well it foretold the pings."""
         cloud = each.cloud
@@ -266,26 +266,26 @@ class MapFilter:
                 log_path = self._plan.pass_walls(self._believed(0.0), path_m, evidence.log_path)
                 evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:
-                self._judge(each, evidence, pings, unplanned, path_m, share)
+                self._update_plausibility(each, evidence, pings, unplanned, path_m, share)
 
-    def _judge(
-        self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
+    def _update_plausibility(
+        self, each: CloudHypothesis, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
         share: float,
     ) -> None:  # fmt: skip
         """Update the probability that a cloud is right; one that has not contracted gains nothing, and a search's is judged against chance alone."""
         cloud, most = each.cloud, each.plausibility.probability
         judged = each.has_contracted and not cloud.is_scattered
-        each.has_contracted = each.has_contracted or cloud.is_small  # what contracts it, it has not foretold
+        each.has_contracted = each.has_contracted or cloud.is_contracted  # what contracts it, it has not foretold
         rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
         seen = 1.0 - cloud.hidden_shares[pings.ranger]
         gain = share * beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
         each.plausibility.update(gain, evidence.log_path, path_m)
         if judged:
-            each.judged_m += path_m
+            each.evidence_m += path_m
         else:
-            each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))
+            each.plausibility.limit(min(most, UNSTATED) if cloud.rescues else max(most, UNSTATED))
 
-    def _clouds(self) -> list[Hypothetical]:
+    def _clouds(self) -> list[CloudHypothesis]:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
     def _right(self) -> Right:
@@ -337,7 +337,7 @@ class MapFilter:
             self._plan.agree()
         self.search, self._is_elsewhere = None, False
 
-    def _follow_search(self, search: Hypothetical) -> None:
+    def _follow_search(self, search: CloudHypothesis) -> None:
         """Track from now on what a search has found."""
         was = self._believed(0.0)
         self.tracked, self.search, self._is_elsewhere = search, None, False
@@ -349,7 +349,7 @@ class MapFilter:
         if cloud.is_coarse and self._progress.note_coarse(self._pings.path_m) and cloud.place_share < DOUBTED:
             self._plan.fail_search()
 
-    def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
+    def _doubt(self, tracked: CloudHypothesis, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
         least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else WIDE_DOUBTED
         if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
@@ -366,10 +366,10 @@ class MapFilter:
         """Anywhere, a share near the tracked cloud, at its height."""
         return Start(near=self._believed(walk_heading_rad), near_z_m=float(self.cloud.weight @ self.cloud.z_m))
 
-    def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
+    def _new_search(self, start: Start, walk_heading_rad: float) -> CloudHypothesis:
         self._progress.begin(self._pings.path_m, self.tracked.plausibility.log_odds)
         self._met.forget_beacons()
-        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
+        return CloudHypothesis(self._new_cloud(start, walk_heading_rad), Plausibility(UNSTATED))
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""

@@ -7,7 +7,7 @@ coarse.
 
 from __future__ import annotations
 
-from echostep.localization.belief import EARLY_M, FOUND, FOUND_WITHIN_M, LEVEL_M, REJECTED, Hypothetical
+from echostep.localization.belief import EARLY_M, FOUND, FOUND_WITHIN_M, LEVEL_M, REJECTED, CloudHypothesis
 from echostep.localization.particles.cloud import Cloud
 
 
@@ -39,7 +39,7 @@ class SearchProgress:
         """Whether a cloud is still coarse after twice the path within which a place is found."""
         return cloud.is_coarse and self.length_m(path_m) > 2.0 * self.found_within_m
 
-    def has_failed(self, search: Hypothetical, path_m: float) -> bool:
+    def has_failed(self, search: CloudHypothesis, path_m: float) -> bool:
         """Whether a search has gathered in a wrong place, left through walls as a whole, or found nothing probable for long."""
         if search.plausibility.probability < REJECTED or (search.cloud.rescues and not search.has_contracted):
             return True

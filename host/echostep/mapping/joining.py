@@ -18,7 +18,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.mapping.graph.fragments import Fragments
-from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.graph import Closure, FittedWalls, Graph
 from echostep.mapping.graph.nodes import Nodes, Pings
 from echostep.mapping.mapper import Mapped, Progress, close_loops, drawn, settle
 from echostep.mapping.placing import Place, find_place
@@ -42,7 +42,7 @@ def merged(old: Graph, new: Graph, place: Place) -> Graph:
     closures = [*old.closures, *(shift.closure(closure, n) for closure in new.closures)]
     closures.append(Closure(nearest, node, pose[node] - pose[nearest], tie, place.log_odds))
     fragments = _fragments(old.fragments, new.fragments, n)
-    none = Walls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
+    none = FittedWalls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
     base = None if new.base_rad is None else old.base_rad
     return Graph(nodes, fragments, pose, none, closures, base)
 

@@ -18,7 +18,7 @@ from echostep.mapping.graph.bias import find_bias, without_bias
 from echostep.mapping.graph.closures import APART_M, STRETCH_M, find_closure
 from echostep.mapping.graph.directions import LEAST_EVIDENCE, Directions
 from echostep.mapping.graph.fragments import Fragments, find_fragments
-from echostep.mapping.graph.graph import ROUNDS, Closure, Graph, Walls, contradicted
+from echostep.mapping.graph.graph import ROUNDS, Closure, FittedWalls, Graph, contradicted
 from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.graph.relief import find_relief
 from echostep.mapping.graph.spots import with_spots
@@ -94,7 +94,7 @@ def settle(graph: Graph) -> list[Closure]:
 
 def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
     """The graph with its path as the building's directions correct it, where it has any."""
-    none = Walls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
+    none = FittedWalls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
     if directions.evidence < LEAST_EVIDENCE:
         return Graph(nodes, fragments, nodes.pose.copy(), none)
     pose, drift = nodes.pose.copy(), directions.drift_rad

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What views read of a tracker: copies of its state.
 
-In: nothing. Out: `TrackerState`, `StreamState`, `Particles`. Owns nothing.
+In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`. Owns nothing.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class StreamState:
 
 
 @dataclass(frozen=True, slots=True)
-class Particles:
+class ParticleSnapshot:
     """n particles: `x_m`, `y_m` (n,) in the map, `level` (n,) index in the plan, `log_weight` (n,), 0 for the heaviest of all particles."""
 
     x_m: Floats

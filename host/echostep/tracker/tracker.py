@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The tracker: chunks in, estimates out. The only module where the stages meet.
 
-In: chunks in order of arrival. Out: estimates; for views, copies of the state (`TrackerState`, `StreamState`, `Particles`). Owns the front end,
-the filter and the random generator. Live, replay and simulation all use `Tracker.take`. No wall clock is read here: equal chunks give equal
-estimates, bit for bit, in portions of any size.
+In: chunks in order of arrival. Out: estimates; for views, copies of the state (`TrackerState`, `StreamState`, `ParticleSnapshot`). Owns the
+front end, the filter and the random generator. Live, replay and simulation all use `Tracker.take`. No wall clock is read here: equal chunks
+give equal estimates, bit for bit, in portions of any size.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from echostep.ports.people.teammate import TEAM
 from echostep.settings import Settings
 from echostep.tracker.before_check_in import BeforeCheckIn
 from echostep.tracker.last_place import LastPlace, last_place
-from echostep.tracker.state import Particles, StreamState, TrackerState
+from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
@@ -134,13 +134,13 @@ class Tracker:
             foot_reports=replace(front_end.foot_source.board.reports) if front_end.foot_source.port == FOOT else None,
         )
 
-    def particles(self, most: int) -> Particles | None:
+    def particles(self, most: int) -> ParticleSnapshot | None:
         """A copy of at most `most` particles, evenly thinned; None before the first segment."""
         if self.filter is None:
             return None
         cloud = self.filter.cloud
         every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
-        return Particles(
+        return ParticleSnapshot(
             x_m=cloud.map_x_m[every].copy(),
             y_m=cloud.y_m[every].copy(),
             level=cloud.level[every].copy(),
@@ -239,7 +239,7 @@ class Tracker:
             if segment.t1_s <= self._check_in_s:
                 return []
             measured = measured.after(self._check_in_s)
-        self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
+        self.filter.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
         for t_s, meeting in meetings:
             self._meetings.note(meeting, self.filter.meet(on_the_way(meeting, measured.segment, t_s)))
         self._estimate = self.filter.update(measured, readings)
@@ -327,7 +327,7 @@ class Tracker:
             if self.filter is None:
                 waiting += readings
             else:
-                self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
+                self.filter.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
                 for t_s, meeting in meetings:
                     self.filter.meet(on_the_way(meeting, measured.segment, t_s))
                 self._estimate = self.filter.update(measured, readings)

@@ -32,7 +32,7 @@ MARGIN = 12.0  # by which the cost of any other hypothesis must be higher
 FITTING = 0.6  # share of ranges that must fit within three standard deviations
 
 
-class Found(NamedTuple):
+class LocatedBeacon(NamedTuple):
     """A place (m), and whether the readings allow it and no other."""
 
     x_m: float
@@ -41,10 +41,10 @@ class Found(NamedTuple):
 
 
 @kernel
-def locate_beacon(readings: Floats) -> Found:
+def locate_beacon(readings: Floats) -> LocatedBeacon:
     """The beacon's place that fits readings (n, 4) best; not sure while they are too few or another place fits nearly as well."""
     if len(readings) < FEWEST or _extent(readings) < PATH_M:
-        return Found(np.nan, np.nan, False)
+        return LocatedBeacon(np.nan, np.nan, False)
     x, y, far = 0.0, 0.0, 0.0
     for k in range(len(readings)):
         x += readings[k, X] / len(readings)
@@ -53,13 +53,13 @@ def locate_beacon(readings: Floats) -> Found:
     cells = int((far + 1.0) / GRID_M)
     x, y, only = _search(readings, x, y, cells, GRID_M)
     if not only:
-        return Found(x, y, False)
+        return LocatedBeacon(x, y, False)
     x, y, _ = _search(readings, x, y, int(2.0 * FINER), GRID_M / FINER)
     fitting = 0
     for k in range(len(readings)):
         away = math.hypot(readings[k, X] - x, readings[k, Y] - y)
         fitting += abs(away - readings[k, RANGE]) < 3.0 * RANGE_SD_M
-    return Found(x, y, fitting >= FITTING * len(readings))
+    return LocatedBeacon(x, y, fitting >= FITTING * len(readings))
 
 
 @kernel

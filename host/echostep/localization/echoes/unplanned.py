@@ -39,7 +39,7 @@ BIN_M = 0.05  # width of a bin of ranges
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
-JUDGING_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
+EVIDENCE_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
 
 
 class LastWall:
@@ -82,7 +82,7 @@ class LastWall:
         return self._sd_m + self._slant_m * abs(wrap(self.normal_rad - axis_rad))
 
 
-class View:
+class UnplannedView:
     """`density` before `update` for each ping, after `move`."""
 
     def __init__(self, echo: EchoSettings) -> None:
@@ -169,7 +169,7 @@ class RangeMemory:
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self._background, self._echo = background, echo
         self._missed = MissedEchoes()
-        self._views = [View(echo), View(echo)]
+        self._views = [UnplannedView(echo), UnplannedView(echo)]
 
     def densities(self, pings: PlacedPings) -> UnplannedDensities:
         """For pings (k,) in order of time."""
@@ -202,9 +202,9 @@ def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: E
     return mean / len(x)
 
 
-def judged_share(turn_rad: float) -> float:
+def evidence_share(turn_rad: float) -> float:
     """Share of the information of a turning segment's pings that tells whether the cloud is right."""
-    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, JUDGING_RAD)
+    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, EVIDENCE_RAD)
 
 
 def _loss(turn_rad: float, half_rad: float) -> float:
@@ -217,11 +217,11 @@ class UsablePings:
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self.path_m = 0.0  # length of the path so far
-        self.hear_by(background, echo)
+        self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
-    def hear_by(self, background: Background, echo: EchoSettings) -> None:
+    def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
         """From now on the pings are those of rangers with these settings."""
         self._correlation_m, self._own = echo.correlation_m, echo.own
         self._ranges = RangeMemory(background, echo)

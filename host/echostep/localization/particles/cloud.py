@@ -56,12 +56,12 @@ from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet
 
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
-SMALL = 2  # times the least size: a cloud has contracted
+CONTRACTED = 2  # times the least size: a cloud has contracted
 # Bend of a move, as a share of its chord, above which a coarse cloud hears no ping: an uncertain turn of 45 degrees
 COARSE_BEND = bend_of(math.radians(45.0))
 COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, assumed
 START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
-WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse: a room
+COARSE_SD_M = 3.0  # standard deviation of a start's place above which its cloud is coarse: a room
 # Log-weight that crossing a wall costs a coarse cloud: its particles are a step apart
 COARSE_WALL_COST = 5.0
 # The same where there are several levels, after so many metres: only exact likelihoods tell storeys apart that are alike
@@ -105,7 +105,7 @@ class Cloud(Particles):
         self.is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
-        self.is_coarse = start.pose is None or start.sd_m > WIDE_M
+        self.is_coarse = start.pose is None or start.sd_m > COARSE_SD_M
         self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
         wanted = max(self._wanted_size(), START_SIZE)
         if wanted < settings.largest:
@@ -141,9 +141,9 @@ class Cloud(Particles):
         return len(self.x_m) > SCATTERED * self._least_size
 
     @property
-    def is_small(self) -> bool:
+    def is_contracted(self) -> bool:
         """Whether the cloud has contracted to about its least size."""
-        return len(self.x_m) <= SMALL * self._least_size
+        return len(self.x_m) <= CONTRACTED * self._least_size
 
     @property
     def _least_size(self) -> int:

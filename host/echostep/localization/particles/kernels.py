@@ -23,7 +23,7 @@ LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 0 and 1 are x and y
 
 
-class Piece(NamedTuple):
+class MovePiece(NamedTuple):
     """Chord of a piece of a move, and what of it its bend is (m, walk frame)."""
 
     dx_m: float
@@ -32,7 +32,7 @@ class Piece(NamedTuple):
     bend_y_m: float
 
 
-class Ping(NamedTuple):
+class WeightedPing(NamedTuple):
     """One ping of a `PingBatch`."""
 
     axis_rad: float
@@ -87,7 +87,7 @@ def propagate_and_reweight(
             passed += left
             done = until
         if k < len(pings.share):
-            ping = Ping(
+            ping = WeightedPing(
                 pings.axis_rad[k],
                 pings.range_m[k],
                 pings.power[k],
@@ -108,16 +108,16 @@ def propagate_and_reweight(
 
 
 @kernel
-def piece_of(move: Move, begin: float, end: float) -> Piece:
+def piece_of(move: Move, begin: float, end: float) -> MovePiece:
     """The piece of a move between two shares of it: of a parabola [`PathSegment.way_m`]."""
     part, bend = end - begin, (end - begin) * (1.0 - begin - end)
     bend_x, bend_y = bend * move.bend_x_m, bend * move.bend_y_m
-    return Piece(part * move.dx_m + bend_x, part * move.dy_m + bend_y, bend_x, bend_y)
+    return MovePiece(part * move.dx_m + bend_x, part * move.dy_m + bend_y, bend_x, bend_y)
 
 
 @lean_kernel
 def propagate(
-    particles: ParticleArrays, piece: Piece, share: float, noise: Floats, wall_cost: float, walls: WallIndex
+    particles: ParticleArrays, piece: MovePiece, share: float, noise: Floats, wall_cost: float, walls: WallIndex
 ) -> tuple[float, float]:
     """Move every particle by a piece, with this share of its noise but all of that of its bend, and make the greatest log-weight 0 again.
 
@@ -159,7 +159,7 @@ def propagate_without_walls(particles: ParticleArrays, move: Move, rng: np.rando
 
 @kernel
 def reweight_by_ping(
-    particles: ParticleArrays, hidden: Floats, ping: Ping, model: EchoModel, walls: WallIndex
+    particles: ParticleArrays, hidden: Floats, ping: WeightedPing, model: EchoModel, walls: WallIndex
 ) -> tuple[float, float]:
     """Add each particle's log-likelihood, and make the greatest log-weight 0.
 

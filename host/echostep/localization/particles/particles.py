@@ -11,7 +11,7 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.localization.beacons.beliefs import BeaconBeliefs
 from echostep.localization.particle_arrays import ParticleArrays
-from echostep.localization.particles.places import Hypothesis, hypotheses
+from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 # A cloud has gathered when less than this weight is farther than this from its mean; assumed: a room, and a hundredth of a place's weight
@@ -72,7 +72,7 @@ class Particles:
         """Their mean."""
         return float(self.hidden_shares.mean())
 
-    def places(self, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
+    def places(self, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
         """The few places where the trunk may be, the likeliest first."""
         return hypotheses(self.map_x_m, self.y_m, self.level, self.turn_rad + walk_heading_rad, self.weight)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The few places at which a cloud says that the trunk may be.
 
-In: a cloud's places and weights. Out: `Hypothesis`, the likeliest first. Owns nothing.
+In: a cloud's places and weights. Out: `LikelyPlace`, the likeliest first. Owns nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MOST_SQUARES = 1_000_000  # memory: 8 MB
 
 
 @dataclass(frozen=True, slots=True)
-class Hypothesis:
+class LikelyPlace:
     """A place in the map (m) with its level, standard deviation (m, per axis), heading (rad) and probability."""
 
     probability: float
@@ -49,12 +49,12 @@ class _Particles(NamedTuple):
     square: Ints
 
 
-def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[Hypothesis, ...]:
+def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[LikelyPlace, ...]:
     """At most MOST, from places (n,) in the map with weights that sum to 1. Each takes the particles near the heaviest square that is left."""
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
     mass = np.asarray(np.bincount(particles.square, left), np.float64)
-    found: list[Hypothesis] = []
+    found: list[LikelyPlace] = []
     while len(found) < MOST:
         probability, *place = _take(int(mass.argmax()), particles, left, mass)
         if probability < LEAST:
@@ -77,9 +77,9 @@ def _squares(x_m: Floats, y_m: Floats, level: Ints) -> Ints:
 
 def _hypothesis(
     probability: float, x_m: float, y_m: float, level: float, square_m2: float, east: float, north: float
-) -> Hypothesis:
+) -> LikelyPlace:
     sd_m = math.sqrt(max(0.5 * square_m2, 0.0))
-    return Hypothesis(probability, x_m, y_m, int(level), sd_m, math.atan2(north, east))
+    return LikelyPlace(probability, x_m, y_m, int(level), sd_m, math.atan2(north, east))
 
 
 @kernel

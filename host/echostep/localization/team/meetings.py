@@ -30,7 +30,7 @@ import msgspec
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.belief import DOUBTED, Hypothetical
+from echostep.localization.belief import DOUBTED, CloudHypothesis
 from echostep.localization.estimate import LOST_M, TAIL, ellipse95
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
@@ -315,7 +315,7 @@ class MeetingQueue:
         self.news = MeetingNews(1 if self.news is None else self.news.number + 1, meeting.name, effect)
 
 
-def weigh_range(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
+def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
     """Weigh the cloud by a range to a teammate's beacon; returns the probability that the range is right, given the cloud.
 
     A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
@@ -329,6 +329,6 @@ def weigh_range(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
     return right
 
 
-def weigh_by(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
+def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
     """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud."""
     return weigh(each.cloud, meeting, area_m2) if meeting.beacon is None else weigh_range(each, meeting, area_m2)

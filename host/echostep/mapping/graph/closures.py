@@ -23,7 +23,7 @@ from echostep.mapping.graph.matching import Pieces, match
 GAP_M = 0.35  # along the wall, up to which it goes on: half of a door; cuts leave up to three pings, 0.25 m
 STRETCH_M = 8.0  # of path that is matched as one
 APART_M = 20.0  # of path between a stretch and what is older
-NEAR_M = 7.0  # beyond the uncertainty, in which older fragments are looked for
+SEARCHED_M = 7.0  # beyond the uncertainty, in which older fragments are looked for
 NEW = 0.5  # probability before the match that the place is new
 LEAST_LOG_ODDS = math.log(2e4)  # every place is tried twice
 SHIFTS, TURNS = 31, 5  # of the grid to either side of three standard deviations
@@ -108,7 +108,7 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
     sd = _greatest_sd_m(graph.covariance(node, nearest))
     if sd > MOST_SD_M:
         return None
-    older = older[away < NEAR_M + 3.0 * sd]
+    older = older[away < SEARCHED_M + 3.0 * sd]
     if len(older) < LEAST_OLD:
         return None
     return _closure(graph, new, older, node)

@@ -19,7 +19,7 @@ from echostep.mapping.graph.nodes import Nodes
 PEOPLE = 0.05  # share of the path with echoes of a person beside a ranger, assumed
 MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too
 ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from that of the path, assumed
-NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
+COUNTED_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
 LEAST_HALF_M = 0.3  # of path to either side of a fragment's middle, at least, over which its direction is taken
 
 
@@ -28,8 +28,8 @@ def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
     way_m = nodes.way_m[fragments.node]
     order = np.argsort(way_m, kind="stable")
     heard_m = np.concatenate([[0.0], np.cumsum(2.0 * fragments.half_m[order])])
-    low, high = (np.searchsorted(way_m[order], way_m + side * NEAR_M) for side in (-1.0, 1.0))
-    path_m = np.minimum(way_m + NEAR_M, nodes.way_m[-1]) - np.maximum(way_m - NEAR_M, 0.0)
+    low, high = (np.searchsorted(way_m[order], way_m + side * COUNTED_M) for side in (-1.0, 1.0))
+    path_m = np.minimum(way_m + COUNTED_M, nodes.way_m[-1]) - np.maximum(way_m - COUNTED_M, 0.0)
     share: Floats = np.minimum(PEOPLE * 2.0 * path_m / (heard_m[high] - heard_m[low]), MOST_PEOPLE)
     return share
 

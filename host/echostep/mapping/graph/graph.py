@@ -31,7 +31,7 @@ FREE_SD_RAD = math.radians(30.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Walls:
+class FittedWalls:
     """Straight walls: `normal_rad` (w,) from the path to the wall, `rho_m` (w,): normal times any of its points; `of` (f,): wall of each
     fragment, -1: none.
     """
@@ -65,7 +65,7 @@ class Graph:
     nodes: Nodes
     fragments: Fragments
     pose: Floats
-    walls: Walls
+    walls: FittedWalls
     closures: list[Closure] = field(default_factory=list)
     base_rad: float | None = None
     factor: SuperLU | None = None
@@ -84,7 +84,7 @@ class Graph:
             count = 3 * len(self.nodes)
             self.pose = self.pose + step[:count].reshape(-1, 3)
             w = step[count:].reshape(-1, 2)
-            self.walls = Walls(self.walls.normal_rad + w[:, 0], self.walls.rho_m + w[:, 1], self.walls.of)
+            self.walls = FittedWalls(self.walls.normal_rad + w[:, 0], self.walls.rho_m + w[:, 1], self.walls.of)
             if float(np.abs(step).max(initial=0.0)) < 1e-3:
                 break
 

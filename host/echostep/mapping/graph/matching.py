@@ -35,7 +35,7 @@ class Pieces(NamedTuple):
     range_m: Floats
 
 
-class Piece(NamedTuple):
+class PlacedFragment(NamedTuple):
     """One fragment in the map."""
 
     x_m: float
@@ -59,7 +59,7 @@ def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: 
             c, s = math.cos(turns_rad[k]), math.sin(turns_rad[k])
             dx, dy = new.x_m[i] - pivot[0], new.y_m[i] - pivot[1]
             x, y = pivot[0] + c * dx - s * dy, pivot[1] + s * dx + c * dy
-            piece = Piece(x, y, new.normal_rad[i] + turns_rad[k], new.half_m[i], new.sd_rad[i])
+            piece = PlacedFragment(x, y, new.normal_rad[i] + turns_rad[k], new.half_m[i], new.sd_rad[i])
             fits[:], free[:] = 0.0, 0.0
             for j in range(len(old.x_m)):
                 _add_older(fits, free, piece, old, j, shifts_m)
@@ -70,7 +70,7 @@ def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: 
 
 
 @kernel
-def _add_older(fits: Floats, free: Floats, piece: Piece, old: Pieces, j: int, shifts_m: Floats) -> None:
+def _add_older(fits: Floats, free: Floats, piece: PlacedFragment, old: Pieces, j: int, shifts_m: Floats) -> None:
     """Raise `fits` and lower `free` (shifts, shifts) by what the older fragment j says of a fragment at each shift."""
     n, old_half = len(shifts_m), old.half_m[j]
     ex, ey = piece.x_m - old.x_m[j], piece.y_m - old.y_m[j]

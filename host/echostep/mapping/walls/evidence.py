@@ -25,7 +25,7 @@ MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
 FITS_M = 0.1  # of a range from the distance of the line
 BEYOND_M = 0.18  # a range longer by more than so much passed through the cell
 HALF_CONE_RAD = math.radians(27.5)
-NEAR_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
+BEYOND_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
 HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least so wide; weight of that against pings
 CORNER_M = 0.15  # of a range from the distance of a corner
 TURNING_RAD = math.radians(15.0)  # turn of a stride
@@ -115,7 +115,7 @@ def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: 
             if cell < 0 or cell >= cells.size[line]:
                 continue
             if fits:
-                near = lines.low_m[line] - NEAR_M < along < lines.high_m[line] + NEAR_M
+                near = lines.low_m[line] - BEYOND_M < along < lines.high_m[line] + BEYOND_M
                 if free[k] and cells.of[k] < 0 and near:
                     cells.heard[line, cell] += 1.0
                     cells.of[k] = line
