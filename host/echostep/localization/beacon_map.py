@@ -143,7 +143,7 @@ class BeaconMap:
         return cloud.beliefs.mean.shape[1] == len(self._heard_s)
 
     def _begin_anew(self, cloud: Cloud) -> None:
-        """Forget the places, which were those of a wrong cloud, and when each beacon was heard there."""
+        """Forget the places, which were those of a wrong cloud, and when each beacon was last received."""
         self._health, self._waiting = initial_health(0), no_waiting(0)
         self._heard_s, self._reach_m, self._unexpected_s = [], [], []
         cloud.beliefs = empty_beliefs(len(cloud.x_m), 0)

@@ -37,7 +37,7 @@ class Building:
 
     @property
     def has_walls(self) -> bool:
-        """Whether there is anything that echoes could tell."""
+        """Whether the plan has walls, so that echoes carry information."""
         return len(self.walls.index.walls) > 0
 
     @property
@@ -58,7 +58,7 @@ class Building:
         return self._fields[model]
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
-        """What particles (n,) beside an upper storey lose in log-weight on this length of path; None where none does."""
+        """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None where there is none."""
         return None if self.upper_storeys is None else self.upper_storeys.log_loss(x_m, y_m, path_m)
 
     def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The estimate: moments of the cloud.
 
-In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that says how far to trust it. Owns nothing.
+In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that states how far to trust it. Owns nothing.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ RISK = 1e-3  # probability of an error beyond the protection radius
 # Of the protection radius of a normal distribution: errors of echoes and steps have heavier tails.
 TAIL = 1.5
 SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, assumed
-UNFIT = 0.5  # probability of the plan below which it is said not to fit, assumed
-OUTSIDE = 0.5  # probability of being outside of the building above which it is said, assumed
+UNFIT = 0.5  # probability of the plan below which it is reported not to fit, assumed
+OUTSIDE = 0.5  # probability of being outside of the building above which that is reported, assumed
 SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, assumed
 WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
 
@@ -103,7 +103,7 @@ class Estimate:
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
     `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
     the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
-    `hypotheses`: the places of a cloud that has not gathered, or not on one level, the likeliest first.
+    `hypotheses`: the likely places of a cloud wider than SPREAD_M, or on several levels, the likeliest first.
     """
 
     t_s: float
@@ -172,10 +172,10 @@ def estimate(
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
-    Of a cloud of several places the mean is in none of them: the position is then that of the place which has more than half of the weight, if there
-    is one. `sd_m`: standard deviation per axis to be added; `right`: probability that the cloud is right, otherwise the trunk is `elsewhere`. While
-    tracking, the covariance is the cloud's; otherwise that of the mixture of both about the position. The hypotheses are those of `search`, if there
-    is one.
+    The mean of a cloud with several likely places may lie in none of them: the position is then that of the likeliest place, if that has more than
+    half of the weight, and MUCH_LIKELIER times that near the mean. `sd_m`: standard deviation per axis to be added; `right`: probability that the
+    cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise that of the mixture of both about the
+    position. The hypotheses are those of `search`, if there is one.
     """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)

@@ -68,7 +68,7 @@ UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out
 
 
 class MapFilter:
-    """The cloud of a start, and a second one that searches the building while the first is doubted."""
+    """The tracked cloud, and a second one that searches the building while the first is doubted."""
 
     def __init__(
         self, building: Building, start: Start, walk_heading_rad: float, rng: np.random.Generator,
@@ -103,11 +103,11 @@ class MapFilter:
 
     @property
     def echo(self) -> EchoSettings:
-        """What the rangers may report."""
+        """Settings of the ranger model."""
         return self._settings.echo
 
     def set_ranger_model(self, echo: EchoSettings) -> None:
-        """From now on the pings are those of rangers with these settings."""
+        """Use these ranger settings from the next segment on."""
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = echo_models(self._settings)
@@ -141,9 +141,9 @@ class MapFilter:
     def meet(self, meeting: Meeting) -> MeetingEffect:
         """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
 
-        Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
-        one only when a second teammate says so, and that is the likelier. A radio range beyond PLACE_M moves nothing; ranges to beacons of two
-        teammates can begin a search.
+        Agreement raises the cloud's probability to at most the meeting's, since both may stem from one source. A contradiction moves a doubted cloud,
+        a believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to
+        beacons of two teammates can begin a search.
         """
         area_m2 = self._building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
@@ -196,9 +196,9 @@ class MapFilter:
         self._search_beside(self.cloud.air, segment.heading1_rad)
 
     def _search_beside(self, air: Air | None, walk_heading_rad: float) -> None:
-        """Search the whole building beside the tracked cloud, which stands for what is near.
+        """Search the whole building in addition to the tracked cloud, which covers the near places.
 
-        `air`: what is known of the heights by pressure; None: nothing tells the level, so what is above and below is searched more than the rest.
+        `air`: calibration of the heights by pressure; None: the level is unknown, so places above and below are searched more densely than the rest.
         """
         if self.cloud.is_coarse or not len(self._building.floor.x_m):
             return
@@ -208,7 +208,7 @@ class MapFilter:
         self.search = self._new_search(Start(near=near, air=air), walk_heading_rad)
 
     def _follow_barometer(self, measured: MeasuredSegment) -> None:
-        """The lag of the height by pressure drifts in a pause, and is not known after a restart of the board: it may be another one."""
+        """Let the lag of the height by pressure drift over a pause; forget it after a restart of the board, which may be another board."""
         anew = len(measured.height_m) > 0 and measured.board_restarts != self._board_restarts
         if anew:
             self._board_restarts = measured.board_restarts
@@ -222,7 +222,7 @@ class MapFilter:
         self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
 
     def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
-        """Spread the cloud over an unobserved segment."""
+        """Spread the clouds over an unobserved segment."""
         for each in self._clouds():
             each.cloud.scatter(move_of(segment), change)
             each.plausibility.doubt(UNOBSERVED_DOUBT)
@@ -245,7 +245,7 @@ class MapFilter:
     def _follow_with(
         self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
     ) -> None:
-        """Propagate and reweight one cloud, and judge it by this share of how well it foretold the pings."""
+        """Propagate and reweight one cloud, and update its probability by this share of the evidence of the pings."""
         cloud = each.cloud
         if cloud.is_coarse:
             field = self._building.field(self._model)
@@ -254,10 +254,10 @@ class MapFilter:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
                 cloud.draw_veer()
         else:
-            # A scattered cloud's particles stand for the places between them.
+            # The particles of a scattered cloud are sparse: the echo model is blurred by their spacing.
             model = self._blurred if cloud.is_scattered else self._model
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
-            # Where there was more than one place, a light one may have lost a level by chance.
+            # Where there were several places, a light one may have lost its particles on one level by chance.
             if cloud.is_on_any_level and cloud.is_in_one_place:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
                 cloud.is_on_any_level = False
@@ -272,15 +272,19 @@ class MapFilter:
         self, each: CloudHypothesis, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
         share: float,
     ) -> None:  # fmt: skip
-        """Update the probability that a cloud is right; one that has not contracted gains nothing, and a search's is judged against chance alone."""
+        """Update the probability that a cloud is right by the density of its echoes against that without a plan.
+
+        Echoes that made a cloud converge are not counted as evidence for it: until it has contracted its probability stays at most UNSTATED, or
+        what it was, and a search is compared only with a wearer anywhere in the building.
+        """
         cloud, most = each.cloud, each.plausibility.probability
-        judged = each.has_contracted and not cloud.is_scattered
-        each.has_contracted = each.has_contracted or cloud.is_contracted  # what contracts it, it has not foretold
-        rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
+        converged = each.has_contracted and not cloud.is_scattered
+        each.has_contracted = each.has_contracted or cloud.is_contracted
+        rival = unplanned.either if converged or each.is_stated else unplanned.anywhere
         seen = 1.0 - cloud.hidden_shares[pings.ranger]
         gain = share * beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
         each.plausibility.update(gain, evidence.log_path, path_m)
-        if judged:
+        if converged:
             each.evidence_m += path_m
         else:
             each.plausibility.limit(min(most, UNSTATED) if cloud.rescues else max(most, UNSTATED))
@@ -291,7 +295,7 @@ class MapFilter:
     def _right(self) -> Right:
         """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height.
 
-        Where the search has none there, or has not gathered, it is what the tracked cloud has foretold against what the search has.
+        Where the search has no weight there, or is coarse, both are compared by how well they have predicted the echoes.
         """
         here = self.tracked.plausibility.probability
         if self.search is None:
@@ -305,7 +309,7 @@ class MapFilter:
         return Right(min(here, most), about)
 
     def _choose(self, right: float, walk_heading_rad: float) -> bool:
-        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found.
+        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or track the cloud of the search.
 
         `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
         """
@@ -330,7 +334,7 @@ class MapFilter:
         return True
 
     def _agree(self) -> None:
-        """The search agrees with the tracked cloud: that was right, unless it was refuted, and has come by chance to where it is now."""
+        """End a search that agrees with the tracked cloud: that cloud was right, unless it was refuted and is now at the true place by chance."""
         if self._is_refuted:
             self._plan.find(self._progress.length_m(self._pings.path_m), math.inf)
         else:
@@ -338,13 +342,13 @@ class MapFilter:
         self.search, self._is_elsewhere = None, False
 
     def _follow_search(self, search: CloudHypothesis) -> None:
-        """Track from now on what a search has found."""
+        """Track the cloud of the search."""
         was = self._believed(0.0)
         self.tracked, self.search, self._is_elsewhere = search, None, False
         self._plan.find(self._progress.length_m(self._pings.path_m), away_m(was, self._believed(0.0)))
 
     def _note_coarse(self) -> None:
-        """Measure the path of a coarse search; count against the plan that no place is probable at the end of that within which one is found."""
+        """Count against the plan that a coarse search has no probable place at the end of the path within which one is usually found."""
         cloud = self._clouds()[-1].cloud
         if cloud.is_coarse and self._progress.note_coarse(self._pings.path_m) and cloud.place_share < DOUBTED:
             self._plan.fail_search()
@@ -385,7 +389,7 @@ class MapFilter:
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
         search = self.search.cloud if self.search else None
         elsewhere, plan_fits = self._building.elsewhere, self._plan.probability
-        if plan_fits < SURE:  # otherwise what is said of a place holds if the plan does
+        if plan_fits < SURE:  # above it, the stated errors are conditional on the plan
             right = Right(right.here * plan_fits, right.about)
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
         if self._height is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a measured segment of the path does to a cloud: its move, its change of height, and gaps after which the wearer may be elsewhere.
+"""From a measured segment of the path: its move, its change of height, and gaps after which the wearer may be elsewhere.
 
 In: `MeasuredSegment`s in order of time. Out: `Move`, `HeightChange`, the kind of gap that ends with a segment. Owns the errors of the path that the
 segment does not state, and the times of the last segment and of the last ping.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The place of a beacon that was first heard from afar, or was moved, from several of its readings along the path.
+"""The place of a beacon that was first received from afar, or was moved, from several of its readings along the path.
 
 In: readings, each with the boot's place. Out: the beacon's place, or None while several places fit. Owns nothing.
 Ranges along a straight path fit two places, one on either side: bearings decide, or a bend of the path does.

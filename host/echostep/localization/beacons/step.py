@@ -5,9 +5,9 @@ In: particles, and what a beacon measured to the boot. Out: log-weights, correct
 not known, or not any more. `BeaconMap` and the study of guided returns call the same kernels.
 
 A beacon that is near within its first readings was just dropped and lies about each particle (one range of twenty is too long, the first one too).
-One that was first heard from afar is located from several readings, for a near one leaves open on which side of the path it lies. One that was moved
-goes on to reweight the particles, each of which doubts it for itself, while readings for a new place are collected; they count only while the plan
-supports the cloud, because a wrong cloud would place a beacon where it suits that cloud, and other beacons may fit a wrong cloud too.
+One that was first received from afar is located from several readings, for a near one leaves open on which side of the path it lies. One that was
+moved goes on to reweight the particles, each of which doubts it for itself, while readings for a new place are collected; they count only while the
+plan supports the cloud, because a wrong cloud would place a beacon where it suits that cloud, and other beacons may fit a wrong cloud too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from echostep.walls.index import WallIndex
 
 # Assumed, not measured.
 MOST_WAITING = 48  # readings kept of a beacon without a place
-FIRST = 4  # readings of a beacon, among which a near one says that it was just dropped
+FIRST = 4  # readings of a beacon, among which a near one means that it was just dropped
 LOCATE_EVERY = 4  # readings of a beacon without a place
 LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`, about the cloud's own error
 

@@ -5,8 +5,8 @@ In: a range and the plan's echo sources, nearest first. Out: a likelihood. Owns 
 
 An SRF02 reports the first echo that it detects. So a source answers if it is detected and no nearer one is, and a second reflection after them all.
 Where the plan is not what stands there (furniture, people, a door that is shut, a wall that is gone), the view of a ranger is hidden, and its echo
-says nothing about the pose. A hidden view lasts: furniture has a length. So each particle carries the probability that its view is hidden, a Markov
-chain of two states over the path [Thrun et al. 2005, 6.3: the mixture of the beam model; here with a memory].
+carries no information about the pose. A hidden view persists along the path, as furniture has a length. So each particle carries the probability that
+its view is hidden, a Markov chain of two states over the path [Thrun et al. 2005, 6.3: the mixture of the beam model; here with a memory].
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def planned_density(
 
 @inline_kernel
 def outlier_density(range_m: float, m: EchoModel) -> float:
-    """Density per metre of a range that nothing foretells; range 0: the probability of no echo."""
+    """Density per metre of an outlier; range 0: the probability of no echo."""
     return SILENT if range_m <= 0.0 else (1.0 - SILENT) / (m.maximum_m - m.minimum_m)
 
 

@@ -3,7 +3,7 @@
 receives, or what the last echoes predict.
 
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
-densities without a plan. Owns the views of both rangers, each a line in the walk frame that was heard last, or nothing, and the length of the path.
+densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
 
 A cloud that explains the echoes no better than this is wrong, or the plan is. So it has to be as good as can be done without a plan: a wall that goes
 on is predicted as well as by the plan, and only where a view changes does the plan know more. A smooth wall answers from the foot of the
@@ -39,7 +39,7 @@ BIN_M = 0.05  # width of a bin of ranges
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
-EVIDENCE_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
+EVIDENCE_RAD = math.radians(15.0)  # as evidence for the cloud: they select the path of a turn, and are predicted badly
 
 
 class LastWall:
@@ -203,7 +203,7 @@ def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: E
 
 
 def evidence_share(turn_rad: float) -> float:
-    """Share of the information of a turning segment's pings that tells whether the cloud is right."""
+    """Share of the information of a turning segment's pings that is evidence for or against the cloud."""
     return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, EVIDENCE_RAD)
 
 
@@ -222,7 +222,7 @@ class UsablePings:
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
     def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
-        """From now on the pings are those of rangers with these settings."""
+        """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
         self._correlation_m, self._own = echo.correlation_m, echo.own
         self._ranges = RangeMemory(background, echo)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The steps of the particle filter on plain arrays: propagate, reweight by a ping, normalise, choose whom to keep.
+"""The steps of the particle filter on plain arrays: propagate, reweight by a ping, normalise, select survivors.
 
 In: `ParticleArrays`, a `Move` in the walk frame, a `PingBatch`, the walls. Out: the same arrays, changed in place. Owns nothing.
 """
@@ -163,9 +163,9 @@ def reweight_by_ping(
 ) -> tuple[float, float]:
     """Add each particle's log-likelihood, and make the greatest log-weight 0.
 
-    `hidden` (n,): of this ranger, the probability that the particle's view is hidden: then the plan tells nothing. Along the path it returns to
-    `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors are alike;
-    probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, and the effective size after.
+    `hidden` (n,): of this ranger, the probability that the particle's view is hidden, so that the plan gives no information. Along the path it
+    returns to `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors
+    are alike; probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, and the effective size after.
     """
     x, y, turn, _, log_weight = particles
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)

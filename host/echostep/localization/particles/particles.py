@@ -14,7 +14,7 @@ from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-# A cloud has gathered when less than this weight is farther than this from its mean; assumed: a room, and a hundredth of a place's weight
+# A cloud is gathered when less than this weight is farther than this from its mean; assumed: a room, and a hundredth of a place's weight
 GATHERED_M, GATHERED_REST = 2.5, 1e-4
 
 
@@ -73,7 +73,7 @@ class Particles:
         return float(self.hidden_shares.mean())
 
     def places(self, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
-        """The few places where the trunk may be, the likeliest first."""
+        """The likeliest places of the trunk, the likeliest first."""
         return hypotheses(self.map_x_m, self.y_m, self.level, self.turn_rad + walk_heading_rad, self.weight)
 
     @property

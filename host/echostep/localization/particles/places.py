@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The few places at which a cloud says that the trunk may be.
+"""The likeliest places of the trunk by a cloud.
 
 In: a cloud's places and weights. Out: `LikelyPlace`, the likeliest first. Owns nothing.
 """
@@ -50,7 +50,7 @@ class _Particles(NamedTuple):
 
 
 def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[LikelyPlace, ...]:
-    """At most MOST, from places (n,) in the map with weights that sum to 1. Each takes the particles near the heaviest square that is left."""
+    """At most MOST likely places of particles (n,) in the map, with weights that sum to 1; each takes the particles near the heaviest square left."""
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
     mass = np.asarray(np.bincount(particles.square, left), np.float64)

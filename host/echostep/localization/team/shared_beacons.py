@@ -2,12 +2,12 @@
 """Beacons that teammates have placed, as this wearer's filter uses them.
 
 In: messages of teammates (`TeamBeacons`), readings of this wearer's gateway, the beacons that this wearer has placed. Out: a `Meeting` of each
-reading of a teammate's beacon, a range from the place that the teammate told; `SharedBeacon`s of the wearer's own. Owns the newest message of each
-teammate, and counts those that are none.
+reading of a teammate's beacon, a range from the place that the teammate reported; `SharedBeacon`s of the wearer's own. Owns the newest message of
+each teammate, and the count of invalid messages.
 
 Such a range is fused as one by radio (`meeting_model`): by covariance intersection, for the beacon's error is its teammate's, which may be this
 wearer's own. One reading in five is an outlier (`BeaconSettings.range_outliers`), as often as a meeting with an `uncertain` teammate is wrong. A
-reading of a beacon of which k teammates tell is a range to each of these places, but one measurement: each range has the power 1/k.
+reading of a beacon that k teammates report is a range to each of these places, but one measurement: each range has the power 1/k.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from echostep.ports.people.team_beacons import SharedBeacon, parse_team_beacons
 
 MOST_TEAMMATES = 64  # whose beacons are kept, the newest, assumed
 TEAM_RANGE_SD_M = 0.4  # of a range to the trunk: BeaconSettings.range_sd_m, for the same reasons
-SHARED_SD_M = 1.0  # per axis, of a place above which a beacon is not shared: it says less than the echoes
+SHARED_SD_M = 1.0  # per axis, of a place above which a beacon is not shared: it has less information than the echoes
 ROUNDING_M2 = 2e-4  # added to the variances of a shared place, which is rounded to 0.01 m
 
 
 def shared_beacons(beacon_map: BeaconMap, cloud: Cloud, t_s: float, numbers: Sequence[int]) -> tuple[SharedBeacon, ...]:
-    """The beacons that a cloud has placed, to be told to teammates; `numbers`: of the beacon in each slot."""
+    """The beacons that a cloud has placed, to be sent to teammates; `numbers`: of the beacon in each slot."""
     found = []
     for place in beacon_map.places(cloud, t_s):
         if place.sd_m > SHARED_SD_M:
@@ -60,7 +60,7 @@ class TeamBeaconMap:
             self.told.pop(next(iter(self.told)))
 
     def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[TimedMeeting]:
-        """Of these readings, those of beacons whose place a teammate told, with their times; `numbers`: of the beacon in each slot."""
+        """Of these readings, those of beacons whose place a teammate reports, with their times; `numbers`: of the beacon in each slot."""
         found: list[TimedMeeting] = []
         for reading in readings if self.told else ():
             number = numbers[reading.slot]
@@ -70,7 +70,7 @@ class TeamBeaconMap:
 
 
 def _range_to(name: str, b: SharedBeacon, reading: BeaconReading, share: float) -> PreparedMeeting:
-    """A reading as a range to where the teammate `name` has told the beacon."""
+    """A reading as a range to the place that the teammate `name` reports for the beacon."""
     return PreparedMeeting(
         name, "uncertain", b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2,
         range_m=reading.range_m, range_sd_m=TEAM_RANGE_SD_M, beacon=b.number, share=share,
