@@ -141,9 +141,9 @@ class MapFilter:
     def meet(self, meeting: Meeting) -> MeetingEffect:
         """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
 
-        Agreement raises the cloud's probability to at most the meeting's, since both may stem from one source. A contradiction moves a doubted cloud,
-        a believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to
-        beacons of two teammates can begin a search.
+        Agreement raises the cloud's probability to at most the meeting's: both may stem from one source. A contradiction moves a doubted cloud, a
+        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to two
+        teammates' beacons can begin a search.
         """
         area_m2 = self._building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
@@ -274,8 +274,7 @@ class MapFilter:
     ) -> None:  # fmt: skip
         """Update the probability that a cloud is right by the density of its echoes against that without a plan.
 
-        Echoes that made a cloud converge are not counted as evidence for it: until it has contracted its probability stays at most UNSTATED, or
-        what it was, and a search is compared only with a wearer anywhere in the building.
+        Echoes that made it converge are not counted as evidence for it: until it has contracted, they raise its probability to UNSTATED at most.
         """
         cloud, most = each.cloud, each.plausibility.probability
         converged = each.has_contracted and not cloud.is_scattered
