@@ -142,8 +142,8 @@ class MeasuredSegment:
         s = self.segment
         x_m, y_m = s.way_m((t_s - s.t0_s) / (s.t1_s - s.t0_s))
         rest = replace(s, t0_s=t_s, dx_m=s.dx_m - x_m, dy_m=s.dy_m - y_m, heading0_rad=s.heading_rad(t_s))
-        kept = self.t_s >= t_s
-        return replace(self, segment=rest, t_s=self.t_s[kept], ranger=self.ranger[kept], range_m=self.range_m[kept])
+        later = self.t_s >= t_s
+        return replace(self, segment=rest, t_s=self.t_s[later], ranger=self.ranger[later], range_m=self.range_m[later])
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,5 +64,5 @@ def toe(square: Floats, cube: Floats) -> float:
     left = 0.5 * math.atan2(2.0 * square[1], square[0] - square[2])
     if cube[0] * math.cos(left) + cube[1] * math.sin(left) < 0.0:
         left += math.pi
-    found = left - 0.5 * math.pi
-    return math.atan2(math.sin(found), math.cos(found))
+    toe_rad = left - 0.5 * math.pi
+    return math.atan2(math.sin(toe_rad), math.cos(toe_rad))

@@ -64,10 +64,10 @@ def _restore_axis(nav: Nav, window: SampleWindow, axis: int, end: int, step: int
         begin += 1
         height = max(height, abs(window.gyro[(newest - begin) % RING, axis]))
     flat_s = window.t_s[(newest - end) % RING] - window.t_s[(newest - begin) % RING]
-    found = begin < last and begin - end >= FEWEST and flat_s >= SHORTEST_S and height >= NEAR * peak
+    is_plateau = begin < last and begin - end >= FEWEST and flat_s >= SHORTEST_S and height >= NEAR * peak
     begin += step - 1
     span_s = window.t_s[(newest - end) % RING] - window.t_s[(newest - begin) % RING]
-    if not found:
+    if not is_plateau:
         return 0
     sign = 1.0 if window.gyro[(newest - begin) % RING, axis] > 0.0 else -1.0
     rises, falls = 0.0, 0.0

@@ -49,15 +49,15 @@ class GuidedRescue(CueList):
 
     def _hear(self, payload: bytes) -> None:
         """A new place of the other wearer; one on a level that the plan has not is none."""
-        heard = parse_teammate(payload)
-        if heard is None or heard.name != self.name or heard.level >= len(self._tracker.plan.levels):
+        teammate = parse_teammate(payload)
+        if teammate is None or teammate.name != self.name or teammate.level >= len(self._tracker.plan.levels):
             self.bad += 1
             return
-        self._target = heard
+        self._target = teammate
 
     def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
         """Add the cue of a new estimate."""
-        said = self._find_route(e)
+        announcement = self._find_route(e)
         if self._guide is None or self._target is None:
             text = self._why or f"Stop. The place of {self.name} is not known yet"
             self.cues.append(Cue(e.t_s, CueKind.STOP, text, None, f"{text}." if self._is_new(text) else ""))
@@ -68,8 +68,8 @@ class GuidedRescue(CueList):
             cue = replace(
                 cue, text=f"{self.name} is here{within}", spoken=cue.spoken and f"{self.name} is here{within}."
             )
-        elif said:
-            cue = replace(cue, spoken=f"{said} {cue.spoken}".strip())
+        elif announcement:
+            cue = replace(cue, spoken=f"{announcement} {cue.spoken}".strip())
         self.cues.append(cue)
 
     def _is_new(self, text: str) -> bool:

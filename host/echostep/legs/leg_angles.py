@@ -91,13 +91,13 @@ class LegAngles:
         level, grid = self.level, self._grid
         indices = np.arange(begin, end + 1)
         yaw = np.linspace(grid.yaw[begin], grid.yaw[end], len(indices)) - grid.yaw[level.index]
-        found = []
+        angles = []
         for turned, sign, bias, start in zip(
             (grid.thigh, grid.shank), signs, self.bias, (level.thigh, level.shank), strict=True
         ):
             angle = sign * (np.array(turned[begin : end + 1]) - turned[level.index])
-            found.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
-        return found[0], found[1]
+            angles.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
+        return angles[0], angles[1]
 
     def move_level(self, signs: Signs, k: int) -> None:
         """Take the level to grid index k by integration; it is known the less, the longer the way and the wider the turn to there."""

@@ -113,5 +113,5 @@ def speed(way: Travel, at: int, until: int, hz: float, most: float) -> float:
     first, last = max(min(at, until), 0), min(max(at, until), len(way.forward_m) - 1)
     if last <= first:
         return 0.0
-    found = (float(way.forward_m[last]) - float(way.forward_m[first])) * hz / (last - first)
-    return float(np.clip(found, 0.0, most))
+    mean_m_s = (float(way.forward_m[last]) - float(way.forward_m[first])) * hz / (last - first)
+    return float(np.clip(mean_m_s, 0.0, most))

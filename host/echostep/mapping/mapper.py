@@ -124,8 +124,8 @@ def _anchored(graph: Graph) -> Bools:
     at = way_m[graph.fragments.node]
     k = np.clip(np.searchsorted(ends_m, at), 1, len(ends_m) - 1) if len(ends_m) > 1 else np.zeros(len(at), np.int64)
     nearest: Floats = np.minimum(np.abs(at - ends_m[k]), np.abs(at - ends_m[np.maximum(k - 1, 0)]))
-    found: Bools = nearest < KNOWN_M
-    return found
+    anchored: Bools = nearest < KNOWN_M
+    return anchored
 
 
 def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:

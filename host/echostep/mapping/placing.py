@@ -60,8 +60,8 @@ class Place(NamedTuple):
 
     def moved(self, points: Floats) -> Floats:
         """Points (n, 2) of the new map on the old one."""
-        found: Floats = points @ _turned(self.turn_rad).T + self.shift_m
-        return found
+        moved_points: Floats = points @ _turned(self.turn_rad).T + self.shift_m
+        return moved_points
 
 
 def scene_of(graph: Graph) -> Scene:
@@ -193,9 +193,9 @@ def _values(images: _Images, side: Ints, points: Floats) -> Floats:
     """Ratios at points (n, 2), zero outside of the image."""
     x, y = _cells(points, images.low)
     inside = (x >= 0) & (y >= 0) & (x < images.ratio.shape[1]) & (y < images.ratio.shape[2])
-    found = np.zeros(len(points))
-    found[inside] = images.ratio[side[inside], x[inside], y[inside]]
-    return found
+    ratios = np.zeros(len(points))
+    ratios[inside] = images.ratio[side[inside], x[inside], y[inside]]
+    return ratios
 
 
 def _cells(points: Floats, low: Ints) -> tuple[Ints, Ints]:

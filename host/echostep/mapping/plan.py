@@ -41,8 +41,8 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
     turned = np.array([[c, -s], [s, c]])
 
     def moved(points: Floats) -> Floats:
-        found: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
-        return found
+        moved_points: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
+        return moved_points
 
     return plan_in(mapped, moved, start, name)
 

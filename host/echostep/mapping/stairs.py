@@ -67,11 +67,11 @@ def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
             continue
         lines = shapely.difference(shapely.linestrings(level.walls.reshape(-1, 2, 2)), well.area.buffer(CLEAR_M))
         parts = [part for part in shapely.get_parts(lines) if part.length > LEAST_M]
-        heard = [np.array(part.coords).ravel() for part in parts]
+        outside = [np.array(part.coords).ravel() for part in parts]
         doors = [door for door in level.doors if not _line_of(door).intersects(well.area)]
         rim, ways = _rim(well, index)
         doors += [Door((float(a), float(b), float(c), float(d)), "open") for a, b, c, d in ways]
-        level = replace(level, walls=np.array(heard + rim).reshape(-1, 4).round(3), doors=tuple(doors))
+        level = replace(level, walls=np.array(outside + rim).reshape(-1, 4).round(3), doors=tuple(doors))
     return level
 
 
@@ -106,10 +106,10 @@ def _rim(well: Well, index: int) -> tuple[list[Floats], list[Floats]]:
 
 def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Intervals in order, those that are nearer than a wall's least length as one."""
-    found: list[tuple[float, float]] = []
+    merged: list[tuple[float, float]] = []
     for low, high in sorted(intervals):
-        if found and low < found[-1][1] + LEAST_M:
-            found[-1] = (found[-1][0], max(found[-1][1], high))
+        if merged and low < merged[-1][1] + LEAST_M:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
         else:
-            found.append((low, high))
-    return found
+            merged.append((low, high))
+    return merged

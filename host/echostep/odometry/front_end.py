@@ -224,8 +224,8 @@ class FrontEnd:
         named = np.column_stack([reports["part_ranger_left"], reports["part_ranger_right"]]).astype(np.int64)
         known = np.concatenate([self._ranger_parts, named])
         self._ranger_parts = known[-1:]
-        found: Ints = known[np.searchsorted(report_row, ping_row), ranger]
-        return found
+        part: Ints = known[np.searchsorted(report_row, ping_row), ranger]
+        return part
 
     def _track_foot(
         self, samples: FootSamples, leg_blocks: list[tuple[int, GyroBlock]], times: Times

@@ -121,10 +121,10 @@ class HeadingFusion:
         if not known.update(headings):
             self._refused += 1
             return False
-        found = float(known.state[FOOT])
-        known.state[FOOT], known.state[OFFSET] = 0.0, known.state[OFFSET] + found
+        error_rad = float(known.state[FOOT])
+        known.state[FOOT], known.state[OFFSET] = 0.0, known.state[OFFSET] + error_rad
         self._share = share if known.trusted else 0.0
-        self.correction_rad = wrap(self.correction_rad + self._share * found)
+        self.correction_rad = wrap(self.correction_rad + self._share * error_rad)
         self._refused, self._promised = 0, 0.0
         return True
 

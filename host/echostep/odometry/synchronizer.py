@@ -155,11 +155,11 @@ def _pieces(
 
 def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats, ahead_rad: float) -> MeasuredSegment:
     """A segment with its pings, and apart from them the heights."""
-    heard = ranger % PART != HEIGHT
-    which, high = ranger[heard], ranger[~heard]
+    is_ping = ranger % PART != HEIGHT
+    which, high = ranger[is_ping], ranger[~is_ping]
     part, restarts = (int(kind[-1]) // PART if len(kind) else 0 for kind in (which, high))
     return MeasuredSegment(
-        segment, t_s[heard], which % PART, value_m[heard], value_m[~heard], part, restarts, ahead_rad
+        segment, t_s[is_ping], which % PART, value_m[is_ping], value_m[~is_ping], part, restarts, ahead_rad
     )
 
 

@@ -112,8 +112,8 @@ def _zone_probability(at: Matched, plan: Plan) -> float | None:
     if at.level is None or at.true_level is None:
         return None
     zones = Zones(plan)
-    true, found = zones.of(at.true_xy_m, at.true_level), zones.of(at.xy_m, at.level)
-    return _share(found == true, true != NO_ZONE)
+    true, by_track = zones.of(at.true_xy_m, at.true_level), zones.of(at.xy_m, at.level)
+    return _share(by_track == true, true != NO_ZONE)
 
 
 def _coverage(track: ScoredPath, truth: ScoredPath) -> tuple[float, float]:

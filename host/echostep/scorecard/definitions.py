@@ -93,10 +93,10 @@ METRICS: tuple[Metric, ...] = (
 
 def notes(card: Scorecard) -> list[str]:
     """What a reader has to know beside the figures."""
-    said = [f"{card.track}: {card.points} points in {card.span_s:.1f} s"]
+    notes = [f"{card.track}: {card.points} points in {card.span_s:.1f} s"]
     if not card.evaal_knows_floors:
-        said.append("No floor is stated by both files: the EvAAL score takes all points as on the right floor.")
-    return said
+        notes.append("No floor is stated by both files: the EvAAL score takes all points as on the right floor.")
+    return notes
 
 
 def as_text(value: float | None, unit: str) -> str:

@@ -113,10 +113,10 @@ def _level(table: CsvColumns, row: int, name: str, text: str, index_of: Callable
     try:
         value = float(text)
     except ValueError:
-        found = index_of(text)
-        if found is None:
+        level = index_of(text)
+        if level is None:
             raise table.error(row, name, f"{text[:40]!r} is neither a whole number nor a level of the plan") from None
-        return float(found)
+        return float(level)
     if value != round(value) or abs(value) > 1000:
         raise table.error(row, name, f"{text[:40]!r} is not a whole number of a floor")
     return value

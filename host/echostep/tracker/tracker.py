@@ -190,9 +190,9 @@ class Tracker:
                 for hear in self.team_watchers:
                     hear(from_team)
             for port, apply in ((MEETING, self._hear_meeting), (PERSON, self._apply_person)):
-                told = piece.of(port)
-                if len(told.row):
-                    estimates += apply(told.received)
+                message = piece.of(port)
+                if len(message.row):
+                    estimates += apply(message.received)
         return estimates
 
     def warm_up(self) -> None:
@@ -280,10 +280,10 @@ class Tracker:
 
     def _apply_person(self, received: bytes) -> list[Estimate]:
         """Apply a check-in, its undoing or a call; other bytes are counted. A tap is a sign of life."""
-        said, now_s = parse_person(received), self.front_end.newest_s
-        if said is not None and said != Call(help=True):
-            self.alarm.answer(now_s, ends_help=isinstance(said, Call))
-        match said:
+        message, now_s = parse_person(received), self.front_end.newest_s
+        if message is not None and message != Call(help=True):
+            self.alarm.answer(now_s, ends_help=isinstance(message, Call))
+        match message:
             case Call(wanted):
                 if wanted:
                     self.alarm.call_for_help(now_s)

@@ -126,17 +126,17 @@ def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     added, screens = len(more.rows), len(more.screens)
     start, screen_start = _room(table.start, unit + BEARINGS + 1), _room(table.screen_start, rows + added + 1)
     tile_start, order = _room(table.tile_start, tile + 2), _room(table.order, ordered + len(more.order))
-    kept, hiding = table.rows, _room(table.screens, used + screens)
-    if len(kept) < rows + added:
-        kept = np.empty((2 * (rows + added), more.rows.shape[1]))
-        kept[:rows] = table.rows[:rows]
-    kept[rows : rows + added] = more.rows
+    all_rows, hiding = table.rows, _room(table.screens, used + screens)
+    if len(all_rows) < rows + added:
+        all_rows = np.empty((2 * (rows + added), more.rows.shape[1]))
+        all_rows[:rows] = table.rows[:rows]
+    all_rows[rows : rows + added] = more.rows
     hiding[used : used + screens] = more.screens
     screen_start[rows : rows + added + 1] = more.screen_start + used
     tile_start[tile + 1] = rows + added
     order[ordered : ordered + len(more.order)] = more.order + rows
     start[unit : unit + BEARINGS + 1] = more.start + ordered
-    return SourceTable(tile_start, start, order, kept, screen_start, hiding)
+    return SourceTable(tile_start, start, order, all_rows, screen_start, hiding)
 
 
 @kernel

@@ -39,18 +39,18 @@ def _walls_near(tile: int, index: WallIndex) -> Int32s:
     reach = math.ceil((EAR_REACH_M + JOIN_M) / TILE_M)
     column, row = tile % index.columns, tile // index.columns
     left, right = max(column - reach, 0), min(column + reach + 1, index.columns)
-    found = np.empty(64, np.int32)
+    numbers = np.empty(64, np.int32)
     count = 0
     for r in range(max(row - reach, 0), min(row + reach + 1, index.rows)):
         for k in range(index.start[r * index.columns + left], index.start[r * index.columns + right]):
-            if count == len(found):
-                found = np.concatenate((found, found))
-            found[count] = index.ids[k]
+            if count == len(numbers):
+                numbers = np.concatenate((numbers, numbers))
+            numbers[count] = index.ids[k]
             count += 1
-    found = np.sort(found[:count])
-    kept = 0
+    numbers = np.sort(numbers[:count])
+    unique = 0
     for k in range(count):
-        if kept == 0 or found[k] != found[kept - 1]:
-            found[kept] = found[k]
-            kept += 1
-    return found[:kept]
+        if unique == 0 or numbers[k] != numbers[unique - 1]:
+            numbers[unique] = numbers[k]
+            unique += 1
+    return numbers[:unique]

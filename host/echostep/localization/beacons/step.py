@@ -97,9 +97,9 @@ def _wait(particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasur
     waiting.taken[k] += 1
     if waiting.taken[k] % LOCATE_EVERY:
         return
-    found = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_WAITING)])
-    if found.sure:
-        set_beliefs(beliefs, k, found.x_m, found.y_m, 0.0, LOCATED_SD_M**2, math.pi**2)
+    fix = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_WAITING)])
+    if fix.sure:
+        set_beliefs(beliefs, k, fix.x_m, fix.y_m, 0.0, LOCATED_SD_M**2, math.pi**2)
         for i in range(len(particles.x_m)):
             beliefs.mean[i, k, X] += particles.x_m[i] - x
             beliefs.mean[i, k, Y] += particles.y_m[i] - y

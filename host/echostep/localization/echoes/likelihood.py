@@ -60,9 +60,9 @@ class MissedEchoes:
         self._last_m[ranger], self._silent[ranger] = range_m, 0
 
     def _count(self, ranger: int, silent: int) -> None:
-        missed, heard = self._missed[ranger] + silent, self._heard[ranger] + 1.0
-        kept = min(1.0, REMEMBERED / (missed + heard))
-        self._missed[ranger], self._heard[ranger] = kept * missed, kept * heard
+        missed, received = self._missed[ranger] + silent, self._heard[ranger] + 1.0
+        memory = min(1.0, REMEMBERED / (missed + received))
+        self._missed[ranger], self._heard[ranger] = memory * missed, memory * received
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +148,11 @@ def planned_density(
     """
     unheard, hit = 1.0, 0.0
     for k in range(count):
-        heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
-        unheard -= heard
+        answers = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
+        unheard -= answers
         sd = m.sd_m + m.slant_m * off_axis_rad[k]
-        if heard > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
-            hit += heard * normal(range_m - distance_m[k], sd)
+        if answers > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
+            hit += answers * normal(range_m - distance_m[k], sd)
         if unheard < NEGLIGIBLE:
             break
     if range_m <= 0.0:

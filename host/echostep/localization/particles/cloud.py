@@ -318,9 +318,9 @@ class Cloud(Particles):
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
         chosen = systematic(np.exp(log_wanted - log_wanted.max()), float(self._rng.random()), count)
-        kept = log_weight[chosen]
+        log_chosen = log_weight[chosen]
         self.keep(chosen)
-        self.log_weight = kept - kept.max()
+        self.log_weight = log_chosen - log_chosen.max()
 
     @property
     def is_in_one_place(self) -> bool:
@@ -360,6 +360,6 @@ class Cloud(Particles):
 
     def _wanted_size(self) -> int:
         """Size for the present spread; the lightest of a coarse cloud, COARSE_REST of its weight, do not count."""
-        kept = heaviest(self.weight, 1.0 - COARSE_REST) if self.is_coarse else slice(None)
-        size = kld_size(self.x_m[kept], self.y_m[kept], self.turn_rad[kept], self._settings)
+        counted = heaviest(self.weight, 1.0 - COARSE_REST) if self.is_coarse else slice(None)
+        size = kld_size(self.x_m[counted], self.y_m[counted], self.turn_rad[counted], self._settings)
         return max(size, self._least_size)

@@ -169,7 +169,7 @@ def reweight_by_ping(
     """
     x, y, turn, _, log_weight = particles
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    kept = math.exp(-ping.travel_m / model.hidden_m)
+    persists = math.exp(-ping.travel_m / model.hidden_m)
     outlier = model.outlier * (outlier_density(ping.range_m, model) + ping.missed) ** ping.power
     stray = 0.5 * (ping.alike + 1.0 / (model.maximum_m - model.minimum_m))
     top = -np.inf
@@ -181,7 +181,7 @@ def reweight_by_ping(
         count = echo_sources(x[i], y[i], ping.axis_rad + turn[i], walls, distance_m, off_axis_rad, kind)
         density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, stray, model) + ping.missed
         planned = (1.0 - model.outlier) * math.exp(ping.power * math.log(max(density, LEAST_DENSITY))) + outlier
-        before = model.hidden + kept * (hidden[i] - model.hidden)
+        before = model.hidden + persists * (hidden[i] - model.hidden)
         by_hidden = before * ping.unplanned
         likelihood = by_hidden + (1.0 - before) * planned
         hidden[i] = by_hidden / likelihood

@@ -54,13 +54,13 @@ def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weigh
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
     mass = np.asarray(np.bincount(particles.square, left), np.float64)
-    found: list[LikelyPlace] = []
-    while len(found) < MOST:
+    places: list[LikelyPlace] = []
+    while len(places) < MOST:
         probability, *place = _take(int(mass.argmax()), particles, left, mass)
         if probability < LEAST:
             break
-        found.append(_hypothesis(probability, *place))
-    return tuple(sorted(found, key=lambda h: -h.probability))
+        places.append(_hypothesis(probability, *place))
+    return tuple(sorted(places, key=lambda h: -h.probability))
 
 
 def _squares(x_m: Floats, y_m: Floats, level: Ints) -> Ints:

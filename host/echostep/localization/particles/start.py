@@ -101,13 +101,13 @@ def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:
 def _within(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
     """The cells of the floor that a start without a pose allows; all of them where a room has none."""
     level = np.zeros(len(floor.x_m), np.int64) if sheet is None else level_of(floor.x_m, sheet)
-    kept = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level
+    allowed = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level
     if start.room_m is not None:
         import shapely
 
         map_x = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
-        kept &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
-    return Floor(floor.x_m[kept], floor.y_m[kept], floor.enclosed[kept]) if kept.any() else floor
+        allowed &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
+    return Floor(floor.x_m[allowed], floor.y_m[allowed], floor.enclosed[allowed]) if allowed.any() else floor
 
 
 def _on_floor(floor: Floor, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:

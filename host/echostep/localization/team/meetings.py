@@ -90,8 +90,8 @@ def covariance(meeting: Meeting) -> Floats:
     """Covariance (2, 2) of the wearer's place given the meeting (m2): the teammate's with heavier tails, its way since the report, the offset."""
     own = np.array([[meeting.xx_m2, meeting.xy_m2], [meeting.xy_m2, meeting.yy_m2]])
     offset_m2 = (MOVED_M_S * meeting.age_s) ** 2 + (SIDE_SD_M**2 if meeting.range_m is None else 0.0)
-    found: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
-    return found
+    total: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
+    return total
 
 
 def share_of(meeting: Meeting) -> float:
@@ -119,8 +119,8 @@ def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -
         distance = np.hypot(away[:, 0], away[:, 1])
         variance = _range_variance(meeting, away, spread)
         log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * np.log(2.0 * math.pi * variance)
-    found: Floats = log_normal + log_level
-    return found
+    log_total: Floats = log_normal + log_level
+    return log_total
 
 
 def information(meeting: Meeting, mean: Floats) -> Floats:
@@ -131,8 +131,8 @@ def information(meeting: Meeting, mean: Floats) -> Floats:
         return inverse
     away = (mean - [meeting.x_m, meeting.y_m])[None]
     along = _along(away)[0]
-    found: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
-    return found
+    along_only: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
+    return along_only
 
 
 def best_omega(own: Floats, other: Floats) -> float:
@@ -188,22 +188,22 @@ def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floa
         return None
     away = place - mean
     log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
-    found: Floats = (1.0 - omega) * (log_met - log_prior)
-    return found
+    log_factor: Floats = (1.0 - omega) * (log_met - log_prior)
+    return log_factor
 
 
 def _along(away: Floats) -> Floats:
     """Unit vectors (n, 2); east where there is no direction."""
     distance = np.hypot(away[:, 0], away[:, 1])[:, None]
-    found: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
-    return found
+    unit: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
+    return unit
 
 
 def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     """Variance (n,) of a radio range, with the teammate's own along the line to each place."""
     along = _along(away)
-    found: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + LEAST_SD_M**2
-    return found
+    variance: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + LEAST_SD_M**2
+    return variance
 
 
 class MeetingEffect(StrEnum):

@@ -29,15 +29,15 @@ ROUNDING_M2 = 2e-4  # added to the variances of a shared place, which is rounded
 
 def shared_beacons(beacon_map: BeaconMap, cloud: Cloud, t_s: float, numbers: Sequence[int]) -> tuple[SharedBeacon, ...]:
     """The beacons that a cloud has placed, to be sent to teammates; `numbers`: of the beacon in each slot."""
-    found = []
+    shared = []
     for place in beacon_map.places(cloud, t_s):
         if place.sd_m > SHARED_SD_M:
             continue
         (xx, xy), (_, yy) = beacon_map.covariance(cloud, place.slot).tolist()
         x_m, y_m = round(place.x_m, 2), round(place.y_m, 2)
         spread = (round(xx + ROUNDING_M2, 4), round(xy, 4), round(yy + ROUNDING_M2, 4))
-        found.append(SharedBeacon(numbers[place.slot], x_m, y_m, place.level, *spread))
-    return tuple(found)
+        shared.append(SharedBeacon(numbers[place.slot], x_m, y_m, place.level, *spread))
+    return tuple(shared)
 
 
 class TeamBeaconMap:
@@ -49,24 +49,24 @@ class TeamBeaconMap:
 
     def hear(self, payload: bytes, levels: int) -> None:
         """Take one message, on a plan of so many levels; bytes that are none are counted."""
-        told = parse_team_beacons(payload)
-        if told is None or any(b.level >= levels for b in told.beacons):
+        message = parse_team_beacons(payload)
+        if message is None or any(b.level >= levels for b in message.beacons):
             self.counts["bad"] += 1
             return
         self.counts["believed"] += 1
-        self.told.pop(told.name, None)
-        self.told[told.name] = {b.number: b for b in told.beacons}
+        self.told.pop(message.name, None)
+        self.told[message.name] = {b.number: b for b in message.beacons}
         if len(self.told) > MOST_TEAMMATES:
             self.told.pop(next(iter(self.told)))
 
     def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[TimedMeeting]:
         """Of these readings, those of beacons whose place a teammate reports, with their times; `numbers`: of the beacon in each slot."""
-        found: list[TimedMeeting] = []
+        meetings: list[TimedMeeting] = []
         for reading in readings if self.told else ():
             number = numbers[reading.slot]
-            told = {name: beacons[number] for name, beacons in self.told.items() if number in beacons}
-            found += [(reading.t_s, _range_to(name, b, reading, 1.0 / len(told))) for name, b in told.items()]
-        return found
+            reports = {name: beacons[number] for name, beacons in self.told.items() if number in beacons}
+            meetings += [(reading.t_s, _range_to(name, b, reading, 1.0 / len(reports))) for name, b in reports.items()]
+        return meetings
 
 
 def _range_to(name: str, b: SharedBeacon, reading: BeaconReading, share: float) -> PreparedMeeting:

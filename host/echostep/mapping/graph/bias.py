@@ -37,10 +37,10 @@ def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
     bias = known_rad_m
     for scale in SCALES:
         wider = replace(nodes, turn_sd_rad=max(scale, 1.0) * nodes.turn_sd_rad)
-        found = _climbed(wider, pings, bias, scale * step)
-        if found == known_rad_m:
+        candidate = _climbed(wider, pings, bias, scale * step)
+        if candidate == known_rad_m:
             break  # as of a foot
-        bias = found
+        bias = candidate
     if bias == known_rad_m:
         return known_rad_m
     gain = _evidence(nodes, pings, bias) - _evidence(nodes, pings, known_rad_m)
@@ -65,8 +65,8 @@ def _climbed(nodes: Nodes, pings: Pings, begin_rad_m: float, step: float) -> flo
 
 def _evidence(nodes: Nodes, pings: Pings, bias_rad_m: float) -> float:
     """That the walls have two directions, with this bias."""
-    turned, heard = without_bias(nodes, pings, bias_rad_m)
-    return find_directions(turned, find_fragments(turned, heard)).evidence
+    turned, turned_pings = without_bias(nodes, pings, bias_rad_m)
+    return find_directions(turned, find_fragments(turned, turned_pings)).evidence
 
 
 def without_bias(nodes: Nodes, pings: Pings, bias_rad_m: float) -> tuple[Nodes, Pings]:

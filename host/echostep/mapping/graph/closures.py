@@ -161,11 +161,11 @@ def _matched(single: Pieces, ways: Pieces, at: Floats, covariance: Floats) -> _M
     prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(before), grid))
     prior /= prior.sum()
     top = max(float(score.max()), 0.0)
-    found = prior * np.exp(score.ravel() - top)
-    log_odds = math.log(max(float(found.sum()), 1e-300)) + top + math.log((1.0 - NEW) / NEW)
-    found /= max(float(found.sum()), 1e-300)
-    mean = found @ grid
-    spread = (grid - mean) * np.sqrt(found)[:, None]
+    posterior = prior * np.exp(score.ravel() - top)
+    log_odds = math.log(max(float(posterior.sum()), 1e-300)) + top + math.log((1.0 - NEW) / NEW)
+    posterior /= max(float(posterior.sum()), 1e-300)
+    mean = posterior @ grid
+    spread = (grid - mean) * np.sqrt(posterior)[:, None]
     return _Matched(mean, spread.T @ spread + LEAST_COVARIANCE, before, log_odds)
 
 
@@ -176,8 +176,8 @@ def _explaining(graph: Graph, single: Pieces, older: Ints, at: Floats, shift: Fl
     passages = np.split(older[order], np.flatnonzero(np.diff(way_m[order]) > STRETCH_M) + 1)
     moved = single._replace(x_m=single.x_m + shift[0], y_m=single.y_m + shift[1])
     here, turned = np.zeros(1), shift[2:]
-    found = [float(match(moved, stretches(graph, p), at + shift[:2], here, turned)[0, 0, 0]) for p in passages]
-    return passages[int(np.argmax(found))]
+    scores = [float(match(moved, stretches(graph, p), at + shift[:2], here, turned)[0, 0, 0]) for p in passages]
+    return passages[int(np.argmax(scores))]
 
 
 def _nearest(graph: Graph, which: Ints, at: Floats) -> int:

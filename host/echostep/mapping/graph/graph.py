@@ -105,8 +105,8 @@ class Graph:
         for k in range(3):
             right[3 * new + k, k] += 1.0
             right[3 * old + k, k] -= 1.0
-        found = self.factor.solve(right)
-        covariance: Floats = found[3 * new : 3 * new + 3] - found[3 * old : 3 * old + 3]
+        columns = self.factor.solve(right)
+        covariance: Floats = columns[3 * new : 3 * new + 3] - columns[3 * old : 3 * old + 3]
         return 0.5 * (covariance + covariance.T)
 
     def storey_of(self, node: Ints) -> Ints:

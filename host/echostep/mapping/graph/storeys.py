@@ -45,10 +45,10 @@ class Storeys:
     @property
     def with_flights(self) -> Ints:
         """The storey of each node (n,); each way over stairs is one of its own, numbered after the storeys."""
-        found = self.of.copy()
+        storey = self.of.copy()
         for k, (first, end) in enumerate(spans(self.of == STAIRS).tolist(), len(self.height_m)):
-            found[first:end] = k
-        return found
+            storey[first:end] = k
+        return storey
 
 
 def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys | None:
@@ -112,10 +112,10 @@ def _climb(segments: Sequence[MeasuredSegment]) -> tuple[Floats, Floats]:
     if any(math.isfinite(m.segment.rise_sd_m) for m in segments):
         rise = [m.segment.rise_m if math.isfinite(m.segment.rise_sd_m) else 0.0 for m in segments]
         return t_s, np.concatenate([[0.0], np.cumsum(rise)])
-    heard = [(m.segment.t1_s, median(m.height_m.tolist())) for m in segments if len(m.height_m)]
-    if not heard:
+    measured = [(m.segment.t1_s, median(m.height_m.tolist())) for m in segments if len(m.height_m)]
+    if not measured:
         return t_s, np.zeros(len(t_s))
-    times, heights = np.array(heard).T
+    times, heights = np.array(measured).T
     low, high = (np.searchsorted(times, times + side * 0.5 * PRESSURE_S) for side in (-1.0, 1.0))
     smooth = np.array([np.median(heights[a:b]) for a, b in zip(low, np.maximum(high, low + 1), strict=True)])
     return times, smooth - smooth[0]

@@ -41,16 +41,16 @@ class Completed(NamedTuple):
 def complete(level: Level, graph: Graph, pings: Pings, drawing: Drawing) -> Completed:
     """The level, corrected."""
     cells = _counts(level.walls, graph, pings)
-    kept, doubtful = [np.zeros((0, 4))], [level.doubtful]
+    standing, doubtful = [np.zeros((0, 4))], [level.doubtful]
     for k, wall in enumerate(level.walls):
         there, gone = _split(wall, _passed(cells, k, float(np.hypot(*(wall[2:] - wall[:2])))))
-        kept.append(there)
+        standing.append(there)
         doubtful.append(gone)
-    found = _unknown(drawing.walls, np.concatenate([*kept, level.windows, level.solid[len(level.walls) :]]))
+    new_walls = _unknown(drawing.walls, np.concatenate([*standing, level.windows, level.solid[len(level.walls) :]]))
     gone = np.concatenate(doubtful)
-    walls = np.round(np.concatenate([*kept, found]), 3)
+    walls = np.round(np.concatenate([*standing, new_walls]), 3)
     completed = replace(level, walls=walls, doubtful=np.round(gone, 3))
-    return Completed(completed, _length_m(found), _length_m(gone) - _length_m(level.doubtful))
+    return Completed(completed, _length_m(new_walls), _length_m(gone) - _length_m(level.doubtful))
 
 
 def _counts(walls: Floats, graph: Graph, pings: Pings) -> Cells:
@@ -77,9 +77,9 @@ def _passed(cells: Cells, k: int, length_m: float) -> Bools:
     """Which cells of wall k, from its first end on, are doubtful."""
     first, count = round(MARGIN_M / CELL_M), max(1, round(length_m / CELL_M))
     window = np.ones(round(SMOOTH_M / CELL_M))
-    heard, passed = (np.convolve(c[k], window, "same")[first : first + count] for c in (cells.heard, cells.passed))
-    found: Bools = (passed >= LEAST_PASSED) & (passed > PASSED_ODDS * heard)
-    return found
+    answered, passed = (np.convolve(c[k], window, "same")[first : first + count] for c in (cells.heard, cells.passed))
+    doubtful: Bools = (passed >= LEAST_PASSED) & (passed > PASSED_ODDS * answered)
+    return doubtful
 
 
 def _split(wall: Floats, gone: Bools) -> tuple[Floats, Floats]:

@@ -100,8 +100,8 @@ def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> Floats:
 def meets(lines: Lines, runs: list[Run], i: int) -> bool:
     """Whether run i reaches another wall as it stands: a corner or a junction."""
     low, high = runs[i].low_m - MEETS_M, runs[i].high_m + MEETS_M
-    found = (_crossing(lines, runs, i, j) for j in range(len(runs)) if runs[j].high_m - runs[j].low_m > LONG_M)
-    return any(c is not None and c[1] and low < c[0] < high for c in found)
+    crossings = (_crossing(lines, runs, i, j) for j in range(len(runs)) if runs[j].high_m - runs[j].low_m > LONG_M)
+    return any(c is not None and c[1] and low < c[0] < high for c in crossings)
 
 
 def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> tuple[float, bool] | None:

@@ -53,8 +53,8 @@ def distance_variances(graph: Graph, normal_rad: float, own: Ints, places: Ints)
     """
     assert graph.factor is not None
     moves = distance_derivatives(graph.pose, normal_rad, own, places, graph.factor.shape[0])
-    found: Floats = (moves * graph.factor.solve(moves)).sum(0)
-    return np.maximum(found, 0.0)
+    variance: Floats = (moves * graph.factor.solve(moves)).sum(0)
+    return np.maximum(variance, 0.0)
 
 
 def distance_derivatives(pose: Floats, normal_rad: float, own: Ints, places: Ints, unknowns: int) -> Floats:

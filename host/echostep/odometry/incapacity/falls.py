@@ -125,7 +125,9 @@ class Falls:
         """A stride between two times: one of a wearer on foot teaches the standing directions."""
         if length_m < STRIDE_M or not 0.0 < t1_s - t0_s < STRIDE_S:
             return
-        belt, foot = ([x for x in kept if t0_s < x.end_s <= t1_s] for kept in (self._belt_tenths, self._foot_tenths))
+        belt, foot = (
+            [x for x in tenths if t0_s < x.end_s <= t1_s] for tenths in (self._belt_tenths, self._foot_tenths)
+        )
         self._trunk.add_stride([x.force for x in belt], [])
         self._thigh.add_stride([x.beside for x in belt], [])
         calm = [x.force for x in foot if x.unrest < CALM_M_S2 and x.turning < CALM_RAD_S]

@@ -75,8 +75,8 @@ def sways(short: Floats) -> Bools:
     long = short.reshape(len(short), GROUPS, SHORT // GROUPS, -1).mean(axis=2)
     slow = long.var(axis=1, ddof=1).sum(axis=1)
     noise = 0.5 * (np.diff(short, axis=1) ** 2).mean(axis=1).sum(axis=1) / (SHORT // GROUPS)
-    found: Bools = (slow > LEAST_RATIO * noise) & (slow > LEAST_RAD_S**2)
-    return found
+    sway: Bools = (slow > LEAST_RATIO * noise) & (slow > LEAST_RAD_S**2)
+    return sway
 
 
 class Window(NamedTuple):
@@ -104,14 +104,14 @@ class MotionWindows:
         Samples of an earlier window are skipped.
         """
         index = np.floor(t_s / WINDOW_S).astype(np.int64)
-        kept = np.flatnonzero(index >= self._index)
-        t_s, index, values = t_s[kept], index[kept], values[kept]
+        fresh = np.flatnonzero(index >= self._index)
+        t_s, index, values = t_s[fresh], index[fresh], values[fresh]
         if not len(index):
             return []
         begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
         low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
         sways = self._sways(t_s, index, values)
-        index, completed_by = index[begins], kept[begins]
+        index, completed_by = index[begins], fresh[begins]
         if index[0] == self._index:
             completed_by = completed_by[1:]
             low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
@@ -157,14 +157,14 @@ class Stillness:
 
     def add_legs(self, block: GyroBlock) -> list[Window]:
         """Windows completed by a block of the leg gyros."""
-        found = self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
-        return [window for _, window in self._of_worn(self._legs, found)]
+        windows = self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
+        return [window for _, window in self._of_worn(self._legs, windows)]
 
     def _of_worn(self, source: MotionWindows, windows: list[tuple[int, Window]]) -> list[tuple[int, Window]]:
-        kept: list[tuple[int, Window]] = []
+        finished: list[tuple[int, Window]] = []
         for index, window in windows:
             if window.moved:
                 self._worn.add(source)
             if source in self._worn:
-                kept.append((index, window))
-        return kept
+                finished.append((index, window))
+        return finished
