@@ -45,7 +45,7 @@ class StanceHeadings(NamedTuple):
 
 
 class BeltEvidence(NamedTuple):
-    """What the belt's gyro says of a step: stances since the step before; the error of the foot's heading that was taken out of the step, and the
+    """Evidence of the belt's gyro for a step: stances since the step before; the error of the foot's heading that was removed from the step, and the
     standard deviation of its turn without that.
     """
 

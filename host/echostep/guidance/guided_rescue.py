@@ -40,15 +40,15 @@ class GuidedRescue(CueList):
         self._searched_s = -math.inf
         self._why = ""  # there is no way
         tracker.watchers.append(self._watch)
-        tracker.team_watchers.append(self._hear)
+        tracker.team_watchers.append(self._receive)
 
     @property
     def route(self) -> Route | None:
         """The present route."""
         return self._guide.route if self._guide else None
 
-    def _hear(self, payload: bytes) -> None:
-        """A new place of the other wearer; one on a level that the plan has not is none."""
+    def _receive(self, payload: bytes) -> None:
+        """Take a new place of the other wearer, unless it is on a level that the plan does not have."""
         teammate = parse_teammate(payload)
         if teammate is None or teammate.name != self.name or teammate.level >= len(self._tracker.plan.levels):
             self.bad += 1
@@ -76,7 +76,7 @@ class GuidedRescue(CueList):
         return not self.cues or self.cues[-1].text != text
 
     def _find_route(self, e: Estimate) -> str:
-        """Find a new way when the other wearer has moved; returns what is to be said about it."""
+        """Find a new way when the other wearer has moved; returns the sentence to speak about it."""
         target, end = self._target, self._end
         if target is None or e.t_s - self._searched_s < AGAIN_S:
             return ""

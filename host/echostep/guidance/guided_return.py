@@ -119,7 +119,7 @@ class GuidedReturn(CueList):
 
 
 def _on_track(e: Estimate) -> Estimate:
-    """An estimate relative to the track: the drift since the start, which moves the way back as well, makes nothing lost.
+    """An estimate relative to the track: the drift since the start moves the way back as well, so it is no error here.
 
     Of the covariance as much is kept as a track may be beside itself.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The way back along the way that was walked, where no plan knows another.
+"""The way back along the way that was walked, for buildings without a plan.
 
 In: positions in order of time. Out: the shortest way back to the first one along them, and its length. Owns the positions.
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Several walks through one building as one drawing.
 
-In: solved walks by name, in any order, each of unknown start. Out: `Mapped`, `Join`s. Owns what is enough to say that two walks are of one building:
+In: solved walks by name, in any order, each of unknown start. Out: `Mapped`, `Join`s. Owns the conditions under which two walks are of one building:
 a place that leaves no other, most of the walls in common there, and two closures between the walks; and the standard deviations of the loose closure
-that ties the second walk to the first. Between the last node of one walk and the first of the next the path says nothing.
+that ties the second walk to the first. Between the last node of one walk and the first of the next the path gives no constraint.
 """
 
 from __future__ import annotations

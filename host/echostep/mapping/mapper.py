@@ -55,7 +55,7 @@ class Mapped:
 
 
 def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
-    """Draw one walk; `progress` is told the share that is done."""
+    """Draw one walk; `progress` is called with the share that is done."""
     return drawn(solve_walk(segments, progress))
 
 
@@ -106,7 +106,7 @@ def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gra
 
 
 def find_walls(graph: Graph) -> None:
-    """Find which fragments are of one wall, and solve; those heard on stairs are of walls there, which hold the heading."""
+    """Find which fragments are of one wall, and solve; those detected on stairs are of walls there, which constrain the heading."""
     node = graph.fragments.node
     storey = np.zeros(len(node), np.int64) if graph.storeys is None else graph.storeys.with_flights[node]
     graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), storey)

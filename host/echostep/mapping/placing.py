@@ -2,8 +2,8 @@
 """Where a walk of unknown start lies on the drawing of another one.
 
 In: fragments of both, each in its own map. Out: `Place`, with its odds. Owns the limits. The log-ratio of every turn and shift against two
-places that have nothing in common is a correlation: walls of each on what the other says of a place (a wall seen from here, free floor, unknown),
-summed by Fourier transforms over all shifts.
+places that have nothing in common is a correlation of the walls of each with the state of the other at a place (a wall seen from here, free floor,
+unknown), summed by Fourier transforms over all shifts.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def scene_of(graph: Graph) -> Scene:
 
 
 class _Images(NamedTuple):
-    """Cells from `low` (2,) on: `wall` (SIDES, x, y): 1 where one is seen from this side; `ratio`: what the scene says of such a wall there."""
+    """Cells from `low` (2,) on: `wall` (SIDES, x, y): 1 where one is seen from this side; `ratio`: log-ratio of such a wall there by the scene."""
 
     low: Ints
     wall: Floats
@@ -184,7 +184,7 @@ def _described(new: Scene, known: _Images, place: Place, base_rad: float) -> Pla
 
 
 def _looked_up(images: _Images, wall: Floats, low: Ints) -> Floats:
-    """What `images` say of each cell of a wall image that begins at `low`."""
+    """The ratios of `images` at each cell of a wall image that begins at `low`."""
     side, x, y = np.nonzero(wall)
     return _values(images, side, _metres(np.column_stack([x, y]) + low) + 0.5 * CELL_M)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Stairs between the storeys of a drawing, as connectors in a well with a way in on each level.
 
-In: the path on the stairs, in the plan. Out: `Well`s; levels with the walls of these. Owns their width. What the rangers hear on stairs is not drawn:
+In: the path on the stairs, in the plan. Out: `Well`s; levels with the walls of these. Owns their width. Echoes on stairs are not drawn:
 the well is the rectangle about the path.
 """
 

@@ -253,7 +253,7 @@ class FrontEnd:
         return completed + self._standing_segments(foot, t_s, message_index, begin, len(t_s))
 
     def _step_segments(self, step: Step) -> list[PathSegment]:
-        """The segment of a step, with what the belt says of it."""
+        """The segment of a step, with the evidence of the belt."""
         return [replace(segment, belt=self.heading_fusion.evidence) for segment in self.path.add_step(step)]
 
     def _add_belt(self, blocks: deque[tuple[int, GyroBlock]], before: float = math.inf) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Kalman filter of what foot less belt heading is made of, from stance to stance.
+"""Kalman filter of the components of the difference between foot and belt heading, from stance to stance.
 
 In: `StanceHeadings`. Out: state and covariance, whether the belt can be trusted. Owns the model of both headings' errors.
 
@@ -35,7 +35,7 @@ LARGEST_SCALE = 0.1  # sensitivity, and 20 degrees of tilt of the axis, which co
 SCALE_WALK = 0.001  # from stance to stance: a belt that shifts, 1 % in a hundred strides
 MEMORY = 20  # stances in the mean of the squared normalized innovations; 1 is expected
 LARGEST_MEAN_SQUARE = 2.5  # of a belt that is worn; about 20 normal ones exceed it once in 10,000
-CORRELATED_S = 30.0  # the error of the bias acts in one direction until walls tell the heading: as a random walk of this much growth
+CORRELATED_S = 30.0  # the error of the bias acts in one direction until walls correct the heading: as a random walk of this much growth
 
 
 class HeadingFilter:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The foot's heading with the drift taken out that the belt gyro does not confirm.
+"""The foot's heading, corrected for the drift that the belt gyro does not confirm.
 
-In: blocks of belt rates, steps and stances of the foot (walk frame), in order of their messages. Out: the same steps, turned, and what the belt says
-of each. Owns the filter of foot less belt heading and the correction of the foot's heading.
+In: blocks of belt rates, steps and stances of the foot (walk frame), in order of their messages. Out: the same steps, turned, and the belt's evidence
+for each. Owns the filter of foot less belt heading and the correction of the foot's heading.
 
-In the middle of each stance, and at both ends of standing, foot less belt heading is measured. What the filter finds of the foot's error is shared
-out by the variances of both turns. Only a recent error is sought: a bias found later must not bend the path that is behind, or all corrections would
-sum up to the foot's own drift. In the long run the foot knows more, since its error grows by the root of time: the correction fades. A drawing, which
-needs no heading at once, finds more in hindsight [mapping.smoothed_heading].
+In the middle of each stance, and at both ends of standing, foot less belt heading is measured. The filter's estimate of the foot's error is
+divided by the variances of both turns. Only a recent error is corrected: a bias found later must not bend the path that is behind, or all
+corrections would sum up to the foot's own drift. In the long run the foot is more accurate, since its error grows with the root of time: the
+correction fades. A drawing, which needs no heading at once, uses a smoother [mapping.smoothed_heading].
 
 Without evidence that the belt gyro turns with the foot the correction is kept as it is: a dead, loose or reversed gyro never corrects. A gap of foot
 or belt, or REFUSALS stances in a row beyond the gate, begin the evidence anew.
@@ -112,7 +112,7 @@ class HeadingFusion:
         self._last, self._growth = headings, 0.0
 
     def _correct(self, known: HeadingFilter, headings: StanceHeadings, last: StanceHeadings) -> bool:
-        """Correct the foot by the belt's share of what is found of its error; False: the difference is beyond the gate."""
+        """Correct the foot by the belt's share of its estimated error; False: the difference is beyond the gate."""
         dt = headings.t_s - last.t_s
         belt = known.belt_variance(dt, wrap(headings.foot_rad - last.foot_rad))
         share = headings.growth_rad2 / (headings.growth_rad2 + belt)

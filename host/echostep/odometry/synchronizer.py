@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Synchronizer: joins each path segment with the pings that were triggered on it.
 
-In: segments and pings as messages bring them, and how far either port has come after each message. Out: each segment with its pings, once no older
-ping can come any more; a `Dropout` for each second without any observation. Owns the pings and segments that wait.
+In: segments and pings in order of their messages, and the newest time of either port after each message. Out: each segment with its pings, once no
+older ping can arrive; a `Dropout` for each second without any observation. Owns the pings and segments that wait.
 """
 
 from __future__ import annotations

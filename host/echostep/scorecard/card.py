@@ -4,7 +4,7 @@
 In: a track, the truth, a plan. Out: `Scorecard`. Owns the definitions; `definitions.py` has their names and sources.
 
 The numbers in brackets are clauses of [ISO/IEC 18305:2016]. Its coverage and availability are shares of places and of time for which the system gives
-a position; here a position is at most GAP_S old and not said to be lost by the track itself.
+a position; here a position is at most GAP_S old and not marked lost by the track itself.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TICK_S = 0.1  # of the moments of which availability is the share, assumed
 
 @dataclass(frozen=True, slots=True)
 class Scorecard:
-    """What a track is worth; None where its files do not state what a metric needs. Shares are from 0 to 1."""
+    """The metrics of a track; None where its files do not state what a metric needs. Shares are from 0 to 1."""
 
     track: str
     points: int
@@ -100,7 +100,7 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
 
 
 def _floors_off(at: Matched) -> Floats | None:
-    """By how many floors each point is off; NaN where one of both does not say."""
+    """By how many floors each point is off; NaN where one of both does not state it."""
     if at.level is None or at.true_level is None:
         return None
     off = np.abs(at.level - at.true_level)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A CSV file of anybody's: numbers by the names of its columns.
+"""A CSV file of any tracker: numbers by the names of its columns.
 
 In: a file with a line of names, then numbers, with commas, semicolons or tabs in between. Out: `CsvColumns`. Owns nothing. Every error is one line
 that names the file, the line and the column.

@@ -4,7 +4,7 @@
 In: a `Scorecard`. Out: rows of text for tables. Owns the order of the metrics.
 
 The clauses are those of the standard's public table of contents [NIST, ISO/IEC 18305:2016 table of contents]; its text was not at hand, so each row
-says what is computed.
+states what is computed.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def _near(t_s: Floats, at: Floats) -> Bools:
 
 
 def known(track: ScoredPath, t_s: Floats) -> Bools:
-    """At which times (m,) a track has a row at most GAP_S old that does not say that it is lost."""
+    """At which times (m,) a track has a row at most GAP_S old that is not marked lost."""
     row = np.searchsorted(track.t_s, t_s, side="right") - 1
     fresh = (row >= 0) & (t_s - track.t_s[np.maximum(row, 0)] <= GAP_S)
     return np.asarray(fresh & ~track.lost[np.maximum(row, 0)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tracks and true paths of anybody's CSV files: which column means what.
+"""Tracks and true paths from CSV files of any tracker: which column means what.
 
 In: a CSV file, the plan's levels. Out: `ScoredPath`s. Owns the names that columns may have. Metres, seconds, radians; x and y in the frame of the
 truth, which is the plan's where there is one.
@@ -41,8 +41,8 @@ REQUIRED = ("time", "x", "y")
 class ScoredPath:
     """A track or a true path of n rows: `t_s` (n,), `xy_m` (n, 2); None for what the file does not have.
 
-    `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that say so
-    themselves. `columns`: what was found, name of the column by what it means.
+    `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that are marked
+    so. `columns`: what was found, name of the column by what it means.
     """
 
     path: Path

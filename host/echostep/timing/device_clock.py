@@ -42,7 +42,7 @@ class DeviceClock(ArrivalClock, Protocol):
     run: int  # different arrival times that contradicted since the last one that agreed
     run_begin_ns: int  # the first of them
     run_newest_ns: int
-    run_late_s: float  # by how much the first of them was later than its counter says
+    run_late_s: float  # delay of the first of them against its counter
     contradicted: int  # messages whose arrival time contradicts their counter
     jumps: int  # those of them that were dropped
     restarts: int

@@ -6,8 +6,8 @@ In: a plan. Out: `LaidOutPlan`: walls for the cloud, and `LevelSheet`, plain arr
     x of the sheet:  x0_m          x0_m + pitch_m    x0_m + 2 pitch_m
                      |  level 0    |    level 1      |    level 2      |
 
-Level k lies `k * pitch_m` east of its place in the map. So a particle's x tells its level, walls and echoes of other levels are out of its reach,
-and only this module and `level_changes` need to know of levels. A plan of one level lies where its map has it.
+Level k lies `k * pitch_m` east of its place in the map. So a particle's x determines its level, walls and echoes of other levels are out of its
+reach, and only this module and `level_changes` need to know of levels. A plan of one level lies where its map has it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Points of a tile: the places where walls end or meet, corners and edges, that can be heard from it.
+"""Points of a tile: the places where walls end or meet, corners and edges, that can be detected from it.
 
 In: a tile's corners and the walls near it. Out: a `SourceTable` of points with their screens. Owns nothing.
 """
@@ -229,7 +229,7 @@ def _clip_to_wedge(
     if max(a_aside - low * a_ahead, b_aside - low * b_ahead) < -SLACK_M:
         return 1.0, 0.0, False
     ux, uy = bx - ax, by - ay
-    here = ax * uy - ay * ux  # its sign tells on which side of the wall the origin lies
+    here = ax * uy - ay * ux  # its sign is the side of the wall on which the origin lies
     before, beside = True, True
     for k in range(4):
         side = ((corners[k, 1] - y - ay) * ux - (corners[k, 0] - x - ax) * uy) * here

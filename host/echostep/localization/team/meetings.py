@@ -289,7 +289,7 @@ class MeetingQueue:
         self.news: MeetingNews | None = None
         self._waiting: list[TimedMeeting] = []
 
-    def hear(self, payload: bytes, levels: int) -> Meeting | None:
+    def receive(self, payload: bytes, levels: int) -> Meeting | None:
         """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
         meeting = parse_meeting(payload)
         if meeting is None or meeting.level >= levels:

@@ -41,30 +41,30 @@ def shared_beacons(beacon_map: BeaconMap, cloud: Cloud, t_s: float, numbers: Seq
 
 
 class TeamBeaconMap:
-    """`told`: the beacons of each teammate by number. `counts`: messages that were `believed`, and `bad` ones."""
+    """`reported`: the beacons of each teammate by number. `counts`: messages `believed`, and `bad` ones."""
 
     def __init__(self) -> None:
-        self.told: dict[str, dict[int, SharedBeacon]] = {}
+        self.reported: dict[str, dict[int, SharedBeacon]] = {}
         self.counts: Counter[str] = Counter()
 
-    def hear(self, payload: bytes, levels: int) -> None:
+    def receive(self, payload: bytes, levels: int) -> None:
         """Take one message, on a plan of so many levels; bytes that are none are counted."""
         message = parse_team_beacons(payload)
         if message is None or any(b.level >= levels for b in message.beacons):
             self.counts["bad"] += 1
             return
         self.counts["believed"] += 1
-        self.told.pop(message.name, None)
-        self.told[message.name] = {b.number: b for b in message.beacons}
-        if len(self.told) > MOST_TEAMMATES:
-            self.told.pop(next(iter(self.told)))
+        self.reported.pop(message.name, None)
+        self.reported[message.name] = {b.number: b for b in message.beacons}
+        if len(self.reported) > MOST_TEAMMATES:
+            self.reported.pop(next(iter(self.reported)))
 
     def ranges(self, readings: Sequence[BeaconReading], numbers: Sequence[int]) -> list[TimedMeeting]:
         """Of these readings, those of beacons whose place a teammate reports, with their times; `numbers`: of the beacon in each slot."""
         meetings: list[TimedMeeting] = []
-        for reading in readings if self.told else ():
+        for reading in readings if self.reported else ():
             number = numbers[reading.slot]
-            reports = {name: beacons[number] for name, beacons in self.told.items() if number in beacons}
+            reports = {name: beacons[number] for name, beacons in self.reported.items() if number in beacons}
             meetings += [(reading.t_s, _range_to(name, b, reading, 1.0 / len(reports))) for name, b in reports.items()]
         return meetings
 

@@ -2,7 +2,7 @@
 """Which fragments are pieces of one straight wall.
 
 In: fragments at their present places. Out: `FittedWalls`. Owns the gates. Each fragment, in order of the path, joins the wall that it continues,
-or begins one. A wall that was last heard more than `KNOWN_M` of path ago is another one, unless a closure has tied both places together.
+or begins one. A wall that was last detected more than `KNOWN_M` of path ago is another one, unless a closure has tied both places together.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from echostep.mapping.graph.spots import is_spot
 APART_M = 0.15  # of a fragment's middle from the line of its wall: three standard deviations of either
 TURNED_RAD = math.radians(6.0)
 GAP_M = 2.0  # along the wall, between the pieces of one: wider than a door
-KNOWN_M = 15.0  # of path, over which odometry alone tells one wall from another beside it
+KNOWN_M = 15.0  # of path, over which odometry alone distinguishes a wall from another beside it
 SMALL_M = 0.5  # a shorter fragment begins no wall: a corner or an edge seems to be one
 
 

@@ -2,7 +2,7 @@
 """A turn that odometry adds to each metre of path, the same throughout the walk: unequal wheels, the bias of a gyroscope.
 
 In: nodes and pings. Out: the bias by the directions of the building, nodes and pings without it. Owns the search. The stated drift is a random walk,
-which does not foresee that all errors have one sign: in two logs of carmen the heading errs by 3.2 and 1.0 degrees a metre, and by 10 and 6 degrees
+which does not model that all errors have one sign: in two logs of carmen the heading errs by 3.2 and 1.0 degrees a metre, and by 10 and 6 degrees
 about that in all. A bias is believed where the walls have two directions at right angles with it and not without it.
 """
 

@@ -2,8 +2,9 @@
 """Loop closures: a stretch of the path is where an older one was.
 
 In: a graph solved so far. Out: `Closure`s with their odds. Owns the limits. The posterior of a shift is the graph's own uncertainty times the match
-of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure says what this posterior knows better than
-the graph, along the directions in which it does: of a corridor, its width only. It is one with the passage that heard the matched walls.
+of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure carries the information of this posterior
+beyond the graph's, along the axes where there is any: in a corridor only across it. It ties the stretch to the passage that detected the matched
+walls.
 
 Fragments that continue each other are one piece of wall. A fragment ends after 2 m of path wherever it is: such a cut is nothing that a later passage
 could find again. A door is.
@@ -115,9 +116,10 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
 
 
 def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
-    """The closure with the passage that heard the walls which are matched; None if it is not sure, or known on no axis.
+    """The closure with the passage that detected the matched walls; None if it is not sure, or known on no axis.
 
-    Another passage of the same place may be elsewhere in the graph, until a return ties the two: what its neighbour heard says nothing of it.
+    Another passage of the same place may be elsewhere in the graph, until a return ties the two: echoes of its neighbour carry no information about
+    it.
     """
     at = graph.pose[node, :2]
     single, ways = pieces(graph, new), stretches(graph, older)
@@ -137,7 +139,7 @@ def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
 
 
 def _said(graph: Graph, node: int, old_node: int, matched: _Matched) -> Closure | None:
-    """What the posterior of the shift says beyond the graph; None if it is known on no axis."""
+    """The information of the posterior of the shift beyond the graph's; None if there is none on any axis."""
     if (news := gained(matched.mean, matched.after, matched.before)) is None:
         return None
     shift, information = news
@@ -187,10 +189,11 @@ def _nearest(graph: Graph, which: Ints, at: Floats) -> int:
 
 
 def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:
-    """What a match alone says of a shift, if the prior (zero, `before`) became the posterior (`mean`, `after`) by it.
+    """The information of a match alone, given the prior (zero, `before`) and the posterior (`mean`, `after`) of a shift.
 
     Shift (3,) and information (3, 3), of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and
-    prior differ by that of the match, whose shift is so much farther from zero. Where little differs the match is silent: it confirms the graph.
+    prior differ by that of the match, whose shift is so much farther from zero. Where they differ little the match adds nothing: it confirms the
+    graph.
     """
     root = np.linalg.cholesky(before[:2, :2])
     white = np.linalg.inv(root)

@@ -4,7 +4,7 @@
 In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or its echoes are of a person, and
 it has that of the path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
 any, then it diffuses as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so
-that a few walls askew, heard first, decide nothing. The evidence is the likelihood of all fragments against walls of any direction.
+that a few walls askew at the beginning do not decide. The evidence is the likelihood of all fragments against walls of any direction.
 """
 
 from __future__ import annotations

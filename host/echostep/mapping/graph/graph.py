@@ -45,7 +45,7 @@ class FittedWalls:
 class Closure:
     """Node `new` is where it was believed relative to node `old`, corrected by `shift` (3,): x, y (m), heading; `information` (3, 3) of it.
 
-    `between` (3,): pose of `new` less pose of `old` (map axes) that the closure says. `log_odds` of being right.
+    `between` (3,): pose of `new` less pose of `old` (map axes) by the closure. `log_odds` of being right.
     """
 
     old: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Places of walls that are heard while the trunk turns on the spot: at the end of a room, where no ranger is ever carried along the wall.
+"""Places of walls that are detected while the trunk turns on the spot: at the end of a room, where no ranger is ever carried along the wall.
 
 In: pings of no fragment, the directions of the building. Out: fragments of one spot each. Owns the limits. From one place a wall, a corner and an
 edge sound alike: the range is the same while the axis sweeps over them, and the middle of that sweep is where they are [Kuc and Siegel 1987]. A

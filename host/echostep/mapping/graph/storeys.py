@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The storeys of a walk: level stretches of path, told apart by what the foot climbed between them.
+"""The storeys of a walk: level stretches of path, separated by the climb of the foot between them.
 
 In: measured segments, nodes. Out: `Storeys`. Owns the limits. From one stretch to the next the foot's rise is exact to centimetres; a storey that is
 entered again gets its height of before, so its errors do not add up over a walk. Pressure counts only where no foot is worn.

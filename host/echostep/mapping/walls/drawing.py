@@ -21,8 +21,8 @@ from echostep.mapping.walls.lines import Lines, find_lines, joined
 from echostep.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 from echostep.mapping.walls.wall_sd import wall_sds
 
-# Of wall on one line, at least; shorter ones must be heard again, or be across the path. One passer-by in 15, in 70, goes along for longer, when one
-# second is the mean
+# Of wall on one line, at least; shorter ones must be detected again, or be across the path. One passer-by in 15, in 70, goes along for longer, when
+# one second is the mean
 LONE_M, LONE_ASKEW_M = 2.5, 6.0
 PASSAGE_M = 5.0  # of path, between two passages
 ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within which a person may have gone along
@@ -111,7 +111,7 @@ def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, 
 
 
 def _is_of_a_person(run: Run, lines: Lines, heard: _Heard, of: Ints) -> bool:
-    """Whether a piece may be one: heard in one passage, and along the path or along no direction of the building."""
+    """Whether a piece may be of a person: detected in one passage, and along the path or along no direction of the building."""
     normal = lines.normal_rad[run.line]
     along = math.cos(normal) * heard.poses[:, 1] - math.sin(normal) * heard.poses[:, 0]
     own = np.flatnonzero((of == run.line) & (along >= run.low_m) & (along <= run.high_m))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where along its line a wall stands: cells that echoes came from, and cells through which a ranger heard something farther.
+"""Where along its line a wall stands: cells that echoes came from, and cells through which a ranger detected something farther.
 
 In: lines, pings at their corrected places. Out: counts by line and cell. Owns the sensor's inverse model: a smooth wall answers from the foot of the
-perpendicular, so one ping says something about one cell of each line within its cone.
+perpendicular, so one ping is evidence about one cell of each line within its cone.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Walls as segments: runs of cells that answered, joined over what was not heard, extended to the walls that they meet.
+"""Walls as segments: runs of cells that answered, joined over gaps without echoes, extended to the walls that they meet.
 
 In: lines and counts by cell. Out: segments. Owns the limits.
 """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """How well drawn walls are known against the path beside them.
 
-In: a solved graph, the pieces of lines that are walls, pings. Out: a standard deviation of each. Owns the number of places asked. What is said of a
-wall is not where it is on the map but how far it is from the places beside it, by all passages: so a drawing that is turned or shifted as a
-whole is as good as another to the next person, and one whose passages do not fit together is worse.
+In: a solved graph, the pieces of lines that are walls, pings. Out: a standard deviation of each. Owns the number of places used. The standard
+deviation is not that of a wall's place on the map but of its distance from the places beside it, over all passages: a drawing that is turned or
+shifted as a whole serves a person as well as another, one whose passages do not fit together is worse.
 """
 
 from __future__ import annotations

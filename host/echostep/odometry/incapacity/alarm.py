@@ -25,7 +25,7 @@ from echostep.odometry.incapacity.wearer_signs import Sign, StepTaken
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion
 WALKED_STEPS = 3  # of the foot: the wearer walks; a helper who turns a wearer over makes fewer
-OVER_S = 30.0  # an alarm that has ended is told as over for so long
+OVER_S = 30.0  # an alarm that has ended is reported as over for so long
 SWAY_S = 120.0  # so long after the last movement sway alone keeps the question back: longer than a foot is not moved by chance
 GAP_S = 2.0  # a longer time without samples is no time without motion
 MARGIN_S = WINDOW_S  # how late windows of the other sensor may come
@@ -33,7 +33,7 @@ MOST_CHANGES = 1000  # that are kept
 
 
 class AlarmKind(StrEnum):
-    """What is told."""
+    """Kind of an alarm."""
 
     ASKING = "asking"
     MAYDAY = "mayday"
@@ -41,7 +41,7 @@ class AlarmKind(StrEnum):
 
 
 class AlarmReason(StrEnum):
-    """Why."""
+    """Cause of an alarm."""
 
     STILL = "no motion"
     FALL = "fall"
@@ -76,7 +76,7 @@ class WearerAlarm:
         self._begun_s = math.nan  # when the last question or mayday began
 
     def add(self, signs: Sequence[Sign]) -> None:
-        """Take signs in order; before the first steps nothing is watched: a device that lies ready is not worn yet."""
+        """Take signs in order; there is no alarm before the first steps: a device that lies ready is not worn yet."""
         for sign in signs:
             if isinstance(sign, StepTaken):
                 self._steps.append(sign.t_s)
@@ -91,7 +91,7 @@ class WearerAlarm:
     def _ask_about(self, fall: Fall) -> None:
         """Ask at once, unless a question or a mayday is under way."""
         if self.alarm is None or self.alarm.kind is AlarmKind.OVER:
-            self._begin(AlarmKind.ASKING, AlarmReason.FALL, fall.t_s, fall.told_s)
+            self._begin(AlarmKind.ASKING, AlarmReason.FALL, fall.t_s, fall.known_s)
 
     def _pass(self, window: Window) -> None:
         if math.isnan(self._seen_s):
@@ -112,7 +112,7 @@ class WearerAlarm:
             self._begin(AlarmKind.MAYDAY, AlarmReason.HELP, self._time(t_s), self._time(t_s))
 
     def answer(self, t_s: float, *, ends_help: bool) -> None:
-        """The wearer has tapped. `ends_help`: the tap says that all is well; another one says only that the wearer is conscious."""
+        """The wearer has tapped. `ends_help`: the tap means that all is well; any other one means only that the wearer is conscious."""
         self._motion_s = self._moved_s = self._time(t_s)
         if self.alarm and (ends_help or self.alarm.reason is not AlarmReason.HELP):
             self._end(self._time(t_s))

@@ -6,9 +6,9 @@ A window of half a second has motion when the range of a channel (largest less s
 orientation in which a wearer lies do not matter, and the result does not depend on how samples are cut into portions. Pings are not used: they change
 when others walk by. A window below these limits may still show that a living wearer stands or crouches on the foot (`sway.py`).
 
-Sway, the small slow turning of a foot or a leg that carries a living wearer, is told from the noise of its gyros. Noise is white: means over 0.1 s
-have a fifth of the variance of means over 0.02 s. Sway is slow (below 3 Hz), so it adds to the former alone; shivering, machines and engines add to
-the latter as well. No level of noise has to be known or learnt.
+Sway, the small slow turning of a foot or a leg that carries a living wearer, is separated from the noise of its gyros by spectrum. Noise is white:
+means over 0.1 s have a fifth of the variance of means over 0.02 s. Sway is slow (below 3 Hz), so it adds to the former alone; shivering, machines and
+engines add to the latter as well. No level of noise has to be known or learnt.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
 
 SHORT, GROUPS = 25, 5  # short means of 0.02 s in a window of half a second, long means of 0.1 s
-# Ratio of the long means' variance to that of white noise. A pair of leg gyros, the least that is judged, exceeds 2.5 by chance in 3 % of
+# Ratio of the long means' variance to that of white noise. A pair of leg gyros, the least that is tested, exceeds 2.5 by chance in 3 % of
 # all windows, hence never in most of ten. Where recorded feet are stillest it is 0.6 to 2.
 LEAST_RATIO = 2.5
 # rad/s, standard deviation of the long means, all channels: in public recordings of quiet standing 40-100 % of the half seconds of shanks and
@@ -38,7 +38,7 @@ SWAY_WINDOWS, LEAST_SWAYING = 10, 8
 
 
 class SwayWindows:
-    """`add` takes samples; `restart` tells of the last window when the next sample is of a later one."""
+    """`add` takes samples; `restart` returns whether the last window sways, when the next sample is of a later one."""
 
     def __init__(self, channels: int) -> None:
         self.channels = channels
@@ -91,7 +91,7 @@ class MotionWindows:
     """Windows of one sensor: `add` takes samples and returns the windows that they complete."""
 
     def __init__(self, limits: Floats, swaying: int = 0) -> None:
-        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros by which sway is judged."""
+        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros, used for the test of sway."""
         self._limits = limits
         self._index = -1  # of the unfinished window
         self._low, self._high = np.full(len(limits), np.inf), np.full(len(limits), -np.inf)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tenths of a second of an accelerometer and a gyro: the means, peaks and unrest from which posture and falls are told.
+"""Tenths of a second of an accelerometer and a gyro: the means, peaks and unrest from which posture and falls are detected.
 
 In: samples of one place of the body with their times. Out: `Tenth`s. Owns the samples of the unfinished tenth. A tenth is computed from all of its
 samples at once, so the result does not depend on how they are cut into portions, to the last bit.
