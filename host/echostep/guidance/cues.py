@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Cues for a wearer on a route: where to go next, as words, as an arrow, and as a sentence to speak.
 
-In: a `Route`, estimates, and when a beacon was last heard. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
+In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
 `Contact`: the last known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
 """
 

@@ -4,7 +4,7 @@
 In: nothing. Out: `Stride`, `Flag`, `StrideSettings`, `LegCounts`, and the uncertainty of a sum of strides. Owns nothing.
 
 In a turn the outer leg goes farther than the trunk. The pelvis turns forward with the leg that lands [Perry 1992], so the twist of the belt over a
-stride tells the legs apart. Both legs are equally likely before it is seen; the more it lies within the twist that a belt has by chance, the nearer
+stride distinguishes the legs. Both legs are equally likely before it is seen; the more it lies within the twist that a belt has by chance, the nearer
 the result is to the middle of the trunk.
 """
 

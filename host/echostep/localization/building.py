@@ -13,7 +13,7 @@ from echostep.localization.echoes.likelihood import EchoModel
 from echostep.localization.echoes.range_table import CoarseField, coarse_field
 from echostep.localization.echoes.unplanned import Background, background
 from echostep.localization.estimate import Elsewhere
-from echostep.localization.height.levels import UpperStoreys
+from echostep.localization.height.levels import UpperLevels
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
 from echostep.walls.indoors import indoors
@@ -28,9 +28,9 @@ class Building:
         self.sheet = sheet
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
-        self.upper_storeys = None
+        self.upper_levels = None
         if sheet is not None and len(sheet.height_m) > 1 and len(self.floor.x_m):
-            self.upper_storeys = UpperStoreys(self.floor, sheet)
+            self.upper_levels = UpperLevels(self.floor, sheet)
         self.elsewhere = _elsewhere(self.floor, sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
         self._fields: dict[EchoModel, CoarseField] = {}
@@ -59,7 +59,7 @@ class Building:
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
         """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None where there is none."""
-        return None if self.upper_storeys is None else self.upper_storeys.log_loss(x_m, y_m, path_m)
+        return None if self.upper_levels is None else self.upper_levels.log_loss(x_m, y_m, path_m)
 
     def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:
         """Weight of particles (n,) outside of the building; 0 where walls enclose no floor."""

@@ -16,7 +16,7 @@ from echostep.localization.particle_arrays import Move
 from echostep.path import MeasuredSegment, PathSegment
 
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
-HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
+HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than in its data sheet
 HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
 AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce: draughts
 # Assumed, not measured.

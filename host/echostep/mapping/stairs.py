@@ -61,7 +61,7 @@ def connector(well: Well, number: int) -> Connector:
 
 
 def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
-    """The level with the walls of the wells that join it, each open where the path led in; heard walls end before them."""
+    """The level with the walls of the wells that join it, each open where the path led in; drawn walls end before them."""
     for well in wells:
         if index not in well.levels:
             continue

@@ -42,7 +42,7 @@ class HeadingFusion:
 
     def __init__(self) -> None:
         self.correction_rad = 0.0  # error of the foot's heading so far, as far as it is known
-        self.evidence: BeltEvidence | None = None  # what the belt says of the last step; None before there is a belt
+        self.evidence: BeltEvidence | None = None  # of the last step; None before there is a belt
         self._belt = BeltAngle()
         self._filter: HeadingFilter | None = None
         self._last: StanceHeadings | None = None  # measured last

@@ -44,9 +44,9 @@ from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
-LATE_S = 0.5  # behind a published time: an older estimate no longer says where the wearer is: half a stride, a third of the claimed 1 m
+LATE_S = 0.5  # behind a published time: an older estimate is outdated: half a stride, a third of the claimed 1 m
 KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over, assumed
-KNOWN = 0.9  # probability of the estimate whose heading it is: a tap where the wearer is not says that the estimate was wrong
+KNOWN = 0.9  # probability of the estimate whose heading it is: a tap at another place means that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
 
@@ -187,8 +187,8 @@ class Tracker:
                 self._team_beacons.receive(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
             self.alarm.add(self.front_end.signs.pop())
             if from_team := piece.of(TEAM).received:
-                for hear in self.team_watchers:
-                    hear(from_team)
+                for receive in self.team_watchers:
+                    receive(from_team)
             for port, apply in ((MEETING, self._receive_meeting), (PERSON, self._apply_person)):
                 message = piece.of(port)
                 if len(message.row):

@@ -4,8 +4,8 @@
 In: walls, their floor. Out: `CoarseField`, and `reweight_coarsely`, which looks a ping up instead of tracing it. Owns nothing.
 
 A cell of the floor has one row, a sector of the ranger's axis one column. A ranger's cone is wide, so its range changes little within a sector of 15
-degrees; within a cell of 25 cm it changes by as much as the cell is wide, and COARSE_SD_M says so. An entry is an expected range and the probability
-that an echo is heard at all, for walls at a grazing angle or far away seldom are. A look-up takes a tenth of a trace's time.
+degrees; within a cell of 25 cm it changes by as much as the cell is wide, which is in COARSE_SD_M. An entry is an expected range and the probability
+of an echo at all, since walls at a grazing angle or far away seldom answer. A look-up takes a tenth of a trace's time.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ COARSE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sect
 # Of the expected ranges are off by so many times as much: edges, corners, the next wall
 FAR_SHARE, FAR_FACTOR = 0.2, 3.0
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
-CHANCES = 8  # steps of the probability that an echo is heard
+CHANCES = 8  # steps of the probability of an echo
 RANGES = 256  # steps of the expected range
 OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
 # The ping before, of the same ranger: silence goes on where nothing answers, and where an entry is wrong
@@ -47,7 +47,7 @@ INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information o
 class CoarseField(NamedTuple):
     """`row` (rows, columns): row of `expected` by cell of the grid from (x0_m, y0_m) on, or UNKNOWN.
 
-    `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability that an echo is heard, of CHANCES.
+    `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability of an echo, of CHANCES.
     """
 
     x0_m: float

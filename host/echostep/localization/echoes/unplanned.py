@@ -87,7 +87,7 @@ class UnplannedView:
 
     def __init__(self, echo: EchoSettings) -> None:
         self._echo = echo
-        self._wall: LastWall | None = None  # None: nothing was heard
+        self._wall: LastWall | None = None  # None: no echo yet
         self._x_m, self._y_m = math.nan, math.nan
 
     def move(self, x_m: float, y_m: float) -> float:

@@ -35,11 +35,11 @@ from echostep.walls.level_sheet import (
 
 PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
-SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
+SAME_LEVEL_M = 1.5  # difference of height within one level: half of one; on stairs and in lifts two clouds change levels one after the other
 # Standard deviation of the height by pressure's speed: a front changes the pressure by 0.4 hPa in an hour
 WEATHER_M_S = 1e-3
 LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
-ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is none of an upper storey
+ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is not on an upper level
 FALL_PER_M = 1.0  # log-weight lost on a metre of path, assumed: a corner that the plan lacks is passed
 
 
@@ -169,7 +169,7 @@ def set_levels_by_pressure(x: Floats, heights: HeightArrays, height_m: float, sh
         z[i] = sheet.height_m[new_level]
 
 
-class UpperStoreys:
+class UpperLevels:
     """The floor of a building, and which of its levels are above the ground."""
 
     def __init__(self, floor: Floor, sheet: LevelSheet) -> None:

@@ -91,38 +91,38 @@ def _take(
     Returns their weight, mean x and y, level, mean square of the distance from there, and the mean of their unit vectors.
     """
     x, y, level, heading, square = particles
-    at_x, at_y, storey = _middle(heaviest, particles, left)
+    at_x, at_y, on_level = _middle(heaviest, particles, left)
     total, mean_x, mean_y = 0.0, 0.0, 0.0
     for i in range(len(x)):
-        if level[i] == storey and _is_near(x[i] - at_x, y[i] - at_y):
+        if level[i] == on_level and _is_near(x[i] - at_x, y[i] - at_y):
             total += left[i]
             mean_x += left[i] * x[i]
             mean_y += left[i] * y[i]
     if total < LEAST:
-        return total, at_x, at_y, float(storey), 0.0, 0.0, 0.0
+        return total, at_x, at_y, float(on_level), 0.0, 0.0, 0.0
     mean_x, mean_y = mean_x / total, mean_y / total
     spread, east, north = 0.0, 0.0, 0.0
     for i in range(len(x)):
-        if left[i] > 0.0 and level[i] == storey and _is_near(x[i] - at_x, y[i] - at_y):
+        if left[i] > 0.0 and level[i] == on_level and _is_near(x[i] - at_x, y[i] - at_y):
             spread += left[i] * ((x[i] - mean_x) ** 2 + (y[i] - mean_y) ** 2)
             east += left[i] * math.cos(heading[i])
             north += left[i] * math.sin(heading[i])
             mass[square[i]] -= left[i]
             left[i] = 0.0
-    return total, mean_x, mean_y, float(storey), spread / total, east / total, north / total
+    return total, mean_x, mean_y, float(on_level), spread / total, east / total, north / total
 
 
 @kernel
 def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, float, int]:
     """Mean place and level of what is left in a square."""
-    total, x_m, y_m, storey = 0.0, 0.0, 0.0, -1
+    total, x_m, y_m, on_level = 0.0, 0.0, 0.0, -1
     for i in range(len(left)):
         if particles.square[i] == heaviest and left[i] > 0.0:
             total += left[i]
             x_m += left[i] * particles.x_m[i]
             y_m += left[i] * particles.y_m[i]
-            storey = particles.level[i]
-    return x_m / total, y_m / total, storey
+            on_level = particles.level[i]
+    return x_m / total, y_m / total, on_level
 
 
 @kernel

@@ -23,7 +23,7 @@ from echostep.mapping.walls.lines import Lines
 from echostep.plan.model import Level
 
 SMOOTH_M = 0.4  # of wall, over which pings are counted together
-# Pings through a place of a wall, and how many for each that heard it, that make it doubtful
+# Pings through a place of a wall, and how many for each that detected it, that make it doubtful
 LEAST_PASSED, PASSED_ODDS = 4.0, 2.0
 LEAST_DOUBTFUL_M, LEAST_NEW_M = 0.6, 0.6  # of a piece
 KNOWN_M = 0.3  # a drawn wall so near to one of the plan is that wall

@@ -49,7 +49,7 @@ def _path_sd_m(graph: Graph, pings: Pings, poses: Floats, lines: Lines, run: Run
 def distance_variances(graph: Graph, normal_rad: float, own: Ints, places: Ints) -> Floats:
     """Variance (m,) of the distance of a wall from each of the nodes `places` (m,), as factored last.
 
-    `own` (k,): node of each ping that heard the wall, which moves with their mean and turns with them.
+    `own` (k,): node of each ping that detected the wall, which moves with their mean and turns with them.
     """
     assert graph.factor is not None
     moves = distance_derivatives(graph.pose, normal_rad, own, places, graph.factor.shape[0])
