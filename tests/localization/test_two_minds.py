@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A search of another mind than the tracked cloud: what each has foretold decides, and not before the search has been judged."""
+"""A search that disagrees with the tracked cloud: the one that has predicted the echoes better is right, once the search has predicted enough of them."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_a_judged_search_is_followed_if_it_has_foretold_more(
 
 
 def test_a_search_that_agrees_is_asked_for_its_weight_there() -> None:
-    """Whatever it has foretold: it is the same place."""
+    """Whatever it has predicted: it is the same place."""
     two = of_two_minds(11.0, 11.0, 1.5 * EVIDENCE_M, at=HERE)
     assert two._right().here > AGREED
 

@@ -25,7 +25,7 @@ from echostep.legs.walking_bout import climbs
 # Assumed, not measured, where no source is named.
 STANDING_RAD = (0.0, math.radians(-3.0))  # thigh, shank: the weight is in front of the ankles
 MEAN_RAD = (math.radians(7.0), math.radians(-14.2))  # over a stride, by the curves of `kinematics`
-STANDING_SD_RAD = math.radians(4.0)  # of people who stand; a foot is often a little ahead
+STANDING_SD_RAD = math.radians(4.0)  # of standing persons; a foot is often a little ahead
 BRIEF_SD_RAD, BRIEF_S = math.radians(12.0), 1.0  # of a shorter rest: it may be one between two steps, legs apart
 # Of people's mean angles [offsets of sagittal angles: Kadaba 1990], which all strides share
 MEAN_SD_RAD = math.radians(8.0)

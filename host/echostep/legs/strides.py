@@ -31,7 +31,7 @@ from echostep.legs.walking_bout import SPEED_S, Bout, Swing, leaving_share, pace
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
 # Growth of the sd in a gap or without a swing, and for how long it grows in a gap
 UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0
-FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; people run above [Alexander 1989]
+FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; above it a person runs [Alexander 1989]
 SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
 LONGEST_ON_STAIRS_M = 1.0  # length of a stride

@@ -92,7 +92,7 @@ METRICS: tuple[Metric, ...] = (
 
 
 def notes(card: Scorecard) -> list[str]:
-    """What a reader has to know beside the figures."""
+    """Remarks beside the figures."""
     notes = [f"{card.track}: {card.points} points in {card.span_s:.1f} s"]
     if not card.evaal_knows_floors:
         notes.append("No floor is stated by both files: the EvAAL score takes all points as on the right floor.")

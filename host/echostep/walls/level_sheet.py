@@ -7,7 +7,7 @@ In: a plan. Out: `LaidOutPlan`: walls for the cloud, and `LevelSheet`, plain arr
                      |  level 0    |    level 1      |    level 2      |
 
 Level k lies `k * pitch_m` east of its place in the map. So a particle's x determines its level, walls and echoes of other levels are out of its
-reach, and only this module and `level_changes` need to know of levels. A plan of one level lies where its map has it.
+reach, and only this module and `change_levels` depend on levels. A plan of one level lies where its map has it.
 """
 
 from __future__ import annotations

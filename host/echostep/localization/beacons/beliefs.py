@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each particle believes of each beacon: a small Kalman filter of three states per particle and beacon [Montemerlo 2002, FastSLAM].
+"""Each particle's estimate of each beacon: a Kalman filter of three states per particle and beacon [Montemerlo 2002, FastSLAM].
 
 In: innovations of one measurement. Out: means, covariances, and their moments over all particles. Owns `BeaconBeliefs`. Given a particle's path,
 the beacons do not depend on each other, so each has a covariance of its own.

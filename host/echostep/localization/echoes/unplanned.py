@@ -5,10 +5,10 @@ receives, or what the last echoes predict.
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
 densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
 
-A cloud that explains the echoes no better than this is wrong, or the plan is. So it has to be as good as can be done without a plan: a wall that goes
-on is predicted as well as by the plan, and only where a view changes does the plan know more. A smooth wall answers from the foot of the
-perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and direction of
-the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
+A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best that is possible without a plan: a
+wall that goes on is predicted as well as by the plan; only where a view changes has the plan more information. A smooth wall answers from the foot of
+the perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and
+direction of the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ def propagate(
 
 @kernel
 def propagate_without_walls(particles: ParticleArrays, move: Move, rng: np.random.Generator) -> None:
-    """Move every particle on open ground, where there are no walls to ask."""
+    """Move every particle on open ground, without walls."""
     x, y, turn, scale, _ = particles
     for i in range(len(x)):
         turn[i] += move.turn_sd_rad * rng.standard_normal()

@@ -15,7 +15,7 @@ The teammate's errors may be this wearer's own: both use one plan, and positions
 not known, so the two are fused by covariance intersection [Julier and Uhlmann 1997, A Non-divergent Estimation Algorithm in the Presence of Unknown
 Correlations], which is consistent for any: the inverse covariance becomes omega A + (1 - omega) B, A of the cloud, B of the meeting. Particles carry
 the prior already, so their weights are multiplied by (meeting / prior)^(1 - omega), the prior taken as a normal distribution. omega minimises the
-determinant; a cloud that knows every direction better than the meeting has omega = 1 and does not change, by a bit. A coarse cloud, which is spread
+determinant; a cloud with more information than the meeting in every direction has omega = 1 and stays bit-identical. A coarse cloud, which is spread
 over the building, has no information that could be the teammate's: there the meeting is a likelihood, and the cloud is reweighted even if it fits
 badly.
 """
@@ -80,7 +80,7 @@ def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
 
 
 def carries_position(meeting: Meeting) -> bool:
-    """Whether the teammate knows its place: its status is not lost, its 95 % radius is below LOST_M, and the report is not too old."""
+    """Whether the teammate's place is known: its status is not lost, its 95 % radius is below LOST_M, and the report is not too old."""
     radius_m = ellipse95(meeting.xx_m2, meeting.xy_m2, meeting.yy_m2).major_m
     (xx, xy), (_, yy) = covariance(meeting).tolist()
     return meeting.status in WRONG and radius_m <= LOST_M and ellipse95(xx, xy, yy).major_m <= WIDEST_M
@@ -179,7 +179,7 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
 
 
 def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floats) -> Floats | None:
-    """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud knows every direction better."""
+    """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud has more information in every direction."""
     mean = weight @ place
     spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
     own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
