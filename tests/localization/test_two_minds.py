@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A search that disagrees with the tracked cloud: the one that has predicted the echoes better is right, once the search has predicted enough of them."""
+"""A search that disagrees with the tracked cloud: the better predictions of echoes decide, and not before the search has made enough of them."""
 
 from __future__ import annotations
 
