@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the filters of one plan share.
+"""Data of a plan, shared by all filters on it.
 
 In: walls, sheet of levels. Out: `Building`. Owns the walkable floor, and the tables of echoes, made when a cloud first needs them.
 """
@@ -21,7 +21,7 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 
 
 class Building:
-    """What the filters of one plan share: walls, sheet of levels, floor; the tables are made when a cloud first needs them."""
+    """Data of a plan, shared by all filters on it: walls, sheet of levels, floor; tables are made when a cloud first needs them."""
 
     def __init__(self, walls: Walls, sheet: LevelSheet | None = None) -> None:
         self.walls = walls

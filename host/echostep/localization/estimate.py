@@ -54,7 +54,7 @@ class Moments(NamedTuple):
 
 @lean_kernel
 def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_m: float, about_m: float) -> Moments:
-    """Of particles (n,) in the map."""
+    """Weighted moments of particles (n,) in the map."""
     x, y, east, north = 0.0, 0.0, 0.0, 0.0
     for i in range(len(weight)):
         w = weight[i]
@@ -142,7 +142,7 @@ class Estimate:
 
 
 class Ellipse(NamedTuple):
-    """Half axes in metres and the angle of the longer one from x."""
+    """Half axes in metres, and the angle of the longer one from x."""
 
     major_m: float
     minor_m: float

@@ -51,7 +51,7 @@ class Gap(Enum):
 
 
 class Gaps:
-    """Watches the segments of one walk."""
+    """Detects gaps between the segments of one walk."""
 
     def __init__(self) -> None:
         self.pause_s = 0.0  # between the last two segments

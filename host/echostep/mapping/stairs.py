@@ -25,7 +25,7 @@ SHARED = 0.3  # of the smaller well's area: two flights in one well
 
 @dataclass(frozen=True, slots=True)
 class Well:
-    """`area`: a rectangle; `ways_in`: level and place (x, y) of each end of a flight."""
+    """Stairs in one rectangle `area` of the plan; `ways_in`: level and place (x, y) of each end of a flight."""
 
     area: shapely.Polygon
     ways_in: tuple[tuple[int, float, float], ...]
@@ -37,7 +37,7 @@ class Well:
 
 
 def wells_of(storeys: Storeys, path: Floats) -> list[Well]:
-    """The wells of a path (n, 2); flights in one well, as from storey to storey, are one."""
+    """The wells of a path (n, 2); flights above one another are in one well."""
     wells: list[Well] = []
     for first, last in storeys.stairs:
         flight = shapely.LineString(path[first : last + 1])

@@ -50,7 +50,7 @@ class HeadingFilter:
 
     @property
     def trusted(self) -> bool:
-        """Whether foot and belt have been seen to turn alike."""
+        """Whether the turns of the foot have confirmed those of the belt."""
         known = self.P[SCALE, SCALE] < SURE_SCALE**2 and abs(self.state[SCALE]) < LARGEST_SCALE
         return bool(known and self._mean_square < LARGEST_MEAN_SQUARE)
 

@@ -59,7 +59,7 @@ class HeadingFusion:
 
     @property
     def trusted(self) -> bool:
-        """Whether foot and belt have been seen to turn alike."""
+        """Whether the turns of the foot have confirmed those of the belt."""
         return self._filter is not None and self._filter.trusted
 
     def corrected(self, event: Step | Stance) -> Step | Stance:

@@ -46,7 +46,7 @@ class LastWall:
     """`distance_m`, `normal_rad`: the line seen from where the last echo was received; their covariance."""
 
     def __init__(self, range_m: float, axis_rad: float, sd_m: float, slant_m: float) -> None:
-        """From a first echo. Standard deviation of a range: `sd_m`, and `slant_m` per radian off the axis."""
+        """Begin with a first echo. Standard deviation of a range: `sd_m`, and `slant_m` per radian off the axis."""
         self._sd_m, self._slant_m = sd_m, slant_m
         self.distance_m, self.normal_rad = range_m, axis_rad
         self._var_m2, self._covariance_m, self._var_rad2 = sd_m**2, 0.0, AXIS_SD_RAD**2
@@ -83,7 +83,7 @@ class LastWall:
 
 
 class UnplannedView:
-    """`density` before `update` for each ping, after `move`."""
+    """The view of one ranger without a plan: for each ping call `move`, `density`, `update`, in this order."""
 
     def __init__(self, echo: EchoSettings) -> None:
         self._echo = echo

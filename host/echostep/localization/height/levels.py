@@ -178,7 +178,7 @@ class UpperLevels:
         self._is_above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + ABOVE_M
 
     def log_loss(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
-        """What places (n,) on the sheet lose in log-weight on this length of path; None if none is in the air."""
+        """Loss of log-weight (n,) of places on the sheet on this length of path; None if none is in the air."""
         is_above = self._is_above[level_of(x_m, self._sheet)]
         if not is_above.any():
             return None

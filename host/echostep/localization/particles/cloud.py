@@ -136,7 +136,7 @@ class Cloud(Particles):
             self.z_m[: near_count(count)] = start.near_z_m
 
     def draw_veer(self) -> None:
-        """Draw each particle's veer; not while the cloud is coarse, since its few particles about a place do not sample one more dimension."""
+        """Draw each particle's veer; not while the cloud is coarse, since its particles are too few to sample one more dimension."""
         sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
         if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
             self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
@@ -341,7 +341,7 @@ class Cloud(Particles):
         return noise
 
     def _draw_bends(self, move: Move) -> None:
-        """How much more than BENT of an arc each particle's way is on a move."""
+        """Draw the bend of each particle's path on a move, relative to that of BENT of an arc."""
         turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
         self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
 
