@@ -40,7 +40,7 @@ CALM_RAD_S = math.radians(1.0)
 FULL_TURN_RAD = math.radians(330.0)  # to be turned: second harmonics bridge the rest
 FEWEST_READINGS = 20  # three for each of the six unknowns, and more
 LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as that of the earth
-FITS = 6  # linearizations
+LINEARIZATIONS = 6  # of the fit, each at the newest headings
 REWEIGHTINGS = 3  # of the readings in each, for outliers
 SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals: twice the compass's resolution
 MAD_TO_SD = 1.4826  # of a normal distribution
@@ -271,7 +271,7 @@ def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> 
     if (compass[-1] - compass[0]) * (turn[-1] - turn[0]) < 0.0:
         turn = -turn
     offset, drift, iron = float(np.mean(compass - turn)), 0.0, np.zeros(4)
-    for _ in range(FITS):
+    for _ in range(LINEARIZATIONS):
         h = turn + offset + drift * time
         columns = np.column_stack([np.ones_like(h), time - time.mean(), *_harmonics(h)])
         solution, residuals = _robust_least_squares(columns, compass - h)

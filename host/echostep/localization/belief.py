@@ -33,7 +33,7 @@ STATED = 0.99  # prior probability of a stated start
 # counts against the cloud only, since the density without a plan adapts to it
 STAYS = 0.5
 # Log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
-LEAST, MOST = -6.0, 12.0
+LEAST_LOG_ODDS, MOST_LOG_ODDS = -6.0, 12.0
 # Of the plan; assumed, not measured.
 PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
@@ -96,7 +96,7 @@ class Plausibility:
 
     def add(self, log_ratio: float) -> None:
         """One observation: the log of its density if right over that if wrong."""
-        self.log_odds = min(max(self.log_odds + log_ratio, LEAST), MOST)
+        self.log_odds = min(max(self.log_odds + log_ratio, LEAST_LOG_ODDS), MOST_LOG_ODDS)
 
     def update(self, log_ratio: Floats, log_passed: float, path_m: float) -> None:
         """Pings on a path of this length, each with the log of its density under the cloud over its density without it, both to its power.

@@ -22,7 +22,7 @@ from echostep.mapping.graph.graph import ROUNDS, Closure, FittedWalls, Graph, co
 from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.graph.relief import find_relief
 from echostep.mapping.graph.spots import with_spots
-from echostep.mapping.graph.storeys import STAIRS, find_storeys
+from echostep.mapping.graph.storeys import BETWEEN, find_storeys
 from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment
@@ -46,7 +46,7 @@ class Mapped:
     def first_storey(self) -> int:
         """That on which the first level stretch of path is."""
         storeys = self.graph.storeys
-        return 0 if storeys is None else int(storeys.of[storeys.of != STAIRS][0])
+        return 0 if storeys is None else int(storeys.of[storeys.of != BETWEEN][0])
 
     @property
     def drawing(self) -> Drawing:

@@ -24,7 +24,7 @@ FEWEST = 12  # readings
 PATH_M = 3.0  # between the outermost places of the boot
 GRID_M = 0.25
 FINER = 5.0  # the second grid
-RANGE_SD_M = 0.3
+READING_SD_M = 0.3
 BEARING_SD_RAD = math.radians(30.0)
 OUTLIER_COST = 9.0  # greatest cost of one reading: three standard deviations, squared
 APART_M = 1.5  # places further apart are two hypotheses
@@ -58,7 +58,7 @@ def locate_beacon(readings: Floats) -> LocatedBeacon:
     fitting = 0
     for k in range(len(readings)):
         away = math.hypot(readings[k, X] - x, readings[k, Y] - y)
-        fitting += abs(away - readings[k, RANGE]) < 3.0 * RANGE_SD_M
+        fitting += abs(away - readings[k, RANGE]) < 3.0 * READING_SD_M
     return LocatedBeacon(x, y, fitting >= FITTING * len(readings))
 
 
@@ -94,7 +94,7 @@ def _cost(readings: Floats, x: float, y: float, axes: Floats) -> float:
     cost, sine, cosine = 0.0, 0.0, 0.0
     for k in range(len(readings)):
         dx, dy = readings[k, X] - x, readings[k, Y] - y
-        residual = (math.sqrt(dx * dx + dy * dy) - readings[k, RANGE]) / RANGE_SD_M
+        residual = (math.sqrt(dx * dx + dy * dy) - readings[k, RANGE]) / READING_SD_M
         cost += min(residual * residual, OUTLIER_COST)
         axes[k] = math.atan2(dy, dx) - readings[k, BEARING]  # the beacon's axis by this reading
         if not math.isnan(axes[k]):

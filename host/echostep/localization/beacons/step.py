@@ -27,7 +27,7 @@ from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex
 
 # Assumed, not measured.
-MOST_WAITING = 48  # readings kept of a beacon without a place
+MOST_READINGS = 48  # readings kept of a beacon without a place
 FIRST = 4  # readings of a beacon, among which a near one means that it was just dropped
 LOCATE_EVERY = 4  # readings of a beacon without a place
 LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`, about the cloud's own error
@@ -36,7 +36,7 @@ LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`, about the cloud's own
 class Waiting(NamedTuple):
     """Readings of b beacons that wait for a place.
 
-    `rows` (b, MOST_WAITING, 4): a ring of rows for `locate_beacon`; `taken` (b,): rows written so far.
+    `rows` (b, MOST_READINGS, 4): a ring of rows for `locate_beacon`; `taken` (b,): rows written so far.
     """
 
     rows: Floats
@@ -53,7 +53,7 @@ class Beacons(NamedTuple):
 
 def no_waiting(beacons: int) -> Waiting:
     """Beacons without readings."""
-    return Waiting(np.zeros((beacons, MOST_WAITING, 4)), np.zeros(beacons, np.int64))
+    return Waiting(np.zeros((beacons, MOST_READINGS, 4)), np.zeros(beacons, np.int64))
 
 
 @kernel
@@ -92,12 +92,12 @@ def _wait(particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasur
     """
     beliefs, waiting, k = beacons.beliefs, beacons.waiting, measurement.slot
     x, y = mean_place(particles)
-    row = waiting.rows[k, waiting.taken[k] % MOST_WAITING]
+    row = waiting.rows[k, waiting.taken[k] % MOST_READINGS]
     row[0], row[1], row[2], row[3] = x, y, measurement.range_m, measurement.bearing_rad
     waiting.taken[k] += 1
     if waiting.taken[k] % LOCATE_EVERY:
         return
-    fix = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_WAITING)])
+    fix = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_READINGS)])
     if fix.sure:
         set_beliefs(beliefs, k, fix.x_m, fix.y_m, 0.0, LOCATED_SD_M**2, math.pi**2)
         for i in range(len(particles.x_m)):

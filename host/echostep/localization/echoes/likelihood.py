@@ -29,8 +29,8 @@ REMEMBERED = 200.0  # pings: tens of metres of path
 ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
 # Probability that no source so far was detected below which sources further away are left out, assumed
-NEGLIGIBLE = 1e-4
-SILENT = 0.2  # share of outliers and of hidden views that are "no echo", assumed
+NEGLIGIBLE_REST = 1e-4
+SILENT_SHARE = 0.2  # share of outliers and of hidden views that are "no echo", assumed
 HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source: more is added to a room than removed
 LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
 GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
@@ -153,7 +153,7 @@ def planned_density(
         sd = m.sd_m + m.slant_m * off_axis_rad[k]
         if answers > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
             hit += answers * normal(range_m - distance_m[k], sd)
-        if unheard < NEGLIGIBLE:
+        if unheard < NEGLIGIBLE_REST:
             break
     if range_m <= 0.0:
         return (1.0 - m.stray) * unheard
@@ -163,17 +163,17 @@ def planned_density(
 @inline_kernel
 def outlier_density(range_m: float, m: EchoModel) -> float:
     """Density per metre of an outlier; range 0: the probability of no echo."""
-    return SILENT if range_m <= 0.0 else (1.0 - SILENT) / (m.maximum_m - m.minimum_m)
+    return SILENT_SHARE if range_m <= 0.0 else (1.0 - SILENT_SHARE) / (m.maximum_m - m.minimum_m)
 
 
 @inline_kernel
 def hidden_density(range_m: float, first_m: float, m: EchoModel) -> float:
     """Density per metre of a range if the view is hidden, and the plan's first source is at `first_m`; range 0: the probability of no echo."""
     if range_m <= 0.0:
-        return SILENT
+        return SILENT_SHARE
     before = min(max(first_m, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
     nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
-    return (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
+    return (1.0 - SILENT_SHARE) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
 
 
 @lean_kernel

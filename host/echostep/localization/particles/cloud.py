@@ -22,7 +22,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.beacons.beliefs import empty_beliefs
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import OUTSIDE, CoarseField, CoarsePings, reweight_coarsely
+from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, CoarseField, CoarsePings, reweight_coarsely
 from echostep.localization.height.levels import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
@@ -187,7 +187,7 @@ class Cloud(Particles):
         self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
     ) -> None:
         """The same for a coarse cloud: the pings that `CoarsePings` takes, looked up in the table, and none in a turn."""
-        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE + 1), 0.0
+        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE_ENTRY + 1), 0.0
         is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
         noise, used = self._noise(move, 1.0), self._coarse_pings
         for k, share in enumerate([*pings.share.tolist(), 1.0]):

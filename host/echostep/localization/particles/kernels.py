@@ -18,7 +18,7 @@ from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatc
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex, crosses_wall
 
-NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed: the next resampling drops such particles
+NEGLIGIBLE_WEIGHT = 1e-9  # weight below which no likelihood is computed: the next resampling drops such particles
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 0 and 1 are x and y
 
@@ -176,7 +176,7 @@ def reweight_by_ping(
     weight, evidence, total, squares = 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         w = math.exp(log_weight[i])
-        if w < NEGLIGIBLE:
+        if w < NEGLIGIBLE_WEIGHT:
             continue
         count = echo_sources(x[i], y[i], ping.axis_rad + turn[i], walls, distance_m, off_axis_rad, kind)
         density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, stray, model) + ping.missed

@@ -17,8 +17,8 @@ from echostep.jit import kernel
 
 # Assumed, not measured.
 REACH_M = 2.5  # particles so near to the heaviest square are one hypothesis: a room
-MOST = 5  # hypotheses that are listed
-LEAST = 0.02  # probability of one that is listed
+MOST_PLACES = 5  # likely places that are listed
+LEAST_PROBABILITY = 0.02  # probability of one that is listed
 SQUARE_M = 1.0  # side of a square, doubled until there are at most MOST_SQUARES
 MOST_SQUARES = 1_000_000  # memory: 8 MB
 
@@ -50,14 +50,14 @@ class _Particles(NamedTuple):
 
 
 def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[LikelyPlace, ...]:
-    """At most MOST likely places of particles (n,) in the map, with weights that sum to 1; each takes the particles near the heaviest square left."""
+    """At most MOST_PLACES likely places of particles (n,) with weights that sum to 1; each takes those near the heaviest square that is left."""
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
     mass = np.asarray(np.bincount(particles.square, left), np.float64)
     places: list[LikelyPlace] = []
-    while len(places) < MOST:
+    while len(places) < MOST_PLACES:
         probability, *place = _take(int(mass.argmax()), particles, left, mass)
-        if probability < LEAST:
+        if probability < LEAST_PROBABILITY:
             break
         places.append(_hypothesis(probability, *place))
     return tuple(sorted(places, key=lambda h: -h.probability))
@@ -86,7 +86,7 @@ def _hypothesis(
 def _take(
     heaviest: int, particles: _Particles, left: Floats, mass: Floats
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Take the particles within REACH_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST of the weight.
+    """Take particles within REACH_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST_PROBABILITY in all.
 
     Returns their weight, mean x and y, level, mean square of the distance from there, and the mean of their unit vectors.
     """
@@ -98,7 +98,7 @@ def _take(
             total += left[i]
             mean_x += left[i] * x[i]
             mean_y += left[i] * y[i]
-    if total < LEAST:
+    if total < LEAST_PROBABILITY:
         return total, at_x, at_y, float(on_level), 0.0, 0.0, 0.0
     mean_x, mean_y = mean_x / total, mean_y / total
     spread, east, north = 0.0, 0.0, 0.0

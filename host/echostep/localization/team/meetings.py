@@ -43,7 +43,7 @@ from echostep.ports.people.meeting import Meeting, parse_meeting
 SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
 MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
 WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which the meeting adds nothing to the plan
-LEAST_SD_M = 0.1  # of a radio range: what bodies and antennas add
+RANGE_BODY_SD_M = 0.1  # of a radio range: what bodies and antennas add
 WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by the teammate's status
 MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong
 LEAST_WRONG = 1e-6  # probability that a range is wrong, at least, in a ratio
@@ -104,7 +104,7 @@ def start_at(meeting: Meeting) -> CheckIn:
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
     way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, PreparedMeeting) else 0.0
     sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
-    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)
+    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, RANGE_BODY_SD_M), MOST_SD_M), meeting.level)
 
 
 def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -> Floats:
@@ -202,7 +202,7 @@ def _along(away: Floats) -> Floats:
 def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     """Variance (n,) of a radio range, with the teammate's own along the line to each place."""
     along = _along(away)
-    variance: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + LEAST_SD_M**2
+    variance: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + RANGE_BODY_SD_M**2
     return variance
 
 

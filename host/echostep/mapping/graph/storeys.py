@@ -25,12 +25,12 @@ STRETCH_M = 4.0  # of level path that is a storey; a shorter one is a landing
 APART_M = 1.5  # between two storeys, at least: half a storey
 SILL_M = 0.25  # of rise from the last level place, up to which a node still belongs to it: one step
 PRESSURE_S = 10.0  # over which heights by pressure are averaged by their median, where no foot is worn
-STAIRS = -1
+BETWEEN = -1  # storey of a node on stairs
 
 
 @dataclass(frozen=True, slots=True)
 class Storeys:
-    """`of` (n,): storey of each node, STAIRS between two; `height_m` (s,) of each above the first node's, ascending."""
+    """`of` (n,): storey of each node, BETWEEN on stairs; `height_m` (s,) of each above the first node's, ascending."""
 
     of: Ints
     height_m: Floats
@@ -38,7 +38,7 @@ class Storeys:
     @property
     def stairs(self) -> list[tuple[int, int]]:
         """The last node on a storey and the first one on another, of each way between them."""
-        level = np.flatnonzero(self.of != STAIRS)
+        level = np.flatnonzero(self.of != BETWEEN)
         changed = np.flatnonzero(np.diff(self.of[level]))
         return [(int(level[k]), int(level[k + 1])) for k in changed]
 
@@ -46,7 +46,7 @@ class Storeys:
     def with_flights(self) -> Ints:
         """The storey of each node (n,); each way over stairs is one of its own, numbered after the storeys."""
         storey = self.of.copy()
-        for k, (first, end) in enumerate(spans(self.of == STAIRS).tolist(), len(self.height_m)):
+        for k, (first, end) in enumerate(spans(self.of == BETWEEN).tolist(), len(self.height_m)):
             storey[first:end] = k
         return storey
 
@@ -74,7 +74,7 @@ def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys |
         return None
     order = np.argsort(heights)
     rank = np.argsort(order)
-    of = np.full(len(way), STAIRS)
+    of = np.full(len(way), BETWEEN)
     for (first, end), storey in zip(stretches, which, strict=True):
         low, high = _widened(climb, first, end)
         of[low:high] = rank[storey]
@@ -99,7 +99,7 @@ def _widened(climb: Floats, first: int, end: int) -> tuple[int, int]:
 
 def _filled(of: Ints) -> Ints:
     """Nodes between two stretches of one storey, as over a few steps up and down, belong to it."""
-    level = np.flatnonzero(of != STAIRS)
+    level = np.flatnonzero(of != BETWEEN)
     for a, b in zip(level[:-1], level[1:], strict=True):
         if of[a] == of[b]:
             of[a:b] = of[a]
