@@ -55,8 +55,8 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet
 
-SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a contracted one is never so large
-CONTRACTED = 2  # times the least size, assumed: KLD-sampling still adds some particles to a cloud at one place
+SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
+CONTRACTED = 2  # times the least size, up to which a cloud is contracted, assumed
 # Bend of a move, as a share of its chord, above which a coarse cloud uses no ping: an uncertain turn of 45 degrees
 COARSE_BEND = bend_of(math.radians(45.0))
 COARSE_REST = 0.03  # weight outside of few cells, or of one place, below which a cloud is no longer coarse, assumed

@@ -14,7 +14,7 @@ from echostep.localization.particle_arrays import ParticleArrays
 from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-# A cloud is gathered when less than this weight is farther than this from its mean; assumed: a room, and a hundredth of a place's weight
+# A cloud is gathered when less than this weight is farther than this from its mean; assumed, the distance as of a room
 GATHERED_M, GATHERED_REST = 2.5, 1e-4
 
 
