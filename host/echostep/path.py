@@ -15,7 +15,7 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 
-# How much of an arc the way in a turn is. By reason: the simulated wearers walk whole arcs; in the one turn at hand with motion capture, on the spot,
+# How much of an arc the way in a turn is. The simulated wearers walk whole arcs; in the one turn at hand with motion capture, on the spot,
 # the pelvis went 0 to 0.4 of it [Sy 2020]
 BENT = 0.5
 Share = TypeVar("Share", float, Floats)
@@ -45,7 +45,7 @@ class StanceHeadings(NamedTuple):
 
 
 class BeltEvidence(NamedTuple):
-    """What the belt's gyro says of a step: stances since the step before; the error of the foot's heading that was taken out of the step, and the
+    """Evidence of the belt's gyro for a step: stances since the step before; the error of the foot's heading that was removed from the step, and the
     standard deviation of its turn without that.
     """
 
@@ -142,8 +142,8 @@ class MeasuredSegment:
         s = self.segment
         x_m, y_m = s.way_m((t_s - s.t0_s) / (s.t1_s - s.t0_s))
         rest = replace(s, t0_s=t_s, dx_m=s.dx_m - x_m, dy_m=s.dy_m - y_m, heading0_rad=s.heading_rad(t_s))
-        kept = self.t_s >= t_s
-        return replace(self, segment=rest, t_s=self.t_s[kept], ranger=self.ranger[kept], range_m=self.range_m[kept])
+        later = self.t_s >= t_s
+        return replace(self, segment=rest, t_s=self.t_s[later], ranger=self.ranger[later], range_m=self.range_m[later])
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.legs.angle_grid import AngleGrid
 from echostep.legs.gyro_bias import GyroBias
-from echostep.legs.leg_angles import LegAngles, Level
+from echostep.legs.leg_angles import LegAngles, SwingAngles
 from echostep.legs.mounting import walking_axis
 from echostep.legs.stride import HALF_PELVIS_M, Flag, Stride, StrideSettings, about_trunk, leg_left_m
 from echostep.legs.strides import StrideEstimator
@@ -69,9 +69,9 @@ def test_bias_and_leak_are_told_apart() -> None:
 
 
 def test_a_brief_rest_says_less_about_the_level() -> None:
-    known = Level(math.radians(15.0), math.radians(-20.0), 0, math.radians(3.0) ** 2)
+    known = SwingAngles(math.radians(15.0), math.radians(-20.0), 0, math.radians(3.0) ** 2)
     assert known.standing(3.0).thigh < known.standing(0.4).thigh < known.thigh
-    assert Level().standing(3.0).thigh == pytest.approx(0.0, abs=0.01)
+    assert SwingAngles().standing(3.0).thigh == pytest.approx(0.0, abs=0.01)
 
 
 def test_stairs_need_a_knee_that_moves_and_hips_that_rise() -> None:
@@ -144,6 +144,6 @@ def _level_sd_deg(turn_rad: float, *, learnt: bool) -> float:
     for bias in angles.bias if learnt else ():
         for turn in (math.pi, 0.0) * 20:
             bias.learn(0.3 * turn, math.radians(1.0), turn)
-    angles.level = Level(variance=math.radians(4.0) ** 2)
+    angles.level = SwingAngles(variance=math.radians(4.0) ** 2)
     angles.move_level((1.0, 1.0), len(grid) - 1)
     return math.degrees(math.sqrt(angles.level.variance))

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from echostep.localization.belief import ALIKE_M, EARLY_M, FAILS, NEAR_M, PLAN_FITS, PlanVerdict
+from echostep.localization.belief import ALIKE_M, EARLY_M, FAILS, PLAN_FITS, START_ERROR_M, PlanVerdict
 from echostep.localization.building import Building
 from echostep.localization.estimate import SURE, Estimate, TrackStatus
 from echostep.localization.map_filter import MapFilter
@@ -53,7 +53,7 @@ def test_a_plan_that_fits_takes_nothing(failed: int, confirmed_m: float) -> None
 
 
 @pytest.mark.parametrize(
-    ("after_m", "away_m", "fits"), [(10.0, 1.0, True), (10.0, 2 * NEAR_M, False), (30.0, 1.0, False)]
+    ("after_m", "away_m", "fits"), [(10.0, 1.0, True), (10.0, 2 * START_ERROR_M, False), (30.0, 1.0, False)]
 )
 def test_a_start_that_was_a_little_wrong_says_nothing_of_the_plan(after_m: float, away_m: float, fits: bool) -> None:
     verdict = PlanVerdict()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A search of another mind than the tracked cloud: what each has foretold decides, and not before the search has been judged."""
+"""A search that disagrees with the tracked cloud: the better predictions of echoes decide, and not before the search has made enough of them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from echostep.localization.belief import (
     AGREED,
     DOUBTED,
-    JUDGED_M,
+    EVIDENCE_M,
     REFUTED,
     UNDECIDED,
-    Hypothetical,
+    CloudHypothesis,
     Plausibility,
     probability_of,
 )
@@ -31,22 +31,22 @@ HERE, THERE = Pose(3.0, 4.0, 0.0), Pose(25.0, 4.0, 0.0)
 NONE = np.zeros(0)
 
 
-def hypothetical(at: Pose, log_odds: float) -> Hypothetical:
+def hypothetical(at: Pose, log_odds: float) -> CloudHypothesis:
     """A cloud of a few decimetres at a place that has contracted."""
     cloud = Cloud(CloudSettings(size=100, largest=1000), Start(at, 0.1, 0.05), 0.0, np.random.default_rng(1))
     cloud.is_gathered = True
-    each = Hypothetical(cloud, Plausibility(0.5), has_contracted=True)
+    each = CloudHypothesis(cloud, Plausibility(0.5), has_contracted=True)
     each.plausibility.log_odds = log_odds
     return each
 
 
-def of_two_minds(log_odds: float, search_log_odds: float, judged_m: float, at: Pose = THERE) -> MapFilter:
+def of_two_minds(log_odds: float, search_log_odds: float, evidence_m: float, at: Pose = THERE) -> MapFilter:
     """A filter that tracks HERE with these log-odds, and whose search says `at` with others."""
     settings = FilterSettings(cloud=CloudSettings(size=100, largest=1000, searching=2_000))
     two = MapFilter(ROOM, Start(HERE), 0.0, np.random.default_rng(1), settings)
     two.tracked = hypothetical(HERE, log_odds)
     two.search = hypothetical(at, search_log_odds)
-    two.search.judged_m = judged_m
+    two.search.evidence_m = evidence_m
     return two
 
 
@@ -60,7 +60,7 @@ def after_a_step(two: MapFilter) -> float:
     ("log_odds", "right"), [(11.0, UNDECIDED), (7.0, probability_of(-1.0)), (0.0, probability_of(-8.0))]
 )
 def test_before_the_search_is_judged_a_place_that_may_be_alike_is_not_sure(log_odds: float, right: float) -> None:
-    two = of_two_minds(log_odds, 9.0, 0.5 * JUDGED_M)
+    two = of_two_minds(log_odds, 9.0, 0.5 * EVIDENCE_M)
     assert two._right().here == pytest.approx(right)
 
 
@@ -80,7 +80,7 @@ def test_a_search_that_has_not_gathered_is_no_rival(gained: float, right: float)
 def test_a_judged_search_is_followed_if_it_has_foretold_more(
     log_odds: float, search_log_odds: float, stays: bool
 ) -> None:
-    two = of_two_minds(log_odds, search_log_odds, 1.5 * JUDGED_M)
+    two = of_two_minds(log_odds, search_log_odds, 1.5 * EVIDENCE_M)
     assert (two._right().here > AGREED) == stays
     assert (two._right().here < DOUBTED) == (not stays)
     assert abs(after_a_step(two) - (HERE if stays else THERE).x_m) < 0.5
@@ -88,8 +88,8 @@ def test_a_judged_search_is_followed_if_it_has_foretold_more(
 
 
 def test_a_search_that_agrees_is_asked_for_its_weight_there() -> None:
-    """Whatever it has foretold: it is the same place."""
-    two = of_two_minds(11.0, 11.0, 1.5 * JUDGED_M, at=HERE)
+    """Whatever it has predicted: it is the same place."""
+    two = of_two_minds(11.0, 11.0, 1.5 * EVIDENCE_M, at=HERE)
     assert two._right().here > AGREED
 
 

@@ -23,7 +23,7 @@ from echostep.localization.beacons.initialisation import (
     MARGIN,
     OUTLIER_COST,
     PATH_M,
-    RANGE_SD_M,
+    READING_SD_M,
 )
 from echostep.localization.beacons.model import BeaconModel
 from echostep.localization.beacons.slam import (
@@ -33,14 +33,14 @@ from echostep.localization.beacons.slam import (
     MISFIT,
     RECOVERED_FIT,
 )
-from echostep.localization.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_WAITING
+from echostep.localization.beacons.step import FIRST, LOCATE_EVERY, LOCATED_SD_M, MOST_READINGS
 from naive.beacons import Belief, Particle, recover, reweight
 
 
 def cost(readings: Floats, place: Floats) -> float:
     """Squared normalised residuals of ranges and bearings, none above OUTLIER_COST; the beacon's axis is the mean of what the bearings say."""
     away = readings[:, :2] - place
-    off = (np.hypot(away[:, 0], away[:, 1]) - readings[:, 2]) / RANGE_SD_M
+    off = (np.hypot(away[:, 0], away[:, 1]) - readings[:, 2]) / READING_SD_M
     axes = np.angle((away[:, 0] + 1j * away[:, 1]) * np.exp(-1j * readings[:, 3]))
     axes = axes[~np.isnan(axes)]
     turned = np.angle(np.exp(1j * (axes - np.angle(np.exp(1j * axes).sum())))) / BEARING_SD_RAD
@@ -67,7 +67,7 @@ def locate(readings: Floats) -> tuple[Floats, bool]:
     places, costs = grid(readings, best, int(2.0 * FINER), GRID_M / FINER)
     best = places[costs.argmin()]
     off = np.hypot(*(readings[:, :2] - best).T) - readings[:, 2]
-    return best, bool(np.mean(np.abs(off) < 3.0 * RANGE_SD_M) >= FITTING)
+    return best, bool(np.mean(np.abs(off) < 3.0 * READING_SD_M) >= FITTING)
 
 
 @dataclass
@@ -142,7 +142,7 @@ class Beacons:
         known.waiting.append((*mean.tolist(), measurement.range_m, measurement.bearing_rad))
         if len(known.waiting) % LOCATE_EVERY:
             return
-        place, sure = locate(np.array(known.waiting[-MOST_WAITING:]))
+        place, sure = locate(np.array(known.waiting[-MOST_READINGS:]))
         if sure:
             variances = np.diag([LOCATED_SD_M**2, LOCATED_SD_M**2, math.pi**2])
             for p in self.cloud:

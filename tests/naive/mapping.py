@@ -76,7 +76,7 @@ def cell_counts(
             if off_axis > evidence.HALF_CONE_RAD or not inside:
                 continue
             if abs(z - abs(signed)) < evidence.FITS_M:
-                if not explained and low - evidence.NEAR_M < along < high + evidence.NEAR_M:
+                if not explained and low - evidence.BEYOND_M < along < high + evidence.BEYOND_M:
                     heard[cell], explained = heard.get(cell, 0) + 1, True
             elif (
                 off_axis < evidence.SURE_RAD

@@ -7,7 +7,7 @@ import numpy as np
 
 from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
-from echostep.localization.particles.places import LEAST, MOST, REACH_M
+from echostep.localization.particles.places import LEAST_PROBABILITY, MOST_PLACES, REACH_M
 
 Place = tuple[float, float, float, int, float, float]  # probability, x, y, level, standard deviation, heading
 
@@ -16,7 +16,7 @@ def places(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: F
     """The places about the heaviest square metres, one after the other, the likeliest first."""
     square = np.column_stack([np.floor(x_m), np.floor(y_m), level])
     left, found = weight.copy(), list[Place]()
-    while len(found) < MOST:
+    while len(found) < MOST_PLACES:
         each, member = np.unique(square, axis=0, return_inverse=True)
         heaviest = int(np.bincount(member.ravel(), left, len(each)).argmax())
         inside = (member.ravel() == heaviest) & (left > 0.0)
@@ -25,7 +25,7 @@ def places(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: F
         at_x, at_y = np.average(x_m[inside], weights=left[inside]), np.average(y_m[inside], weights=left[inside])
         near = (np.hypot(x_m - at_x, y_m - at_y) < REACH_M) & (level == level[inside][0]) & (left > 0.0)
         total = float(left[near].sum())
-        if total < LEAST:
+        if total < LEAST_PROBABILITY:
             break
         share = left[near] / total
         x, y = float(share @ x_m[near]), float(share @ y_m[near])

@@ -8,13 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles.places import Hypothesis
+from echostep.localization.particles.places import LikelyPlace
 from echostep.output.track_plot import write_track
 from page.frames import told
 
 
 def test_each_estimate_is_a_row_with_its_hypotheses(tmp_path: Path) -> None:
-    places = (Hypothesis(0.58, 12.31, 4.5, 0, 1.0, 0.0), Hypothesis(0.4, 2.0, 7.5, 1, 1.0, 0.0))
+    places = (LikelyPlace(0.58, 12.31, 4.5, 0, 1.0, 0.0), LikelyPlace(0.4, 2.0, 7.5, 1, 1.0, 0.0))
     spread = replace(told(x_m=0.1 + 0.2, status=TrackStatus.LOST), hypotheses=places, right=0.3, plan_fits=0.25)
     write_track(tmp_path / "track.csv", [told(), spread])
     sure, unsure = csv.DictReader((tmp_path / "track.csv").read_text().splitlines())

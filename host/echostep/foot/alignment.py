@@ -16,9 +16,9 @@ import numpy as np
 
 from echostep.foot.steps import Stance, Step, Track
 
-SURE_DEG = 20.0  # by reason: error bound of the estimate; below it the wearer's x-to-toe mounting is trusted
+SURE_DEG = 20.0  # error bound of the estimate, assumed; below it the wearer's x-to-toe mounting is trusted
 SURE_RAD = math.radians(SURE_DEG)
-# By reason: the estimate needs two steps as a rule; output must not wait much longer.
+# The estimate needs two steps as a rule; output must not wait much longer.
 PATIENCE_STEPS = 3
 PATIENCE_S = 4.0
 

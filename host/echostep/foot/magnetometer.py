@@ -30,12 +30,8 @@ FLOOR = 0.05  # least rms, as a share of the strength: the field bends slowly al
 NORTH_SD, IRON_SD = 0.5, 0.15  # initial, as shares of the strength
 GAIN = 0.08  # of one stance, in the running means of `usual`
 
-NORTH, IRON, DELTA, SIZE = (
-    0,
-    2,
-    4,
-    5,
-)  # state: north (2) in the walk frame, iron (2) in the foot's axes, error of the yaw
+# State: north (2) in the walk frame, iron (2) in the foot's axes, error of the yaw
+NORTH, IRON, DELTA, SIZE = 0, 2, 4, 5
 STRENGTH, HEIGHT, SCATTER2 = range(3)  # `usual`
 MEASURED, IN_A_ROW, TRUSTED = range(3)  # `seen`
 

@@ -17,11 +17,12 @@ from echostep.foot import ins
 from echostep.foot.ins import Nav, Vector
 from echostep.jit import lean_kernel
 
-# By reason: a whole stride has a larger second moment of the tilt; the first half step of a walk has less, and may tip toe up only.
+# A whole stride has a larger second moment of the tilt; the first half step of a walk has less, and may tip toe up only.
 ENOUGH_RAD2_S = 0.1
-# Of the second moment: 1 is a tilt about one axis, 0 one about all axes alike. By reason: 0.6 is a tilt twice as large (rms) along as across.
+# Of the second moment: 1 is a tilt about one axis, 0 one about all axes alike. 0.6 is a tilt twice as large (rms) along as across.
 LEAST_ANISOTROPY = 0.6
-MEMORY = 0.95  # weight of the sums of earlier swings, per swing; by reason: a mean over 20, so that a sensor that slips is followed
+# Weight of the sums of earlier swings, per swing: a mean over 20, so that a sensor that slips is followed
+MEMORY = 0.95
 
 
 @lean_kernel
@@ -63,5 +64,5 @@ def toe(square: Floats, cube: Floats) -> float:
     left = 0.5 * math.atan2(2.0 * square[1], square[0] - square[2])
     if cube[0] * math.cos(left) + cube[1] * math.sin(left) < 0.0:
         left += math.pi
-    found = left - 0.5 * math.pi
-    return math.atan2(math.sin(found), math.cos(found))
+    toe_rad = left - 0.5 * math.pi
+    return math.atan2(math.sin(toe_rad), math.cos(toe_rad))

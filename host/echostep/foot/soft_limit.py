@@ -16,7 +16,7 @@ from echostep.foot.ins import TILT, VEL, YAW, Nav, Vector
 from echostep.foot.stance import RING, SampleWindow
 from echostep.jit import lean_kernel
 
-# All by reason; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
+# Assumed; the recordings of `evaluate feet` whose gyros have a wider range keep every figure.
 HIGH_RAD_S = 4.0  # no limit of a gyro for feet is lower
 FLAT_PER_S = 2.0  # greatest change of a flat rate, as a share of it per second: 1 % in 5 ms
 STEP_S = 0.005  # over which the change of a rate is measured, so that noise at high sample rates is none
@@ -64,10 +64,10 @@ def _restore_axis(nav: Nav, window: SampleWindow, axis: int, end: int, step: int
         begin += 1
         height = max(height, abs(window.gyro[(newest - begin) % RING, axis]))
     flat_s = window.t_s[(newest - end) % RING] - window.t_s[(newest - begin) % RING]
-    found = begin < last and begin - end >= FEWEST and flat_s >= SHORTEST_S and height >= NEAR * peak
+    is_plateau = begin < last and begin - end >= FEWEST and flat_s >= SHORTEST_S and height >= NEAR * peak
     begin += step - 1
     span_s = window.t_s[(newest - end) % RING] - window.t_s[(newest - begin) % RING]
-    if not found:
+    if not is_plateau:
         return 0
     sign = 1.0 if window.gyro[(newest - begin) % RING, axis] > 0.0 else -1.0
     rises, falls = 0.0, 0.0

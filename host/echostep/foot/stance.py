@@ -5,7 +5,7 @@ In: the latest samples and the navigation state. Out: test statistics, and corre
 
 Two tests decide a stance, so one setting serves walking, running, stairs and shuffling at any rate. The first uses the sensors alone: the SHOE
 statistic [Skog et al. 2010] in physical units, with a loose threshold, because a runner's foot is never still. The second is a gate on the
-normalized innovation of the filter, which knows the velocity to a few cm/s at the end of a swing; in mid swing, at metres a second, it fails.
+normalized innovation of the filter, whose velocity is good to a few cm/s at the end of a swing; in mid swing, at metres a second, it fails.
 A standing foot rolls about its contact with the floor. The sensor then moves with angular rate times its height, and the error of the lever arm
 grows with the rate. So the update weighs a calm mid-stance much and a heel rise little, and strides do not come out short.
 """
@@ -30,8 +30,9 @@ CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a f
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
-GRAVITY_ALONE_M_S2 = 1.0  # of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4; by reason
-# At most, of a foot that stands on a floor which accelerates; by reason: people shift, a lift takes up to 1.2 m/s2.
+# Of a resting foot's force against gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
+GRAVITY_ALONE_M_S2 = 1.0
+# At most, of a foot that stands on a floor which accelerates: a lift takes up to 1.2 m/s2, and a standing person shifts.
 RIDING_RAD_S, RIDING_M_S2 = 0.15, 2.0
 LASTING_S = 0.15  # no swing is calm for so long: the stance is accepted, the velocity is corrected
 OVERDUE_S = 2.0  # no swing lasts so long
@@ -208,7 +209,7 @@ def may_ride(rate2: float, force2: float) -> bool:
 
 @lean_kernel
 def follow_floor(nav: Nav, expected: Vector, variance: float) -> None:
-    """A floor accelerates with the foot that stands on it: begin the vertical velocity anew, so that neither level nor biases learn from it."""
+    """A floor accelerates with the foot that stands on it: reset the vertical velocity, so that neither level nor biases are corrected by it."""
     axis = VEL + UP
     for j in range(ins.SIZE):
         nav.P[axis, j] = nav.P[j, axis] = 0.0

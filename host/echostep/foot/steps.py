@@ -177,7 +177,7 @@ class Foot:
                 f"samples of shapes {t_s.shape}, {accel.shape}, {gyro.shape}; expected (n,), (n, 3), (n, 3), mag as gyro"
             )
         events = np.zeros((zupt_state.EVENTS_PER_SAMPLE * len(t_s), zupt_state.EVENT_SIZE))
-        state = zupt_state.FootState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
+        state = zupt_state.ZuptInsState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
         count = zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), zupt_state.Output(events, rows))
         return [_event(row) for row in events[:count]]
 

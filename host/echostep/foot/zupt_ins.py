@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The foot's kernel: zero-velocity-aided inertial navigation, sample by sample, and the steps and stances that follow from it.
 
-In: `Samples`, and the `FootState`. Out: rows of `Output`, which `steps` turns into events. The caller owns the `FootState`.
+In: `Samples`, and the `ZuptInsState`. Out: rows of `Output`, which `steps` turns into events. The caller owns the `ZuptInsState`.
 
 Navigation starts when the foot has been still long enough to be levelled, and again after samples were missing for too long.
 Position and yaw errors count from the last stance, so every step has its own covariance. Floors are assumed level.
@@ -32,10 +32,10 @@ from echostep.foot.zupt_state import (
     START_S,
     STEP,
     TOE,
-    FootState,
+    ImuSample,
     Output,
-    Sample,
     Samples,
+    ZuptInsState,
     ZuptState,
 )
 from echostep.jit import lean_kernel
@@ -59,7 +59,7 @@ FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, ker
 
 
 @lean_kernel
-def process(foot: FootState, samples: Samples, output: Output) -> int:
+def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
     """Navigate through the samples in turn and fill `output`; returns the number of events."""
     s, nav, window, sums, compass = foot
     t_s, accel, gyro, mag = samples
@@ -71,7 +71,7 @@ def process(foot: FootState, samples: Samples, output: Output) -> int:
             if s.samples > 1 and not 0.0 < dt <= GAP_S:
                 event_count = _restart(s, nav, sums, compass, dt, events, event_count)
                 dt = 0.0
-            sample = Sample(dt, t_s[k], accel[k], gyro[k])
+            sample = ImuSample(dt, t_s[k], accel[k], gyro[k])
             _track_period(s, dt)
             stance.add_sample(window, t_s[k], accel[k], gyro[k])
             if s.levelled:
@@ -140,7 +140,9 @@ def _restart(
 
 
 @lean_kernel
-def _find_level(s: ZuptState, nav: Nav, window: SampleWindow, sample: Sample, events: Floats, event_count: int) -> int:
+def _find_level(
+    s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample, events: Floats, event_count: int
+) -> int:
     """Level the foot after LEVEL_S of stillness, by the mean force; after IMPATIENT_S at any possible stance, with a larger tilt sd."""
     dt, t_s = sample.dt, sample.t_s
     stillness = stance.stillness_statistic(*stance.activity(window, nav.gyro_bias))
@@ -183,7 +185,7 @@ def _navigate(
     window: SampleWindow,
     sums: ZaruSums,
     compass: Magnetometer,
-    sample: Sample,
+    sample: ImuSample,
     events: Floats,
     event_count: int,
 ) -> int:
@@ -216,7 +218,7 @@ def _navigate(
 
 
 @lean_kernel
-def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Sample) -> bool:
+def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample) -> bool:
     """Detect rest by both tests of `stance` and apply the zero-velocity update; whether the foot rests.
 
     A rest against the gate is accepted if it lasts, or if no rest was accepted for long; then the covariance is inflated first. Where a foot has

@@ -64,7 +64,7 @@ class ZuptState(Protocol):
     height_m: float  # of the sensor above the sole's contact with the floor
 
 
-class FootState(NamedTuple):
+class ZuptInsState(NamedTuple):
     """All state of one foot."""
 
     zupt: ZuptState
@@ -83,7 +83,7 @@ class Samples(NamedTuple):
     mag: Floats
 
 
-class Sample(NamedTuple):
+class ImuSample(NamedTuple):
     """One sample, `dt` s after the one before: accel m/s2 and gyro rad/s (3,)."""
 
     dt: float

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Contact with what makes the place known: when a wearer is sent back, and when on.
+"""Contact with the beacons: when a wearer is sent back to the last known place, and when onward.
 
 In: when and where the place was last known (a beacon measured), the present place by dead reckoning since. Out: whether to go back. Owns the fields
 of a `Contact` record. `Guide` and the study of guided returns call the same kernels.
 
-After a silence the way leads back to where the place was last known. Without a measurement there either it leads on, for twice as long: no beacon
-hears better while the wearer stands still.
+After a silence guidance leads back to where the place was last known. Without a measurement there either, it leads onward for twice as long, since
+reception does not improve while the wearer stands still.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Protocol
 from echostep.arrays import record_dtype
 from echostep.jit import kernel
 
-# All constants here are by reason.
+# Assumed, not measured.
 PERIODS = 1.5  # silence at least, in the times between measurements that were usual: one may be missing
 PERIOD_KEPT = 0.9  # share of the usual time between measurements that stays after a shorter one
 SAFE_S = 15.0  # of contact after which the allowed silence is the first one again
@@ -59,7 +59,8 @@ def update_contact(
 ) -> bool:
     """Whether the wearer, at (x, y) at `t_s`, is to go back to the last known place. `known_s`: when a beacon last measured.
 
-    A lost estimate sends back at once, whatever beacons measure. Arrived there without a measurement, it is on again, for twice as long.
+    A lost estimate sends the wearer back at once, whatever beacons measure. After an arrival there without a measurement the wearer goes onward, for
+    twice the time.
     """
     if not lost and known_s > contact.known_s:
         _note_known(contact, known_s, x, y)

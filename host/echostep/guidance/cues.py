@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Cues for a wearer on a route: where to go next, as words, as an arrow, and as a sentence to speak.
 
-In: a `Route`, estimates, and when a beacon was last heard. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
+In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
 `Contact`: the last known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
 """
 
@@ -38,10 +38,10 @@ class CueKind(StrEnum):
 Choice = tuple[CueKind, str, float | None]  # kind, words, direction from straight ahead (rad)
 NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
 NEVER_KNOWN = "Your place is not known yet: walk slowly along the walls"
-# Direction beyond which the target is behind, by reason.
+# Direction beyond which the target is behind, assumed.
 AROUND_RAD = math.radians(135.0)
-RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, by reason
-LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts anew, by reason
+RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, assumed
+LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts anew, assumed
 ARROWS = "↑↖←↙↓↘→↗"
 
 

@@ -19,7 +19,7 @@ from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.ports.people.teammate import Teammate, parse_teammate
 from echostep.tracker import Tracker
 
-# By reason:
+# Assumed, not measured.
 MOVED_M = 1.5  # of the other wearer: then there is a new way
 AGAIN_S = 2.0  # shortest time between two searches for a way
 PREFIX = "wearer:"
@@ -40,24 +40,24 @@ class GuidedRescue(CueList):
         self._searched_s = -math.inf
         self._why = ""  # there is no way
         tracker.watchers.append(self._watch)
-        tracker.team_watchers.append(self._hear)
+        tracker.team_watchers.append(self._receive)
 
     @property
     def route(self) -> Route | None:
         """The present route."""
         return self._guide.route if self._guide else None
 
-    def _hear(self, payload: bytes) -> None:
-        """A new place of the other wearer; one on a level that the plan has not is none."""
-        heard = parse_teammate(payload)
-        if heard is None or heard.name != self.name or heard.level >= len(self._tracker.plan.levels):
+    def _receive(self, payload: bytes) -> None:
+        """Take a new place of the other wearer, unless it is on a level that the plan does not have."""
+        teammate = parse_teammate(payload)
+        if teammate is None or teammate.name != self.name or teammate.level >= len(self._tracker.plan.levels):
             self.bad += 1
             return
-        self._target = heard
+        self._target = teammate
 
     def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
         """Add the cue of a new estimate."""
-        said = self._find_route(e)
+        announcement = self._find_route(e)
         if self._guide is None or self._target is None:
             text = self._why or f"Stop. The place of {self.name} is not known yet"
             self.cues.append(Cue(e.t_s, CueKind.STOP, text, None, f"{text}." if self._is_new(text) else ""))
@@ -68,15 +68,15 @@ class GuidedRescue(CueList):
             cue = replace(
                 cue, text=f"{self.name} is here{within}", spoken=cue.spoken and f"{self.name} is here{within}."
             )
-        elif said:
-            cue = replace(cue, spoken=f"{said} {cue.spoken}".strip())
+        elif announcement:
+            cue = replace(cue, spoken=f"{announcement} {cue.spoken}".strip())
         self.cues.append(cue)
 
     def _is_new(self, text: str) -> bool:
         return not self.cues or self.cues[-1].text != text
 
     def _find_route(self, e: Estimate) -> str:
-        """Find a new way when the other wearer has moved; returns what is to be said about it."""
+        """Find a new way when the other wearer has moved; returns the sentence to speak about it."""
         target, end = self._target, self._end
         if target is None or e.t_s - self._searched_s < AGAIN_S:
             return ""

@@ -26,12 +26,11 @@ from echostep.plan.polyline import nearest, way_m
 from echostep.plan.routing import Route, RoutePlace, Stretch
 from echostep.tracker import Tracker
 
-TURN_M = (
-    6.0  # of the way, after which a return has begun or is over; by reason: more than the steps of a search in one room
-)
+# Of the way, after which a return has begun or is over: more than the steps of a search in one room
+TURN_M = 6.0
 AHEAD_M = 3.0  # of the arrow's target along the way back, as in `GuidanceSettings`
-OFF_M = 2.0  # from the way, beyond the 95 % radius, that is not on it; by reason: the width of a corridor
-BESIDE_M = 3.0  # 95 % radius of the way back beside the way in, at most; by reason: a corridor and a half
+OFF_M = 2.0  # from the way, beyond the 95 % radius, that is not on it: the width of a corridor
+BESIDE_M = 3.0  # 95 % radius of the way back beside the way in, at most: a corridor and a half
 IN, AGAIN = "The way back", "You are going in again"
 
 
@@ -120,7 +119,7 @@ class GuidedReturn(CueList):
 
 
 def _on_track(e: Estimate) -> Estimate:
-    """An estimate relative to the track: the drift since the start, which moves the way back as well, makes nothing lost.
+    """An estimate relative to the track: the drift since the start moves the way back as well, so it is no error here.
 
     Of the covariance as much is kept as a track may be beside itself.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The way back along the way that was walked, where no plan knows another.
+"""The way back along the way that was walked, for buildings without a plan.
 
 In: positions in order of time. Out: the shortest way back to the first one along them, and its length. Owns the positions.
 
@@ -17,9 +17,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-STEP_M = 0.5  # least distance between two positions; by reason: corners of corridors are kept
-JOIN_M = 1.0  # positions so near on one storey are the same place; by reason: less than a wall between two people in the middle of their ways
-STOREY_M = 1.5  # less than this between their heights; by reason: half a storey
+STEP_M = 0.5  # least distance between two positions: corners of corridors are kept
+JOIN_M = 1.0  # positions so near on one level are the same place: less than the distance of two ways on either side of a wall
+LEVEL_M = 1.5  # less than this between their heights: half the height of a level
 
 
 class OwnWay:
@@ -71,7 +71,7 @@ class OwnWay:
         x, y, z = here
         column, row = _cell(x, y)
         near = [k for i in (-1, 0, 1) for j in (-1, 0, 1) for k in self._cells.get((column + i, row + j), ())]
-        same = [k for k in near if math.dist(self._at[k][:2], (x, y)) < JOIN_M and abs(self._at[k][2] - z) < STOREY_M]
+        same = [k for k in near if math.dist(self._at[k][:2], (x, y)) < JOIN_M and abs(self._at[k][2] - z) < LEVEL_M]
         return [self._here, *same] if self._at else []
 
 

@@ -16,11 +16,11 @@ from echostep.arrays import Floats
 from echostep.legs.stride import LegCounts
 from echostep.legs.swing_detection import GRID_HZ
 
-LONGEST_GAP_S = 0.25  # integrated over; by reason: a quarter of a stride
-FASTEST_RAD_S = 35.0  # a larger rate is impossible; by reason: nearly twice a sprinter's shank
+LONGEST_GAP_S = 0.25  # integrated over: a quarter of a stride
+FASTEST_RAD_S = 35.0  # a larger rate is impossible: nearly twice a sprinter's shank
 
 
-class Sample(enum.Enum):
+class GridSample(enum.Enum):
     """What a sample is to the grid."""
 
     TAKEN = enum.auto()
@@ -53,23 +53,23 @@ class AngleGrid:
         """Time (s) of a grid index."""
         return self._origin_s + k / GRID_HZ
 
-    def add(self, t_s: float, thigh: float, shank: float, belt: float) -> Sample:
+    def add(self, t_s: float, thigh: float, shank: float, belt: float) -> GridSample:
         """Integrate to one sample and interpolate the angles on the grid."""
         self.counts.samples += 1
         if not abs(thigh) < FASTEST_RAD_S or not abs(shank) < FASTEST_RAD_S or not math.isfinite(t_s):
             self.counts.impossible += 1
-            return Sample.SKIPPED
+            return GridSample.SKIPPED
         if not self.thigh:
             self.restart(t_s, thigh, shank, belt)
-            return Sample.TAKEN
+            return GridSample.TAKEN
         if t_s <= self.last_s:
             self.counts.not_later += 1
-            return Sample.SKIPPED
+            return GridSample.SKIPPED
         if t_s - self.last_s > LONGEST_GAP_S:
             self.counts.gaps += 1
-            return Sample.AFTER_GAP
+            return GridSample.AFTER_GAP
         self._integrate(t_s, (thigh, shank, _turn(belt)))
-        return Sample.TAKEN
+        return GridSample.TAKEN
 
     def restart(self, t_s: float, thigh: float, shank: float, belt: float) -> None:
         """Begin anew at this sample, with all angles 0."""

@@ -65,8 +65,8 @@ class ClippingRepair:
 
 def _at_limit(rate: Floats, limit: float | Floats) -> Bools:
     """Whether rates are at the upper limit: not below it, and not beyond it either, where only a wider sensor can be."""
-    found: Bools = (rate >= NEAR * limit) & (rate <= BEYOND * limit)
-    return found
+    at_limit: Bools = (rate >= NEAR * limit) & (rate <= BEYOND * limit)
+    return at_limit
 
 
 def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) -> None:

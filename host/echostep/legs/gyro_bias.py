@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 BIAS_SD_RAD_S = math.radians(3.0)  # at the start [ADIS16100 datasheet: 3 deg/s with temperature]
-SMALLEST_BIAS_SD_RAD_S = math.radians(0.02)  # bias instability, by reason
+SMALLEST_BIAS_SD_RAD_S = math.radians(0.02)  # bias instability, assumed
 LEAK_SD = 0.35  # sine of the tilt of a strapped sensor's axis: strapped legs show 0 to 26 degrees, thighs up to 35
 GATE_SD = 3.0  # on the innovation: a stride that is none, or a rest that is none, exceeds it
 

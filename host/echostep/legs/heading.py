@@ -25,7 +25,7 @@ from echostep.arrays import Bools, Floats
 HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
 SIZE = 6
 
-# By reason, all of them.
+# Assumed, not measured.
 GATE_SD = 3.0  # gate on the innovation: a normal one exceeds it in 0.3 % of readings
 STEP_S = 0.1  # of the covariance's propagation; also the compass period until two readings show it
 SHORTEST_PERIOD_S = 0.02  # of the compass
@@ -36,11 +36,11 @@ BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose mean rates di
 CALM_BINS = 7
 CALM_RAD_S = math.radians(1.0)
 
-# Fit of the compass errors; by reason, all of them.
+# Fit of the compass errors; assumed, not measured.
 FULL_TURN_RAD = math.radians(330.0)  # to be turned: second harmonics bridge the rest
 FEWEST_READINGS = 20  # three for each of the six unknowns, and more
 LARGEST_IRON_RAD = math.radians(60.0)  # about an iron field as strong as that of the earth
-FITS = 6  # linearizations
+LINEARIZATIONS = 6  # of the fit, each at the newest headings
 REWEIGHTINGS = 3  # of the readings in each, for outliers
 SMALLEST_SPREAD_RAD = math.radians(0.2)  # of the residuals: twice the compass's resolution
 MAD_TO_SD = 1.4826  # of a normal distribution
@@ -271,7 +271,7 @@ def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> 
     if (compass[-1] - compass[0]) * (turn[-1] - turn[0]) < 0.0:
         turn = -turn
     offset, drift, iron = float(np.mean(compass - turn)), 0.0, np.zeros(4)
-    for _ in range(FITS):
+    for _ in range(LINEARIZATIONS):
         h = turn + offset + drift * time
         columns = np.column_stack([np.ones_like(h), time - time.mean(), *_harmonics(h)])
         solution, residuals = _robust_least_squares(columns, compass - h)

@@ -33,22 +33,20 @@ DORSIFLEXION_STEP = 0.04  # phase between two values
 # the curve (1.35 m/s with legs of 0.86 m), at a phase of 0.56; half of it for what is slower. The foot's own gyros show 70 degrees per unit between
 # 1.55 and 1.95 m/s (two legs of one person), and about 30 down to 1.05 m/s (two of another).
 PUSH_OFF_RAD, CURVE_SPEED = math.radians(60.0), 0.465
-PUSH_OFF_PHASES = (
-    0.33,
-    0.56,
-)  # from none to all of it; the change at 0.4 is a third of that at 0.56, at 0.5 three quarters (the same feet)
+# From none to all of it; the change at 0.4 is a third of that at 0.56, at 0.5 three quarters (the same feet)
+PUSH_OFF_PHASES = (0.33, 0.56)
 # In lengths of the shank: 0.039 of the body's height over 0.246 [Winter 2009, after Drillis and Contini].
 ANKLE_HEIGHT = 0.16
-# In lengths of the shank, from the ankle to the ball of the foot and to the rolling point of the heel; by reason: a foot is about 0.62 of a shank
+# In lengths of the shank, from the ankle to the ball of the foot and to the rolling point of the heel: a foot is about 0.62 of a shank
 # long (0.152 of the body's height over 0.246), nearly half of it between ankle and ball, a sixth behind the ankle.
 BALL_AHEAD, HEEL_BEHIND = 0.30, 0.11
 FLAT = 0.08  # phase from which the foot is flat on the floor [Perry 1992, loading response]
-HEEL_RISES = 0.25  # earliest phase of heel rise; by reason: a little before mid stance, TOE_OFF / 2
-TOE_OFF = 0.62  # phase; by reason: a foot stands for about 60 % of a stride
+HEEL_RISES = 0.25  # earliest phase of heel rise: a little before mid stance, TOE_OFF / 2
+TOE_OFF = 0.62  # phase: a foot stands for about 60 % of a stride
 PELVIS = 1.017  # factor on a stride: two hips 17 cm apart turn by 4 degrees either way with steps of 0.7 m [Perry 1992]
-# Phases at which half strides begin; by reason: about FLAT, and half a stride later the same foot still stands (TOE_OFF).
+# Phases at which half strides begin: about FLAT, and half a stride later the same foot still stands (TOE_OFF).
 HALVES = (0.06, 0.08, 0.10)
-# Phases between which the foot carries alone; by reason: the other one leaves at TOE_OFF - 0.5 and lands at 0.5, with a margin at both ends.
+# Phases between which the foot carries alone: the other one leaves at TOE_OFF - 0.5 and lands at 0.5, with a margin at both ends.
 SINGLE_SUPPORT = (0.14, 0.42)
 # Least shank over thigh of a shank measured to the floor: to the floor it is 0.285 of the height, to the ankle 0.246, the thigh is 0.245
 # [Winter 2009]; the limit lies between 1.00 and 1.16, as persons differ.

@@ -4,7 +4,7 @@
 In: the grid of integrated rates, signs, moments at which the leg stands, begins and ends of strides. Out: angles between two grid indices. Owns the
 gyros' errors and the level.
 
-Gyros do not measure the angles at one moment: a Kalman filter of what is usual, `Level`, estimates them from the angles while standing and their mean
+Gyros do not measure the angles at one moment: a Kalman filter, `SwingAngles`, estimates them from the angles while standing and their mean
 over a stride.
 """
 
@@ -22,18 +22,17 @@ from echostep.legs.kinematics import knee_at
 from echostep.legs.swing_detection import GRID_HZ, heel_strike_index
 from echostep.legs.walking_bout import climbs
 
-# By reason, where no source is named.
+# Assumed, not measured, where no source is named.
 STANDING_RAD = (0.0, math.radians(-3.0))  # thigh, shank: the weight is in front of the ankles
 MEAN_RAD = (math.radians(7.0), math.radians(-14.2))  # over a stride, by the curves of `kinematics`
-STANDING_SD_RAD = math.radians(4.0)  # of people who stand; a foot is often a little ahead
+STANDING_SD_RAD = math.radians(4.0)  # of standing persons; a foot is often a little ahead
 BRIEF_SD_RAD, BRIEF_S = math.radians(12.0), 1.0  # of a shorter rest: it may be one between two steps, legs apart
-MEAN_SD_RAD = math.radians(
-    8.0
-)  # of people's mean angles [offsets of sagittal angles: Kadaba 1990], which all strides share
+# Of people's mean angles [offsets of sagittal angles: Kadaba 1990], which all strides share
+MEAN_SD_RAD = math.radians(8.0)
 STRIDE_SD_RAD = math.radians(1.5)  # growth in a stride: soft tissue
 UNKNOWN_SD_RAD = math.radians(20.0)  # before anything is known
 Signs = tuple[float, float]
-# Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one; by reason.
+# Of the change of a mean angle from stride to stride, and about the first stride of a walk, whose first swing is a smaller one, assumed.
 CLOSURE_SD_RAD, FIRST_CLOSURE_SD_RAD = math.radians(1.5), math.radians(5.0)
 # Of the rate of a standing leg over a window of rest, by sway; windows overlap seven times, so the sd of one is the root of 7 times 0.7 deg/s.
 REST_SD_RAD_S = math.radians(1.9)
@@ -41,7 +40,7 @@ UPRIGHT_RANGE_RAD = math.radians(74.0)  # range of the shank in a usual stride, 
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class SwingAngles:
     """`thigh`, `shank`: angles (rad, forward positive) at grid index `index`, both with this variance (rad2)."""
 
     thigh: float = 0.0
@@ -49,18 +48,18 @@ class Level:
     index: int = 0
     variance: float = UNKNOWN_SD_RAD**2
 
-    def moved(self, thigh: float, shank: float, index: int, drift: float) -> Level:
+    def moved(self, thigh: float, shank: float, index: int, drift: float) -> SwingAngles:
         """The level at a later index, where integration finds these angles; `drift`: variance (rad2) of what the gyros' errors have added."""
-        return Level(thigh, shank, index, self.variance + STRIDE_SD_RAD**2 + drift)
+        return SwingAngles(thigh, shank, index, self.variance + STRIDE_SD_RAD**2 + drift)
 
-    def corrected(self, off: tuple[float, float], sd: float) -> Level:
+    def corrected(self, off: tuple[float, float], sd: float) -> SwingAngles:
         """Kalman update by the differences `off` (thigh, shank) of the usual angles from those found, with this sd."""
         gain = self.variance / (self.variance + sd * sd)
-        return Level(
+        return SwingAngles(
             self.thigh + gain * off[0], self.shank + gain * off[1], self.index, (1.0 - gain) * self.variance
         )  # fmt: skip
 
-    def standing(self, rest_s: float) -> Level:
+    def standing(self, rest_s: float) -> SwingAngles:
         """The level after a rest of this duration."""
         sd = STANDING_SD_RAD if rest_s > BRIEF_S else BRIEF_SD_RAD
         return self.corrected((STANDING_RAD[0] - self.thigh, STANDING_RAD[1] - self.shank), sd)
@@ -79,8 +78,8 @@ class LegAngles:
 
     def __init__(self, grid: AngleGrid) -> None:
         self.bias = (GyroBias(), GyroBias())
-        self.level = Level()
-        self._rested = Level()  # when the standing under way began
+        self.level = SwingAngles()
+        self._rested = SwingAngles()  # when the standing under way began
         self._grid = grid
         self._mean: StrideMean | None = None  # of the stride before
 
@@ -92,13 +91,13 @@ class LegAngles:
         level, grid = self.level, self._grid
         indices = np.arange(begin, end + 1)
         yaw = np.linspace(grid.yaw[begin], grid.yaw[end], len(indices)) - grid.yaw[level.index]
-        found = []
+        angles = []
         for turned, sign, bias, start in zip(
             (grid.thigh, grid.shank), signs, self.bias, (level.thigh, level.shank), strict=True
         ):
             angle = sign * (np.array(turned[begin : end + 1]) - turned[level.index])
-            found.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
-        return found[0], found[1]
+            angles.append(start + angle - bias.value * (indices - level.index) / GRID_HZ - bias.leak * yaw)
+        return angles[0], angles[1]
 
     def move_level(self, signs: Signs, k: int) -> None:
         """Take the level to grid index k by integration; it is known the less, the longer the way and the wider the turn to there."""
@@ -119,7 +118,7 @@ class LegAngles:
         for bias, sign, rate in zip(self.bias, signs, rates.tolist(), strict=True):
             bias.learn(sign * rate, REST_SD_RAD_S)
         rested = self._rested.standing(rested_s)
-        self.level = Level(rested.thigh, rested.shank, k, rested.variance)
+        self.level = SwingAngles(rested.thigh, rested.shank, k, rested.variance)
 
     def learn_closure(self, signs: Signs, begin: int, end: int, *, first: bool) -> None:
         """Update the gyros' errors by a stride: its mean angles are those of the stride before, but for bias and leak.
@@ -155,7 +154,7 @@ class LegAngles:
 
     def forget_level(self, k: int = 0) -> None:
         """Nothing is known of the level from grid index k on."""
-        self.level = Level(index=k)
+        self.level = SwingAngles(index=k)
         self._mean = None
 
     def drop(self, k: int) -> None:

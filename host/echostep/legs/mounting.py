@@ -15,13 +15,12 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-GRID_HZ = 50.0  # by reason: ten times the highest frequency that is used
+GRID_HZ = 50.0  # ten times the highest frequency that is used
 SLOW_S = 2.4  # running mean that is subtracted: twice the time of a usual stride
 FAST_S = 0.2  # running mean: halves 3 Hz, the third harmonic of strides; removes impacts [soft tissue, 10 to 20 Hz: Wakeling 2003]
-FEWEST_S = 3.0  # of samples: two strides, by reason
-CLEAR_RATIO = (
-    1.3  # least ratio of the first to the second principal rate; by reason: below it another axis swings as far
-)
+FEWEST_S = 3.0  # of samples: two strides
+# Least ratio of the first to the second principal rate: below it another axis swings as far
+CLEAR_RATIO = 1.3
 
 
 @dataclass(frozen=True, slots=True)

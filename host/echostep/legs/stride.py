@@ -4,7 +4,7 @@
 In: nothing. Out: `Stride`, `Flag`, `StrideSettings`, `LegCounts`, and the uncertainty of a sum of strides. Owns nothing.
 
 In a turn the outer leg goes farther than the trunk. The pelvis turns forward with the leg that lands [Perry 1992], so the twist of the belt over a
-stride tells the legs apart. Both legs are equally likely before it is seen; the more it lies within what a belt twists without a reason, the nearer
+stride distinguishes the legs. Both legs are equally likely before it is seen; the more it lies within the twist that a belt has by chance, the nearer
 the result is to the middle of the trunk.
 """
 
@@ -21,14 +21,12 @@ from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
 
 HALF_PELVIS_M = 0.09  # of a leg from the middle of the trunk, as in `WearerSettings`
-# Phase after mid swing at which the pelvis is turned farthest; by reason: between the strike (0.18, half of the swing) and the other foot's toe off
+# Phase after mid swing at which the pelvis is turned farthest: between the strike (0.18, half of the swing) and the other foot's toe off
 # (0.30), until which the pelvis is carried on. Four legs of two people have it at 0.29 to 0.37, the simulated ones at the strike.
 LANDS, TWIST_POINTS = 0.25, 50
-TWIST_RAD = math.radians(
-    3.0
-)  # either way; by reason: 4 degrees of the pelvis [Perry 1992], less what a belt does not follow
-PERSON_SD_RAD = math.radians(1.5)  # of it from person to person and by the belt's seat; by reason
-STRIDE_SD_RAD = math.radians(3.0)  # of it from stride to stride, before that is seen; by reason
+TWIST_RAD = math.radians(3.0)  # either way: 4 degrees of the pelvis [Perry 1992], less what a belt does not follow
+PERSON_SD_RAD = math.radians(1.5)  # of it from person to person and by the belt's seat, assumed
+STRIDE_SD_RAD = math.radians(3.0)  # of it from stride to stride, before that is seen, assumed
 LEAST_STRIDE_M = 0.5  # of a stride whose pelvis turns visibly
 STRAIGHT_RAD = math.radians(15.0)  # largest turn of a stride that shows it: a turn hides the twist
 

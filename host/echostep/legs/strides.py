@@ -19,7 +19,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs import swing_detection as leg_swings
-from echostep.legs.angle_grid import AngleGrid, Sample
+from echostep.legs.angle_grid import AngleGrid, GridSample
 from echostep.legs.gyro_bias import GyroBias
 from echostep.legs.kinematics import FLAT, PELVIS, TOE_OFF, Travel, travel
 from echostep.legs.leg_angles import LegAngles, knees
@@ -29,17 +29,15 @@ from echostep.legs.walking_bout import SPEED_S, Bout, Swing, leaving_share, pace
 
 # The source of a value without a citation is not recorded.
 BRIDGED_S = 3.0  # longest gap bridged by the pace before it
-UNWATCHED_M_S, LONGEST_DOUBT_S = (
-    0.4,
-    600.0,
-)  # growth of the sd in a gap or without a swing, and for how long it grows in a gap
-FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; people run above [Alexander 1989]
+# Growth of the sd in a gap or without a swing, and for how long it grows in a gap
+UNWATCHED_M_S, LONGEST_DOUBT_S = 0.4, 600.0
+FASTEST = 0.75  # relative speed of walking: 2.2 m/s with legs of 0.86 m; above it a person runs [Alexander 1989]
 SHORTEST_M = 0.25  # length of a stride: less is a step in place or sideways
 LEAST_PASSED = 0.12  # share of the stride that the hips move in single support; 0.25 to 0.3 in walking
 LONGEST_ON_STAIRS_M = 1.0  # length of a stride
 STAIRS_M, STAIRS_RISE_M = 0.57, 0.34  # two treads of 28.5 and 17 cm; houses differ by 2 cm each [DIN 18065]
 STAIRS_WEIGHT = 0.15  # of the length by the angles
-SCALE_SD = 0.078  # of the scale common to all strides: people differ so much, whether their legs are measured or not [14 legs of 7 people]
+SCALE_SD = 0.078  # of the scale common to all strides: the spread between persons, whether their legs are measured or not [14 legs of 7 people]
 CALIBRATED_SD = 0.025  # the same after a walk of known length: it changes by 2 to 3 % with a person's speed
 OWN_SD_M = 0.04  # of one stride, besides
 EDGE_SD_M = 0.08  # of an edge of a walk
@@ -48,10 +46,11 @@ LOOK = 3  # grid samples on either side, from which a rate is computed
 SWING_END = 0.35  # of the peak rate: below it the swing is over
 STANCE = 62  # percent of a stride
 STAYS = 0.44  # last phase of a foot that stays on the floor
-FEWEST_SPEED = 6  # grid samples that give a speed; by reason
-CALM = 6  # grid samples without motion at either end of a record, which show that it begins or ends with standing; by reason
+FEWEST_SPEED = 6  # grid samples that give a speed, assumed
+# Grid samples without motion at either end of a record, which show that it begins or ends with standing, assumed
+CALM = 6
 FORGET = 500  # grid samples no longer needed, from which on they are dropped
-# Strides in a row that confirm the signs, or contradict them; by reason: motion before a walk is seldom so regular.
+# Strides in a row that confirm the signs, or contradict them: motion before a walk is seldom so regular.
 CONFIRMING = 3
 
 
@@ -110,11 +109,11 @@ class StrideEstimator:
         """Take one sample; search the grid that it fills once the signs are known."""
         before = len(self._grid)
         kind = self._grid.add(t_s, thigh, shank, belt)
-        if kind is Sample.AFTER_GAP:
+        if kind is GridSample.AFTER_GAP:
             self._bridge_gap(t_s)
             self._grid.restart(t_s, thigh, shank, belt)
             return
-        if kind is Sample.SKIPPED or len(self._grid) == before:
+        if kind is GridSample.SKIPPED or len(self._grid) == before:
             return
         if self.swings.known:
             self._advance(len(self._grid) - LOOK)

@@ -28,9 +28,8 @@ from echostep.path import STANDING_PIECE_S, PathSegment
 RANGE_RAD_S = math.radians(300.0)  # of the gyros [ADIS16100 datasheet]
 # The source of these values is not recorded.
 TURN_SD_RAD = math.radians(0.7)  # growth of the yaw error in a stride, without the part that the compass corrects
-FRAME_SD_RAD = math.radians(
-    1.0
-)  # first compass heading in the walk frame, which it defines; later ones show the gyro's bias
+# First compass heading in the walk frame, which it defines; later ones show the gyro's bias
+FRAME_SD_RAD = math.radians(1.0)
 SLOW_RAD_S = math.radians(10.0)  # largest rate of a standing leg, with the gyro's bias
 SETTING_OFF_S = 1.0  # duration of the motion in an edge of a walk
 SCALE_SD = 0.004  # random walk of the strides' scale per stride
@@ -114,9 +113,8 @@ class LegPath:
         self._covered_s = t1
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
-        begun = (
-            t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
-        )  # no way before: the wearer may turn on the spot
+        # No way before: the wearer may turn on the spot
+        begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
         ahead, aside = self._direction(max(t0, begun), t1)
         length = share * stride.length_m
         if Flag.EDGE not in stride.flags and length > 0.0:

@@ -21,7 +21,7 @@ from echostep.legs.kinematics import LegLengths, Travel
 from echostep.legs.stride import Flag
 from echostep.legs.swing_detection import GRID_HZ
 
-USUAL_STRIDE_S = 1.2  # duration before a stride is known; by reason
+USUAL_STRIDE_S = 1.2  # duration before a stride is known, assumed
 # Knee (rad) on stairs at the strike (up) or half a stride later (down), and its change between these moments. On the flat 5 to 15 degrees and +4
 # to -20, up stairs 62 and -48, down stairs 40 and +33 [curves of Riener 2002]. A drift of the angles, or a turn that leaks into them, changes the
 # difference less than the angle itself: both are needed, and the hips must rise or sink over the standing foot.
@@ -29,7 +29,7 @@ BENT_RAD = math.radians(25.0)
 EXTENDS_RAD, BENDS_RAD = math.radians(30.0), math.radians(20.0)
 LEAST_RISE_M = 0.04  # in half a stride; a step is 0.15 to 0.2 m high [DIN 18065]
 PACES = (0.32, 0.55)  # speed / sqrt(g leg): 0.9 and 1.6 m/s with legs of 0.86 m [Froude number 0.10 and 0.30]
-SPEED_S = 0.15  # over which a speed is taken; by reason: long against noise, short against a step
+SPEED_S = 0.15  # over which a speed is taken: long against noise, short against a step
 SETTING_OFF = 0.25  # speed over the pace when the first foot leaves the floor [Breniere and Do 1986; Jian 1993]
 
 
@@ -113,5 +113,5 @@ def speed(way: Travel, at: int, until: int, hz: float, most: float) -> float:
     first, last = max(min(at, until), 0), min(max(at, until), len(way.forward_m) - 1)
     if last <= first:
         return 0.0
-    found = (float(way.forward_m[last]) - float(way.forward_m[first])) * hz / (last - first)
-    return float(np.clip(found, 0.0, most))
+    mean_m_s = (float(way.forward_m[last]) - float(way.forward_m[first])) * hz / (last - first)
+    return float(np.clip(mean_m_s, 0.0, most))

@@ -2,7 +2,7 @@
 """The beacons of one walk: the cloud is reweighted by their readings, and their places follow from the cloud.
 
 In: a cloud, its last path segment, the beacons' readings on it. Out: log-weights, and `BeaconPlace`s. Owns each beacon's health, when it was
-last heard, and the readings of beacons whose place is not known yet.
+last received, and the readings of beacons whose place is not known yet.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall
 
-# All constants here are by reason.
-SILENT_S = 8.0  # without a reading, while it is expected to be heard and others are: the beacon is silent
-EXPECTED_SHARE = 0.6  # of the greatest range at which a beacon was heard: within it, and without a wall between, it is expected to be heard
+# Assumed, not measured.
+SILENT_S = 8.0  # without a reading, while its reception is expected and others are received: the beacon is silent
+EXPECTED_SHARE = 0.6  # of the greatest range at which a beacon was received: within it, and without a wall between, reception is expected
 
 
 class BeaconState(StrEnum):
@@ -46,7 +46,7 @@ class BeaconState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BeaconPlace:
-    """A beacon's place by the cloud: on the map (m), its standard deviation, axis (rad), level, and when it was last heard."""
+    """A beacon's place by the cloud: on the map (m), its standard deviation, axis (rad), level, and when it was last received."""
 
     slot: int
     x_m: float
@@ -59,7 +59,7 @@ class BeaconPlace:
 
 
 class BeaconMap:
-    """All beacons that were heard on one walk."""
+    """All beacons that were received on one walk."""
 
     def __init__(self, walls: Walls, settings: BeaconSettings, rng: np.random.Generator) -> None:
         self._walls = walls
@@ -68,9 +68,9 @@ class BeaconMap:
         self._health = initial_health(0)
         self._waiting = no_waiting(0)
         self._heard_s: list[float] = []
-        self._reach_m: list[float] = []  # greatest range at which each was heard
+        self._reach_m: list[float] = []  # greatest range at which each was received
         self._unexpected_s: list[float] = []  # when each was last too far away or behind a wall
-        self.heard_s: float | None = None  # when any beacon was last heard
+        self.heard_s: float | None = None  # when any beacon was last received
 
     def update(
         self, cloud: Cloud, segment: PathSegment, readings: Sequence[BeaconReading], plan_supports: bool = False
@@ -116,7 +116,7 @@ class BeaconMap:
         return BeaconPlace(slot, x - level * cloud.pitch_m, y, sd, axis, level, state, self._heard_s[slot])
 
     def _note_unexpected(self, cloud: Cloud, t_s: float) -> None:
-        """Note the time for each beacon that is not expected to be heard from the cloud's mean place."""
+        """Note the time for each beacon whose reception is not expected at the cloud's mean place."""
         weight = cloud.weight
         x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
         beacons = moments(cloud.beliefs, weight)
@@ -143,7 +143,7 @@ class BeaconMap:
         return cloud.beliefs.mean.shape[1] == len(self._heard_s)
 
     def _begin_anew(self, cloud: Cloud) -> None:
-        """Forget the places, which were those of a wrong cloud, and when each beacon was heard there."""
+        """Forget the places, which were those of a wrong cloud, and when each beacon was last received."""
         self._health, self._waiting = initial_health(0), no_waiting(0)
         self._heard_s, self._reach_m, self._unexpected_s = [], [], []
         cloud.beliefs = empty_beliefs(len(cloud.x_m), 0)

@@ -26,46 +26,43 @@ from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.plan.model import Pose
 
-# All by reason.
+# Assumed, not measured.
 WRONG_PER_M = 2e-5  # probability that a right cloud becomes wrong on a metre of the path: once in 50 km
 STATED = 0.99  # prior probability of a stated start
-# Of a ping's log-ratio, up to which it tells nothing: an error of one standard deviation that stays along a wall (plan, sway, speed of sound) is the
-# cloud's alone, for a rival that follows the wall learns it
+# Of a ping's log-ratio, below which it is no evidence: an error of one standard deviation that stays along a wall (plan, sway, speed of sound)
+# counts against the cloud only, since the density without a plan adapts to it
 STAYS = 0.5
-LEAST, MOST = (
-    -6.0,
-    12.0,
-)  # log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
-# All by reason.
+# Log-odds are kept between these: a wrong cloud that becomes right is believed again within some metres
+LEAST_LOG_ODDS, MOST_LOG_ODDS = -6.0, 12.0
+# Of the plan; assumed, not measured.
 PLAN_FITS = 0.99  # prior
 FAILS = 0.05  # unknown starts are found within FOUND_WITHIN_M; stated ones are wrong about as often as plans
 GRAZED = 0.2  # of a wall on a plan that states an error: its end is in the way of a right cloud by as much, on 100 m once or so
 FAR = 0.4  # the same for a rejected start that is found elsewhere: one in a hundred is so far off, half of the wrong plans have a place alike
 FOUND_WITHIN_M = 40.0  # path on which an unknown start is found on one level
-ALIKE_M = 30.0  # path on which a place on a wrong plan foretells the echoes, in the mean (20 to 50 m were seen): symmetric wings, storeys
+ALIKE_M = 30.0  # path on which a place on a wrong plan predicts the echoes, in the mean (20 to 50 m were seen): symmetric wings, levels
 MOST_FITS = 0.9995  # greatest probability: one wall that was never built leaves a confirmed plan at its prior
 EARLY_M = 20.0  # path on which a cloud is rejected that was wrong from the first
-NEAR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
-CROSSED_M = (
-    4.0  # from one way through a wall, within which another is through the same one; path on which a cloud goes through
-)
-THROUGH = math.log(
-    1 / 100
-)  # share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
-# Probabilities that a cloud is right, by reason:
+START_ERROR_M = 5.0  # from a start that was rejected, within which a place makes it an error of the start: a room
+# From one way through a wall, within which another is through the same one; path on which a cloud goes through
+CROSSED_M = 4.0
+# Log of the share of a cloud that finds no other way, below which it went through a wall: one edge of a door leaves more
+THROUGH = math.log(1 / 100)
+# Probabilities that a cloud is right; assumed, not measured.
 DOUBTED = 0.5  # of the tracked one, below which a search begins
 AGREED = 0.95  # of the tracked one and of the search about it, above which a search ends
 BELIEVED = 0.99  # of the tracked one, above which the plan supports it
-GATHERED = 0.7  # of one that has just gathered anywhere, if the plan fits: it has yet to foretell echoes
-UNDECIDED = 0.8  # at most of the tracked one, while a search that has not gathered is of another mind: the true place dies in one of five by chance
-FOUND = 0.95  # of the search's, once it has gathered, above which it is tracked
-REJECTED = 0.003  # of the search's, once it has gathered, below which it begins anew: a doorway costs a right one a factor of twenty
-WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes tell little of a wide cloud
+UNSTATED = 0.7  # prior of any other start, if the plan fits: the cloud has not yet predicted echoes
+# At most of the tracked one, while a search that disagrees with it is young: one search in five loses the true place by chance
+UNDECIDED = 0.8
+FOUND = 0.95  # of the search's, once it is in one place, above which it is tracked
+REJECTED = 0.003  # of the search's, below which it begins anew: a doorway costs a right one a factor of twenty
+WIDE_DOUBTED = 0.05  # of a stated start that has not contracted yet, below which a search begins: echoes are weak evidence for a wide cloud
 REFUTED = -5.0  # log-odds of a doubted cloud below which it was wrong, even if a search agrees with it later
 ALIKE_NATS = 8.0  # of evidence that a wrong place gains by being alike, before a search has found another
-JUDGED_M = 20.0  # path on which a search's place is judged before it counts against the tracked one
-ELSEWHERE = 0.05  # weight of a search about the tracked cloud, below which it is of another mind
-LEVEL_M = 20.0  # the same for each level more: storeys are often alike but for their doors
+EVIDENCE_M = 20.0  # path on which a search has to predict echoes before it counts against the tracked one
+ELSEWHERE = 0.05  # weight of a search near the tracked cloud, below which it disagrees with the tracked cloud
+LEVEL_M = 20.0  # added to FOUND_WITHIN_M for each level more: levels are often alike but for their doors
 
 
 def log_odds(probability: float) -> float:
@@ -79,9 +76,9 @@ def probability_of(log_odds: float) -> float:
 
 
 def beyond_errors_that_stay(log_ratio: Floats, power: Floats) -> Floats:
-    """What the log-ratios of pings (k,) tell of a cloud: nothing up to what errors that stay explain, less by that beyond.
+    """Evidence (k,) of pings for a cloud: their log-ratios, reduced towards 0 by what a persistent error explains.
 
-    `power` (k,): that of the ping, times the probability that the view is as planned: a hidden one has no such errors.
+    `power` (k,): that of the ping, times the probability that the view is as planned: a hidden view has no such errors.
     """
     return np.asarray(np.sign(log_ratio) * np.maximum(np.abs(log_ratio) - STAYS * power, 0.0))
 
@@ -99,7 +96,7 @@ class Plausibility:
 
     def add(self, log_ratio: float) -> None:
         """One observation: the log of its density if right over that if wrong."""
-        self.log_odds = min(max(self.log_odds + log_ratio, LEAST), MOST)
+        self.log_odds = min(max(self.log_odds + log_ratio, LEAST_LOG_ODDS), MOST_LOG_ODDS)
 
     def update(self, log_ratio: Floats, log_passed: float, path_m: float) -> None:
         """Pings on a path of this length, each with the log of its density under the cloud over its density without it, both to its power.
@@ -135,7 +132,7 @@ def away_m(one: Pose, other: Pose) -> float:
 
 
 class PlanVerdict:
-    """`probability` that the plan fits, after all that was told."""
+    """`probability` that the plan fits, given the outcomes reported so far: clouds confirmed or doubted, searches, crossed walls."""
 
     def __init__(self, plan_sd_m: float = 0.0) -> None:
         """`plan_sd_m`: error of the walls' positions that the plan states."""
@@ -152,11 +149,11 @@ class PlanVerdict:
         return self._fits.probability
 
     def confirm(self, path_m: float) -> None:
-        """A cloud was believed on this length of path."""
+        """Count for the plan: a cloud was believed on this length of path."""
         self._gain(path_m / ALIKE_M)
 
     def fail_search(self) -> None:
-        """A search has found nothing, or a wrong place."""
+        """Count against the plan: a search has found nothing, or a wrong place."""
         self._fits.add(math.log(FAILS))
 
     def reject_start(self, path_m: float) -> None:
@@ -179,14 +176,14 @@ class PlanVerdict:
         Soon and near, it was the stated start that was a little wrong.
         """
         if self._start_rejected:
-            self._gain(self._taken if after_m < EARLY_M and off_m < NEAR_M else math.log(FAR))
+            self._gain(self._taken if after_m < EARLY_M and off_m < START_ERROR_M else math.log(FAR))
         self._log_passed = 0.0
         self._forget_rejection()
 
     def pass_walls(self, at: Pose, path_m: float, log_passed: float) -> float:
-        """A believed cloud has gone so far to this place; `log_passed`: log of the share of it that crossed no wall. Returns what that tells of it.
+        """A believed cloud has moved so far to this place; `log_passed`: log of the share that crossed no wall. Returns the evidence for the cloud.
 
-        If hardly any of it found another way, the plan is wrong there. That counts once a wall, and tells nothing more of the cloud afterwards.
+        If hardly any of it found another way, the plan is wrong there. That counts once per wall, and is no evidence about the cloud afterwards.
         """
         if self._has_crossed(at):
             self._log_passed = 0.0
@@ -214,26 +211,27 @@ class PlanVerdict:
 
 
 @dataclass(slots=True)
-class Hypothetical:
-    """A cloud, the probability that it is right, and whether it has contracted once: before that, echoes tell little of it.
+class CloudHypothesis:
+    """A cloud as a hypothesis of the trunk's place, and the probability that it is right.
 
-    `is_stated`: it began where it was said to begin, so it should explain the echoes from the first on. `doubts`: log-odds that ranges to beacons of
-    each teammate have taken from it. `judged_m`: length of the path on which it was judged by the echoes that it foretold.
+    `is_stated`: it began at a stated start, so it should explain the echoes from the first on. `has_contracted`: it was contracted once; before that,
+    echoes are weak evidence. `evidence_m`: length of the path on which the echoes that it predicted were evidence. `doubts`: log-odds that ranges to
+    beacons of each teammate have taken from it.
     """
 
     cloud: Cloud
     plausibility: Plausibility
     is_stated: bool = False
     has_contracted: bool = False
-    judged_m: float = 0.0
+    evidence_m: float = 0.0
     doubts: dict[str, float] = field(default_factory=dict)
 
 
-def right_against(tracked: Hypothetical, search: Hypothetical, log_odds_before: float) -> float:
-    """Probability that the tracked cloud is right where a search disagrees with it, or has not gathered; `log_odds_before`: when the search began."""
+def right_against(tracked: CloudHypothesis, search: CloudHypothesis, log_odds_before: float) -> float:
+    """Probability that the tracked cloud is right while a search disagrees with it, or is coarse; `log_odds_before`: when the search began."""
     log_odds, alike = tracked.plausibility.log_odds, ALIKE_NATS
-    if search.judged_m > JUDGED_M:
+    if search.evidence_m > EVIDENCE_M:
         return probability_of(log_odds - search.plausibility.log_odds)
-    if search.cloud.is_coarse:  # there is no rival yet: what the tracked one had before is its own
+    if search.cloud.is_coarse:  # no rival yet: evidence from before the search cannot stem from likeness
         alike = min(max(log_odds - log_odds_before, 0.0), ALIKE_NATS)
     return min(probability_of(log_odds - alike), UNDECIDED)

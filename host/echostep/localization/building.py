@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the filters of one plan share.
+"""Data of a plan, shared by all filters on it.
 
 In: walls, sheet of levels. Out: `Building`. Owns the walkable floor, and the tables of echoes, made when a cloud first needs them.
 """
@@ -13,7 +13,7 @@ from echostep.localization.echoes.likelihood import EchoModel
 from echostep.localization.echoes.range_table import CoarseField, coarse_field
 from echostep.localization.echoes.unplanned import Background, background
 from echostep.localization.estimate import Elsewhere
-from echostep.localization.height.levels import UpperStoreys
+from echostep.localization.height.levels import UpperLevels
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Floor, walkable_floor
 from echostep.walls.indoors import indoors
@@ -21,23 +21,23 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 
 
 class Building:
-    """What the filters of one plan share: walls, sheet of levels, floor; the tables are made when a cloud first needs them."""
+    """Data of a plan, shared by all filters on it: walls, sheet of levels, floor; tables are made when a cloud first needs them."""
 
     def __init__(self, walls: Walls, sheet: LevelSheet | None = None) -> None:
         self.walls = walls
         self.sheet = sheet
         self.floor = walkable_floor(walls.index.walls)
         self.indoors = indoors(self.floor)
-        self.upper_storeys = None
+        self.upper_levels = None
         if sheet is not None and len(sheet.height_m) > 1 and len(self.floor.x_m):
-            self.upper_storeys = UpperStoreys(self.floor, sheet)
+            self.upper_levels = UpperLevels(self.floor, sheet)
         self.elsewhere = _elsewhere(self.floor, sheet)
         self._backgrounds: dict[EchoModel, Background] = {}
         self._fields: dict[EchoModel, CoarseField] = {}
 
     @property
     def has_walls(self) -> bool:
-        """Whether there is anything that echoes could tell."""
+        """Whether the plan has walls, so that echoes carry information."""
         return len(self.walls.index.walls) > 0
 
     @property
@@ -58,8 +58,8 @@ class Building:
         return self._fields[model]
 
     def log_loss_in_air(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
-        """What particles (n,) beside an upper storey lose in log-weight on this length of path; None where none does."""
-        return None if self.upper_storeys is None else self.upper_storeys.log_loss(x_m, y_m, path_m)
+        """Loss of log-weight (n,) on this length of path, of particles in the air beside an upper level; None where there is none."""
+        return None if self.upper_levels is None else self.upper_levels.log_loss(x_m, y_m, path_m)
 
     def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:
         """Weight of particles (n,) outside of the building; 0 where walls enclose no floor."""

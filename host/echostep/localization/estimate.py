@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The estimate: moments of the cloud.
 
-In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that says how far to trust it. Owns nothing.
+In: a cloud. Out: `Estimate`, immutable: position, covariance, heading, level, and a status that states how far to trust it. Owns nothing.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from echostep.arrays import Floats
 from echostep.jit import lean_kernel
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.places import Hypothesis
+from echostep.localization.particles.places import LikelyPlace
 
 CHI2_95 = 5.991464547107979  # 95 % quantile of chi-square, two degrees of freedom
-TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter, by reason: a door, a room
-SURE = 0.95  # probability of an error below TRACKING_M while tracking, by reason
-# Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, by reason
+TRACKING_M, LOST_M = 1.0, 5.0  # errors that matter: a door, a room
+SURE = 0.95  # probability of an error below TRACKING_M while tracking, assumed
+# Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
 MUCH_LIKELIER = 2.0
-UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, by reason
+UNSURE = 0.5  # probability of an error below LOST_M, less than which is lost, assumed
 RISK = 1e-3  # probability of an error beyond the protection radius
-# Of the protection radius of a normal distribution, by reason: errors of echoes and steps have heavier tails.
+# Of the protection radius of a normal distribution: errors of echoes and steps have heavier tails.
 TAIL = 1.5
-SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, by reason
-UNFIT = 0.5  # probability of the plan below which it is said not to fit, by reason
-OUTSIDE = 0.5  # probability of being outside of the building above which it is said, by reason
-SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, by reason
-WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis, by reason: a brisk walk
+SPREAD_M = 0.75  # standard deviation of a cloud above which its hypotheses are listed, assumed
+UNFIT = 0.5  # probability of the plan below which it is reported not to fit, assumed
+OUTSIDE = 0.5  # probability of being outside of the building above which that is reported, assumed
+SURE_OF_LEVEL = 0.99  # least probability of the likeliest level while tracking, assumed
+WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
 
 
 class Moments(NamedTuple):
@@ -54,7 +54,7 @@ class Moments(NamedTuple):
 
 @lean_kernel
 def moments(x_m: Floats, y_m: Floats, heading_rad: Floats, weight: Floats, near_m: float, about_m: float) -> Moments:
-    """Of particles (n,) in the map."""
+    """Weighted moments of particles (n,) in the map."""
     x, y, east, north = 0.0, 0.0, 0.0, 0.0
     for i in range(len(weight)):
         w = weight[i]
@@ -103,7 +103,7 @@ class Estimate:
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
     `protection_m`: radius on that level beyond which the error is with probability RISK, infinite where none is that safe. `right`: probability that
     the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
-    `hypotheses`: the places of a cloud that has not gathered, or not on one level, the likeliest first.
+    `hypotheses`: the likely places of a cloud wider than SPREAD_M, or on several levels, the likeliest first.
     """
 
     t_s: float
@@ -122,7 +122,7 @@ class Estimate:
     z_sd_m: float = 0.0
     protection_m: float = math.inf
     right: float = 1.0
-    hypotheses: tuple[Hypothesis, ...] = ()
+    hypotheses: tuple[LikelyPlace, ...] = ()
     plan_fits: float = 1.0
     outside: float = 0.0
 
@@ -142,7 +142,7 @@ class Estimate:
 
 
 class Ellipse(NamedTuple):
-    """Half axes in metres and the angle of the longer one from x."""
+    """Half axes in metres, and the angle of the longer one from x."""
 
     major_m: float
     minor_m: float
@@ -172,15 +172,15 @@ def estimate(
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
 
-    Of a cloud of several places the mean is in none of them: the position is then that of the place which has more than half of the weight, if there
-    is one. `sd_m`: standard deviation per axis to be added; `right`: probability that the cloud is right, otherwise the trunk is `elsewhere`. While
-    tracking, the covariance is the cloud's; otherwise that of the mixture of both about the position. The hypotheses are those of `search`, if there
-    is one.
+    The mean of a cloud with several likely places may lie in none of them: the position is then that of the likeliest place, if that has more than
+    half of the weight, and MUCH_LIKELIER times that near the mean. `sd_m`: standard deviation per axis to be added; `right`: probability that the
+    cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise that of the mixture of both about the
+    position. The hypotheses are those of `search`, if there is one.
     """
     weight = cloud.weight
     levels, z, z_sd = _heights(cloud, weight)
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
-    places: tuple[Hypothesis, ...] = ()
+    places: tuple[LikelyPlace, ...] = ()
     if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < SURE_OF_LEVEL:
         places = (search or cloud).places(walk_heading_rad)
     if search is None and places and places[0].probability > UNSURE:
@@ -200,7 +200,7 @@ def estimate(
     )  # fmt: skip
 
 
-def _moments_at(place: Hypothesis, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
+def _moments_at(place: LikelyPlace, mean: Moments, cloud: Cloud, weight: Floats) -> Moments:
     """The moments about a place, with its heading; those about the mean, if they have half as much weight near them."""
     distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
     near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))

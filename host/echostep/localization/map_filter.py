@@ -22,11 +22,11 @@ from echostep.localization.belief import (
     DOUBTED,
     ELSEWHERE,
     FOUND,
-    GATHERED,
     REFUTED,
     STATED,
+    UNSTATED,
     WIDE_DOUBTED,
-    Hypothetical,
+    CloudHypothesis,
     PlanVerdict,
     Plausibility,
     away_m,
@@ -35,7 +35,7 @@ from echostep.localization.belief import (
 )
 from echostep.localization.building import Building
 from echostep.localization.echoes.likelihood import EchoSettings
-from echostep.localization.echoes.unplanned import UnplannedDensities, UsablePings, judged_share
+from echostep.localization.echoes.unplanned import UnplannedDensities, UsablePings, evidence_share
 from echostep.localization.estimate import LOST_M, SURE, TRACKING_M, Estimate, Right, estimate, weight_about
 from echostep.localization.height.height_filter import RelativeHeight, RidingHeight
 from echostep.localization.height.levels import HeightChange
@@ -59,15 +59,16 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan.model import Pose
 from echostep.ports.people.meeting import Meeting
 
-SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, by reason
-EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate, by reason: no plan is more exact
-HIDDEN_SD_M = 0.15  # standard deviation per axis when all views are hidden, by reason: a plan that explains few echoes may be so far off
+SUPPORTED_M = 2.0  # path behind the last ping on which the plan still supports the cloud, assumed
+EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan is more exact
+# Standard deviation per axis when all views are hidden: a plan that explains few echoes may be so far off
+HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
-UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, by reason
+UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 
 
 class MapFilter:
-    """The cloud of a start, and a second one that searches the building while the first is doubted."""
+    """The tracked cloud, and a second one that searches the building while the first is doubted."""
 
     def __init__(
         self, building: Building, start: Start, walk_heading_rad: float, rng: np.random.Generator,
@@ -83,9 +84,9 @@ class MapFilter:
         cloud = self._new_cloud(start, walk_heading_rad)
         stated = not cloud.is_coarse
         self._plan = PlanVerdict(self._settings.plan_sd_m)
-        prior = (STATED if stated else GATHERED) if building.has_walls else BY_DEFINITION
-        self.tracked = Hypothetical(cloud, Plausibility(prior), stated)
-        self.search: Hypothetical | None = None
+        prior = (STATED if stated else UNSTATED) if building.has_walls else BY_DEFINITION
+        self.tracked = CloudHypothesis(cloud, Plausibility(prior), stated)
+        self.search: CloudHypothesis | None = None
         self._progress = SearchProgress(building.levels, self.tracked.plausibility.log_odds)
         self._is_refuted = False  # whether the tracked cloud was as good as wrong since it was doubted
         self._is_elsewhere = False  # whether a gap may have led elsewhere since the tracked cloud was last confirmed
@@ -102,15 +103,15 @@ class MapFilter:
 
     @property
     def echo(self) -> EchoSettings:
-        """What the rangers may report."""
+        """Settings of the ranger model."""
         return self._settings.echo
 
-    def hear_by(self, echo: EchoSettings) -> None:
-        """From now on the pings are those of rangers with these settings."""
+    def set_ranger_model(self, echo: EchoSettings) -> None:
+        """Use these ranger settings from the next segment on."""
         if echo != self._settings.echo:
             self._settings = replace(self._settings, echo=echo)
             self._model, self._blurred = echo_models(self._settings)
-            self._pings.hear_by(self._building.background(self._model), with_plan_error(self._settings))
+            self._pings.set_ranger_model(self._building.background(self._model), with_plan_error(self._settings))
 
     @property
     def cloud(self) -> Cloud:
@@ -140,9 +141,9 @@ class MapFilter:
     def meet(self, meeting: Meeting) -> MeetingEffect:
         """Weigh the clouds by the place of a teammate beside the wearer, and decide which of them is tracked.
 
-        Agreement makes the cloud at most as sure as the meeting, for both may stem from one source. A contradiction moves a doubted cloud; a believed
-        one only when a second teammate says so, and that is the likelier. A radio range beyond PLACE_M moves nothing; ranges to beacons of two
-        teammates can begin a search.
+        Agreement raises the cloud's probability to at most the meeting's: both may stem from one source. A contradiction moves a doubted cloud, a
+        believed one only when a second teammate contradicts too and that is likelier. A radio range beyond PLACE_M moves nothing; ranges to two
+        teammates' beacons can begin a search.
         """
         area_m2 = self._building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._met.refusal(meeting, self._pings.path_m)
@@ -171,7 +172,7 @@ class MapFilter:
         else:
             at = start_at(meeting)
             start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
-            self.tracked = Hypothetical(self._new_cloud(start, 0.0), Plausibility(right), is_stated=True)
+            self.tracked = CloudHypothesis(self._new_cloud(start, 0.0), Plausibility(right), is_stated=True)
         self.search, self._is_elsewhere = None, False
 
     def turn_walk_frame(self, by_rad: float) -> None:
@@ -195,9 +196,9 @@ class MapFilter:
         self._search_beside(self.cloud.air, segment.heading1_rad)
 
     def _search_beside(self, air: Air | None, walk_heading_rad: float) -> None:
-        """Search the whole building beside the tracked cloud, which stands for what is near.
+        """Search the whole building in addition to the tracked cloud, which covers the near places.
 
-        `air`: what is known of the heights by pressure; None: nothing tells the level, so what is above and below is searched more than the rest.
+        `air`: calibration of the heights by pressure; None: the level is unknown, so places above and below are searched more densely than the rest.
         """
         if self.cloud.is_coarse or not len(self._building.floor.x_m):
             return
@@ -207,7 +208,7 @@ class MapFilter:
         self.search = self._new_search(Start(near=near, air=air), walk_heading_rad)
 
     def _follow_barometer(self, measured: MeasuredSegment) -> None:
-        """The lag of the height by pressure drifts in a pause, and is not known after a restart of the board: it may be another one."""
+        """Let the lag of the height by pressure drift over a pause; forget it after a restart of the board, which may be another board."""
         anew = len(measured.height_m) > 0 and measured.board_restarts != self._board_restarts
         if anew:
             self._board_restarts = measured.board_restarts
@@ -221,7 +222,7 @@ class MapFilter:
         self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
 
     def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
-        """Spread the cloud over an unobserved segment."""
+        """Spread the clouds over an unobserved segment."""
         for each in self._clouds():
             each.cloud.scatter(move_of(segment), change)
             each.plausibility.doubt(UNOBSERVED_DOUBT)
@@ -233,7 +234,7 @@ class MapFilter:
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
         for each in self._clouds():
-            self._follow_with(each, move, pings, unplanned, judged_share(segment.turn_rad))
+            self._follow_with(each, move, pings, unplanned, evidence_share(segment.turn_rad))
             each.cloud.change_levels(move, change)
             loss = self._building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m) if path_m > 0.0 else None
             if loss is not None:
@@ -242,9 +243,9 @@ class MapFilter:
             self._plan.confirm(path_m)
 
     def _follow_with(
-        self, each: Hypothetical, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
+        self, each: CloudHypothesis, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
     ) -> None:
-        """Propagate and reweight one cloud, and judge it by this share of how well it foretold the pings."""
+        """Propagate and reweight one cloud, and update its probability by this share of the evidence of the pings."""
         cloud = each.cloud
         if cloud.is_coarse:
             field = self._building.field(self._model)
@@ -253,10 +254,10 @@ class MapFilter:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
                 cloud.draw_veer()
         else:
-            # A scattered cloud's particles stand for the places between them.
+            # The particles of a scattered cloud are sparse: the echo model is blurred by their spacing.
             model = self._blurred if cloud.is_scattered else self._model
             evidence = cloud.propagate_and_reweight(move, pings, model, self._building.walls)
-            # Where there was more than one place, a light one may have lost a level by chance.
+            # Where there were several places, a light one may have lost its particles on one level by chance.
             if cloud.is_on_any_level and cloud.is_in_one_place:
                 self._way.pass_again(cloud, self._blurred, self._building.walls)
                 cloud.is_on_any_level = False
@@ -265,32 +266,35 @@ class MapFilter:
                 log_path = self._plan.pass_walls(self._believed(0.0), path_m, evidence.log_path)
                 evidence = evidence._replace(log_path=log_path)
             if self._building.has_walls:
-                self._judge(each, evidence, pings, unplanned, path_m, share)
+                self._update_plausibility(each, evidence, pings, unplanned, path_m, share)
 
-    def _judge(
-        self, each: Hypothetical, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
+    def _update_plausibility(
+        self, each: CloudHypothesis, evidence: Evidence, pings: PingBatch, unplanned: UnplannedDensities, path_m: float,
         share: float,
     ) -> None:  # fmt: skip
-        """Update the probability that a cloud is right; one that has not contracted gains nothing, and a search's is judged against chance alone."""
+        """Update the probability that a cloud is right by the density of its echoes against that without a plan.
+
+        Echoes that made it converge are not counted as evidence for it: until it has contracted, they raise its probability to UNSTATED at most.
+        """
         cloud, most = each.cloud, each.plausibility.probability
-        judged = each.has_contracted and not cloud.is_scattered
-        each.has_contracted = each.has_contracted or cloud.is_small  # what contracts it, it has not foretold
-        rival = unplanned.either if judged or each.is_stated else unplanned.anywhere
+        converged = each.has_contracted and not cloud.is_scattered
+        each.has_contracted = each.has_contracted or cloud.is_contracted
+        rival = unplanned.either if converged or each.is_stated else unplanned.anywhere
         seen = 1.0 - cloud.hidden_shares[pings.ranger]
         gain = share * beyond_errors_that_stay(evidence.log_pings - rival, seen * pings.power)
         each.plausibility.update(gain, evidence.log_path, path_m)
-        if judged:
-            each.judged_m += path_m
+        if converged:
+            each.evidence_m += path_m
         else:
-            each.plausibility.limit(min(most, GATHERED) if cloud.rescues else max(most, GATHERED))
+            each.plausibility.limit(min(most, UNSTATED) if cloud.rescues else max(most, UNSTATED))
 
-    def _clouds(self) -> list[Hypothetical]:
+    def _clouds(self) -> list[CloudHypothesis]:
         return [self.tracked] if self.search is None else [self.tracked, self.search]
 
     def _right(self) -> Right:
         """Probability that the tracked cloud is right; while the building is searched, no more than the search's weight about it, at its height.
 
-        Where the search has none there, or has not gathered, it is what the tracked cloud has foretold against what the search has.
+        Where the search has no weight there, or is coarse, both are compared by how well they have predicted the echoes.
         """
         here = self.tracked.plausibility.probability
         if self.search is None:
@@ -304,7 +308,7 @@ class MapFilter:
         return Right(min(here, most), about)
 
     def _choose(self, right: float, walk_heading_rad: float) -> bool:
-        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or follow the one that the search has found.
+        """Begin a search where the tracked cloud is doubted, end it where it is believed again, or track the cloud of the search.
 
         `right`: probability that the tracked cloud is right. Returns whether the tracked cloud or the search was replaced.
         """
@@ -329,26 +333,26 @@ class MapFilter:
         return True
 
     def _agree(self) -> None:
-        """The search agrees with the tracked cloud: that was right, unless it was refuted, and has come by chance to where it is now."""
+        """End a search that agrees with the tracked cloud: that cloud was right, unless it was refuted and is now at the true place by chance."""
         if self._is_refuted:
             self._plan.find(self._progress.length_m(self._pings.path_m), math.inf)
         else:
             self._plan.agree()
         self.search, self._is_elsewhere = None, False
 
-    def _follow_search(self, search: Hypothetical) -> None:
-        """Track from now on what a search has found."""
+    def _follow_search(self, search: CloudHypothesis) -> None:
+        """Track the cloud of the search."""
         was = self._believed(0.0)
         self.tracked, self.search, self._is_elsewhere = search, None, False
         self._plan.find(self._progress.length_m(self._pings.path_m), away_m(was, self._believed(0.0)))
 
     def _note_coarse(self) -> None:
-        """Measure the path of a coarse search; count against the plan that no place is probable at the end of that within which one is found."""
+        """Count against the plan that a coarse search has no probable place at the end of the path within which one is usually found."""
         cloud = self._clouds()[-1].cloud
         if cloud.is_coarse and self._progress.note_coarse(self._pings.path_m) and cloud.place_share < DOUBTED:
             self._plan.fail_search()
 
-    def _doubt(self, tracked: Hypothetical, walk_heading_rad: float) -> bool:
+    def _doubt(self, tracked: CloudHypothesis, walk_heading_rad: float) -> bool:
         """Begin a search if the tracked cloud is improbable; returns whether a search began."""
         least = DOUBTED if tracked.has_contracted or tracked.cloud.rescues else WIDE_DOUBTED
         if tracked.plausibility.probability >= least or tracked.cloud.is_coarse or not len(self._building.floor.x_m):
@@ -365,10 +369,10 @@ class MapFilter:
         """Anywhere, a share near the tracked cloud, at its height."""
         return Start(near=self._believed(walk_heading_rad), near_z_m=float(self.cloud.weight @ self.cloud.z_m))
 
-    def _new_search(self, start: Start, walk_heading_rad: float) -> Hypothetical:
+    def _new_search(self, start: Start, walk_heading_rad: float) -> CloudHypothesis:
         self._progress.begin(self._pings.path_m, self.tracked.plausibility.log_odds)
         self._met.forget_beacons()
-        return Hypothetical(self._new_cloud(start, walk_heading_rad), Plausibility(GATHERED))
+        return CloudHypothesis(self._new_cloud(start, walk_heading_rad), Plausibility(UNSTATED))
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
@@ -384,7 +388,7 @@ class MapFilter:
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M)
         search = self.search.cloud if self.search else None
         elsewhere, plan_fits = self._building.elsewhere, self._plan.probability
-        if plan_fits < SURE:  # otherwise what is said of a place holds if the plan does
+        if plan_fits < SURE:  # above it, the stated errors are conditional on the plan
             right = Right(right.here * plan_fits, right.about)
         new = estimate(self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, elsewhere, search)
         if self._height is not None:

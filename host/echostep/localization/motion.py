@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a measured segment of the path does to a cloud: its move, its change of height, and gaps after which the wearer may be elsewhere.
+"""From a measured segment of the path: its move, its change of height, and gaps after which the wearer may be elsewhere.
 
 In: `MeasuredSegment`s in order of time. Out: `Move`, `HeightChange`, the kind of gap that ends with a segment. Owns the errors of the path that the
 segment does not state, and the times of the last segment and of the last ping.
@@ -16,10 +16,10 @@ from echostep.localization.particle_arrays import Move
 from echostep.path import MeasuredSegment, PathSegment
 
 BESIDE_M = 0.05  # of the trunk from a foot on the floor: half of a step's width of 10 cm
-HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than its data sheet says
+HEIGHT_SD_M = 0.3  # of one height by pressure: an SCP1000 in its fast mode, a little worse than in its data sheet
 HEIGHT_SAMPLES = 9  # used at the end of a segment: a second
-AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce, by reason: draughts
-# All by reason.
+AIR_SD_M = 0.1  # of a height by pressure that more samples do not reduce: draughts
+# Assumed, not measured.
 PAUSE_S = 1.0  # between two segments: nothing was received
 LONG_S = 5.0  # of an unobserved segment: a walk out of the room
 MUTE_S = 10.0  # of standing without a ping, where there were pings before: rangers measure whatever the wearer does
@@ -51,7 +51,7 @@ class Gap(Enum):
 
 
 class Gaps:
-    """Watches the segments of one walk."""
+    """Detects gaps between the segments of one walk."""
 
     def __init__(self) -> None:
         self.pause_s = 0.0  # between the last two segments

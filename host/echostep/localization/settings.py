@@ -18,7 +18,7 @@ UNPLANNED_DOOR = -6.0  # log-probability (1 in 400) that a way leads through a w
 
 @dataclass(frozen=True, slots=True)
 class CloudSettings:
-    """Size of the cloud, spread of a start about whose errors nothing is said, and noise that the path's own covariance leaves out.
+    """Size of the cloud, spread of a start whose errors are not stated, and noise that the path's own covariance leaves out.
 
     `step_sd`: of a move's length, per square root of a metre, twice that of a foot; `turn_sd_deg`, `scale_sd`: drift of the walk frame's rotation
     and of the lengths, likewise. `start_scale_sd`, `scale_sd`: of nine walks with surveyed or captured feet. `start_veer_sd_deg`: of a bias

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The last metres of the path, for a second pass: storeys of a building are often alike, and a coarse search cannot tell them apart.
+"""The last metres of the path, for a second pass: levels of a building are often alike, and a coarse search cannot
+discriminate between them.
 
 In: moves with their pings and changes of height; a cloud that has just turned exact. Out: the same cloud, after the pass. Owns the moves.
 
-A coarse cloud has a particle or two about each true pose, and hears half of what the echoes tell. So which of two storeys gets the weight is chance,
-and doors tell them apart late. The places that it has found are therefore tried once more on every level, exactly, from where the way to them began.
+A coarse cloud has a particle or two near each pose, and uses half of the information of the echoes. So chance decides which of two levels gets the
+weight, and doors correct that late. The exact filter therefore processes the same path a second time, from its beginning on every level.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from echostep.localization.particle_arrays import Move, PingBatch
 from echostep.localization.particles.cloud import Cloud
 from echostep.walls.echo_sources import Walls
 
-PAST_M = 40.0  # path that is passed again, by reason: that on which a place is found
-MOST_PIECES = 1_000  # of it, by reason: eight minutes of standing
+PAST_M = 40.0  # path that is passed again: that on which a place is found
+MOST_PIECES = 1_000  # of it: eight minutes of standing
 
 
 class RecentWay:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Several walks through one building as one drawing.
 
-In: solved walks by name, in any order, each of unknown start. Out: `Mapped`, `Join`s. Owns what is enough to say that two walks are of one building:
+In: solved walks by name, in any order, each of unknown start. Out: `Mapped`, `Join`s. Owns the conditions under which two walks are of one building:
 a place that leaves no other, most of the walls in common there, and two closures between the walks; and the standard deviations of the loose closure
-that ties the second walk to the first. Between the last node of one walk and the first of the next the path says nothing.
+that ties the second walk to the first. Between the last node of one walk and the first of the next the path gives no constraint.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.mapping.graph.fragments import Fragments
-from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.graph import Closure, FittedWalls, Graph
 from echostep.mapping.graph.nodes import Nodes, Pings
 from echostep.mapping.mapper import Mapped, Progress, close_loops, drawn, settle
 from echostep.mapping.placing import Place, find_place
@@ -42,7 +42,7 @@ def merged(old: Graph, new: Graph, place: Place) -> Graph:
     closures = [*old.closures, *(shift.closure(closure, n) for closure in new.closures)]
     closures.append(Closure(nearest, node, pose[node] - pose[nearest], tie, place.log_odds))
     fragments = _fragments(old.fragments, new.fragments, n)
-    none = Walls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
+    none = FittedWalls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
     base = None if new.base_rad is None else old.base_rad
     return Graph(nodes, fragments, pose, none, closures, base)
 

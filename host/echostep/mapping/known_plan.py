@@ -13,7 +13,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.mapping.graph.directions import RIGHT_RAD, Directions
 from echostep.mapping.graph.fragments import SD_M, SD_RAD, Fragments
-from echostep.mapping.graph.graph import Graph, Walls
+from echostep.mapping.graph.graph import FittedWalls, Graph
 from echostep.mapping.graph.nodes import Nodes, Pings
 from echostep.mapping.mapper import Mapped
 from echostep.plan.model import Level
@@ -41,7 +41,7 @@ def plan_as_walk(level: Level, sd_m: float) -> Mapped:
     fragments = Fragments(
         np.arange(n), middle - at, seen, half, np.full(n, sd), np.full(n, SD_RAD), np.full(n, 10), np.zeros(0, np.int64)
     )
-    none = Walls(np.zeros(0), np.zeros(0), np.full(n, -1))
+    none = FittedWalls(np.zeros(0), np.zeros(0), np.full(n, -1))
     graph = Graph(nodes, fragments, pose.copy(), none, base_rad=_base(normal, length))
     nothing, integers = np.zeros(0), np.zeros(0, np.int64)
     pings = Pings(np.zeros((0, 2)), nothing, nothing, integers, nothing, integers, nothing)

@@ -18,11 +18,11 @@ from echostep.mapping.graph.bias import find_bias, without_bias
 from echostep.mapping.graph.closures import APART_M, STRETCH_M, find_closure
 from echostep.mapping.graph.directions import LEAST_EVIDENCE, Directions
 from echostep.mapping.graph.fragments import Fragments, find_fragments
-from echostep.mapping.graph.graph import ROUNDS, Closure, Graph, Walls, contradicted
+from echostep.mapping.graph.graph import ROUNDS, Closure, FittedWalls, Graph, contradicted
 from echostep.mapping.graph.nodes import Nodes, Pings, nodes_of
 from echostep.mapping.graph.relief import find_relief
 from echostep.mapping.graph.spots import with_spots
-from echostep.mapping.graph.storeys import STAIRS, find_storeys
+from echostep.mapping.graph.storeys import BETWEEN, find_storeys
 from echostep.mapping.smoothed_heading import with_smoothed_headings
 from echostep.mapping.walls.drawing import Drawing, draw
 from echostep.path import MeasuredSegment
@@ -46,7 +46,7 @@ class Mapped:
     def first_storey(self) -> int:
         """That on which the first level stretch of path is."""
         storeys = self.graph.storeys
-        return 0 if storeys is None else int(storeys.of[storeys.of != STAIRS][0])
+        return 0 if storeys is None else int(storeys.of[storeys.of != BETWEEN][0])
 
     @property
     def drawing(self) -> Drawing:
@@ -55,7 +55,7 @@ class Mapped:
 
 
 def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _share: None) -> Mapped:
-    """Draw one walk; `progress` is told the share that is done."""
+    """Draw one walk; `progress` is called with the share that is done."""
     return drawn(solve_walk(segments, progress))
 
 
@@ -94,7 +94,7 @@ def settle(graph: Graph) -> list[Closure]:
 
 def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
     """The graph with its path as the building's directions correct it, where it has any."""
-    none = Walls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
+    none = FittedWalls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
     if directions.evidence < LEAST_EVIDENCE:
         return Graph(nodes, fragments, nodes.pose.copy(), none)
     pose, drift = nodes.pose.copy(), directions.drift_rad
@@ -106,7 +106,7 @@ def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gra
 
 
 def find_walls(graph: Graph) -> None:
-    """Find which fragments are of one wall, and solve; those heard on stairs are of walls there, which hold the heading."""
+    """Find which fragments are of one wall, and solve; those detected on stairs are of walls there, which constrain the heading."""
     node = graph.fragments.node
     storey = np.zeros(len(node), np.int64) if graph.storeys is None else graph.storeys.with_flights[node]
     graph.walls = associate(graph.nodes, graph.fragments, *graph.places(), _anchored(graph), storey)
@@ -124,8 +124,8 @@ def _anchored(graph: Graph) -> Bools:
     at = way_m[graph.fragments.node]
     k = np.clip(np.searchsorted(ends_m, at), 1, len(ends_m) - 1) if len(ends_m) > 1 else np.zeros(len(at), np.int64)
     nearest: Floats = np.minimum(np.abs(at - ends_m[k]), np.abs(at - ends_m[np.maximum(k - 1, 0)]))
-    found: Bools = nearest < KNOWN_M
-    return found
+    anchored: Bools = nearest < KNOWN_M
+    return anchored
 
 
 def close_loops(graph: Graph, progress: Progress, first: int = 0, before_m: float = math.inf) -> list[Closure]:

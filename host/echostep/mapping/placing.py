@@ -2,8 +2,8 @@
 """Where a walk of unknown start lies on the drawing of another one.
 
 In: fragments of both, each in its own map. Out: `Place`, with its odds. Owns the limits. The log-ratio of every turn and shift against two
-places that have nothing in common is a correlation: walls of each on what the other says of a place (a wall seen from here, free floor, unknown),
-summed by Fourier transforms over all shifts.
+places that have nothing in common is a correlation of the walls of each with the state of the other at a place (a wall seen from here, free floor,
+unknown), summed by Fourier transforms over all shifts.
 """
 
 from __future__ import annotations
@@ -23,10 +23,8 @@ SIDES = 4  # directions from which a wall is seen, a right angle apart
 OFF_SD_M = 0.15  # of one wall in two drawings: both bend
 BAND_M = np.array([-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])  # across a wall, where its ratio is above 1
 CHANCE_M = 1.5  # half width within which another wall would lie anywhere
-OUTLIER, FREE_RATIO = (
-    0.1,
-    math.log(0.15),
-)  # share of unexplained walls; ratio of a wall in space that was free [as in matching.py]
+# Share of unexplained walls; ratio of a wall in space that was free [as in matching.py]
+OUTLIER, FREE_RATIO = 0.1, math.log(0.15)
 FREE_M = 0.35  # before a wall, from which the floor is free
 POWER = 0.5  # of each metre of wall: errors of a stretch are shared
 LEAST_HALF_M = 0.25  # of a fragment
@@ -62,8 +60,8 @@ class Place(NamedTuple):
 
     def moved(self, points: Floats) -> Floats:
         """Points (n, 2) of the new map on the old one."""
-        found: Floats = points @ _turned(self.turn_rad).T + self.shift_m
-        return found
+        moved_points: Floats = points @ _turned(self.turn_rad).T + self.shift_m
+        return moved_points
 
 
 def scene_of(graph: Graph) -> Scene:
@@ -85,7 +83,7 @@ def scene_of(graph: Graph) -> Scene:
 
 
 class _Images(NamedTuple):
-    """Cells from `low` (2,) on: `wall` (SIDES, x, y): 1 where one is seen from this side; `ratio`: what the scene says of such a wall there."""
+    """Cells from `low` (2,) on: `wall` (SIDES, x, y): 1 where one is seen from this side; `ratio`: log-ratio of such a wall there by the scene."""
 
     low: Ints
     wall: Floats
@@ -186,7 +184,7 @@ def _described(new: Scene, known: _Images, place: Place, base_rad: float) -> Pla
 
 
 def _looked_up(images: _Images, wall: Floats, low: Ints) -> Floats:
-    """What `images` say of each cell of a wall image that begins at `low`."""
+    """The ratios of `images` at each cell of a wall image that begins at `low`."""
     side, x, y = np.nonzero(wall)
     return _values(images, side, _metres(np.column_stack([x, y]) + low) + 0.5 * CELL_M)
 
@@ -195,9 +193,9 @@ def _values(images: _Images, side: Ints, points: Floats) -> Floats:
     """Ratios at points (n, 2), zero outside of the image."""
     x, y = _cells(points, images.low)
     inside = (x >= 0) & (y >= 0) & (x < images.ratio.shape[1]) & (y < images.ratio.shape[2])
-    found = np.zeros(len(points))
-    found[inside] = images.ratio[side[inside], x[inside], y[inside]]
-    return found
+    ratios = np.zeros(len(points))
+    ratios[inside] = images.ratio[side[inside], x[inside], y[inside]]
+    return ratios
 
 
 def _cells(points: Floats, low: Ints) -> tuple[Ints, Ints]:

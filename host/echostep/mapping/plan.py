@@ -41,8 +41,8 @@ def plan_of(mapped: Mapped, start: Pose, name: str) -> tuple[Plan, Walked]:
     turned = np.array([[c, -s], [s, c]])
 
     def moved(points: Floats) -> Floats:
-        found: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
-        return found
+        moved_points: Floats = (points - first[:2]) @ turned.T + [start.x_m, start.y_m]
+        return moved_points
 
     return plan_in(mapped, moved, start, name)
 
@@ -71,7 +71,7 @@ def plan_in(mapped: Mapped, moved: Moved, start: Pose, name: str) -> tuple[Plan,
 def _turn(mapped: Mapped, heading_rad: float) -> float:
     """Turn of the map so that the first metres lead to where the wearer looked, and walls within SQUARE_RAD of the axes are parallel to them.
 
-    The foot does not know yet at its first step where the toe points.
+    At the first step the direction of the toe is not estimated yet.
     """
     graph = mapped.graph
     course = _first_course(graph.pose, graph.nodes.way_m)
@@ -95,7 +95,7 @@ def _first_course(pose: Floats, way_m: Floats) -> float:
 
 
 def _doors(level: Level, paths: tuple[Floats, ...]) -> tuple[Door, ...]:
-    """The openings of a level, with what the paths (n, 2) say of them."""
+    """The openings of a level, open where the paths (n, 2) lead through."""
     walked = shapely.MultiLineString([path for path in paths if len(path) > 1])
     return tuple(
         replace(door, state="open") if shapely.LineString((door.line[:2], door.line[2:])).intersects(walked) else door

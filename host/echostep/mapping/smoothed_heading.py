@@ -40,13 +40,13 @@ def with_smoothed_headings(segments: Sequence[MeasuredSegment]) -> list[Measured
     smoothed = {key: _smooth(chain) for key, chain in {id(chain): chain for chain in chain_of if chain}.items()}
     corrected, live, error = [], 0.0, 0.0  # what is taken out of the foot's heading live, and in hindsight
     for measured, chain in zip(segments, chain_of, strict=True):
-        s, belt, found = measured.segment, measured.segment.belt, smoothed.get(id(chain))
+        s, belt, smooth = measured.segment, measured.segment.belt, smoothed.get(id(chain))
         if belt is None:
             turned = rotated_segment(s, live - error)
         else:
-            grown = _growth(found, s) if found else belt.correction_rad - live
+            grown = _growth(smooth, s) if smooth else belt.correction_rad - live
             turned = _turned(s, belt.correction_rad, live - error, error + 0.5 * grown, error + grown)
-            turned = replace(turned, turn_sd_rad=_turn_sd(found, s, belt)) if found else turned
+            turned = replace(turned, turn_sd_rad=_turn_sd(smooth, s, belt)) if smooth else turned
             live, error = belt.correction_rad, error + grown
         corrected.append(replace(measured, segment=turned))
     return corrected

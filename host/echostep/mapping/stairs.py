@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Stairs between the storeys of a drawing, as connectors in a well with a way in on each level.
 
-In: the path on the stairs, in the plan. Out: `Well`s; levels with the walls of these. Owns their width. What the rangers hear on stairs is not drawn:
+In: the path on the stairs, in the plan. Out: `Well`s; levels with the walls of these. Owns their width. Echoes on stairs are not drawn:
 the well is the rectangle about the path.
 """
 
@@ -16,7 +16,7 @@ from echostep.arrays import Floats
 from echostep.mapping.graph.storeys import Storeys
 from echostep.plan.model import Connector, Door, Level
 
-HALF_M = 0.6  # of a flight's width; by reason
+HALF_M = 0.6  # of a flight's width, assumed
 DOOR_M = 1.0  # width of the way in
 CLEAR_M = 0.15  # about the well, in which other walls end: nearer ones are taken for its own
 LEAST_M = 0.1  # a shorter piece is no wall
@@ -25,7 +25,7 @@ SHARED = 0.3  # of the smaller well's area: two flights in one well
 
 @dataclass(frozen=True, slots=True)
 class Well:
-    """`area`: a rectangle; `ways_in`: level and place (x, y) of each end of a flight."""
+    """Stairs in one rectangle `area` of the plan; `ways_in`: level and place (x, y) of each end of a flight."""
 
     area: shapely.Polygon
     ways_in: tuple[tuple[int, float, float], ...]
@@ -37,7 +37,7 @@ class Well:
 
 
 def wells_of(storeys: Storeys, path: Floats) -> list[Well]:
-    """The wells of a path (n, 2); flights in one well, as from storey to storey, are one."""
+    """The wells of a path (n, 2); flights above one another are in one well."""
     wells: list[Well] = []
     for first, last in storeys.stairs:
         flight = shapely.LineString(path[first : last + 1])
@@ -61,17 +61,17 @@ def connector(well: Well, number: int) -> Connector:
 
 
 def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
-    """The level with the walls of the wells that join it, each open where the path led in; heard walls end before them."""
+    """The level with the walls of the wells that join it, each open where the path led in; drawn walls end before them."""
     for well in wells:
         if index not in well.levels:
             continue
         lines = shapely.difference(shapely.linestrings(level.walls.reshape(-1, 2, 2)), well.area.buffer(CLEAR_M))
         parts = [part for part in shapely.get_parts(lines) if part.length > LEAST_M]
-        heard = [np.array(part.coords).ravel() for part in parts]
+        outside = [np.array(part.coords).ravel() for part in parts]
         doors = [door for door in level.doors if not _line_of(door).intersects(well.area)]
         rim, ways = _rim(well, index)
         doors += [Door((float(a), float(b), float(c), float(d)), "open") for a, b, c, d in ways]
-        level = replace(level, walls=np.array(heard + rim).reshape(-1, 4).round(3), doors=tuple(doors))
+        level = replace(level, walls=np.array(outside + rim).reshape(-1, 4).round(3), doors=tuple(doors))
     return level
 
 
@@ -106,10 +106,10 @@ def _rim(well: Well, index: int) -> tuple[list[Floats], list[Floats]]:
 
 def _joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Intervals in order, those that are nearer than a wall's least length as one."""
-    found: list[tuple[float, float]] = []
+    merged: list[tuple[float, float]] = []
     for low, high in sorted(intervals):
-        if found and low < found[-1][1] + LEAST_M:
-            found[-1] = (found[-1][0], max(found[-1][1], high))
+        if merged and low < merged[-1][1] + LEAST_M:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
         else:
-            found.append((low, high))
-    return found
+            merged.append((low, high))
+    return merged

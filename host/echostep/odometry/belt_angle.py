@@ -13,8 +13,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-GAP_S = 0.05  # ten samples; a longer gap may hide a turn, by reason
-KEPT_S = 30.0  # longest standing that tells a bias
+GAP_S = 0.05  # ten samples; a longer gap may hide a turn, assumed
+KEPT_S = 30.0  # longest standing from which a bias is measured
 
 
 class BeltAngle:

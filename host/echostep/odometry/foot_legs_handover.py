@@ -24,12 +24,13 @@ from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.path import UNOBSERVED_SD_M, PathSegment
 
-# All by reason, unless a source is named.
+# Assumed, not measured, unless a source is named.
 SILENT_S = 0.5  # the foot is silent when its newest sample is older than the leg samples by this
 KEPT_S = 30.0  # of leg samples and foot segments
 MAX_LENGTH_ERROR = 0.35  # share by which the legs' length may differ from the foot's; beyond it no leg gyros are worn
 MIN_OVERLAP_M = 3.0  # of the foot's path, to compare lengths
-# Weight of the prior scale, 1, as a length of path: people's scales differ by 7.8 %, and the foot gives the scale of 8 m to 2 % (4 cm a stride).
+# Weight of the prior scale, 1, as a length of path: the scale varies by 7.8 % between persons, and the foot gives the scale of 8 m to 2 % (4 cm a
+# stride).
 PRIOR_M = 0.6
 ALIGNED_SD = 0.025  # of the scale after that: a person's scale changes by 2 to 3 % with speed
 REJOIN_SD_RAD = math.radians(2.0)  # of the angle between foot and legs where the foot takes over

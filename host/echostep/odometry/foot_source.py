@@ -56,8 +56,8 @@ class FootSource:
             first = [part.row[0] if len(part.row) else len(portion.port) for part in (from_mtx, from_board)]
             self.port = MTX if first[0] < first[1] else FOOT
         if self.port == FOOT:
-            found = self.board.feed(from_board.received)
-            mag = np.full_like(found.accel, np.nan)
-            return FootSamples(found.ticks, found.accel, found.gyro, mag, from_board.rows_of(found.end))
+            samples = self.board.feed(from_board.received)
+            mag = np.full_like(samples.accel, np.nan)
+            return FootSamples(samples.ticks, samples.accel, samples.gyro, mag, from_board.rows_of(samples.end))
         batch: MtBatch = self.mtx.feed_batch(from_mtx.received)
         return FootSamples(batch.counter, batch.accel, batch.gyro, batch.mag, from_mtx.rows_of(batch.end))

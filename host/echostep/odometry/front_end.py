@@ -61,7 +61,7 @@ _REPORTS = (Identity, Configuration, Status, GyroHealth, BoardHealth, Parts)
 
 @dataclass(slots=True)
 class FrontEndCounts:
-    """Input that became neither a segment nor a ping, by reason."""
+    """Counts of input that became neither a segment nor a ping, by cause."""
 
     unknown_ports: int = 0
     late_pings: int = 0
@@ -224,8 +224,8 @@ class FrontEnd:
         named = np.column_stack([reports["part_ranger_left"], reports["part_ranger_right"]]).astype(np.int64)
         known = np.concatenate([self._ranger_parts, named])
         self._ranger_parts = known[-1:]
-        found: Ints = known[np.searchsorted(report_row, ping_row), ranger]
-        return found
+        part: Ints = known[np.searchsorted(report_row, ping_row), ranger]
+        return part
 
     def _track_foot(
         self, samples: FootSamples, leg_blocks: list[tuple[int, GyroBlock]], times: Times
@@ -253,7 +253,7 @@ class FrontEnd:
         return completed + self._standing_segments(foot, t_s, message_index, begin, len(t_s))
 
     def _step_segments(self, step: Step) -> list[PathSegment]:
-        """The segment of a step, with what the belt says of it."""
+        """The segment of a step, with the evidence of the belt."""
         return [replace(segment, belt=self.heading_fusion.evidence) for segment in self.path.add_step(step)]
 
     def _add_belt(self, blocks: deque[tuple[int, GyroBlock]], before: float = math.inf) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Kalman filter of what foot less belt heading is made of, from stance to stance.
+"""Kalman filter of the components of the difference between foot and belt heading, from stance to stance.
 
 In: `StanceHeadings`. Out: state and covariance, whether the belt can be trusted. Owns the model of both headings' errors.
 
@@ -28,14 +28,14 @@ GYRO = HeadingSettings()
 # turns of 60 to 170 degrees a stride (motion capture, legs_gaittoolbox).
 JITTER_RAD, TWIST_SHARE = math.radians(1.2), 0.3
 GATE_SD = 3.0  # a normal innovation exceeds it in 0.3 % of stances
-# All by reason.
+# Assumed, not measured.
 FIRST_SCALE_SD = 1.0  # a dead gyro (-1) is possible, and a reversed one (-2) not excluded
 SURE_SCALE = 0.03  # sd, two right angles; real belts err by 1 to 2 %
 LARGEST_SCALE = 0.1  # sensitivity, and 20 degrees of tilt of the axis, which cost 6 %
 SCALE_WALK = 0.001  # from stance to stance: a belt that shifts, 1 % in a hundred strides
 MEMORY = 20  # stances in the mean of the squared normalized innovations; 1 is expected
 LARGEST_MEAN_SQUARE = 2.5  # of a belt that is worn; about 20 normal ones exceed it once in 10,000
-CORRELATED_S = 30.0  # the error of the bias acts in one direction until walls tell the heading: as a random walk of this much growth
+CORRELATED_S = 30.0  # the error of the bias acts in one direction until walls correct the heading: as a random walk of this much growth
 
 
 class HeadingFilter:
@@ -50,7 +50,7 @@ class HeadingFilter:
 
     @property
     def trusted(self) -> bool:
-        """Whether foot and belt have been seen to turn alike."""
+        """Whether the turns of the foot have confirmed those of the belt."""
         known = self.P[SCALE, SCALE] < SURE_SCALE**2 and abs(self.state[SCALE]) < LARGEST_SCALE
         return bool(known and self._mean_square < LARGEST_MEAN_SQUARE)
 

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The foot's heading with the drift taken out that the belt gyro does not confirm.
+"""The foot's heading, corrected for the drift that the belt gyro does not confirm.
 
-In: blocks of belt rates, steps and stances of the foot (walk frame), in order of their messages. Out: the same steps, turned, and what the belt says
-of each. Owns the filter of foot less belt heading and the correction of the foot's heading.
+In: blocks of belt rates, steps and stances of the foot (walk frame), in order of their messages. Out: the same steps, turned, and the belt's evidence
+for each. Owns the filter of foot less belt heading and the correction of the foot's heading.
 
-In the middle of each stance, and at both ends of standing, foot less belt heading is measured. What the filter finds of the foot's error is shared
-out by the variances of both turns. Only a recent error is sought: a bias found later must not bend the path that is behind, or all corrections would
-sum up to the foot's own drift. In the long run the foot knows more, since its error grows by the root of time: the correction fades. A drawing, which
-needs no heading at once, finds more in hindsight [mapping.smoothed_heading].
+In the middle of each stance, and at both ends of standing, foot less belt heading is measured. The filter's estimate of the foot's error is
+divided by the variances of both turns. Only a recent error is corrected: a bias found later must not bend the path that is behind, or all
+corrections would sum up to the foot's own drift. In the long run the foot is more accurate, since its error grows with the root of time: the
+correction fades. A drawing, which needs no heading at once, uses a smoother [mapping.smoothed_heading].
 
 Without evidence that the belt gyro turns with the foot the correction is kept as it is: a dead, loose or reversed gyro never corrects. A gap of foot
 or belt, or REFUSALS stances in a row beyond the gate, begin the evidence anew.
@@ -30,11 +30,11 @@ REST_S = 1.0  # a longer stance is standing [foot.trunk_path], which is measured
 EDGE_S = 0.25  # half a stance from them
 # Walking adds to the bias by turns about the other axes: two belts on one pelvis differ by 0.08 deg/s more in walking than at rest [legs_qmt].
 WALKING_RAD_S = math.radians(0.06)
-RECENT_S = 10.0  # by reason: some strides, in which jitter lets the filter find an error of the foot; what is older is no longer sought
-REFUSALS = 3  # by reason
-LOST_RAD = math.radians(
-    10.0
-)  # by reason: a stride's turn is known to a degree; beyond it the foot's samples were missing, and its frame is a new one
+# Some strides, in which jitter lets the filter find an error of the foot; what is older is no longer sought
+RECENT_S = 10.0
+REFUSALS = 3  # stances in a row, assumed
+# A stride's turn is known to a degree; beyond this the foot's samples were missing, and its frame is a new one
+LOST_RAD = math.radians(10.0)
 
 
 class HeadingFusion:
@@ -42,7 +42,7 @@ class HeadingFusion:
 
     def __init__(self) -> None:
         self.correction_rad = 0.0  # error of the foot's heading so far, as far as it is known
-        self.evidence: BeltEvidence | None = None  # what the belt says of the last step; None before there is a belt
+        self.evidence: BeltEvidence | None = None  # of the last step; None before there is a belt
         self._belt = BeltAngle()
         self._filter: HeadingFilter | None = None
         self._last: StanceHeadings | None = None  # measured last
@@ -59,7 +59,7 @@ class HeadingFusion:
 
     @property
     def trusted(self) -> bool:
-        """Whether foot and belt have been seen to turn alike."""
+        """Whether the turns of the foot have confirmed those of the belt."""
         return self._filter is not None and self._filter.trusted
 
     def corrected(self, event: Step | Stance) -> Step | Stance:
@@ -112,7 +112,7 @@ class HeadingFusion:
         self._last, self._growth = headings, 0.0
 
     def _correct(self, known: HeadingFilter, headings: StanceHeadings, last: StanceHeadings) -> bool:
-        """Correct the foot by the belt's share of what is found of its error; False: the difference is beyond the gate."""
+        """Correct the foot by the belt's share of its estimated error; False: the difference is beyond the gate."""
         dt = headings.t_s - last.t_s
         belt = known.belt_variance(dt, wrap(headings.foot_rad - last.foot_rad))
         share = headings.growth_rad2 / (headings.growth_rad2 + belt)
@@ -121,10 +121,10 @@ class HeadingFusion:
         if not known.update(headings):
             self._refused += 1
             return False
-        found = float(known.state[FOOT])
-        known.state[FOOT], known.state[OFFSET] = 0.0, known.state[OFFSET] + found
+        error_rad = float(known.state[FOOT])
+        known.state[FOOT], known.state[OFFSET] = 0.0, known.state[OFFSET] + error_rad
         self._share = share if known.trusted else 0.0
-        self.correction_rad = wrap(self.correction_rad + self._share * found)
+        self.correction_rad = wrap(self.correction_rad + self._share * error_rad)
         self._refused, self._promised = 0, 0.0
         return True
 

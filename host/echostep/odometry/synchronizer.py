@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Synchronizer: joins each path segment with the pings that were triggered on it.
 
-In: segments and pings as messages bring them, and how far either port has come after each message. Out: each segment with its pings, once no older
-ping can come any more; a `Dropout` for each second without any observation. Owns the pings and segments that wait.
+In: segments and pings in order of their messages, and the newest time of either port after each message. Out: each segment with its pings, once no
+older ping can arrive; a `Dropout` for each second without any observation. Owns the pings and segments that wait.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from echostep.arrays import Floats, Ints, record_dtype
 from echostep.jit import kernel
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 
-PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report; by reason: a cycle of both rangers takes 71 ms [faults/health.py, PINGS_HZ]
-SILENCE_S = 0.5  # a port that lags the other one by more is not waited for; by reason
-BLIND_S = 1.0  # time without any observation that makes a dropout; by reason: twice a standing segment [path.STANDING_PIECE_S]
-MAX_WAITING = 4096  # pings and heights that wait; beyond it the oldest are dropped and counted; by reason: nearly two minutes of both
+PING_AGE_S = 0.1  # longest time from the trigger of a ping to its report: a cycle of both rangers takes 71 ms [faults/health.py, PINGS_HZ]
+SILENCE_S = 0.5  # a port that lags the other one by more is not waited for, assumed
+BLIND_S = 1.0  # time without any observation that makes a dropout: twice a standing segment [path.STANDING_PIECE_S]
+# Pings and heights that wait; beyond it the oldest are dropped and counted: nearly two minutes of both
+MAX_WAITING = 4096
 HEIGHT = 2  # in the ranger column of a ping: the value is a height by pressure, not a range
 PART = 4  # factor of the ranger's part in that column; of a height: of the number of the board's restarts before it
 DROPOUT = -1  # in the segment column of the output: a dropout, no segment
@@ -154,11 +155,11 @@ def _pieces(
 
 def _measured(segment: PathSegment, t_s: Floats, ranger: Ints, value_m: Floats, ahead_rad: float) -> MeasuredSegment:
     """A segment with its pings, and apart from them the heights."""
-    heard = ranger % PART != HEIGHT
-    which, high = ranger[heard], ranger[~heard]
+    is_ping = ranger % PART != HEIGHT
+    which, high = ranger[is_ping], ranger[~is_ping]
     part, restarts = (int(kind[-1]) // PART if len(kind) else 0 for kind in (which, high))
     return MeasuredSegment(
-        segment, t_s[heard], which % PART, value_m[heard], value_m[~heard], part, restarts, ahead_rad
+        segment, t_s[is_ping], which % PART, value_m[is_ping], value_m[~is_ping], part, restarts, ahead_rad
     )
 
 

@@ -64,7 +64,7 @@ _SHAPES: dict[str, Shape] = {
     "str": TEXT,
     "bool": TRUTH,
     "tuple[float, ...]": array(NUMBER),
-    "tuple[Hypothesis, ...]": array({"type": "object"}),
+    "tuple[LikelyPlace, ...]": array({"type": "object"}),
 }
 _SIDES = ("left", "right")
 

@@ -4,7 +4,7 @@
 In: a track, the truth, a plan. Out: `Scorecard`. Owns the definitions; `definitions.py` has their names and sources.
 
 The numbers in brackets are clauses of [ISO/IEC 18305:2016]. Its coverage and availability are shares of places and of time for which the system gives
-a position; here a position is at most GAP_S old and not said to be lost by the track itself.
+a position; here a position is at most GAP_S old and not marked lost by the track itself.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from echostep.scorecard.track_columns import ScoredPath
 from echostep.scorecard.zones import NO_ZONE, Zones
 
 FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
-CELL_M = 1.0  # side of the squares of which coverage is the share, by reason: a person's room
-TICK_S = 0.1  # of the moments of which availability is the share, by reason
+CELL_M = 1.0  # side of the squares of which coverage is the share: a person's room
+TICK_S = 0.1  # of the moments of which availability is the share, assumed
 
 
 @dataclass(frozen=True, slots=True)
 class Scorecard:
-    """What a track is worth; None where its files do not state what a metric needs. Shares are from 0 to 1."""
+    """The metrics of a track; None where its files do not state what a metric needs. Shares are from 0 to 1."""
 
     track: str
     points: int
@@ -100,7 +100,7 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
 
 
 def _floors_off(at: Matched) -> Floats | None:
-    """By how many floors each point is off; NaN where one of both does not say."""
+    """By how many floors each point is off; NaN where one of both does not state it."""
     if at.level is None or at.true_level is None:
         return None
     off = np.abs(at.level - at.true_level)
@@ -112,8 +112,8 @@ def _zone_probability(at: Matched, plan: Plan) -> float | None:
     if at.level is None or at.true_level is None:
         return None
     zones = Zones(plan)
-    true, found = zones.of(at.true_xy_m, at.true_level), zones.of(at.xy_m, at.level)
-    return _share(found == true, true != NO_ZONE)
+    true, by_track = zones.of(at.true_xy_m, at.true_level), zones.of(at.xy_m, at.level)
+    return _share(by_track == true, true != NO_ZONE)
 
 
 def _coverage(track: ScoredPath, truth: ScoredPath) -> tuple[float, float]:
@@ -140,9 +140,8 @@ def _ellipse_holds(track: ScoredPath, at: Matched, error_m: Floats) -> float | N
     dx, dy = error_m.T
     determinant = xx * yy - xy**2
     inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant
-    held = np.where(
-        determinant > 0.0, inside, (dx == 0.0) & (dy == 0.0)
-    )  # an ellipse without area has its centre alone
+    # An ellipse without area has its centre alone
+    held = np.where(determinant > 0.0, inside, (dx == 0.0) & (dy == 0.0))
     return _share(held, np.isfinite(determinant))
 
 

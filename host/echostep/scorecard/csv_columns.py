@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A CSV file of anybody's: numbers by the names of its columns.
+"""A CSV file of any tracker: numbers by the names of its columns.
 
 In: a file with a line of names, then numbers, with commas, semicolons or tabs in between. Out: `CsvColumns`. Owns nothing. Every error is one line
 that names the file, the line and the column.
@@ -20,7 +20,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import CsvLimits, lines_of, separator_of
 
-MOST_ROWS = 1_000_000  # of a track, by reason: eight hours at 30 positions a second
+MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
 SHOWN = 40  # characters of a wrong cell that an error repeats
 
 

@@ -4,7 +4,7 @@
 In: a `Scorecard`. Out: rows of text for tables. Owns the order of the metrics.
 
 The clauses are those of the standard's public table of contents [NIST, ISO/IEC 18305:2016 table of contents]; its text was not at hand, so each row
-says what is computed.
+states what is computed.
 """
 
 from __future__ import annotations
@@ -92,11 +92,11 @@ METRICS: tuple[Metric, ...] = (
 
 
 def notes(card: Scorecard) -> list[str]:
-    """What a reader has to know beside the figures."""
-    said = [f"{card.track}: {card.points} points in {card.span_s:.1f} s"]
+    """Remarks beside the figures."""
+    notes = [f"{card.track}: {card.points} points in {card.span_s:.1f} s"]
     if not card.evaal_knows_floors:
-        said.append("No floor is stated by both files: the EvAAL score takes all points as on the right floor.")
-    return said
+        notes.append("No floor is stated by both files: the EvAAL score takes all points as on the right floor.")
+    return notes
 
 
 def as_text(value: float | None, unit: str) -> str:

@@ -17,8 +17,9 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep.scorecard.track_columns import ScoredPath
 
-PATH_S = 0.5  # median distance of a path's rows, more than which they are surveyed points; by reason: less than a step
-GAP_S = 2.5  # without a row, after which a track has no position; by reason: rows come at each step, and twice a second while standing
+PATH_S = 0.5  # median distance of a path's rows, more than which they are surveyed points: less than a step
+# Without a row, after which a track has no position: rows come at each step, and twice a second while standing
+GAP_S = 2.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def _near(t_s: Floats, at: Floats) -> Bools:
 
 
 def known(track: ScoredPath, t_s: Floats) -> Bools:
-    """At which times (m,) a track has a row at most GAP_S old that does not say that it is lost."""
+    """At which times (m,) a track has a row at most GAP_S old that is not marked lost."""
     row = np.searchsorted(track.t_s, t_s, side="right") - 1
     fresh = (row >= 0) & (t_s - track.t_s[np.maximum(row, 0)] <= GAP_S)
     return np.asarray(fresh & ~track.lost[np.maximum(row, 0)])

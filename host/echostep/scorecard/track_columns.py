@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tracks and true paths of anybody's CSV files: which column means what.
+"""Tracks and true paths from CSV files of any tracker: which column means what.
 
 In: a CSV file, the plan's levels. Out: `ScoredPath`s. Owns the names that columns may have. Metres, seconds, radians; x and y in the frame of the
 truth, which is the plan's where there is one.
@@ -41,8 +41,8 @@ REQUIRED = ("time", "x", "y")
 class ScoredPath:
     """A track or a true path of n rows: `t_s` (n,), `xy_m` (n, 2); None for what the file does not have.
 
-    `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that say so
-    themselves. `columns`: what was found, name of the column by what it means.
+    `level`: index of the plan's level, or the file's own number of the floor. `covariance_m2` (n, 3): xx, xy, yy. `lost`: rows that are marked
+    so. `columns`: what was found, name of the column by what it means.
     """
 
     path: Path
@@ -113,10 +113,10 @@ def _level(table: CsvColumns, row: int, name: str, text: str, index_of: Callable
     try:
         value = float(text)
     except ValueError:
-        found = index_of(text)
-        if found is None:
+        level = index_of(text)
+        if level is None:
             raise table.error(row, name, f"{text[:40]!r} is neither a whole number nor a level of the plan") from None
-        return float(found)
+        return float(level)
     if value != round(value) or abs(value) > 1000:
         raise table.error(row, name, f"{text[:40]!r} is not a whole number of a floor")
     return value

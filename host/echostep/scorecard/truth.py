@@ -17,7 +17,7 @@ from echostep.errors import EchostepError
 from echostep.localization.estimate import Estimate
 from echostep.scorecard.error_statistics import error_statistics
 
-NEARBY_S = 2.5  # by reason: estimates come at each step, and twice a second while standing
+NEARBY_S = 2.5  # estimates come at each step, and twice a second while standing
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,5 +77,13 @@ def errors(estimates: Sequence[Estimate], truth: Truth) -> Errors | None:
     off = np.array([(e.x_m, e.y_m) for e in inside]) - true_xy_m
     distance = np.hypot(off[:, 0], off[:, 1])
     held = [e.holds(x, y) for e, (x, y) in zip(inside, true_xy_m.tolist(), strict=True)]
-    found = error_statistics(distance)
-    return Errors(found.mean_m, found.sd_m, found.max_m, found.min_m, found.ending_m, found.rms_m, float(np.mean(held)))
+    statistics = error_statistics(distance)
+    return Errors(
+        statistics.mean_m,
+        statistics.sd_m,
+        statistics.max_m,
+        statistics.min_m,
+        statistics.ending_m,
+        statistics.rms_m,
+        float(np.mean(held)),
+    )

@@ -29,14 +29,14 @@ class Zones:
 
     def of(self, xy_m: Floats, level: Floats) -> Ints:
         """Places (n, 2), their levels (n,), NaN where unknown -> (n,) number of the zone, NO_ZONE where there is none."""
-        found = np.full(len(xy_m), NO_ZONE, dtype=np.int64)
+        number = np.full(len(xy_m), NO_ZONE, dtype=np.int64)
         for k in range(self._levels):
             here = np.flatnonzero(level == k)
             spaces = self._spaces.on(k) if len(here) else None
             if spaces is not None:
                 zone = _zones(spaces, xy_m[here])
-                found[here] = np.where(zone == NO_ZONE, NO_ZONE, zone * self._levels + k)
-        return found
+                number[here] = np.where(zone == NO_ZONE, NO_ZONE, zone * self._levels + k)
+        return number
 
 
 def _zones(spaces: Spaces, xy_m: Floats) -> Ints:

@@ -25,14 +25,13 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 
-BUCKET_S = 1.0  # device time for which one point is kept; by reason
-KEPT_BUCKETS = 60  # one minute; by reason
-DRIFT_SD = 130e-6  # s/s, standard deviation of the drift between two crystals; by reason
-LEAST_DELAY_S = 20e-6  # lower bound of the mean delay in the fit; by reason: the resolution of arrival times
-EARLY_S = 0.02  # an arrival further below the line needs others like it; by reason: half the error that a damaged one may cause
-CONFIRMING = (
-    3  # different arrival times that are believed together; by reason: two damaged ones within a minute are rare
-)
+BUCKET_S = 1.0  # device time for which one point is kept, assumed
+KEPT_BUCKETS = 60  # buckets in the fit, one minute; assumed
+DRIFT_SD = 130e-6  # s/s, standard deviation of the drift between two crystals, assumed
+LEAST_DELAY_S = 20e-6  # lower bound of the mean delay in the fit: the resolution of arrival times
+EARLY_S = 0.02  # an arrival further below the line needs others like it: half the error that a damaged one may cause
+# Different arrival times that are believed together: two damaged ones within a minute are rare
+CONFIRMING = 3
 
 
 class ArrivalClock(Protocol):

@@ -23,7 +23,7 @@ from echostep.jit import kernel
 from echostep.timing import arrival_envelope as arrival
 from echostep.timing.arrival_envelope import CONFIRMING, KEPT_BUCKETS, ArrivalClock
 
-# All by reason.
+# Assumed, not measured.
 AHEAD_S = 1.0  # a counter further ahead of its arrival contradicts it; the arrivals of a run agree to this
 BEHIND_S = 1.0  # greatest age of a message relative to the newest one: a ping is sent after its ranging
 SMOOTH_S = 1.0  # a counter that is at most this far from the newest goes on from it
@@ -42,7 +42,7 @@ class DeviceClock(ArrivalClock, Protocol):
     run: int  # different arrival times that contradicted since the last one that agreed
     run_begin_ns: int  # the first of them
     run_newest_ns: int
-    run_late_s: float  # by how much the first of them was later than its counter says
+    run_late_s: float  # delay of the first of them against its counter
     contradicted: int  # messages whose arrival time contradicts their counter
     jumps: int  # those of them that were dropped
     restarts: int

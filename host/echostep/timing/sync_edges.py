@@ -18,10 +18,10 @@ import numpy as np
 from echostep.arrays import Floats, Ints, record_dtype
 from echostep.jit import kernel
 
-VOTES = 50  # samples; by reason: half a second at 100 Hz
-KEPT = 256  # edges in the ring; by reason: more than two seconds at 100 Hz
-OUTDATED_PERIODS = 1e3  # farther from the newest edge than this, a sample has no time by edges; by reason
-MATCH_PERIODS = 100  # largest distance of a matching edge from the time by arrival; by reason
+VOTES = 50  # samples: half a second at 100 Hz
+KEPT = 256  # edges in the ring: more than two seconds at 100 Hz
+OUTDATED_PERIODS = 1e3  # farther from the newest edge than this, a sample has no time by edges, assumed
+MATCH_PERIODS = 100  # largest distance of a matching edge from the time by arrival, assumed
 
 
 class SyncEdges(Protocol):

@@ -26,8 +26,8 @@ from echostep.timing.device_clock import DeviceClock
 from echostep.timing.sync_edges import SyncEdges
 
 TICK_S = 0.5e-6  # of the board's counter [protocol/messages.toml, ticks]
-BOARD_LATENCY_S = 0.001  # at best; by reason: a frame waits for the next USB millisecond
-MIN_STEP_S = 1e-6  # between two MTx samples, by reason: times must increase
+BOARD_LATENCY_S = 0.001  # at best: a frame waits for the next USB millisecond
+MIN_STEP_S = 1e-6  # between two MTx samples: times must increase
 SILENT, PLAIN, FIRST_MESSAGE = -3, -2, -1  # kinds of board messages; a kind from 0 on is the count of a SyncOut edge
 
 

@@ -18,10 +18,9 @@ from echostep.localization.team.meetings import TimedMeeting
 from echostep.path import MeasuredSegment
 from echostep.ports.people.check_in import CheckIn
 
-UNDO_S = (
-    120.0  # for so long a check-in can be undone. By reason: 10 s for a person, in a demo at several times real time
-)
-MOST_KEPT = 2000  # segments; by reason: several times as many as a person walks in that time
+# For so long a check-in can be undone: 10 s for a person, in a demo at several times real time
+UNDO_S = 120.0
+MOST_KEPT = 2000  # segments: several times as many as a person walks in that time
 
 
 @dataclass(slots=True)

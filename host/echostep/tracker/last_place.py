@@ -3,9 +3,9 @@
 
 In: the newest estimate of a run, what its cloud knew of the heights by pressure, how long ago that was. Out: a `Start`. Owns nothing.
 
-The next run begins as after a pause (`gaps`): the cloud lies about the last place, with any heading, for the walk frame is another one; the whole
-building is searched beside it, for the wearer may have gone on. The pressure tells the storey at once if the barometer is the same: its lag has
-drifted by no more than the weather and the air in the building allow.
+The next run begins as after a pause (`gaps`): the cloud lies about the last place, with any heading, as the walk frame is new; the whole
+building is searched beside it, as the wearer may have moved on. Pressure gives the level at once if the barometer is the same: its lag has
+drifted by no more than weather and the air in the building allow.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from echostep.localization.height.levels import ClimbSettings, drift_m
 from echostep.localization.particles.start import Air, Start
 from echostep.plan.model import Pose
 
-MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot, by reason: a stride
+MOVED_M = 1.0  # standard deviation per axis of the way while a battery is changed on the spot: a stride
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class LastPlace:
 
 
 def last_place(estimate: Estimate | None, air: Air | None) -> LastPlace | None:
-    """The place of an estimate; None unless it says `tracking`: what is not known cannot be carried over."""
+    """The place of an estimate; None unless its status is `tracking`."""
     if estimate is None or estimate.status is not TrackStatus.TRACKING:
         return None
     sd_m = math.sqrt(0.5 * (estimate.xx_m2 + estimate.yy_m2))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What views read of a tracker: copies of its state.
+"""Copies of a tracker's state for views.
 
-In: nothing. Out: `TrackerState`, `StreamState`, `Particles`. Owns nothing.
+In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`. Owns nothing.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class TrackerState:
     cloud is, NaN before the first segment; `searches`: the whole building is searched. `beacon_numbers`: by slot. `beacon_heard_s`: time of the
     newest reading that the filter used. `waits_for_start`: neither a start nor a check-in is known yet.
     `undoable`: number of the check-in that can be undone. `alarm`: the wearer's, None while all is well. `met`: the newest meeting with a teammate;
-    `meetings`: how many did what, by name of the effect. `team_beacons`: those that each teammate has placed; `team_beacon_messages`: how many were
-    believed, and bad.
+    `meetings`: their number by name of the effect. `team_beacons`: those that each teammate has placed; `team_beacon_messages`: number of
+    messages believed, and bad.
     """
 
     estimate: Estimate | None
@@ -88,7 +88,7 @@ class StreamState:
 
 
 @dataclass(frozen=True, slots=True)
-class Particles:
+class ParticleSnapshot:
     """n particles: `x_m`, `y_m` (n,) in the map, `level` (n,) index in the plan, `log_weight` (n,), 0 for the heaviest of all particles."""
 
     x_m: Floats

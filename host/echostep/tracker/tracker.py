@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The tracker: chunks in, estimates out. The only module where the stages meet.
 
-In: chunks in order of arrival. Out: estimates; for views, copies of the state (`TrackerState`, `StreamState`, `Particles`). Owns the front end,
-the filter and the random generator. Live, replay and simulation all use `Tracker.take`. No wall clock is read here: equal chunks give equal
-estimates, bit for bit, in portions of any size.
+In: chunks in order of arrival. Out: estimates; for views, copies of the state (`TrackerState`, `StreamState`, `ParticleSnapshot`). Owns the
+front end, the filter and the random generator. Live, replay and simulation all use `Tracker.take`. No wall clock is read here: equal chunks
+give equal estimates, bit for bit, in portions of any size.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from echostep.ports.people.teammate import TEAM
 from echostep.settings import Settings
 from echostep.tracker.before_check_in import BeforeCheckIn
 from echostep.tracker.last_place import LastPlace, last_place
-from echostep.tracker.state import Particles, StreamState, TrackerState
+from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
-MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped; by reason
-LATE_S = 0.5  # behind a published time: an older estimate no longer says where the wearer is; by reason: half a stride, a third of the claimed 1 m
-KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over; by reason
-KNOWN = 0.9  # probability of the estimate whose heading it is; by reason: a tap where the wearer is not says that the estimate was wrong
+MAX_READINGS = 4096  # of beacons, that wait for their segment; beyond it the oldest are dropped, assumed
+LATE_S = 0.5  # behind a published time: an older estimate is outdated: half a stride, a third of the claimed 1 m
+KNOWN_SD_RAD = 0.5  # of a heading that a check-in without one takes over, assumed
+KNOWN = 0.9  # probability of the estimate whose heading it is: a tap at another place means that the estimate was wrong
 NO_PINGS = (np.empty(0), np.empty(0, np.int64), np.empty(0))
 Watch = Callable[[MeasuredSegment | None, Estimate], None]  # called with each estimate and its segment; None: a dropout
 
@@ -112,7 +112,7 @@ class Tracker:
             alarm=self.alarm.alarm,
             met=self._meetings.news,
             meetings=dict(self._meetings.counts),
-            team_beacons={name: tuple(beacons.values()) for name, beacons in self._team_beacons.told.items()},
+            team_beacons={name: tuple(beacons.values()) for name, beacons in self._team_beacons.reported.items()},
             team_beacon_messages=dict(self._team_beacons.counts),
         )
 
@@ -134,13 +134,13 @@ class Tracker:
             foot_reports=replace(front_end.foot_source.board.reports) if front_end.foot_source.port == FOOT else None,
         )
 
-    def particles(self, most: int) -> Particles | None:
+    def particles(self, most: int) -> ParticleSnapshot | None:
         """A copy of at most `most` particles, evenly thinned; None before the first segment."""
         if self.filter is None:
             return None
         cloud = self.filter.cloud
         every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
-        return Particles(
+        return ParticleSnapshot(
             x_m=cloud.map_x_m[every].copy(),
             y_m=cloud.y_m[every].copy(),
             level=cloud.level[every].copy(),
@@ -152,9 +152,9 @@ class Tracker:
         return [] if self.filter is None else self.filter.beacon_map.places(self.filter.cloud, t_s)
 
     def own_beacons(self) -> tuple[SharedBeacon, ...] | None:
-        """The beacons that this walk has placed, for teammates; None unless the tracker says `tracking`, and echoes have confirmed it.
+        """The beacons that this walk has placed, for teammates; None unless the status is `tracking` and echoes have confirmed it.
 
-        A stated start says so before any echo, and teammates would take over its error.
+        With a stated start the status is `tracking` before any echo; teammates would take over its error.
         """
         last = self._estimate
         if (
@@ -167,7 +167,7 @@ class Tracker:
         return shared_beacons(self.filter.beacon_map, self.filter.cloud, last.t_s, self.gateway.numbers)
 
     def last_place(self) -> LastPlace | None:
-        """Where the next run may begin; None unless the newest estimate says `tracking`."""
+        """The start of the next run; None unless the status of the newest estimate is `tracking`."""
         return last_place(self._estimate, None if self.filter is None else self.filter.cloud.air)
 
     def arrival_ns(self, t_s: float) -> int:
@@ -184,15 +184,15 @@ class Tracker:
         for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, TEAM, MEETING, PERSON):
             estimates += self._track(piece)
             if len(piece.of(TEAM_BEACONS).row):
-                self._team_beacons.hear(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
+                self._team_beacons.receive(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
             self.alarm.add(self.front_end.signs.pop())
             if from_team := piece.of(TEAM).received:
-                for hear in self.team_watchers:
-                    hear(from_team)
-            for port, apply in ((MEETING, self._hear_meeting), (PERSON, self._apply_person)):
-                told = piece.of(port)
-                if len(told.row):
-                    estimates += apply(told.received)
+                for receive in self.team_watchers:
+                    receive(from_team)
+            for port, apply in ((MEETING, self._receive_meeting), (PERSON, self._apply_person)):
+                message = piece.of(port)
+                if len(message.row):
+                    estimates += apply(message.received)
         return estimates
 
     def warm_up(self) -> None:
@@ -207,7 +207,7 @@ class Tracker:
         systematic(np.ones(2), 0.5, 2)
 
     def _track(self, portion: Portion) -> list[Estimate]:
-        """Estimates from a portion of which only the last chunk may be the gateway's: its readings count from the next portion on."""
+        """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""
         estimates: list[Estimate] = []
         # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
         for piece in self.front_end.process(portion):
@@ -221,7 +221,7 @@ class Tracker:
         return estimates
 
     def _follow(self, measured: MeasuredSegment) -> list[Estimate]:
-        """Localization: propagate by the segment, reweight by pings and beacon readings. Of a segment before a check-in only its heading counts."""
+        """Localization: propagate by the segment, reweight by pings and beacon readings. Of a segment before a check-in only the heading is used."""
         segment = measured.segment
         self._ranger_part = measured.ranger_part or self._ranger_part
         self.filter = self.filter or self._first_filter(segment.heading0_rad)
@@ -239,7 +239,7 @@ class Tracker:
             if segment.t1_s <= self._check_in_s:
                 return []
             measured = measured.after(self._check_in_s)
-        self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
+        self.filter.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
         for t_s, meeting in meetings:
             self._meetings.note(meeting, self.filter.meet(on_the_way(meeting, measured.segment, t_s)))
         self._estimate = self.filter.update(measured, readings)
@@ -254,7 +254,7 @@ class Tracker:
     def _publish(self, measured: MeasuredSegment | None, new: Estimate) -> Estimate:
         """Call the watchers with a new estimate; its time is never before that of an earlier one.
 
-        Bytes that come late, after a dropout, say where the wearer was: such an estimate is carried on to the time of the dropout.
+        Bytes that arrive after a dropout give a past position: such an estimate is extrapolated to the time of the dropout.
         """
         self._published_s = max(self._published_s, new.t_s)
         if new.t_s < self._published_s - LATE_S:
@@ -264,10 +264,10 @@ class Tracker:
             watch(measured, new)
         return new
 
-    def _hear_meeting(self, received: bytes) -> list[Estimate]:
-        """Keep a meeting for the segment in which it happened; where no start is known yet it is one. A tap is a sign of life."""
+    def _receive_meeting(self, received: bytes) -> list[Estimate]:
+        """Queue a meeting for the segment in which it happened; without a start yet, the meeting is the start. A tap is a sign of life."""
         now_s = self.front_end.newest_s
-        meeting = self._meetings.hear(received, len(self.plan.levels))
+        meeting = self._meetings.receive(received, len(self.plan.levels))
         if meeting is None:
             return []
         if meeting.range_m is None:
@@ -280,10 +280,10 @@ class Tracker:
 
     def _apply_person(self, received: bytes) -> list[Estimate]:
         """Apply a check-in, its undoing or a call; other bytes are counted. A tap is a sign of life."""
-        said, now_s = parse_person(received), self.front_end.newest_s
-        if said is not None and said != Call(help=True):
-            self.alarm.answer(now_s, ends_help=isinstance(said, Call))
-        match said:
+        message, now_s = parse_person(received), self.front_end.newest_s
+        if message is not None and message != Call(help=True):
+            self.alarm.answer(now_s, ends_help=isinstance(message, Call))
+        match message:
             case Call(wanted):
                 if wanted:
                     self.alarm.call_for_help(now_s)
@@ -298,7 +298,7 @@ class Tracker:
     def _apply_check_in(self, check_in: CheckIn) -> list[Estimate]:
         """Draw a new filter about a check-in; before the first segment it is the start.
 
-        The place is that of the moment of the check-in, so of the segments that are not known yet only the part after it will move the cloud.
+        The place holds at the moment of the check-in: of the pending segments only the part after it moves the cloud.
         """
         state = self._rng.bit_generator.state
         self._before = BeforeCheckIn(self.filter, self._check_in, self._estimate, state)
@@ -327,7 +327,7 @@ class Tracker:
             if self.filter is None:
                 waiting += readings
             else:
-                self.filter.hear_by(echo_of(self._ranger_part, self.settings.echo))
+                self.filter.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
                 for t_s, meeting in meetings:
                     self.filter.meet(on_the_way(meeting, measured.segment, t_s))
                 self._estimate = self.filter.update(measured, readings)
@@ -343,7 +343,7 @@ class Tracker:
         return None if self.start is None else self._new_filter(self.start, walk_heading_rad, self._rng)
 
     def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> MapFilter:
-        """A filter about a check-in; without a heading it is the last estimate's, unless that is not known: then it is any."""
+        """A filter about a check-in; a check-in without a heading takes that of the last estimate if it is known, else any."""
         heading_rad, sd_rad = check_in.heading_rad, HEADING_SD_RAD
         if heading_rad is None:
             last = self._estimate

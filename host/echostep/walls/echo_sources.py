@@ -33,8 +33,8 @@ __all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
 
 
 WALL = 0.0  # kind, beside EDGE and CORNER
-MOST_SOURCES = 8  # of one ping, by reason: the nearest ones mask the others
-FARTHEST_M = 3.0  # greatest `reach_m`, by reason: it bounds the tiles made at once
+MOST_SOURCES = 8  # of one ping: the nearest ones mask the others
+FARTHEST_M = 3.0  # greatest `reach_m`: it bounds the tiles made at once
 FOOT_M = 1e-3  # a wall so close before another does not hide it: walls drawn twice
 NEAREST_M = 1e-6  # a source no further away has no direction
 CONE = math.cos(CONE_RAD)
@@ -126,17 +126,17 @@ def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     added, screens = len(more.rows), len(more.screens)
     start, screen_start = _room(table.start, unit + BEARINGS + 1), _room(table.screen_start, rows + added + 1)
     tile_start, order = _room(table.tile_start, tile + 2), _room(table.order, ordered + len(more.order))
-    kept, hiding = table.rows, _room(table.screens, used + screens)
-    if len(kept) < rows + added:
-        kept = np.empty((2 * (rows + added), more.rows.shape[1]))
-        kept[:rows] = table.rows[:rows]
-    kept[rows : rows + added] = more.rows
+    all_rows, hiding = table.rows, _room(table.screens, used + screens)
+    if len(all_rows) < rows + added:
+        all_rows = np.empty((2 * (rows + added), more.rows.shape[1]))
+        all_rows[:rows] = table.rows[:rows]
+    all_rows[rows : rows + added] = more.rows
     hiding[used : used + screens] = more.screens
     screen_start[rows : rows + added + 1] = more.screen_start + used
     tile_start[tile + 1] = rows + added
     order[ordered : ordered + len(more.order)] = more.order + rows
     start[unit : unit + BEARINGS + 1] = more.start + ordered
-    return SourceTable(tile_start, start, order, kept, screen_start, hiding)
+    return SourceTable(tile_start, start, order, all_rows, screen_start, hiding)
 
 
 @kernel

@@ -17,7 +17,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
 from echostep.plan.routing import mark_near_walls
 
-# All by reason.
+# Assumed, not measured.
 CELL_M = 0.25  # side of a cell
 BODY_M = 0.25  # half a person's width
 DIRECTIONS = 32  # in which walls are looked for
@@ -83,9 +83,8 @@ def _walls_in_sight(blocked: Bools, sight: int) -> Ints:
     """For each cell, in how many directions a blocked cell is met within so many cells; 0 for blocked cells."""
     rows, columns = blocked.shape
     in_sight = np.zeros((rows, columns), np.int64)
-    aside = np.full(
-        columns, sight, np.int64
-    )  # columns to the nearest one with a wall: others are between two levels of the sheet
+    # Columns to the nearest one with a wall: others are between two levels of the sheet
+    aside = np.full(columns, sight, np.int64)
     for c in range(columns):
         if blocked[:, c].any():
             for k in range(max(c - sight, 0), min(c + sight, columns)):

@@ -21,10 +21,10 @@ from echostep.jit import inline_kernel, kernel, lean_kernel
 
 TILE_M = 1.0
 EAR_REACH_M = 6.3  # greatest distance of an echo source: a little more than the rangers' 6 m
-JOIN_M = 0.01  # walls whose ends are no further apart are joined, by reason: drawing accuracy
+JOIN_M = 0.01  # walls whose ends are no further apart are joined: drawing accuracy
 # Greatest angle off a ranger's axis: half the 55 degree cone and its rim [Girard 2011, Figure 2]; a wall at 1 m still answers there
 CONE_RAD = math.radians(40.0)
-MAX_TILES = 40_000_000  # by reason: a plan of more is not in metres, and its index would fill the memory
+MAX_TILES = 40_000_000  # a plan of more is not in metres, and its index would fill the memory
 SHORTEST_M = 1e-6  # shorter walls are left out
 FACE, POINT = 5, 7  # columns of the rows of a face and of a point (`WallIndex`)
 BEARINGS = 16  # sectors of the ranger's axis for which the tables list their rows

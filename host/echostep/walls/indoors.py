@@ -13,7 +13,7 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 from echostep.walls.floor import CELL_M, Floor
 
-WALL_CELLS = 2  # cells about an indoor one that count as indoors: those under the walls, half a metre; by reason
+WALL_CELLS = 2  # cells about an indoor one that count as indoors: those under the walls, half a metre
 
 
 @dataclass(frozen=True, slots=True)

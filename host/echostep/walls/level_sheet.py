@@ -6,8 +6,8 @@ In: a plan. Out: `LaidOutPlan`: walls for the cloud, and `LevelSheet`, plain arr
     x of the sheet:  x0_m          x0_m + pitch_m    x0_m + 2 pitch_m
                      |  level 0    |    level 1      |    level 2      |
 
-Level k lies `k * pitch_m` east of its place in the map. So a particle's x tells its level, walls and echoes of other levels are out of its reach,
-and only this module and `level_changes` need to know of levels. A plan of one level lies where its map has it.
+Level k lies `k * pitch_m` east of its place in the map. So a particle's x determines its level, walls and echoes of other levels are out of its
+reach, and only this module and `change_levels` depend on levels. A plan of one level lies where its map has it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ from echostep.jit import kernel
 from echostep.plan.model import Plan
 from echostep.walls.echo_sources import Walls
 
-MARGIN_M = (
-    50.0  # on either side of a level on the sheet, by reason: particles do not go so far beyond the outermost walls
-)
+# On either side of a level on the sheet: particles do not go so far beyond the outermost walls
+MARGIN_M = 50.0
 STAIRS, LIFT, RAMP = 0, 1, 2
 KINDS = {"stairs": STAIRS, "lift": LIFT, "ramp": RAMP}
 

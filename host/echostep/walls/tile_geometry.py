@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What faces and points share: a wall's own axes, spans that cover a stretch, rows by bearing.
+"""Geometry for faces and points: a wall's own axes, spans that cover a stretch, rows by bearing.
 
 In: walls, spans, bearings of rows. Out: frames, whether spans cover, order of rows. Owns nothing.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Points of a tile: the places where walls end or meet, corners and edges, that can be heard from it.
+"""Points of a tile: the places where walls end or meet, corners and edges, that can be detected from it.
 
 In: a tile's corners and the walls near it. Out: a `SourceTable` of points with their screens. Owns nothing.
 """
@@ -17,8 +17,8 @@ from echostep.walls.index import EAR_REACH_M, JOIN_M, POINT, TILE_M, SourceTable
 from echostep.walls.tile_geometry import SLACK_M, by_bearing, covered, frame
 
 EDGE, CORNER = 1.0, 2.0  # kinds of points
-FLAT_RAD = math.radians(3.0)  # two walls that turn by less continue each other, by reason: drawing accuracy
-# Greatest deviation from a right angle at which two reflections still send sound back, by reason.
+FLAT_RAD = math.radians(3.0)  # two walls that turn by less continue each other: drawing accuracy
+# Greatest deviation from a right angle at which two reflections still send sound back, assumed.
 CORNER_RAD = math.radians(30.0)
 
 
@@ -229,7 +229,7 @@ def _clip_to_wedge(
     if max(a_aside - low * a_ahead, b_aside - low * b_ahead) < -SLACK_M:
         return 1.0, 0.0, False
     ux, uy = bx - ax, by - ay
-    here = ax * uy - ay * ux  # its sign tells on which side of the wall the origin lies
+    here = ax * uy - ay * ux  # its sign is the side of the wall on which the origin lies
     before, beside = True, True
     for k in range(4):
         side = ((corners[k, 1] - y - ay) * ux - (corners[k, 0] - x - ax) * uy) * here

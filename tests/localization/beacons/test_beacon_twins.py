@@ -30,7 +30,7 @@ from echostep.localization.beacons.slam import (
     reweight,
     update_by_measurement,
 )
-from echostep.localization.beacons.step import MOST_WAITING, Beacons, no_waiting, update_by_reading
+from echostep.localization.beacons.step import MOST_READINGS, Beacons, no_waiting, update_by_reading
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import build_index
 from naive import beacon_readings as naive_readings
@@ -205,7 +205,7 @@ def test_a_beacon_is_dropped_as_by_its_twin(from_afar: int, near: float) -> None
 def test_a_long_wait_is_that_of_the_twin() -> None:
     """A straight path leaves open on which side the beacon lies; its bend tells. The first readings, wrong ones, are forgotten by then."""
     wrong = [(0.0, 0.0, 3.5)] * 20
-    there = [(x, 0.0, math.hypot(x - 1.5, 1.2)) for x in np.linspace(0.0, 3.0, MOST_WAITING - 8).tolist()]
+    there = [(x, 0.0, math.hypot(x - 1.5, 1.2)) for x in np.linspace(0.0, 3.0, MOST_READINGS - 8).tolist()]
     bend = [(3.0, y, math.hypot(1.5, y - 1.2)) for y in np.linspace(0.1, 2.0, 16).tolist()]
     assert assert_waits_as_its_twin([*wrong, *there, *bend])
     assert not assert_waits_as_its_twin([*wrong, *there])

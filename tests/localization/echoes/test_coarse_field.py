@@ -15,7 +15,7 @@ from echostep.localization.echoes.range_table import (
     AFTER_SILENCE,
     CHANCES,
     LIKELY,
-    OUTSIDE,
+    OUTSIDE_ENTRY,
     RANGES,
     SECTORS,
     UNIT_M,
@@ -91,7 +91,7 @@ def test_silence_in_a_hall_is_no_evidence_for_outside() -> None:
     """Otherwise the particles of a hall died within metres, for each silent ping counted."""
     for after in (AFTER_ECHO, AFTER_SILENCE):
         log_densities(CoarsePing(0.0, 0.0, 1.0, 0.0, after), MODEL, ROOM_FOR_TABLE)
-        assert ROOM_FOR_TABLE[OUTSIDE] == ROOM_FOR_TABLE[0]
+        assert ROOM_FOR_TABLE[OUTSIDE_ENTRY] == ROOM_FOR_TABLE[0]
 
 
 @pytest.mark.parametrize("after", [AFTER_ECHO, AFTER_SILENCE])

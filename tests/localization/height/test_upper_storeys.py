@@ -43,15 +43,15 @@ def test_only_air_takes_weight(
     heights_m: tuple[float, float], level: int, at_m: tuple[float, float], loss: float
 ) -> None:
     built = building(*heights_m)
-    assert built.upper_storeys is not None
+    assert built.upper_levels is not None
     assert built.sheet is not None
     x = np.array([at_m[0], IN_M[0]]) + level * built.sheet.pitch_m
-    lost = built.upper_storeys.log_loss(x, np.array([at_m[1], IN_M[1]]), 2.0)
+    lost = built.upper_levels.log_loss(x, np.array([at_m[1], IN_M[1]]), 2.0)
     assert ([0.0, 0.0] if lost is None else lost.tolist()) == [loss, 0.0]
 
 
-def test_a_building_of_one_level_has_no_upper_storeys() -> None:
-    assert building(7.0).upper_storeys is None
+def test_a_building_of_one_level_has_no_upper_levels() -> None:
+    assert building(7.0).upper_levels is None
 
 
 def test_a_cloud_half_in_the_air_comes_back_to_the_storey() -> None:

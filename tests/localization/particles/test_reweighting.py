@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.localization.echoes.likelihood import GATE_SD, EchoSettings, echo_model
 from echostep.localization.particle_arrays import ParticleArrays
-from echostep.localization.particles.kernels import Ping, reweight_by_ping
+from echostep.localization.particles.kernels import WeightedPing, reweight_by_ping
 from echostep.walls.echo_sources import Walls
 
 MODEL = echo_model(EchoSettings())
@@ -20,7 +20,7 @@ WALL = Walls(np.array([[-20.0, 2.0, 20.0, 2.0]]))
 SPAN_M = MODEL.maximum_m - MODEL.minimum_m
 
 
-def written_out(distance_m: float, hidden: float, ping: Ping) -> tuple[float, float]:
+def written_out(distance_m: float, hidden: float, ping: WeightedPing) -> tuple[float, float]:
     """Likelihood of a ping of one wall straight ahead, and the probability that the view is hidden after it."""
     level_db = 20.0 * math.log10(6.0 / distance_m) + 2.6 * (6.0 - distance_m)
     heard = 1.0 / (1.0 + math.exp(-level_db / 2.0))
@@ -46,7 +46,7 @@ def test_the_kernel_is_the_formula(
     places: list[tuple[float, float]], range_m: float, power: float, travel_m: float, alike: float, unplanned: float
 ) -> None:
     missed = 0.02 if range_m == 0.0 else 0.0
-    ping = Ping(0.5 * math.pi, range_m, power, travel_m, missed, alike, unplanned)
+    ping = WeightedPing(0.5 * math.pi, range_m, power, travel_m, missed, alike, unplanned)
     y_m, hidden = (np.array(column) for column in zip(*places, strict=True))
     zeros = np.zeros(len(y_m))
     particles = ParticleArrays(zeros.copy(), y_m.copy(), zeros.copy(), np.ones(len(y_m)), zeros.copy())

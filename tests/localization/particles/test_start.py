@@ -8,7 +8,7 @@ import pytest
 
 from echostep.localization.building import Building
 from echostep.localization.particles.cloud import Cloud
-from echostep.localization.particles.start import ANY_LEVEL, NEAR_M, NEAR_SHARE, Start, draw_poses, near_count
+from echostep.localization.particles.start import ANY_LEVEL, NEAR_SD_M, NEAR_SHARE, Start, draw_poses, near_count
 from echostep.localization.settings import CloudSettings
 from echostep.plan.model import Pose
 from echostep.walls.level_sheet import lay_out_levels, level_of
@@ -24,7 +24,7 @@ def test_near_a_place_of_unknown_level_is_above_and_below_it_too() -> None:
     floor = Building(laid_out.walls, laid_out.sheet).floor
     x, y, heading = draw_poses(Start(near=near), COUNT, floor, laid_out.sheet, np.random.default_rng(1))
     level = level_of(x, laid_out.sheet)
-    is_near = np.hypot(x - level * laid_out.sheet.pitch_m - near.x_m, y - near.y_m) < 3.0 * NEAR_M
+    is_near = np.hypot(x - level * laid_out.sheet.pitch_m - near.x_m, y - near.y_m) < 3.0 * NEAR_SD_M
     assert np.bincount(level[is_near]) == pytest.approx(NEAR_SHARE * COUNT / STOREYS, rel=0.2)
     assert abs(np.exp(1j * heading[is_near]).mean()) < 0.05
 

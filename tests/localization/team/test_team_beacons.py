@@ -138,22 +138,22 @@ def test_ranges_to_beacons_are_counted_but_are_no_news() -> None:
 
 def test_readings_of_told_beacons_become_ranges() -> None:
     beacons = TeamBeaconMap()
-    beacons.hear(told(BEACON, SharedBeacon(9, 1.0, 1.0, 0, 0.1, 0.0, 0.1)).encode(), 1)
-    beacons.hear(told(BEACON, name="bo").encode(), 1)
+    beacons.receive(told(BEACON, SharedBeacon(9, 1.0, 1.0, 0, 0.1, 0.0, 0.1)).encode(), 1)
+    beacons.receive(told(BEACON, name="bo").encode(), 1)
     readings = [BeaconReading(1.0, 0, 2.5, math.nan), BeaconReading(1.1, 1, 4.0, math.nan)]
     ranges = [met for _, met in beacons.ranges(readings, [7, 8])]
     assert [(m.name, m.beacon, m.range_m) for m in ranges] == [("kim", 7, 2.5), ("bo", 7, 2.5)]
-    beacons.hear(told(name="kim").encode(), 1)  # a newer message replaces it
+    beacons.receive(told(name="kim").encode(), 1)  # a newer message replaces it
     assert [m.name for _, m in beacons.ranges(readings, [7, 8])] == ["bo"]
 
 
 def test_only_so_many_teammates_are_kept_the_newest() -> None:
     beacons = TeamBeaconMap()
     for k in range(MOST_TEAMMATES + 3):
-        beacons.hear(told(BEACON, name=f"w{k}").encode(), 1)
-    assert len(beacons.told) == MOST_TEAMMATES
-    assert "w0" not in beacons.told
-    assert f"w{MOST_TEAMMATES + 2}" in beacons.told
+        beacons.receive(told(BEACON, name=f"w{k}").encode(), 1)
+    assert len(beacons.reported) == MOST_TEAMMATES
+    assert "w0" not in beacons.reported
+    assert f"w{MOST_TEAMMATES + 2}" in beacons.reported
 
 
 def test_a_message_comes_back_from_its_bytes() -> None:

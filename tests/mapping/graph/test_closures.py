@@ -11,7 +11,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.mapping.graph.closures import KNOWN_SD_M, find_closure, gained, pieces, stretches
 from echostep.mapping.graph.fragments import Fragments
-from echostep.mapping.graph.graph import Graph, Walls
+from echostep.mapping.graph.graph import FittedWalls, Graph
 from echostep.mapping.graph.matching import match
 from echostep.mapping.graph.nodes import Nodes
 
@@ -30,7 +30,7 @@ def two_passages(first_m: Floats, second_m: Floats) -> Graph:
     found = Fragments(
         np.arange(count), ahead, flat, half, np.full(count, sd_m), np.full(count, sd_rad), np.full(count, 20), np.zeros(0, np.int64)
     )  # fmt: skip
-    return Graph(nodes, found, pose, Walls(flat[:1], np.ones(1), np.zeros(count, np.int64)))
+    return Graph(nodes, found, pose, FittedWalls(flat[:1], np.ones(1), np.zeros(count, np.int64)))
 
 
 def along_the_wall(graph: Graph, count: int) -> Floats:
@@ -105,7 +105,7 @@ def three_passages() -> Graph:
     found = Fragments(
         np.arange(n), to_wall, side, 0.5 * flat, 0.04 * flat, 0.03 * flat, np.full(n, 20), np.zeros(0, np.int64)
     )
-    graph = Graph(nodes, found, pose, Walls(np.zeros(0), np.zeros(0), np.full(n, -1)))
+    graph = Graph(nodes, found, pose, FittedWalls(np.zeros(0), np.zeros(0), np.full(n, -1)))
     graph.solve()
     return graph
 

@@ -53,8 +53,8 @@ def test_the_share_of_people_is_small_where_much_is_heard() -> None:
     nodes, pings = across_a_hall(10)
     fragments = find_fragments(nodes, pings)
     way_m, share = nodes.way_m[fragments.node], people_share(nodes, fragments)
-    assert share[way_m > HALL_M + companions.NEAR_M].max() < 0.08
-    assert np.all(share[way_m < HALL_M - companions.NEAR_M] == companions.MOST_PEOPLE)
+    assert share[way_m > HALL_M + companions.COUNTED_M].max() < 0.08
+    assert np.all(share[way_m < HALL_M - companions.COUNTED_M] == companions.MOST_PEOPLE)
 
 
 def test_a_person_has_the_direction_of_the_path() -> None:

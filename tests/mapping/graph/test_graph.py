@@ -10,7 +10,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.mapping.graph.fragments import Fragments
-from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.graph import Closure, FittedWalls, Graph
 from echostep.mapping.graph.nodes import Nodes
 
 STEP = 1e-6
@@ -45,7 +45,7 @@ def bent_path_along_walls(seed: int) -> Graph:
     )
     between = pose[6] - pose[1] + rng.normal(0.0, 0.1, 3)
     closure = Closure(1, 6, between, np.diag([100.0, 50.0, 400.0]), 10.0)
-    return Graph(nodes, pieces, pose, Walls(normal, rho, of), [closure])
+    return Graph(nodes, pieces, pose, FittedWalls(normal, rho, of), [closure])
 
 
 def moved(graph: Graph, unknown: int, by: float) -> Floats:
@@ -56,7 +56,7 @@ def moved(graph: Graph, unknown: int, by: float) -> Floats:
         pose.flat[unknown] += by
     else:
         wall.flat[unknown - count] += by
-    walls = Walls(wall[:, 0], wall[:, 1], graph.walls.of)
+    walls = FittedWalls(wall[:, 0], wall[:, 1], graph.walls.of)
     return Graph(graph.nodes, graph.fragments, pose, walls, graph.closures).linearized()[1]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from echostep.arrays import Floats, Ints
 from echostep.mapping.graph.fragments import find_fragments
-from echostep.mapping.graph.graph import Graph, Walls
+from echostep.mapping.graph.graph import FittedWalls, Graph
 from echostep.mapping.graph.nodes import nodes_of
 from echostep.mapping.graph.relief import find_relief
 from echostep.path import MeasuredSegment, PathSegment
@@ -65,7 +65,7 @@ def bent(askew_rad: float) -> Floats:
     normal_rad = fragments.normal_rad.copy()
     normal_rad[middle] += askew_rad
     of = np.zeros(len(normal_rad), np.int64)
-    walls = Walls(np.array([0.5 * math.pi]), np.array([1.5]), of)
+    walls = FittedWalls(np.array([0.5 * math.pi]), np.array([1.5]), of)
     graph = Graph(nodes, fragments._replace(normal_rad=normal_rad), nodes.pose.copy(), walls)
     graph.solve()
     return graph.pose[:, 2]

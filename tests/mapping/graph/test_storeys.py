@@ -13,7 +13,7 @@ import pytest
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.mapping.graph.nodes import nodes_of
-from echostep.mapping.graph.storeys import STAIRS, find_storeys
+from echostep.mapping.graph.storeys import BETWEEN, find_storeys
 from echostep.mapping.joining import join_walks
 from echostep.mapping.mapper import Mapped, map_walk
 from echostep.mapping.picture import draw_picture
@@ -106,7 +106,7 @@ def test_walls_of_the_stairwell_hold_the_path_over_the_stairs(mapped: Mapped) ->
     graph, storeys = mapped.graph, mapped.graph.storeys
     assert storeys is not None
     place = storeys.with_flights
-    assert (place[storeys.of != STAIRS] == storeys.of[storeys.of != STAIRS]).all()
+    assert (place[storeys.of != BETWEEN] == storeys.of[storeys.of != BETWEEN]).all()
     assert np.unique(place).tolist() == [0, 1, 2, 3]
     node, wall = graph.fragments.node, graph.walls.of
     for flight in (2, 3):
@@ -143,9 +143,9 @@ def test_storeys_are_told_apart_by_the_climb(foot: bool) -> None:
     storeys = find_storeys(segments, nodes)
     assert storeys is not None
     assert storeys.height_m == pytest.approx([0.0, 3.36, 6.72], abs=0.4)
-    level = storeys.of[storeys.of != STAIRS]
+    level = storeys.of[storeys.of != BETWEEN]
     assert level[np.flatnonzero(np.diff(level, prepend=-2))].tolist() == [0, 1, 2, 1]
-    assert np.mean(storeys.of == STAIRS) < 0.25
+    assert np.mean(storeys.of == BETWEEN) < 0.25
     assert [sorted((int(storeys.of[a]), int(storeys.of[b]))) for a, b in storeys.stairs] == [[0, 1], [1, 2], [1, 2]]
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats, Ints
 from echostep.mapping.graph.fragments import Fragments
-from echostep.mapping.graph.graph import Closure, Graph, Walls
+from echostep.mapping.graph.graph import Closure, FittedWalls, Graph
 from echostep.mapping.graph.nodes import Nodes, Pings
 from echostep.mapping.walls.lines import Lines
 from echostep.mapping.walls.segments import Run
@@ -32,7 +32,7 @@ def there_and_back(closures: list[Closure]) -> Graph:
     nodes = Nodes(np.arange(2.0 * COUNT), pose, np.full(gaps, STEP_SD_M), np.full(gaps, 1e-4), np.arange(2.0 * COUNT))
     none, integers = np.zeros(0), np.zeros(0, np.int64)
     pieces = Fragments(integers, np.zeros((0, 2)), none, none, none, none, integers, integers)
-    graph = Graph(nodes, pieces, pose.copy(), Walls(none, none, integers), closures)
+    graph = Graph(nodes, pieces, pose.copy(), FittedWalls(none, none, integers), closures)
     graph.solve()
     return graph
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from echostep.localization.estimate import TrackStatus
-from echostep.localization.particles.places import Hypothesis
+from echostep.localization.particles.places import LikelyPlace
 from echostep.localization.particles.start import Start
 from echostep.page.elements.scene import status_text
 from page.browser import Walk, looking, picture, wait_for
 from page.frames import scene, served, told
 
-PLACES = (Hypothesis(0.62, 5.0, 7.5, 0, 0.4, 0.0), Hypothesis(0.31, 5.0, 2.0, 0, 0.4, 0.0))
+PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 0, 0.4, 0.0))
 SEARCHED_S = 6.0  # of the demo's walk: along one of two corridors that are alike
 DRAWN = "document.querySelector('#places').textContent"
 

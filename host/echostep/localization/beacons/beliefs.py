@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each particle believes of each beacon: a small Kalman filter of three states per particle and beacon [Montemerlo 2002, FastSLAM].
+"""Each particle's estimate of each beacon: a Kalman filter of three states per particle and beacon [Montemerlo 2002, FastSLAM].
 
 In: innovations of one measurement. Out: means, covariances, and their moments over all particles. Owns `BeaconBeliefs`. Given a particle's path,
 the beacons do not depend on each other, so each has a covariance of its own.
@@ -127,8 +127,10 @@ def correct(
 def place_covariance(beliefs: BeaconBeliefs, slot: int, weight: Floats) -> Floats:
     """Covariance (2, 2) of the place of a beacon (m2): mean of the particles' own, and scatter of their means; `weight` (n,) sums to 1."""
     cov = weight @ beliefs.cov[:, slot][:, [XX, XY, XY, YY]]
-    found: Floats = cov.reshape(2, 2) + np.cov(beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True)
-    return found
+    covariance: Floats = cov.reshape(2, 2) + np.cov(
+        beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True
+    )
+    return covariance
 
 
 @kernel
@@ -139,9 +141,8 @@ def moments(beliefs: BeaconBeliefs, weight: Floats) -> Floats:
     """
     mean, cov, _ = beliefs
     beacons = mean.shape[1]
-    sums = np.zeros(
-        (beacons, 5)
-    )  # of offset x, offset y, their squares with the variances, sine and cosine of the axis
+    # Of offset x, offset y, their squares with the variances, sine and cosine of the axis
+    sums = np.zeros((beacons, 5))
     for i in range(len(mean)):
         w = weight[i]
         for k in range(beacons):

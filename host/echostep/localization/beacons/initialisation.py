@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The place of a beacon that was first heard from afar, or was moved, from several of its readings along the path.
+"""The place of a beacon that was first received from afar, or was moved, from several of its readings along the path.
 
 In: readings, each with the boot's place. Out: the beacon's place, or None while several places fit. Owns nothing.
 Ranges along a straight path fit two places, one on either side: bearings decide, or a bend of the path does.
@@ -16,19 +16,15 @@ from echostep.arrays import Floats
 from echostep.jit import kernel
 from echostep.localization.beacons.beliefs import wrap_angle
 
-X, Y, RANGE, BEARING = (
-    0,
-    1,
-    2,
-    3,
-)  # columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)
+# Columns of readings (n, 4): place of the boot (m), range (m), bearing (rad, NaN: not measured)
+X, Y, RANGE, BEARING = 0, 1, 2, 3
 
-# All constants here are by reason.
+# Assumed, not measured.
 FEWEST = 12  # readings
 PATH_M = 3.0  # between the outermost places of the boot
 GRID_M = 0.25
 FINER = 5.0  # the second grid
-RANGE_SD_M = 0.3
+READING_SD_M = 0.3
 BEARING_SD_RAD = math.radians(30.0)
 OUTLIER_COST = 9.0  # greatest cost of one reading: three standard deviations, squared
 APART_M = 1.5  # places further apart are two hypotheses
@@ -36,7 +32,7 @@ MARGIN = 12.0  # by which the cost of any other hypothesis must be higher
 FITTING = 0.6  # share of ranges that must fit within three standard deviations
 
 
-class Found(NamedTuple):
+class LocatedBeacon(NamedTuple):
     """A place (m), and whether the readings allow it and no other."""
 
     x_m: float
@@ -45,10 +41,10 @@ class Found(NamedTuple):
 
 
 @kernel
-def locate_beacon(readings: Floats) -> Found:
+def locate_beacon(readings: Floats) -> LocatedBeacon:
     """The beacon's place that fits readings (n, 4) best; not sure while they are too few or another place fits nearly as well."""
     if len(readings) < FEWEST or _extent(readings) < PATH_M:
-        return Found(np.nan, np.nan, False)
+        return LocatedBeacon(np.nan, np.nan, False)
     x, y, far = 0.0, 0.0, 0.0
     for k in range(len(readings)):
         x += readings[k, X] / len(readings)
@@ -57,13 +53,13 @@ def locate_beacon(readings: Floats) -> Found:
     cells = int((far + 1.0) / GRID_M)
     x, y, only = _search(readings, x, y, cells, GRID_M)
     if not only:
-        return Found(x, y, False)
+        return LocatedBeacon(x, y, False)
     x, y, _ = _search(readings, x, y, int(2.0 * FINER), GRID_M / FINER)
     fitting = 0
     for k in range(len(readings)):
         away = math.hypot(readings[k, X] - x, readings[k, Y] - y)
-        fitting += abs(away - readings[k, RANGE]) < 3.0 * RANGE_SD_M
-    return Found(x, y, fitting >= FITTING * len(readings))
+        fitting += abs(away - readings[k, RANGE]) < 3.0 * READING_SD_M
+    return LocatedBeacon(x, y, fitting >= FITTING * len(readings))
 
 
 @kernel
@@ -98,7 +94,7 @@ def _cost(readings: Floats, x: float, y: float, axes: Floats) -> float:
     cost, sine, cosine = 0.0, 0.0, 0.0
     for k in range(len(readings)):
         dx, dy = readings[k, X] - x, readings[k, Y] - y
-        residual = (math.sqrt(dx * dx + dy * dy) - readings[k, RANGE]) / RANGE_SD_M
+        residual = (math.sqrt(dx * dx + dy * dy) - readings[k, RANGE]) / READING_SD_M
         cost += min(residual * residual, OUTLIER_COST)
         axes[k] = math.atan2(dy, dx) - readings[k, BEARING]  # the beacon's axis by this reading
         if not math.isnan(axes[k]):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a beacon's measurement is worth: settings, and their form for kernels.
+"""Measurement model of a beacon: settings, and their form for kernels.
 
 In: `BeaconSettings`, section [beacons] of the settings. Out: `BeaconModel` in the kernels' units. Owns nothing.
 """

@@ -34,12 +34,12 @@ from echostep.localization.beacons.model import BeaconModel
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex, crosses_wall
 
-# All constants here are by reason.
+# Assumed, not measured.
 GREATEST_ODDS = math.exp(3.0)  # of a particle, that a beacon was moved
 LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, in terms of a beacon that has just been placed
 CLOSE_BEARING_M2 = 0.25  # squared distance below which a bearing carries no information: half a metre
 UNKNOWN_AXIS_RAD2 = 3.0  # variance above which an axis is unknown: that of a uniform one is pi^2 / 3
-KNOWN_AXIS_RAD2 = 1.0  # variance below which an axis tells on which side of the beacon the boot is
+KNOWN_AXIS_RAD2 = 1.0  # variance below which an axis determines on which side of the beacon the boot is
 GATE = 9.0  # squared normalised innovation above which a bearing is an outlier: three standard deviations
 FIT_SHARE = 0.12  # of the newest measurement in a running mean
 MISFIT = 0.25  # running probability below which a beacon was moved

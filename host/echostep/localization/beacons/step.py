@@ -5,9 +5,9 @@ In: particles, and what a beacon measured to the boot. Out: log-weights, correct
 not known, or not any more. `BeaconMap` and the study of guided returns call the same kernels.
 
 A beacon that is near within its first readings was just dropped and lies about each particle (one range of twenty is too long, the first one too).
-One that was first heard from afar is located from several readings, for a near one leaves open on which side of the path it lies. One that was moved
-goes on to reweight the particles, each of which doubts it for itself, while readings for a new place are collected; they count only while the plan
-supports the cloud, because a wrong cloud would place a beacon where it suits that cloud, and other beacons may fit a wrong cloud too.
+One that was first received from afar is located from several readings, for a near one leaves open on which side of the path it lies. One that was
+moved goes on to reweight the particles, each of which doubts it for itself, while readings for a new place are collected; they count only while the
+plan supports the cloud, because a wrong cloud would place a beacon where it suits that cloud, and other beacons may fit a wrong cloud too.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from echostep.localization.beacons.slam import IN_PLACE, RECOVERIES, SUSPECT, Be
 from echostep.localization.particle_arrays import ParticleArrays
 from echostep.walls.index import WallIndex
 
-# All constants here are by reason.
-MOST_WAITING = 48  # readings kept of a beacon without a place
-FIRST = 4  # readings of a beacon, among which a near one says that it was just dropped
+# Assumed, not measured.
+MOST_READINGS = 48  # readings kept of a beacon without a place
+FIRST = 4  # readings of a beacon, among which a near one means that it was just dropped
 LOCATE_EVERY = 4  # readings of a beacon without a place
 LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`, about the cloud's own error
 
@@ -36,7 +36,7 @@ LOCATED_SD_M = 0.4  # of a place found by `locate_beacon`, about the cloud's own
 class Waiting(NamedTuple):
     """Readings of b beacons that wait for a place.
 
-    `rows` (b, MOST_WAITING, 4): a ring of rows for `locate_beacon`; `taken` (b,): rows written so far.
+    `rows` (b, MOST_READINGS, 4): a ring of rows for `locate_beacon`; `taken` (b,): rows written so far.
     """
 
     rows: Floats
@@ -53,7 +53,7 @@ class Beacons(NamedTuple):
 
 def no_waiting(beacons: int) -> Waiting:
     """Beacons without readings."""
-    return Waiting(np.zeros((beacons, MOST_WAITING, 4)), np.zeros(beacons, np.int64))
+    return Waiting(np.zeros((beacons, MOST_READINGS, 4)), np.zeros(beacons, np.int64))
 
 
 @kernel
@@ -92,14 +92,14 @@ def _wait(particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasur
     """
     beliefs, waiting, k = beacons.beliefs, beacons.waiting, measurement.slot
     x, y = mean_place(particles)
-    row = waiting.rows[k, waiting.taken[k] % MOST_WAITING]
+    row = waiting.rows[k, waiting.taken[k] % MOST_READINGS]
     row[0], row[1], row[2], row[3] = x, y, measurement.range_m, measurement.bearing_rad
     waiting.taken[k] += 1
     if waiting.taken[k] % LOCATE_EVERY:
         return
-    found = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_WAITING)])
-    if found.sure:
-        set_beliefs(beliefs, k, found.x_m, found.y_m, 0.0, LOCATED_SD_M**2, math.pi**2)
+    fix = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_READINGS)])
+    if fix.sure:
+        set_beliefs(beliefs, k, fix.x_m, fix.y_m, 0.0, LOCATED_SD_M**2, math.pi**2)
         for i in range(len(particles.x_m)):
             beliefs.mean[i, k, X] += particles.x_m[i] - x
             beliefs.mean[i, k, Y] += particles.y_m[i] - y

@@ -5,8 +5,8 @@ In: a range and the plan's echo sources, nearest first. Out: a likelihood. Owns 
 
 An SRF02 reports the first echo that it detects. So a source answers if it is detected and no nearer one is, and a second reflection after them all.
 Where the plan is not what stands there (furniture, people, a door that is shut, a wall that is gone), the view of a ranger is hidden, and its echo
-says nothing about the pose. A hidden view lasts: furniture has a length. So each particle carries the probability that its view is hidden, a Markov
-chain of two states over the path [Thrun et al. 2005, 6.3: the mixture of the beam model; here with a memory].
+carries no information about the pose. A hidden view persists along the path, as furniture has a length. So each particle carries the probability that
+its view is hidden, a Markov chain of two states over the path [Thrun et al. 2005, 6.3: the mixture of the beam model; here with a memory].
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from echostep.arrays import Floats
 from echostep.jit import inline_kernel, lean_kernel
 from echostep.walls.tile_points import CORNER, EDGE
 
-# All by reason.
+# Assumed, not measured.
 # Pings: a ranger in order misses one echo in two hundred; one that is not is known after two seconds
 PRIOR_MISSED, PRIOR_HEARD = 0.1, 20.0
 LIKE_M = 0.15  # difference of two echoes from one wall: three errors of their difference
@@ -28,11 +28,10 @@ MOST_SILENT = 8  # pings between two such echoes: more are a door
 REMEMBERED = 200.0  # pings: tens of metres of path
 ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
-NEGLIGIBLE = (
-    1e-4  # probability that no source so far was detected below which sources further away are left out, by reason
-)
-SILENT = 0.2  # share of outliers and of hidden views that are "no echo", by reason
-HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source, by reason: more is added to a room than removed
+# Probability that no source so far was detected below which sources further away are left out, assumed
+NEGLIGIBLE_REST = 1e-4
+SILENT_SHARE = 0.2  # share of outliers and of hidden views that are "no echo", assumed
+HIDDEN_NEARER = 0.6  # share of echoes from hidden views that are nearer than the plan's first source: more is added to a room than removed
 LEAST_LOGIT = -8.0  # below it a source is not detected: probability 3e-4
 GATE_SD = 6.0  # a source further from the range than so many standard deviations adds nothing
 
@@ -61,9 +60,9 @@ class MissedEchoes:
         self._last_m[ranger], self._silent[ranger] = range_m, 0
 
     def _count(self, ranger: int, silent: int) -> None:
-        missed, heard = self._missed[ranger] + silent, self._heard[ranger] + 1.0
-        kept = min(1.0, REMEMBERED / (missed + heard))
-        self._missed[ranger], self._heard[ranger] = kept * missed, kept * heard
+        missed, received = self._missed[ranger] + silent, self._heard[ranger] + 1.0
+        memory = min(1.0, REMEMBERED / (missed + received))
+        self._missed[ranger], self._heard[ranger] = memory * missed, memory * received
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,12 +148,12 @@ def planned_density(
     """
     unheard, hit = 1.0, 0.0
     for k in range(count):
-        heard = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
-        unheard -= heard
+        answers = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
+        unheard -= answers
         sd = m.sd_m + m.slant_m * off_axis_rad[k]
-        if heard > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
-            hit += heard * normal(range_m - distance_m[k], sd)
-        if unheard < NEGLIGIBLE:
+        if answers > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
+            hit += answers * normal(range_m - distance_m[k], sd)
+        if unheard < NEGLIGIBLE_REST:
             break
     if range_m <= 0.0:
         return (1.0 - m.stray) * unheard
@@ -163,18 +162,18 @@ def planned_density(
 
 @inline_kernel
 def outlier_density(range_m: float, m: EchoModel) -> float:
-    """Density per metre of a range that nothing foretells; range 0: the probability of no echo."""
-    return SILENT if range_m <= 0.0 else (1.0 - SILENT) / (m.maximum_m - m.minimum_m)
+    """Density per metre of an outlier; range 0: the probability of no echo."""
+    return SILENT_SHARE if range_m <= 0.0 else (1.0 - SILENT_SHARE) / (m.maximum_m - m.minimum_m)
 
 
 @inline_kernel
 def hidden_density(range_m: float, first_m: float, m: EchoModel) -> float:
     """Density per metre of a range if the view is hidden, and the plan's first source is at `first_m`; range 0: the probability of no echo."""
     if range_m <= 0.0:
-        return SILENT
+        return SILENT_SHARE
     before = min(max(first_m, 2.0 * m.minimum_m), m.maximum_m) - m.minimum_m
     nearer = HIDDEN_NEARER / before if range_m < m.minimum_m + before else 0.0
-    return (1.0 - SILENT) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
+    return (1.0 - SILENT_SHARE) * (nearer + (1.0 - HIDDEN_NEARER) / (m.maximum_m - m.minimum_m))
 
 
 @lean_kernel

@@ -4,8 +4,8 @@
 In: walls, their floor. Out: `CoarseField`, and `reweight_coarsely`, which looks a ping up instead of tracing it. Owns nothing.
 
 A cell of the floor has one row, a sector of the ranger's axis one column. A ranger's cone is wide, so its range changes little within a sector of 15
-degrees; within a cell of 25 cm it changes by as much as the cell is wide, and COARSE_SD_M says so. An entry is an expected range and the probability
-that an echo is heard at all, for walls at a grazing angle or far away seldom are. A look-up takes a tenth of a trace's time.
+degrees; within a cell of 25 cm it changes by as much as the cell is wide, which is in COARSE_SD_M. An entry is an expected range and the probability
+of an echo at all, since walls at a grazing angle or far away seldom answer. A look-up takes a tenth of a trace's time.
 """
 
 from __future__ import annotations
@@ -17,24 +17,22 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
-from echostep.localization.echoes.likelihood import SILENT, EchoModel, detection, hidden_density
+from echostep.localization.echoes.likelihood import SILENT_SHARE, EchoModel, detection, hidden_density
 from echostep.localization.particle_arrays import ParticleArrays, PingBatch
 from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.index import WallIndex
 
-# All by reason.
+# Assumed, not measured.
 SECTORS = 24  # of 15 degrees
 UNIT_M = 0.025  # of a range in the table, one byte
 COARSE_SD_M = 0.2  # a cell's half diagonal, and the heading's error over a sector
-FAR_SHARE, FAR_FACTOR = (
-    0.2,
-    3.0,
-)  # of the expected ranges are off by so many times as much: edges, corners, the next wall
+# Of the expected ranges are off by so many times as much: edges, corners, the next wall
+FAR_SHARE, FAR_FACTOR = 0.2, 3.0
 LIKELY = 0.05  # probability of detection that the sources up to the expected range have together
-CHANCES = 8  # steps of the probability that an echo is heard
+CHANCES = 8  # steps of the probability of an echo
 RANGES = 256  # steps of the expected range
-OUTSIDE = CHANCES * RANGES  # entry of a place outside the building
+OUTSIDE_ENTRY = CHANCES * RANGES  # entry of a place outside the building
 # The ping before, of the same ranger: silence goes on where nothing answers, and where an entry is wrong
 AFTER_ECHO, AFTER_SILENCE = 0, 1
 # Shares after an echo, and after silence: of echoes heard by the entry that are none all the same; of "no echo" where none is heard (the others are
@@ -42,14 +40,14 @@ AFTER_ECHO, AFTER_SILENCE = 0, 1
 MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1, 0.6)
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
 UNKNOWN = -1  # no row: outside the building
-USED_M = 0.25  # path between two pings of one ranger that are used, by reason: a cell of the table
-INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one, by reason: walls go on
+USED_M = 0.25  # path between two pings of one ranger that are used: a cell of the table
+INDEPENDENT_M = 0.8  # path on which pings of one ranger bring the information of one: walls go on
 
 
 class CoarseField(NamedTuple):
     """`row` (rows, columns): row of `expected` by cell of the grid from (x0_m, y0_m) on, or UNKNOWN.
 
-    `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability that an echo is heard, of CHANCES.
+    `expected` (cells, SECTORS): range in UNIT_M (0: none), and RANGES times the step of the probability of an echo, of CHANCES.
     """
 
     x0_m: float
@@ -88,7 +86,7 @@ def reweight_coarsely(
 ) -> None:
     """Add each particle's log-likelihood of a ping, by the table, to the ping's power, and make the greatest log-weight 0.
 
-    `table` (OUTSIDE + 1,): room for the log-density by entry.
+    `table` (OUTSIDE_ENTRY + 1,): room for the log-density by entry.
     """
     x, y, turn, _, log_weight = particles
     log_densities(ping, model, table)
@@ -102,14 +100,14 @@ def reweight_coarsely(
 
 @inline_kernel
 def _entry(x: float, y: float, axis_rad: float, field: CoarseField) -> int:
-    """The entry of the table at a place and in a direction; OUTSIDE outside."""
+    """The entry of the table at a place and in a direction; OUTSIDE_ENTRY outside."""
     rows, columns = field.row.shape
     c, r = (x - field.x0_m) / CELL_M, (y - field.y0_m) / CELL_M
     if not (0.0 <= c < columns and 0.0 <= r < rows):
-        return OUTSIDE
+        return OUTSIDE_ENTRY
     cell = field.row[int(r), int(c)]
     if cell < 0:
-        return OUTSIDE
+        return OUTSIDE_ENTRY
     turns = axis_rad * (0.5 / math.pi)
     return int(field.expected[cell, min(int((turns - math.floor(turns)) * SECTORS), SECTORS - 1)])
 
@@ -124,7 +122,7 @@ def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
     hidden_share, hidden_quiet = HIDDEN[ping.after], HIDDEN_QUIET[ping.after]
     is_echo = range_m > 0.0
     unlikely = (1.0 - quiet) / (model.maximum_m - model.minimum_m) if is_echo else quiet
-    of_hidden = (1.0 - hidden_quiet) / (1.0 - SILENT) if is_echo else hidden_quiet / SILENT
+    of_hidden = (1.0 - hidden_quiet) / (1.0 - SILENT_SHARE) if is_echo else hidden_quiet / SILENT_SHARE
     for k in range(RANGES):
         hidden = of_hidden * hidden_density(range_m, k * UNIT_M if k > 0 else model.maximum_m, model)
         likely = missed
@@ -140,7 +138,7 @@ def log_densities(ping: CoarsePing, model: EchoModel, table: Floats) -> None:
             table[c * RANGES + k] = ping.power * math.log(
                 (1.0 - hidden_share) * planned + hidden_share * hidden + ping.missed
             )
-    table[OUTSIDE] = table[0]
+    table[OUTSIDE_ENTRY] = table[0]
 
 
 @kernel

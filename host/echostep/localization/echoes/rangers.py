@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each kind of ranger may report: the echo model follows the part that the board names.
+"""Ranger models: the echo settings by the part that the board names.
 
 In: the part in the rangers' places, the settings of the run. Out: `EchoSettings`. Owns the parts' figures.
 """

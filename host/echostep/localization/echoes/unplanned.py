@@ -3,12 +3,12 @@
 receives, or what the last echoes predict.
 
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
-densities without a plan. Owns the views of both rangers, each a line in the walk frame that was heard last, or nothing, and the length of the path.
+densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
 
-A cloud that explains the echoes no better than this is wrong, or the plan is. So it has to be as good as can be done without a plan: a wall that goes
-on is predicted as well as by the plan, and only where a view changes does the plan know more. A smooth wall answers from the foot of the
-perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and direction of
-the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
+A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best that is possible without a plan: a
+wall that goes on is predicted as well as by the plan; only where a view changes has the plan more information. A smooth wall answers from the foot of
+the perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and
+direction of the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
 """
 
 from __future__ import annotations
@@ -28,26 +28,25 @@ from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
 from echostep.walls.floor import Floor
 from echostep.walls.index import WallIndex
 
-# All by reason.
-AXIS_SD_RAD = math.radians(
-    20.0
-)  # of a new wall's normal about the ranger's axis: half of the angle at which walls answer
+# Assumed, not measured.
+# Of a new wall's normal about the ranger's axis: half of the angle at which walls answer
+AXIS_SD_RAD = math.radians(20.0)
 SEEN_RAD = math.radians(50.0)  # of the normal from the axis: the angle at which near walls answer, and the axis' error
 TURN_SD_RAD = 0.05  # change of the normal on a metre of path
-VIEW_M = 2.5  # mean length of the path between two changes of a view, by reason: walls, doors, corners
-POSES = 400  # drawn on the floor, by reason: their mean is then good to 5 %
+VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
+POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
-LEAST_POWER = 0.01  # share of independent information below which a ping is left out, by reason: it changes nothing
-# Turns on a segment at which its pings count half, by reason: headings between its ends are interpolated
+LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
+# Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
-JUDGING_RAD = math.radians(15.0)  # as evidence for the cloud: they choose a way round, and are foretold badly
+EVIDENCE_RAD = math.radians(15.0)  # as evidence for the cloud: they select the path of a turn, and are predicted badly
 
 
 class LastWall:
     """`distance_m`, `normal_rad`: the line seen from where the last echo was received; their covariance."""
 
     def __init__(self, range_m: float, axis_rad: float, sd_m: float, slant_m: float) -> None:
-        """From a first echo. Standard deviation of a range: `sd_m`, and `slant_m` per radian off the axis."""
+        """Begin with a first echo. Standard deviation of a range: `sd_m`, and `slant_m` per radian off the axis."""
         self._sd_m, self._slant_m = sd_m, slant_m
         self.distance_m, self.normal_rad = range_m, axis_rad
         self._var_m2, self._covariance_m, self._var_rad2 = sd_m**2, 0.0, AXIS_SD_RAD**2
@@ -83,12 +82,12 @@ class LastWall:
         return self._sd_m + self._slant_m * abs(wrap(self.normal_rad - axis_rad))
 
 
-class View:
-    """`density` before `update` for each ping, after `move`."""
+class UnplannedView:
+    """The view of one ranger without a plan: for each ping call `move`, `density`, `update`, in this order."""
 
     def __init__(self, echo: EchoSettings) -> None:
         self._echo = echo
-        self._wall: LastWall | None = None  # None: nothing was heard
+        self._wall: LastWall | None = None  # None: no echo yet
         self._x_m, self._y_m = math.nan, math.nan
 
     def move(self, x_m: float, y_m: float) -> float:
@@ -170,7 +169,7 @@ class RangeMemory:
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self._background, self._echo = background, echo
         self._missed = MissedEchoes()
-        self._views = [View(echo), View(echo)]
+        self._views = [UnplannedView(echo), UnplannedView(echo)]
 
     def densities(self, pings: PlacedPings) -> UnplannedDensities:
         """For pings (k,) in order of time."""
@@ -203,9 +202,9 @@ def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: E
     return mean / len(x)
 
 
-def judged_share(turn_rad: float) -> float:
-    """Share of the information of a turning segment's pings that tells whether the cloud is right."""
-    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, JUDGING_RAD)
+def evidence_share(turn_rad: float) -> float:
+    """Share of the information of a turning segment's pings that is evidence for or against the cloud."""
+    return _loss(turn_rad, TURNING_RAD) / _loss(turn_rad, EVIDENCE_RAD)
 
 
 def _loss(turn_rad: float, half_rad: float) -> float:
@@ -218,12 +217,12 @@ class UsablePings:
 
     def __init__(self, background: Background, echo: EchoSettings) -> None:
         self.path_m = 0.0  # length of the path so far
-        self.hear_by(background, echo)
+        self.set_ranger_model(background, echo)
         self._x_m, self._y_m = 0.0, 0.0  # end of the path in the walk frame
         self._last_ping_m = [-math.inf, -math.inf]  # length of the path at each ranger's last ping
 
-    def hear_by(self, background: Background, echo: EchoSettings) -> None:
-        """From now on the pings are those of rangers with these settings."""
+    def set_ranger_model(self, background: Background, echo: EchoSettings) -> None:
+        """Use these ranger settings, and this density of echoes without a plan, from the next segment on."""
         self._correlation_m, self._own = echo.correlation_m, echo.own
         self._ranges = RangeMemory(background, echo)
 

@@ -18,12 +18,13 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.height.levels import HeightChange
 
-STARTING_M2_S3 = 0.2  # spectral density of the acceleration, by reason: 0.8 m/s2 for 1.25 s at either end of a ride [ISO 8100-32, typical]
-RATE_SD_M_S = 0.5  # of the rate at first, by reason: stairs, or a lift
+# Spectral density of the acceleration: 0.8 m/s2 for 1.25 s at either end of a ride [ISO 8100-32, typical]
+STARTING_M2_S3 = 0.2
+RATE_SD_M_S = 0.5  # of the rate at first: stairs, or a lift
 HEIGHT, LAG = range(2)
 MEASURED = np.array([1.0, 1.0])  # the height by pressure is their sum
-CLIMB_M_S = 0.5  # standard deviation of a climb that no foot measured, in a second; by reason: stairs at a brisk walk
-UNKNOWN_M = 1e4  # standard deviation of the lag before the first pressure; by reason: any place on earth
+CLIMB_M_S = 0.5  # standard deviation of a climb that no foot measured, in a second: stairs at a brisk walk
+UNKNOWN_M = 1e4  # standard deviation of the lag before the first pressure: any place on earth
 
 
 class RidingHeight:

@@ -33,14 +33,14 @@ from echostep.walls.level_sheet import (
     nearest_level,
 )
 
-PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure, by reason: doors slam
+PRESSURE_TAIL = 3.0  # degrees of freedom of the Student t density of the height by pressure: doors slam
 UNKNOWN_LAG_M2 = 1e6  # variance of `lag` before the first height by pressure: no information
-SAME_LEVEL_M = 1.5  # difference of height within one level: half a storey; on stairs and in lifts two clouds change levels one after the other
-WEATHER_M_S = 1e-3  # standard deviation of the height by pressure's speed, by reason: a front changes the pressure by 0.4 hPa in an hour
+SAME_LEVEL_M = 1.5  # difference of height within one level: half of one; on stairs and in lifts two clouds change levels one after the other
+# Standard deviation of the height by pressure's speed: a front changes the pressure by 0.4 hPa in an hour
+WEATHER_M_S = 1e-3
 LAG_GATE = 9.0  # squared normalised innovation above which the height by pressure does not correct `lag`: three standard deviations
-# By reason:
-ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is none of an upper storey
-FALL_PER_M = 1.0  # log-weight lost on a metre of path: a corner that the plan lacks is passed
+ABOVE_M = 1.5  # height above the ground, which is at 0 or the lowest level: an entrance over a few steps is not on an upper level
+FALL_PER_M = 1.0  # log-weight lost on a metre of path, assumed: a corner that the plan lacks is passed
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +169,7 @@ def set_levels_by_pressure(x: Floats, heights: HeightArrays, height_m: float, sh
         z[i] = sheet.height_m[new_level]
 
 
-class UpperStoreys:
+class UpperLevels:
     """The floor of a building, and which of its levels are above the ground."""
 
     def __init__(self, floor: Floor, sheet: LevelSheet) -> None:
@@ -178,7 +178,7 @@ class UpperStoreys:
         self._is_above = sheet.height_m > max(0.0, float(sheet.height_m.min())) + ABOVE_M
 
     def log_loss(self, x_m: Floats, y_m: Floats, path_m: float) -> Floats | None:
-        """What places (n,) on the sheet lose in log-weight on this length of path; None if none is in the air."""
+        """Loss of log-weight (n,) of places on the sheet on this length of path; None if none is in the air."""
         is_above = self._is_above[level_of(x_m, self._sheet)]
         if not is_above.any():
             return None

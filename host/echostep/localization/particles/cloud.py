@@ -5,8 +5,8 @@ In: moves of the trunk in the walk frame, with the pings on them. Out: a `Cloud`
 generator that it is given. Only the filter's kernels go from the walk frame to the map.
 
 A particle is (x, y) on the sheet of levels, `turn` = rotation walk -> map, `scale` = true length / measured length, `veer` = turn of the path on a
-metre that the wearer has not made. In a building of several levels
-it also has a height `z` and an offset `lag` of the height by pressure. Weights are logarithms.
+metre that the wearer has not made. In a building of several levels it also has a height `z` and an offset `lag` of the height by pressure.
+Weights are logarithms.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.localization.beacons.beliefs import empty_beliefs
 from echostep.localization.echoes.likelihood import EchoModel
-from echostep.localization.echoes.range_table import OUTSIDE, CoarseField, CoarsePings, reweight_coarsely
+from echostep.localization.echoes.range_table import OUTSIDE_ENTRY, CoarseField, CoarsePings, reweight_coarsely
 from echostep.localization.height.levels import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
@@ -55,36 +55,41 @@ from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import NO_FLOOR, Floor
 from echostep.walls.level_sheet import LevelSheet
 
-SCATTERED = 10 / 3  # times the least size above which a cloud is roughened, by reason: a gathered one is never so large
-SMALL = 2  # times the least size, by reason: a cloud has contracted
-# Bend of a move, as a share of its chord, above which a coarse cloud hears no ping; by reason: an uncertain turn of 45 degrees
+SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never so large
+CONTRACTED = 2  # times the least size, up to which a cloud is contracted, assumed
+# Bend of a move, as a share of its chord, above which a coarse cloud uses no ping: an uncertain turn of 45 degrees
 COARSE_BEND = bend_of(math.radians(45.0))
-COARSE_REST = 0.03  # weight outside of few cells, or of one place, with which a coarse cloud has gathered, by reason
-START_SIZE = 6_000  # least particles at the start, by reason: enough of them in the tails of its distribution (`start`)
-WIDE_M = 3.0  # standard deviation of a start's place above which its cloud is coarse, by reason: a room
-COARSE_WALL_COST = (
-    5.0  # log-weight that crossing a wall costs a coarse cloud, by reason: its particles are a step apart
-)
-# The same where there are several levels, after so many metres, by reason: only exact likelihoods tell storeys apart that are alike
+COARSE_REST = 0.03  # weight outside of few cells, or of one place, below which a cloud is no longer coarse, assumed
+START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
+COARSE_SD_M = 3.0  # standard deviation of a start's place above which its cloud is coarse: a room
+# Log-weight that crossing a wall costs a coarse cloud: its particles are a step apart
+COARSE_WALL_COST = 5.0
+# The same on several levels, after so many metres: only exact likelihoods discriminate between levels that are alike
 LEVELS_REST, LEVELS_M = 0.1, 10.0
-COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud, by reason: half its distances
-LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, by reason
-# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much; by reason
+COARSE_ROUGH = (0.1, math.radians(4.0))  # roughening (m, rad) of a coarse cloud: half its distances
+LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by so much
 PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
-# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle; by reason: people turn on the spot, and walk
+# Bend of a particle's way beyond that of the segment, as a share of it: none to two arcs of a circle: a person turns on the spot, or walks
 # round the end of a wall more sharply than an arc
 BENDS = (-1.0, 3.0)
 
 
 class Evidence(NamedTuple):
-    """How well a cloud foretold a segment: of each ping (k,) the log of its mean likelihood before it, and the log of the weight that walls left."""
+    """How well a cloud predicted a segment: log of each ping's mean likelihood before its update (k,), and log of the weight that walls left."""
 
     log_pings: Floats
     log_path: float
 
 
 class Cloud(Particles):
-    """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0."""
+    """Particles as flat arrays of n; `log_weight` is normalised to a maximum of 0.
+
+    A cloud is coarse, scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
+    `is_coarse`: it would need more particles than `CloudSettings.largest`, and echoes are looked up in a table. `is_gathered`: since it last was
+    scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than GATHERED_M from its mean on the sheet of levels.
+    `rescues`: how often all particles crossed a wall.
+    """
 
     def __init__(
         self, settings: CloudSettings, start: Start, walk_heading_rad: float, rng: np.random.Generator,
@@ -106,7 +111,7 @@ class Cloud(Particles):
         self.is_on_any_level = (
             self.sheet is not None and start.pose is None and start.level == ANY_LEVEL and start.air is None
         )
-        self.is_coarse = start.pose is None or start.sd_m > WIDE_M
+        self.is_coarse = start.pose is None or start.sd_m > COARSE_SD_M
         self._draw(start, settings.searching if self.is_coarse else settings.largest, walk_heading_rad, floor)
         wanted = max(self._wanted_size(), START_SIZE)
         if wanted < settings.largest:
@@ -131,24 +136,24 @@ class Cloud(Particles):
             self.z_m[: near_count(count)] = start.near_z_m
 
     def draw_veer(self) -> None:
-        """Draw each particle's veer; not while the cloud is coarse, for its few particles about a place would differ in one thing more."""
+        """Draw each particle's veer; not while the cloud is coarse, since its particles are too few to sample one more dimension."""
         sd_rad_m = math.radians(self._settings.start_veer_sd_deg)
         if sd_rad_m > 0.0:  # otherwise nothing is drawn: a walk on foot stays the same to the bit
             self.veer_rad_m = sd_rad_m * self._rng.standard_normal(len(self.x_m))
 
     @property
     def is_scattered(self) -> bool:
-        """Whether the cloud is so large that it has not gathered yet."""
+        """Whether the cloud has more than SCATTERED times its least number of particles; such a cloud is roughened."""
         return len(self.x_m) > SCATTERED * self._least_size
 
     @property
-    def is_small(self) -> bool:
-        """Whether the cloud has contracted to about its least size."""
-        return len(self.x_m) <= SMALL * self._least_size
+    def is_contracted(self) -> bool:
+        """Whether the cloud has at most CONTRACTED times its least number of particles."""
+        return len(self.x_m) <= CONTRACTED * self._least_size
 
     @property
     def _least_size(self) -> int:
-        """Least number of particles: on each level that may be the true one, for few particles make one of them likelier by chance."""
+        """Least number of particles: `size` for each level with LEAST_LEVEL of the weight, since few particles would favour one level by chance."""
         if self.sheet is None:
             return self._settings.size
         return self._settings.size * int(np.count_nonzero(self.level_shares > LEAST_LEVEL))
@@ -156,8 +161,8 @@ class Cloud(Particles):
     def propagate_and_reweight(self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls) -> Evidence:
         """Propagate by a move and reweight by each ping on it, where it was triggered; resample whenever too few particles carry the weight.
 
-        A particle that crosses a wall loses its weight. If all do, the plan or the path is wrong: the cloud goes on behind the wall, wider. Returns
-        how well the cloud foretold the pings and the path.
+        A particle that crosses a wall loses its weight. If all do, the plan or the path is wrong: the cloud continues behind the wall, wider. Returns
+        how well the cloud predicted the pings and the path.
         """
         log_evidence, log_passed = np.zeros(len(pings.share)), 0.0
         self._draw_bends(move)
@@ -182,7 +187,7 @@ class Cloud(Particles):
         self, move: Move, pings: PingBatch, model: EchoModel, walls: Walls, field: CoarseField
     ) -> None:
         """The same for a coarse cloud: the pings that `CoarsePings` takes, looked up in the table, and none in a turn."""
-        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE + 1), 0.0
+        length, table, done = math.hypot(move.dx_m, move.dy_m), np.empty(OUTSIDE_ENTRY + 1), 0.0
         is_turning = math.hypot(move.bend_x_m, move.bend_y_m) > COARSE_BEND * length
         noise, used = self._noise(move, 1.0), self._coarse_pings
         for k, share in enumerate([*pings.share.tolist(), 1.0]):
@@ -234,7 +239,7 @@ class Cloud(Particles):
             self._settings = settings
 
     def _lay_on_each_level(self, sheet: LevelSheet) -> None:
-        """Copy every particle to each level; nothing is known of the lag then."""
+        """Copy every particle to each level; the lag becomes unknown."""
         levels, log_weight = len(sheet.height_m), self.log_weight
         level = np.tile(np.arange(levels), len(self.x_m))
         self.keep(np.repeat(np.arange(len(self.x_m)), levels))
@@ -244,11 +249,11 @@ class Cloud(Particles):
         self.forget_lag()
 
     def forget_lag(self) -> None:
-        """The height by pressure may have begun anew: nothing is known of its lag."""
+        """Make the lag unknown: the barometer may have restarted."""
         self._lag_variance = UNKNOWN_LAG_M2
 
     def let_lag_drift(self, pause_s: float) -> None:
-        """Nothing was measured for so long."""
+        """Let the variance of the lag grow over a pause without measurements."""
         drifted_m2 = self._lag_variance + drift_m(self._climbing, pause_s) ** 2
         self._lag_variance = min(drifted_m2, UNKNOWN_LAG_M2)
 
@@ -262,7 +267,7 @@ class Cloud(Particles):
         return Air(mean, math.sqrt(self._lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
-        """Spread by an unobserved move: no wall is asked, the path to its end is not known. The level is that of the height by pressure, if any."""
+        """Spread by an unobserved move without regard to walls, since its path is unknown. The level is that of the height by pressure, if any."""
         self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
         noise = self._rng.standard_normal((3, len(self.x_m)))
@@ -282,7 +287,7 @@ class Cloud(Particles):
     def resample_if_needed(self) -> None:
         """Systematic resampling [Kitagawa 1996] when too few particles carry the weight.
 
-        Until the cloud has gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
+        Until the cloud is gathered, the number of a mode's particles follows the square root of its weight, and they keep that weight: resampling
         alone would lose the lighter of two modes by chance.
         """
         weight_after = (
@@ -307,19 +312,19 @@ class Cloud(Particles):
 
     @property
     def _rest(self) -> float:
-        """Weight outside of one place with which a coarse cloud has gathered."""
+        """Weight outside of one place below which the cloud is no longer coarse."""
         return COARSE_REST if self.sheet is None or self._coarse_pings.path_m < LEVELS_M else LEVELS_REST
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
         chosen = systematic(np.exp(log_wanted - log_wanted.max()), float(self._rng.random()), count)
-        kept = log_weight[chosen]
+        log_chosen = log_weight[chosen]
         self.keep(chosen)
-        self.log_weight = kept - kept.max()
+        self.log_weight = log_chosen - log_chosen.max()
 
     @property
     def is_in_one_place(self) -> bool:
-        """Whether the cloud has gathered, on whatever level."""
+        """Whether the cloud is gathered, or would be if all levels lay above one another."""
         return self.is_gathered or self.far_weight(self.map_x_m) < GATHERED_REST
 
     def _noise(self, move: Move, share: float) -> Floats:
@@ -336,7 +341,7 @@ class Cloud(Particles):
         return noise
 
     def _draw_bends(self, move: Move) -> None:
-        """How much more than BENT of an arc each particle's way is on a move."""
+        """Draw the bend of each particle's path on a move, relative to that of BENT of an arc."""
         turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
         self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
 
@@ -355,6 +360,6 @@ class Cloud(Particles):
 
     def _wanted_size(self) -> int:
         """Size for the present spread; the lightest of a coarse cloud, COARSE_REST of its weight, do not count."""
-        kept = heaviest(self.weight, 1.0 - COARSE_REST) if self.is_coarse else slice(None)
-        size = kld_size(self.x_m[kept], self.y_m[kept], self.turn_rad[kept], self._settings)
+        counted = heaviest(self.weight, 1.0 - COARSE_REST) if self.is_coarse else slice(None)
+        size = kld_size(self.x_m[counted], self.y_m[counted], self.turn_rad[counted], self._settings)
         return max(size, self._least_size)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The steps of the particle filter on plain arrays: propagate, reweight by a ping, normalise, choose whom to keep.
+"""The steps of the particle filter on plain arrays: propagate, reweight by a ping, normalise, select survivors.
 
 In: `ParticleArrays`, a `Move` in the walk frame, a `PingBatch`, the walls. Out: the same arrays, changed in place. Owns nothing.
 """
@@ -18,12 +18,12 @@ from echostep.localization.particle_arrays import Move, ParticleArrays, PingBatc
 from echostep.walls.echo_sources import MOST_SOURCES, echo_sources
 from echostep.walls.index import WallIndex, crosses_wall
 
-NEGLIGIBLE = 1e-9  # weight below which no likelihood is computed, by reason: the next resampling drops such particles
+NEGLIGIBLE_WEIGHT = 1e-9  # weight below which no likelihood is computed: the next resampling drops such particles
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 0 and 1 are x and y
 
 
-class Piece(NamedTuple):
+class MovePiece(NamedTuple):
     """Chord of a piece of a move, and what of it its bend is (m, walk frame)."""
 
     dx_m: float
@@ -32,7 +32,7 @@ class Piece(NamedTuple):
     bend_y_m: float
 
 
-class Ping(NamedTuple):
+class WeightedPing(NamedTuple):
     """One ping of a `PingBatch`."""
 
     axis_rad: float
@@ -87,7 +87,7 @@ def propagate_and_reweight(
             passed += left
             done = until
         if k < len(pings.share):
-            ping = Ping(
+            ping = WeightedPing(
                 pings.axis_rad[k],
                 pings.range_m[k],
                 pings.power[k],
@@ -108,16 +108,16 @@ def propagate_and_reweight(
 
 
 @kernel
-def piece_of(move: Move, begin: float, end: float) -> Piece:
+def piece_of(move: Move, begin: float, end: float) -> MovePiece:
     """The piece of a move between two shares of it: of a parabola [`PathSegment.way_m`]."""
     part, bend = end - begin, (end - begin) * (1.0 - begin - end)
     bend_x, bend_y = bend * move.bend_x_m, bend * move.bend_y_m
-    return Piece(part * move.dx_m + bend_x, part * move.dy_m + bend_y, bend_x, bend_y)
+    return MovePiece(part * move.dx_m + bend_x, part * move.dy_m + bend_y, bend_x, bend_y)
 
 
 @lean_kernel
 def propagate(
-    particles: ParticleArrays, piece: Piece, share: float, noise: Floats, wall_cost: float, walls: WallIndex
+    particles: ParticleArrays, piece: MovePiece, share: float, noise: Floats, wall_cost: float, walls: WallIndex
 ) -> tuple[float, float]:
     """Move every particle by a piece, with this share of its noise but all of that of its bend, and make the greatest log-weight 0 again.
 
@@ -147,7 +147,7 @@ def propagate(
 
 @kernel
 def propagate_without_walls(particles: ParticleArrays, move: Move, rng: np.random.Generator) -> None:
-    """Move every particle on open ground, where there are no walls to ask."""
+    """Move every particle on open ground, without walls."""
     x, y, turn, scale, _ = particles
     for i in range(len(x)):
         turn[i] += move.turn_sd_rad * rng.standard_normal()
@@ -159,29 +159,29 @@ def propagate_without_walls(particles: ParticleArrays, move: Move, rng: np.rando
 
 @kernel
 def reweight_by_ping(
-    particles: ParticleArrays, hidden: Floats, ping: Ping, model: EchoModel, walls: WallIndex
+    particles: ParticleArrays, hidden: Floats, ping: WeightedPing, model: EchoModel, walls: WallIndex
 ) -> tuple[float, float]:
     """Add each particle's log-likelihood, and make the greatest log-weight 0.
 
-    `hidden` (n,): of this ranger, the probability that the particle's view is hidden: then the plan tells nothing. Along the path it returns to
-    `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors are alike;
-    probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, and the effective size after.
+    `hidden` (n,): of this ranger, the probability that the particle's view is hidden, so that the plan gives no information. Along the path it
+    returns to `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors
+    are alike; probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, and the effective size after.
     """
     x, y, turn, _, log_weight = particles
     distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    kept = math.exp(-ping.travel_m / model.hidden_m)
+    persists = math.exp(-ping.travel_m / model.hidden_m)
     outlier = model.outlier * (outlier_density(ping.range_m, model) + ping.missed) ** ping.power
     stray = 0.5 * (ping.alike + 1.0 / (model.maximum_m - model.minimum_m))
     top = -np.inf
     weight, evidence, total, squares = 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         w = math.exp(log_weight[i])
-        if w < NEGLIGIBLE:
+        if w < NEGLIGIBLE_WEIGHT:
             continue
         count = echo_sources(x[i], y[i], ping.axis_rad + turn[i], walls, distance_m, off_axis_rad, kind)
         density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, stray, model) + ping.missed
         planned = (1.0 - model.outlier) * math.exp(ping.power * math.log(max(density, LEAST_DENSITY))) + outlier
-        before = model.hidden + kept * (hidden[i] - model.hidden)
+        before = model.hidden + persists * (hidden[i] - model.hidden)
         by_hidden = before * ping.unplanned
         likelihood = by_hidden + (1.0 - before) * planned
         hidden[i] = by_hidden / likelihood

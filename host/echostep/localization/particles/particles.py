@@ -11,13 +11,11 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.localization.beacons.beliefs import BeaconBeliefs
 from echostep.localization.particle_arrays import ParticleArrays
-from echostep.localization.particles.places import Hypothesis, hypotheses
+from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.walls.level_sheet import LevelSheet, level_of
 
-GATHERED_M, GATHERED_REST = (
-    2.5,
-    1e-4,
-)  # a cloud has gathered when no more than this weight is further from its mean, by reason
+# A cloud is gathered when less than this weight is farther than this from its mean; assumed, the distance as of a room
+GATHERED_M, GATHERED_REST = 2.5, 1e-4
 
 
 class Particles:
@@ -74,8 +72,8 @@ class Particles:
         """Their mean."""
         return float(self.hidden_shares.mean())
 
-    def places(self, walk_heading_rad: float) -> tuple[Hypothesis, ...]:
-        """The few places where the trunk may be, the likeliest first."""
+    def places(self, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
+        """The likeliest places of the trunk, the likeliest first."""
         return hypotheses(self.map_x_m, self.y_m, self.level, self.turn_rad + walk_heading_rad, self.weight)
 
     @property

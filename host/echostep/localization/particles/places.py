@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The few places at which a cloud says that the trunk may be.
+"""The likeliest places of the trunk by a cloud.
 
-In: a cloud's places and weights. Out: `Hypothesis`, the likeliest first. Owns nothing.
+In: a cloud's places and weights. Out: `LikelyPlace`, the likeliest first. Owns nothing.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
 
-# All by reason.
+# Assumed, not measured.
 REACH_M = 2.5  # particles so near to the heaviest square are one hypothesis: a room
-MOST = 5  # hypotheses that are listed
-LEAST = 0.02  # probability of one that is listed
+MOST_PLACES = 5  # likely places that are listed
+LEAST_PROBABILITY = 0.02  # probability of one that is listed
 SQUARE_M = 1.0  # side of a square, doubled until there are at most MOST_SQUARES
 MOST_SQUARES = 1_000_000  # memory: 8 MB
 
 
 @dataclass(frozen=True, slots=True)
-class Hypothesis:
+class LikelyPlace:
     """A place in the map (m) with its level, standard deviation (m, per axis), heading (rad) and probability."""
 
     probability: float
@@ -49,18 +49,18 @@ class _Particles(NamedTuple):
     square: Ints
 
 
-def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[Hypothesis, ...]:
-    """At most MOST, from places (n,) in the map with weights that sum to 1. Each takes the particles near the heaviest square that is left."""
+def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[LikelyPlace, ...]:
+    """At most MOST_PLACES likely places of particles (n,) with weights that sum to 1; each takes those near the heaviest square that is left."""
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
     mass = np.asarray(np.bincount(particles.square, left), np.float64)
-    found: list[Hypothesis] = []
-    while len(found) < MOST:
+    places: list[LikelyPlace] = []
+    while len(places) < MOST_PLACES:
         probability, *place = _take(int(mass.argmax()), particles, left, mass)
-        if probability < LEAST:
+        if probability < LEAST_PROBABILITY:
             break
-        found.append(_hypothesis(probability, *place))
-    return tuple(sorted(found, key=lambda h: -h.probability))
+        places.append(_hypothesis(probability, *place))
+    return tuple(sorted(places, key=lambda h: -h.probability))
 
 
 def _squares(x_m: Floats, y_m: Floats, level: Ints) -> Ints:
@@ -77,52 +77,52 @@ def _squares(x_m: Floats, y_m: Floats, level: Ints) -> Ints:
 
 def _hypothesis(
     probability: float, x_m: float, y_m: float, level: float, square_m2: float, east: float, north: float
-) -> Hypothesis:
+) -> LikelyPlace:
     sd_m = math.sqrt(max(0.5 * square_m2, 0.0))
-    return Hypothesis(probability, x_m, y_m, int(level), sd_m, math.atan2(north, east))
+    return LikelyPlace(probability, x_m, y_m, int(level), sd_m, math.atan2(north, east))
 
 
 @kernel
 def _take(
     heaviest: int, particles: _Particles, left: Floats, mass: Floats
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Take the particles within REACH_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST of the weight.
+    """Take particles within REACH_M of the middle of a square out of `left` (n,) and `mass` (squares,), if they have LEAST_PROBABILITY in all.
 
     Returns their weight, mean x and y, level, mean square of the distance from there, and the mean of their unit vectors.
     """
     x, y, level, heading, square = particles
-    at_x, at_y, storey = _middle(heaviest, particles, left)
+    at_x, at_y, on_level = _middle(heaviest, particles, left)
     total, mean_x, mean_y = 0.0, 0.0, 0.0
     for i in range(len(x)):
-        if level[i] == storey and _is_near(x[i] - at_x, y[i] - at_y):
+        if level[i] == on_level and _is_near(x[i] - at_x, y[i] - at_y):
             total += left[i]
             mean_x += left[i] * x[i]
             mean_y += left[i] * y[i]
-    if total < LEAST:
-        return total, at_x, at_y, float(storey), 0.0, 0.0, 0.0
+    if total < LEAST_PROBABILITY:
+        return total, at_x, at_y, float(on_level), 0.0, 0.0, 0.0
     mean_x, mean_y = mean_x / total, mean_y / total
     spread, east, north = 0.0, 0.0, 0.0
     for i in range(len(x)):
-        if left[i] > 0.0 and level[i] == storey and _is_near(x[i] - at_x, y[i] - at_y):
+        if left[i] > 0.0 and level[i] == on_level and _is_near(x[i] - at_x, y[i] - at_y):
             spread += left[i] * ((x[i] - mean_x) ** 2 + (y[i] - mean_y) ** 2)
             east += left[i] * math.cos(heading[i])
             north += left[i] * math.sin(heading[i])
             mass[square[i]] -= left[i]
             left[i] = 0.0
-    return total, mean_x, mean_y, float(storey), spread / total, east / total, north / total
+    return total, mean_x, mean_y, float(on_level), spread / total, east / total, north / total
 
 
 @kernel
 def _middle(heaviest: int, particles: _Particles, left: Floats) -> tuple[float, float, int]:
     """Mean place and level of what is left in a square."""
-    total, x_m, y_m, storey = 0.0, 0.0, 0.0, -1
+    total, x_m, y_m, on_level = 0.0, 0.0, 0.0, -1
     for i in range(len(left)):
         if particles.square[i] == heaviest and left[i] > 0.0:
             total += left[i]
             x_m += left[i] * particles.x_m[i]
             y_m += left[i] * particles.y_m[i]
-            storey = particles.level[i]
-    return x_m / total, y_m / total, storey
+            on_level = particles.level[i]
+    return x_m / total, y_m / total, on_level
 
 
 @kernel

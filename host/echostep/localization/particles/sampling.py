@@ -13,10 +13,10 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.localization.settings import CloudSettings
 
-# Until a cloud has gathered, particles in one cell of these sizes are one mode; by reason: a doorway, a turn into a room
+# Until a cloud is gathered, particles in one cell of these sizes are one mode: a doorway, a turn into a room
 MODE_M, MODE_RAD = 2.0, math.radians(45.0)
-LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, by reason
-MOST_MODES = 1_000_000  # cells beyond which no modes are told apart: memory
+LEAST_MODE = 1e-3  # weight below which a mode's particles become fewer in proportion, assumed
+MOST_MODES = 1_000_000  # cells beyond which modes are not distinguished: memory
 KLD_QUANTILE = 2.33  # z of 99 % [Fox 2003, eq. 7]
 
 
@@ -53,5 +53,5 @@ def kld_size(x_m: Floats, y_m: Floats, turn_rad: Floats, settings: CloudSettings
 
 
 def spread_evenly(size: int, count: int) -> Ints:
-    """At most `count` of so many indices, evenly: in a cloud that has not gathered, light places have more particles than by their weight."""
+    """At most `count` of so many indices, evenly: in a cloud that is not gathered, light places have more particles than by their weight."""
     return np.unique(np.linspace(0, size - 1, count).astype(np.int64))

@@ -17,11 +17,11 @@ from echostep.walls.floor import Floor
 from echostep.walls.level_sheet import LevelSheet, level_of
 
 ANY_LEVEL = -1  # level of a start that is not known
-# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point. By reason:
-WIDE_SHARE = 0.07  # of the particles have these standard deviations beside those stated:
-WIDE_M, WIDE_RAD = 0.9, math.radians(30.0)  # a stride, a foot that is set down turned
-# Of a search, this share is drawn about where the wearer was believed: errors are mostly small. By reason:
-NEAR_SHARE, NEAR_M, NEAR_RAD = 0.6, 2.0, math.radians(20.0)
+# A stated start is sometimes wrong: a tap beside the place, a body that does not face the way the toes point
+WIDE_SHARE = 0.07  # of the particles have these standard deviations beside those stated, assumed:
+WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)  # a stride, a foot that is set down turned
+# Of a search, this share is drawn about where the wearer was believed: errors are mostly small; assumed
+NEAR_SHARE, NEAR_SD_M, NEAR_SD_RAD = 0.6, 2.0, math.radians(20.0)
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
 
 
@@ -63,8 +63,8 @@ def draw_poses(
         x, y, heading = _on_floor(_within(floor, start, sheet), count, rng)
         return (x, y, heading) if start.near is None else _drawn_near(start.near, x, y, heading, sheet, rng)
     is_wide = rng.random(count) < (WIDE_SHARE if len(floor.x_m) else 0.0)  # without walls nothing would correct it
-    sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_M), start.sd_m)
-    sd_rad = np.where(is_wide, math.hypot(start.heading_sd_rad, WIDE_RAD), start.heading_sd_rad)
+    sd_m = np.where(is_wide, math.hypot(start.sd_m, WIDE_SD_M), start.sd_m)
+    sd_rad = np.where(is_wide, math.hypot(start.heading_sd_rad, WIDE_SD_RAD), start.heading_sd_rad)
     pose, noise = start.pose, rng.standard_normal((3, count))
     x, y = pose.x_m + sd_m * noise[0], pose.y_m + sd_m * noise[1]
     heading = pose.heading_rad + sd_rad * noise[2]
@@ -87,9 +87,9 @@ def _drawn_near(
     count = near_count(len(x))
     noise = rng.standard_normal((3, count))
     east = near.x_m if sheet is None else near.x_m + _levels(near.level, count, sheet) * sheet.pitch_m
-    x[:count], y[:count] = east + NEAR_M * noise[0], near.y_m + NEAR_M * noise[1]
+    x[:count], y[:count] = east + NEAR_SD_M * noise[0], near.y_m + NEAR_SD_M * noise[1]
     if near.level != ANY_LEVEL:
-        heading[:count] = near.heading_rad + NEAR_RAD * noise[2]
+        heading[:count] = near.heading_rad + NEAR_SD_RAD * noise[2]
     return x, y, heading
 
 
@@ -101,13 +101,13 @@ def _levels(level: int, count: int, sheet: LevelSheet) -> Ints:
 def _within(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor:
     """The cells of the floor that a start without a pose allows; all of them where a room has none."""
     level = np.zeros(len(floor.x_m), np.int64) if sheet is None else level_of(floor.x_m, sheet)
-    kept = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level
+    allowed = np.ones(len(level), np.bool_) if start.level == ANY_LEVEL else level == start.level
     if start.room_m is not None:
         import shapely
 
         map_x = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
-        kept &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
-    return Floor(floor.x_m[kept], floor.y_m[kept], floor.enclosed[kept]) if kept.any() else floor
+        allowed &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
+    return Floor(floor.x_m[allowed], floor.y_m[allowed], floor.enclosed[allowed]) if allowed.any() else floor
 
 
 def _on_floor(floor: Floor, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:

@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""What meetings with other wearers do to the clouds of a filter.
+"""The update of a filter's clouds by meetings with other wearers.
 
 In: a cloud with its probability, a `Meeting`. Out: the same cloud, reweighted, and how well the meeting fits it; which meetings count. Owns the model
 and its constants, when each teammate was met, and the meetings that wait.
 
-The cloud is that of the begin of a segment, the meeting was at a moment of it, up to a stride later: `PreparedMeeting` carries the way until then,
-and each particle is weighed at the place to which it leads.
+The cloud is that at the begin of a segment, the meeting happened during it, up to a stride later: `PreparedMeeting` carries the displacement until
+then, and each particle is reweighted at its place displaced by it.
 
 If the meeting is right, the wearer stands beside the teammate: the offset is N(0, SIDE_SD_M^2) per axis after a tap, and a radio range is N(distance,
 range_sd_m^2); the teammate's own covariance is added to both. With probability `wrong` (another name was tapped, the teammate is sure of a wrong
-place, the range is a reflection) the meeting says nothing: then the teammate is anywhere on the floor.
+place, the range is a reflection) the meeting carries no information: the teammate is then uniformly distributed over the floor.
 
 The teammate's errors may be this wearer's own: both use one plan, and positions may have gone round the team in earlier meetings. The correlation is
 not known, so the two are fused by covariance intersection [Julier and Uhlmann 1997, A Non-divergent Estimation Algorithm in the Presence of Unknown
 Correlations], which is consistent for any: the inverse covariance becomes omega A + (1 - omega) B, A of the cloud, B of the meeting. Particles carry
 the prior already, so their weights are multiplied by (meeting / prior)^(1 - omega), the prior taken as a normal distribution. omega minimises the
-determinant; a cloud that knows every direction better than the meeting has omega = 1 and does not change, by a bit. A coarse cloud, which is spread
-over the building, knows nothing that could be the teammate's: there the meeting is a likelihood, and the cloud is weighed even if it fits badly.
+determinant; a cloud with more information than the meeting in every direction has omega = 1 and stays bit-identical. A coarse cloud, which is spread
+over the building, has no information that could be the teammate's: there the meeting is a likelihood, and the cloud is reweighted even if it fits
+badly.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ import msgspec
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.localization.belief import DOUBTED, Hypothetical
+from echostep.localization.belief import DOUBTED, CloudHypothesis
 from echostep.localization.estimate import LOST_M, TAIL, ellipse95
 from echostep.localization.height.levels import SAME_LEVEL_M
 from echostep.localization.particles.cloud import Cloud
@@ -38,19 +39,19 @@ from echostep.path import PathSegment
 from echostep.ports.people.check_in import MOST_SD_M, CheckIn
 from echostep.ports.people.meeting import Meeting, parse_meeting
 
-# All by reason.
+# Assumed, not measured.
 SIDE_SD_M = 0.6  # per axis, of the offset between two people side by side: an arm's length
 MOVED_M_S = 1.0  # speed at which a teammate may have gone on since the report: a walk
-WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which it tells no more than the building does
-LEAST_SD_M = 0.1  # of a radio range: what bodies and antennas add
-WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by what the teammate's tracker says
+WIDEST_M = 10.0  # 95 % radius of the wearer's place by a meeting, above which the meeting adds nothing to the plan
+RANGE_BODY_SD_M = 0.1  # of a radio range: what bodies and antennas add
+WRONG = {"tracking": 0.02, "uncertain": 0.2}  # probability that a meeting is wrong, by the teammate's status
 MOST_DOUBT = math.log(WRONG["tracking"])  # of all ranges of one teammate: then this teammate is wrong
 LEAST_WRONG = 1e-6  # probability that a range is wrong, at least, in a ratio
 LEAST_SD_OF_CLOUD_M = 0.02  # of a cloud without spread
 FARTHEST = -4.6  # log of the prior, relative to its peak, at which 99 % of a normal distribution lie inside: a far mode is no tail of it
 FITS = 0.5  # probability that the meeting is right, given the cloud, below which they contradict each other
 LEAST_FACTOR = -200.0  # log of the least weight that a meeting leaves
-# By reason: in so much of the path a wearer's own echoes, or drift, have renewed what the filter knows.
+# Path on which a wearer's own echoes, or drift, renew the filter's information
 RENEWED_M = 10.0
 CONTRADICTIONS = 2  # teammates who have to contradict a believed cloud: one of a team is at a wrong start, as simulated
 PLACE_M = 2.0  # radio range within which the teammate's place is the wearer's, as after a tap; reflections are longer, hardly ever shorter
@@ -61,7 +62,7 @@ TimedMeeting = tuple[float, Meeting]  # time (s) of a meeting, -inf where it is 
 
 
 class PreparedMeeting(Meeting, frozen=True):
-    """A meeting after a way (m, walk frame) since the moment of the cloud; `share`: one by the number of teammates who tell of one measurement."""
+    """A meeting, with the displacement (m, walk frame) since the moment of the cloud; `share`: 1 / number of meetings from one measurement."""
 
     way_x_m: float = 0.0
     way_y_m: float = 0.0
@@ -69,7 +70,7 @@ class PreparedMeeting(Meeting, frozen=True):
 
 
 def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
-    """The meeting of this time with the way since the begin of its segment; of a segment that is a guess, as it is."""
+    """The meeting at this time with the displacement since the begin of its segment; unchanged for an unobserved segment."""
     span_s = segment.t1_s - segment.t0_s
     if segment.unobserved or span_s <= 0.0:
         return meeting
@@ -79,7 +80,7 @@ def on_the_way(meeting: Meeting, segment: PathSegment, t_s: float) -> Meeting:
 
 
 def carries_position(meeting: Meeting) -> bool:
-    """Whether the teammate knows its place: its tracker does not say lost, its 95 % radius is below LOST_M, and the report is not too old."""
+    """Whether the teammate's place is known: its status is not lost, its 95 % radius is below LOST_M, and the report is not too old."""
     radius_m = ellipse95(meeting.xx_m2, meeting.xy_m2, meeting.yy_m2).major_m
     (xx, xy), (_, yy) = covariance(meeting).tolist()
     return meeting.status in WRONG and radius_m <= LOST_M and ellipse95(xx, xy, yy).major_m <= WIDEST_M
@@ -89,12 +90,12 @@ def covariance(meeting: Meeting) -> Floats:
     """Covariance (2, 2) of the wearer's place given the meeting (m2): the teammate's with heavier tails, its way since the report, the offset."""
     own = np.array([[meeting.xx_m2, meeting.xy_m2], [meeting.xy_m2, meeting.yy_m2]])
     offset_m2 = (MOVED_M_S * meeting.age_s) ** 2 + (SIDE_SD_M**2 if meeting.range_m is None else 0.0)
-    found: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
-    return found
+    total: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
+    return total
 
 
 def share_of(meeting: Meeting) -> float:
-    """The power of a meeting's likelihood: of one measurement that several teammates tell of all powers sum to 1."""
+    """The power of a meeting's likelihood: the powers of all meetings that rest on one measurement sum to 1."""
     return meeting.share if isinstance(meeting, PreparedMeeting) else 1.0
 
 
@@ -103,7 +104,7 @@ def start_at(meeting: Meeting) -> CheckIn:
     range_m = 0.0 if meeting.range_m is None else meeting.range_m
     way_m2 = meeting.way_x_m**2 + meeting.way_y_m**2 if isinstance(meeting, PreparedMeeting) else 0.0
     sd_m = math.sqrt(0.5 * (float(np.trace(covariance(meeting))) + range_m**2 + way_m2))
-    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, LEAST_SD_M), MOST_SD_M), meeting.level)
+    return CheckIn(meeting.x_m, meeting.y_m, None, min(max(sd_m, RANGE_BODY_SD_M), MOST_SD_M), meeting.level)
 
 
 def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -> Floats:
@@ -118,8 +119,8 @@ def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -
         distance = np.hypot(away[:, 0], away[:, 1])
         variance = _range_variance(meeting, away, spread)
         log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * np.log(2.0 * math.pi * variance)
-    found: Floats = log_normal + log_level
-    return found
+    log_total: Floats = log_normal + log_level
+    return log_total
 
 
 def information(meeting: Meeting, mean: Floats) -> Floats:
@@ -130,12 +131,12 @@ def information(meeting: Meeting, mean: Floats) -> Floats:
         return inverse
     away = (mean - [meeting.x_m, meeting.y_m])[None]
     along = _along(away)[0]
-    found: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
-    return found
+    along_only: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
+    return along_only
 
 
 def best_omega(own: Floats, other: Floats) -> float:
-    """The share of one's own information (2, 2) that minimises the fused determinant: det(omega A + (1 - omega) B) is a parabola."""
+    """The weight omega of the cloud's information (2, 2) that minimises the fused determinant: det(omega A + (1 - omega) B) is a parabola."""
     a, b = float(np.linalg.det(own)), float(np.linalg.det(other))
     c = float(own[0, 0] * other[1, 1] + own[1, 1] * other[0, 0] - own[0, 1] * other[1, 0] - own[1, 0] * other[0, 1])
     curvature = a - c + b
@@ -168,7 +169,7 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
     right = density / (density + wrong * anywhere)
     factor = log_met if cloud.is_coarse else _intersection(meeting, place, weight, log_met) if right >= FITS else None
-    if factor is not None:  # a gathered cloud elsewhere is left alone
+    if factor is not None:  # a cloud that is concentrated elsewhere is not changed
         factor = share_of(meeting) * factor
         factor -= factor.max()
         factor -= math.log(float(weight @ np.exp(factor)))
@@ -178,7 +179,7 @@ def weigh(cloud: Cloud, meeting: Meeting, area_m2: float) -> float:
 
 
 def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floats) -> Floats | None:
-    """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud knows every direction better."""
+    """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud has more information in every direction."""
     mean = weight @ place
     spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
     own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
@@ -187,28 +188,28 @@ def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floa
         return None
     away = place - mean
     log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
-    found: Floats = (1.0 - omega) * (log_met - log_prior)
-    return found
+    log_factor: Floats = (1.0 - omega) * (log_met - log_prior)
+    return log_factor
 
 
 def _along(away: Floats) -> Floats:
     """Unit vectors (n, 2); east where there is no direction."""
     distance = np.hypot(away[:, 0], away[:, 1])[:, None]
-    found: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
-    return found
+    unit: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
+    return unit
 
 
 def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     """Variance (n,) of a radio range, with the teammate's own along the line to each place."""
     along = _along(away)
-    found: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + LEAST_SD_M**2
-    return found
+    variance: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + RANGE_BODY_SD_M**2
+    return variance
 
 
 class MeetingEffect(StrEnum):
-    """What a meeting did.
+    """The effect of a meeting on the tracked cloud.
 
-    `used`: the cloud agrees, and was weighed; `moved`: the cloud was doubted, or others contradicted it too, and the one that is tracked now lies
+    `used`: the cloud agrees, and was reweighted; `moved`: the cloud was doubted, or others contradicted it too, and the one that is tracked now lies
     about the teammate; `contradicts`: the teammate is elsewhere, and nothing was changed; `empty`: the teammate does not know its own place;
     `repeated`: nothing is new since the last meeting with this teammate.
     """
@@ -230,7 +231,7 @@ class MeetingNews:
 
 
 class MeetingMemory:
-    """Says which meetings may count: a teammate's position counts again when the own cloud has been renewed."""
+    """Decides which meetings may count: a teammate's position counts again after RENEWED_M of the wearer's own path."""
 
     def __init__(self) -> None:
         self._path_m: dict[
@@ -251,11 +252,11 @@ class MeetingMemory:
         return MeetingEffect.REPEATED if repeated else None
 
     def forget_beacons(self) -> None:
-        """A search has begun, which no range to a beacon has weighed yet."""
+        """Reset the ranges to beacons: a search has begun, whose cloud they have not reweighted yet."""
         self._path_m = {key: m for key, m in self._path_m.items() if key[1] is None}
 
     def agree(self) -> None:
-        """A teammate agrees with the cloud: what others said against it is answered."""
+        """A teammate agrees with the cloud: earlier contradictions are cancelled."""
         self._contradicted_m.clear()
 
     def contradict(self, path_m: float) -> int:
@@ -288,7 +289,7 @@ class MeetingQueue:
         self.news: MeetingNews | None = None
         self._waiting: list[TimedMeeting] = []
 
-    def hear(self, payload: bytes, levels: int) -> Meeting | None:
+    def receive(self, payload: bytes, levels: int) -> Meeting | None:
         """The meeting in the bytes of a chunk, on a plan of so many levels; bytes that are none are counted."""
         meeting = parse_meeting(payload)
         if meeting is None or meeting.level >= levels:
@@ -307,7 +308,7 @@ class MeetingQueue:
         return ready
 
     def note(self, meeting: Meeting, effect: MeetingEffect) -> None:
-        """Count what a meeting did; a range to a teammate's beacon is no news."""
+        """Count the effect of a meeting; a range to a teammate's beacon is not reported as news."""
         if meeting.beacon is not None:
             self.counts[f"beacon {effect.value}"] += 1
             return
@@ -315,7 +316,7 @@ class MeetingQueue:
         self.news = MeetingNews(1 if self.news is None else self.news.number + 1, meeting.name, effect)
 
 
-def weigh_range(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
+def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
     """Weigh the cloud by a range to a teammate's beacon; returns the probability that the range is right, given the cloud.
 
     A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
@@ -329,6 +330,6 @@ def weigh_range(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
     return right
 
 
-def weigh_by(each: Hypothetical, meeting: Meeting, area_m2: float) -> float:
+def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
     """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud."""
     return weigh(each.cloud, meeting, area_m2) if meeting.beacon is None else weigh_range(each, meeting, area_m2)

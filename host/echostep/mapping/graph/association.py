@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Which fragments are pieces of one straight wall.
 
-In: fragments at their present places. Out: `Walls`. Owns the gates. Fragments are taken in order of the path; each joins the wall that it continues,
-or begins one. A wall that was last heard more than `KNOWN_M` of path ago is another one, unless a closure has tied both places together.
+In: fragments at their present places. Out: `FittedWalls`. Owns the gates. Each fragment, in order of the path, joins the wall that it continues,
+or begins one. A wall that was last detected more than `KNOWN_M` of path ago is another one, unless a closure has tied both places together.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ import numpy as np
 from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import inline_kernel, kernel
 from echostep.mapping.graph.fragments import Fragments
-from echostep.mapping.graph.graph import Walls
+from echostep.mapping.graph.graph import FittedWalls
 from echostep.mapping.graph.nodes import Nodes
 from echostep.mapping.graph.spots import is_spot
 
 APART_M = 0.15  # of a fragment's middle from the line of its wall: three standard deviations of either
 TURNED_RAD = math.radians(6.0)
 GAP_M = 2.0  # along the wall, between the pieces of one: wider than a door
-KNOWN_M = 15.0  # of path, over which odometry alone tells one wall from another beside it
+KNOWN_M = 15.0  # of path, over which odometry alone distinguishes a wall from another beside it
 SMALL_M = 0.5  # a shorter fragment begins no wall: a corner or an edge seems to be one
 
 
 def associate(
     nodes: Nodes, fragments: Fragments, centre_m: Floats, normal_rad: Floats, anchored: Bools, storey: Ints
-) -> Walls:
+) -> FittedWalls:
     """The walls of all fragments, each at the mean of its pieces; those of one piece too. `anchored` (f,): the place is known by a closure.
 
     `storey` (f,): a wall is on one.
@@ -47,7 +47,7 @@ def associate(
         normals.append(normal)
         rhos.append(rho)
         count += len(normal)
-    return Walls(np.concatenate([*normals, np.zeros(0)]), np.concatenate([*rhos, np.zeros(0)]), of)
+    return FittedWalls(np.concatenate([*normals, np.zeros(0)]), np.concatenate([*rhos, np.zeros(0)]), of)
 
 
 class _Placed(NamedTuple):

@@ -2,7 +2,7 @@
 """A turn that odometry adds to each metre of path, the same throughout the walk: unequal wheels, the bias of a gyroscope.
 
 In: nodes and pings. Out: the bias by the directions of the building, nodes and pings without it. Owns the search. The stated drift is a random walk,
-which does not foresee that all errors have one sign: in two logs of carmen the heading errs by 3.2 and 1.0 degrees a metre, and by 10 and 6 degrees
+which does not model that all errors have one sign: in two logs of carmen the heading errs by 3.2 and 1.0 degrees a metre, and by 10 and 6 degrees
 about that in all. A bias is believed where the walls have two directions at right angles with it and not without it.
 """
 
@@ -37,10 +37,10 @@ def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
     bias = known_rad_m
     for scale in SCALES:
         wider = replace(nodes, turn_sd_rad=max(scale, 1.0) * nodes.turn_sd_rad)
-        found = _climbed(wider, pings, bias, scale * step)
-        if found == known_rad_m:
+        candidate = _climbed(wider, pings, bias, scale * step)
+        if candidate == known_rad_m:
             break  # as of a foot
-        bias = found
+        bias = candidate
     if bias == known_rad_m:
         return known_rad_m
     gain = _evidence(nodes, pings, bias) - _evidence(nodes, pings, known_rad_m)
@@ -65,8 +65,8 @@ def _climbed(nodes: Nodes, pings: Pings, begin_rad_m: float, step: float) -> flo
 
 def _evidence(nodes: Nodes, pings: Pings, bias_rad_m: float) -> float:
     """That the walls have two directions, with this bias."""
-    turned, heard = without_bias(nodes, pings, bias_rad_m)
-    return find_directions(turned, find_fragments(turned, heard)).evidence
+    turned, turned_pings = without_bias(nodes, pings, bias_rad_m)
+    return find_directions(turned, find_fragments(turned, turned_pings)).evidence
 
 
 def without_bias(nodes: Nodes, pings: Pings, bias_rad_m: float) -> tuple[Nodes, Pings]:

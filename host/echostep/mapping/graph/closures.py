@@ -2,8 +2,9 @@
 """Loop closures: a stretch of the path is where an older one was.
 
 In: a graph solved so far. Out: `Closure`s with their odds. Owns the limits. The posterior of a shift is the graph's own uncertainty times the match
-of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure says what this posterior knows better than
-the graph, along the directions in which it does: of a corridor, its width only. It is one with the passage that heard the matched walls.
+of the stretch's fragments with all older ones, beside the hypothesis that the place is new; a closure carries the information of this posterior
+beyond the graph's, along the axes where there is any: in a corridor only across it. It ties the stretch to the passage that detected the matched
+walls.
 
 Fragments that continue each other are one piece of wall. A fragment ends after 2 m of path wherever it is: such a cut is nothing that a later passage
 could find again. A door is.
@@ -23,7 +24,7 @@ from echostep.mapping.graph.matching import Pieces, match
 GAP_M = 0.35  # along the wall, up to which it goes on: half of a door; cuts leave up to three pings, 0.25 m
 STRETCH_M = 8.0  # of path that is matched as one
 APART_M = 20.0  # of path between a stretch and what is older
-NEAR_M = 7.0  # beyond the uncertainty, in which older fragments are looked for
+SEARCHED_M = 7.0  # beyond the uncertainty, in which older fragments are looked for
 NEW = 0.5  # probability before the match that the place is new
 LEAST_LOG_ODDS = math.log(2e4)  # every place is tried twice
 SHIFTS, TURNS = 31, 5  # of the grid to either side of three standard deviations
@@ -33,7 +34,7 @@ KNOWN_SD_M = 0.15  # of a direction after the match that counts as known
 NEW_SHARE = 0.5  # of the graph's variance on an axis: what is left of it, up to which the match counts
 LEAST_OLD = 4
 LEAST_COVARIANCE = np.diag([LEAST_SD_M**2, LEAST_SD_M**2, LEAST_SD_RAD**2])
-PASSAGES = 4  # that are tried for one stretch, by reason: two of them mostly
+PASSAGES = 4  # that are tried for one stretch: two of them mostly
 
 
 def pieces(graph: Graph, which: Ints) -> Pieces:
@@ -108,16 +109,17 @@ def find_closure(graph: Graph, begin: int, end: int, until_m: float) -> Closure 
     sd = _greatest_sd_m(graph.covariance(node, nearest))
     if sd > MOST_SD_M:
         return None
-    older = older[away < NEAR_M + 3.0 * sd]
+    older = older[away < SEARCHED_M + 3.0 * sd]
     if len(older) < LEAST_OLD:
         return None
     return _closure(graph, new, older, node)
 
 
 def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
-    """The closure with the passage that heard the walls which are matched; None if it is not sure, or known on no axis.
+    """The closure with the passage that detected the matched walls; None if it is not sure, or known on no axis.
 
-    Another passage of the same place may be elsewhere in the graph, until a return ties the two: what its neighbour heard says nothing of it.
+    Another passage of the same place may be elsewhere in the graph, until a return ties the two: echoes of its neighbour carry no information about
+    it.
     """
     at = graph.pose[node, :2]
     single, ways = pieces(graph, new), stretches(graph, older)
@@ -137,7 +139,7 @@ def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
 
 
 def _said(graph: Graph, node: int, old_node: int, matched: _Matched) -> Closure | None:
-    """What the posterior of the shift says beyond the graph; None if it is known on no axis."""
+    """The information of the posterior of the shift beyond the graph's; None if there is none on any axis."""
     if (news := gained(matched.mean, matched.after, matched.before)) is None:
         return None
     shift, information = news
@@ -161,11 +163,11 @@ def _matched(single: Pieces, ways: Pieces, at: Floats, covariance: Floats) -> _M
     prior = np.exp(-0.5 * np.einsum("ni,ij,nj->n", grid, np.linalg.inv(before), grid))
     prior /= prior.sum()
     top = max(float(score.max()), 0.0)
-    found = prior * np.exp(score.ravel() - top)
-    log_odds = math.log(max(float(found.sum()), 1e-300)) + top + math.log((1.0 - NEW) / NEW)
-    found /= max(float(found.sum()), 1e-300)
-    mean = found @ grid
-    spread = (grid - mean) * np.sqrt(found)[:, None]
+    posterior = prior * np.exp(score.ravel() - top)
+    log_odds = math.log(max(float(posterior.sum()), 1e-300)) + top + math.log((1.0 - NEW) / NEW)
+    posterior /= max(float(posterior.sum()), 1e-300)
+    mean = posterior @ grid
+    spread = (grid - mean) * np.sqrt(posterior)[:, None]
     return _Matched(mean, spread.T @ spread + LEAST_COVARIANCE, before, log_odds)
 
 
@@ -176,8 +178,8 @@ def _explaining(graph: Graph, single: Pieces, older: Ints, at: Floats, shift: Fl
     passages = np.split(older[order], np.flatnonzero(np.diff(way_m[order]) > STRETCH_M) + 1)
     moved = single._replace(x_m=single.x_m + shift[0], y_m=single.y_m + shift[1])
     here, turned = np.zeros(1), shift[2:]
-    found = [float(match(moved, stretches(graph, p), at + shift[:2], here, turned)[0, 0, 0]) for p in passages]
-    return passages[int(np.argmax(found))]
+    scores = [float(match(moved, stretches(graph, p), at + shift[:2], here, turned)[0, 0, 0]) for p in passages]
+    return passages[int(np.argmax(scores))]
 
 
 def _nearest(graph: Graph, which: Ints, at: Floats) -> int:
@@ -187,10 +189,11 @@ def _nearest(graph: Graph, which: Ints, at: Floats) -> int:
 
 
 def gained(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats] | None:
-    """What a match alone says of a shift, if the prior (zero, `before`) became the posterior (`mean`, `after`) by it.
+    """The information of a match alone, given the prior (zero, `before`) and the posterior (`mean`, `after`) of a shift.
 
     Shift (3,) and information (3, 3), of x, y (m) and heading; None where the posterior is known on no axis. The informations of posterior and
-    prior differ by that of the match, whose shift is so much farther from zero. Where little differs the match is silent: it confirms the graph.
+    prior differ by that of the match, whose shift is so much farther from zero. Where they differ little the match adds nothing: it confirms the
+    graph.
     """
     root = np.linalg.cholesky(before[:2, :2])
     white = np.linalg.inv(root)

@@ -2,8 +2,8 @@
 """Which fragments may be echoes of people beside the wearer, at the same pace.
 
 In: nodes and fragments. Out: the prior probability of that for each fragment, and the density of its direction if so; the course of the path. Owns
-the share of people. Such echoes seem a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a hall,
-these pieces agree with each other like a wall.
+the share of people. Such echoes resemble a piece of wall along the path, whichever way that leads: on a way that is walked again and again across a
+hall, these pieces agree with each other like a wall.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from echostep.arrays import Floats
 from echostep.mapping.graph.fragments import Fragments
 from echostep.mapping.graph.nodes import Nodes
 
-PEOPLE = 0.05  # share of the path with echoes of a person beside a ranger, by reason
-MOST_PEOPLE = 0.8  # of what is heard in the barest hall: there are columns too; by reason
-ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from that of the path; by reason
-NEAR_M = 10.0  # of path to either side of a fragment, over which it is counted how much is heard
+PEOPLE = 0.05  # share of the path with echoes of a person beside a ranger, assumed
+MOST_PEOPLE = 0.8  # of the echoes in the barest hall: there are columns too
+ALONG_SD_RAD = math.radians(5.0)  # of such a fragment's direction from that of the path, assumed
+COUNTED_M = 10.0  # of path to either side of a fragment, over which echoes are counted
 LEAST_HALF_M = 0.3  # of path to either side of a fragment's middle, at least, over which its direction is taken
 
 
@@ -28,8 +28,8 @@ def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
     way_m = nodes.way_m[fragments.node]
     order = np.argsort(way_m, kind="stable")
     heard_m = np.concatenate([[0.0], np.cumsum(2.0 * fragments.half_m[order])])
-    low, high = (np.searchsorted(way_m[order], way_m + side * NEAR_M) for side in (-1.0, 1.0))
-    path_m = np.minimum(way_m + NEAR_M, nodes.way_m[-1]) - np.maximum(way_m - NEAR_M, 0.0)
+    low, high = (np.searchsorted(way_m[order], way_m + side * COUNTED_M) for side in (-1.0, 1.0))
+    path_m = np.minimum(way_m + COUNTED_M, nodes.way_m[-1]) - np.maximum(way_m - COUNTED_M, 0.0)
     share: Floats = np.minimum(PEOPLE * 2.0 * path_m / (heard_m[high] - heard_m[low]), MOST_PEOPLE)
     return share
 

@@ -4,7 +4,7 @@
 In: nodes and fragments. Out: `Directions`. Owns the filter. A fragment has a direction of the building, or any; or its echoes are of a person, and
 it has that of the path. The one state is the direction of the building against the heading by odometry, modulo a right angle: at first it may be
 any, then it diffuses as the heading drifts. Its distribution is kept on a circle of cells, forward and backward along the path [Rabiner 1989], so
-that a few walls askew, heard first, decide nothing. The evidence is the likelihood of all fragments against walls of any direction.
+that a few walls askew at the beginning do not decide. The evidence is the likelihood of all fragments against walls of any direction.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from echostep.mapping.graph.fragments import Fragments
 from echostep.mapping.graph.nodes import Nodes
 
 RIGHT_RAD = 0.5 * math.pi
-ALIGNED = 0.7  # share of fragments along the building's directions, at first; by reason
-DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction [by reason: 6 cm on 5 m]
+ALIGNED = 0.7  # share of fragments along the building's directions, at first, assumed
+DIRECTION_SD_RAD = math.radians(0.7)  # of a wall from the building's direction (6 cm on 5 m)
 LEAST_EVIDENCE = math.log(1000.0)  # odds from which the building is thought to have such directions
 CELLS = 180  # of a right angle, half a degree each: less than DIRECTION_SD_RAD
 CELL_RAD = RIGHT_RAD / CELLS

@@ -21,7 +21,7 @@ LEAST, MISSES = 4, 3  # pings that begin a piece; pings in a row off the line th
 GATE_M = 0.12  # of a ping from the line: three standard deviations of range and sway
 LONGEST_M = 2.0  # of path along one piece, so that the path's own error within it is negligible
 SHORTEST_M = 0.35  # of path: below, the direction of the wall is not known
-FARTHEST_M = 5.0  # range: beyond, two walls are heard by turns
+FARTHEST_M = 5.0  # range: beyond, echoes alternate between two walls
 CONE_RAD = math.radians(30.0)  # half of the ranger's cone, and the heading's own error
 SD_M, SD_RAD = 0.04, math.radians(1.0)  # least standard deviations: sway of the trunk, bias of a ranger
 RANGE_SD_M = 0.04
@@ -54,9 +54,9 @@ def find_fragments(nodes: Nodes, pings: Pings) -> Fragments:
     for ranger in (0, 1):
         own = np.flatnonzero((pings.ranger == ranger) & (pings.range_m < FARTHEST_M))
         way_m = nodes.way_m[pings.node[own]]
-        found, of_ping = _runs(pings.at_m[own], pings.axis_rad[own], pings.range_m[own], way_m)
+        ranger_rows, of_ping = _runs(pings.at_m[own], pings.axis_rad[own], pings.range_m[own], way_m)
         owner[own[of_ping >= 0]] = of_ping[of_ping >= 0] + sum(len(r) for r in rows)
-        rows.append(found)
+        rows.append(ranger_rows)
     table = np.concatenate(rows)
     middle, node = table[:, 0:2], nearest_nodes(pings, owner, len(table))
     pose = nodes.pose[node]
@@ -80,8 +80,8 @@ def nearest_nodes(pings: Pings, owner: Ints, count: int) -> Ints:
     order = np.argsort(owner, kind="stable")
     first, end = (np.searchsorted(owner[order], np.arange(count), side) for side in ("left", "right"))
     k = order[first + (end - first) // 2]
-    found: Ints = pings.node[k] + (pings.share[k] > 0.5)
-    return found
+    nearest: Ints = pings.node[k] + (pings.share[k] > 0.5)
+    return nearest
 
 
 @kernel
@@ -90,7 +90,7 @@ def _runs(at: Floats, axis: Floats, range_m: Floats, way: Floats) -> tuple[Float
     n = len(range_m)
     rows, of_ping = np.zeros((n // LEAST + 1, 7)), np.full(n, -1, np.int64)
     member = np.zeros(n, np.int64)
-    found, begin = 0, 0
+    row_count, begin = 0, 0
     while begin + LEAST <= n:
         for k in range(LEAST):
             member[k] = begin + k
@@ -113,14 +113,14 @@ def _runs(at: Floats, axis: Floats, range_m: Floats, way: Floats) -> tuple[Float
             k += 1
         row = _row(at, axis, member[:count], fit)
         if row[3] >= 0.5 * SHORTEST_M and row[4] < GATE_M:
-            rows[found] = row
+            rows[row_count] = row
             for j in range(count):
-                of_ping[member[j]] = found
-            found += 1
+                of_ping[member[j]] = row_count
+            row_count += 1
             begin = next_begin
         else:
             begin += 1
-    return rows[:found], of_ping
+    return rows[:row_count], of_ping
 
 
 @kernel

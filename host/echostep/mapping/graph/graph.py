@@ -23,16 +23,15 @@ from echostep.mapping.graph.nodes import Nodes
 from echostep.mapping.graph.storeys import Storeys
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
-ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within:
-APART_M, TURNED_RAD = 0.5, math.radians(20.0)  # by reason
+ONE_WALL = 0.8  # share of fragments that are of the wall they lie on, at first; others, as furniture before it, lie anywhere within
+APART_M, TURNED_RAD = 0.5, math.radians(20.0)  # this distance and turn, assumed
 START_SD_M, START_SD_RAD = 0.001, 0.0005  # the first node is the origin
-FREE_SD_RAD = math.radians(
-    30.0
-)  # of its heading where the building's directions hold the map: until a wall is heard it is not known against them
+# Of its heading where the building's directions hold the map: until a wall is detected it is not known against them
+FREE_SD_RAD = math.radians(30.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Walls:
+class FittedWalls:
     """Straight walls: `normal_rad` (w,) from the path to the wall, `rho_m` (w,): normal times any of its points; `of` (f,): wall of each
     fragment, -1: none.
     """
@@ -46,7 +45,7 @@ class Walls:
 class Closure:
     """Node `new` is where it was believed relative to node `old`, corrected by `shift` (3,): x, y (m), heading; `information` (3, 3) of it.
 
-    `between` (3,): pose of `new` less pose of `old` (map axes) that the closure says. `log_odds` of being right.
+    `between` (3,): pose of `new` less pose of `old` (map axes) by the closure. `log_odds` of being right.
     """
 
     old: int
@@ -66,7 +65,7 @@ class Graph:
     nodes: Nodes
     fragments: Fragments
     pose: Floats
-    walls: Walls
+    walls: FittedWalls
     closures: list[Closure] = field(default_factory=list)
     base_rad: float | None = None
     factor: SuperLU | None = None
@@ -85,7 +84,7 @@ class Graph:
             count = 3 * len(self.nodes)
             self.pose = self.pose + step[:count].reshape(-1, 3)
             w = step[count:].reshape(-1, 2)
-            self.walls = Walls(self.walls.normal_rad + w[:, 0], self.walls.rho_m + w[:, 1], self.walls.of)
+            self.walls = FittedWalls(self.walls.normal_rad + w[:, 0], self.walls.rho_m + w[:, 1], self.walls.of)
             if float(np.abs(step).max(initial=0.0)) < 1e-3:
                 break
 
@@ -106,8 +105,8 @@ class Graph:
         for k in range(3):
             right[3 * new + k, k] += 1.0
             right[3 * old + k, k] -= 1.0
-        found = self.factor.solve(right)
-        covariance: Floats = found[3 * new : 3 * new + 3] - found[3 * old : 3 * old + 3]
+        columns = self.factor.solve(right)
+        covariance: Floats = columns[3 * new : 3 * new + 3] - columns[3 * old : 3 * old + 3]
         return 0.5 * (covariance + covariance.T)
 
     def storey_of(self, node: Ints) -> Ints:

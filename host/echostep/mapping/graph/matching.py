@@ -2,7 +2,7 @@
 """How well a stretch of fragments fits older ones when it is moved and turned a little: log-likelihood ratio against a place never seen.
 
 In: fragments in the map, a grid of shifts. Out: log-ratios. Owns the model. A fragment that lies on an older one seen from the same side is explained
-by it; one in the space that an older echo found free is contradicted; one where nothing was seen says nothing.
+by it; one in the space that an older echo found free is contradicted; one where nothing was seen is no evidence.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from echostep.jit import inline_kernel, kernel
 OFF_SD_M, OFF_SD_RAD = 0.07, math.radians(2.5)  # of two fragments of one wall, each bent by its own stretch of path
 CHANCE_M, CHANCE_RAD = 1.5, math.radians(45.0)  # half widths within which a fragment of another wall would lie anywhere
 OUTLIER = 0.1  # share of fragments that no older wall explains where it should
-FREE_RATIO = math.log(0.15)  # of a fragment in space that was free: furniture and people come and go
+FREE_RATIO = math.log(0.15)  # of a fragment in space that was free: furniture and persons move
 FREE_M = 0.35  # a fragment so far before an older wall lies in free space
 LEAST_HALF_M = 0.05  # length of a fragment seen from its end, by which shares are formed
 POWER = 0.5  # of each metre of fragment: errors of a stretch are shared
@@ -35,8 +35,8 @@ class Pieces(NamedTuple):
     range_m: Floats
 
 
-class Piece(NamedTuple):
-    """One fragment in the map."""
+class PlacedFragment(NamedTuple):
+    """One fragment of `Pieces`."""
 
     x_m: float
     y_m: float
@@ -59,7 +59,7 @@ def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: 
             c, s = math.cos(turns_rad[k]), math.sin(turns_rad[k])
             dx, dy = new.x_m[i] - pivot[0], new.y_m[i] - pivot[1]
             x, y = pivot[0] + c * dx - s * dy, pivot[1] + s * dx + c * dy
-            piece = Piece(x, y, new.normal_rad[i] + turns_rad[k], new.half_m[i], new.sd_rad[i])
+            piece = PlacedFragment(x, y, new.normal_rad[i] + turns_rad[k], new.half_m[i], new.sd_rad[i])
             fits[:], free[:] = 0.0, 0.0
             for j in range(len(old.x_m)):
                 _add_older(fits, free, piece, old, j, shifts_m)
@@ -70,8 +70,8 @@ def match(new: Pieces, old: Pieces, pivot: Floats, shifts_m: Floats, turns_rad: 
 
 
 @kernel
-def _add_older(fits: Floats, free: Floats, piece: Piece, old: Pieces, j: int, shifts_m: Floats) -> None:
-    """Raise `fits` and lower `free` (shifts, shifts) by what the older fragment j says of a fragment at each shift."""
+def _add_older(fits: Floats, free: Floats, piece: PlacedFragment, old: Pieces, j: int, shifts_m: Floats) -> None:
+    """Raise `fits` and lower `free` (shifts, shifts) by the evidence of the older fragment j for a fragment at each shift."""
     n, old_half = len(shifts_m), old.half_m[j]
     ex, ey = piece.x_m - old.x_m[j], piece.y_m - old.y_m[j]
     reach = piece.half_m + old_half + max(old.range_m[j], CHANCE_M) + 1.5 * shifts_m[n - 1]

@@ -97,6 +97,6 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
 
 
 def _turn_growth(segment: PathSegment) -> float:
-    """What the heading's error grows by, beside what the segment states, per square root of a metre: less where the belt told of its turn."""
+    """Growth of the heading's error per square root of a metre, beyond that stated by the segment: less where the belt measured its turn."""
     held = segment.belt is not None and segment.turn_sd_rad < segment.belt.foot_turn_sd_rad
     return HELD_TURN_SD_RAD if held else TURN_SD_RAD

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Places of walls that are heard while the trunk turns on the spot: at the end of a room, where no ranger is ever carried along the wall.
+"""Places of walls that are detected while the trunk turns on the spot: at the end of a room, where no ranger is ever carried along the wall.
 
 In: pings of no fragment, the directions of the building. Out: fragments of one spot each. Owns the limits. From one place a wall, a corner and an
 edge sound alike: the range is the same while the axis sweeps over them, and the middle of that sweep is where they are [Kuc and Siegel 1987]. A
@@ -22,19 +22,17 @@ LEAST, MISSED = 5, 1  # pings of a ranger, and how many may be none of the spot 
 SWEEP_RAD = math.radians(25.0)  # of the axis, with the same range: half of the cone
 FITS_M = 0.08  # of a range from the mean: three standard deviations
 SPOT_M = 0.15  # from the first ping to the last: the trunk moves over the feet
-ACROSS_RAD = math.radians(
-    20.0
-)  # of the middle of the sweep from a direction of the building; also its standard deviation: it turns nothing
-CORNER = (
-    ACROSS_RAD**2 / 6.0
-)  # of the range: mean of 1 - cos, by which a corner within ACROSS_RAD is farther than its wall
+# Of the middle of the sweep from a direction of the building; also its standard deviation: it turns nothing
+ACROSS_RAD = math.radians(20.0)
+# Of the range: mean of 1 - cos, by which a corner within ACROSS_RAD is farther than its wall
+CORNER = ACROSS_RAD**2 / 6.0
 SPOT_HALF_M = 0.1  # half the width that reflects: the first Fresnel zone at 2.5 m, sqrt(wavelength * range / 2), wavelength 8.6 mm
 
 
 def is_spot(half_m: Floats) -> Bools:
     """Which fragments of these half lengths (f,) are spots: all others are longer."""
-    found: Bools = half_m <= SPOT_HALF_M
-    return found
+    short: Bools = half_m <= SPOT_HALF_M
+    return short
 
 
 def with_spots(nodes: Nodes, pings: Pings, fragments: Fragments, directions: Directions) -> Fragments:
@@ -45,10 +43,10 @@ def with_spots(nodes: Nodes, pings: Pings, fragments: Fragments, directions: Dir
     node = nearest_nodes(pings, of_ping, len(spots))
     direction = directions.base_rad - directions.drift_rad[node]
     off = (spots[:, 2] - direction + 0.5 * RIGHT_RAD) % RIGHT_RAD - 0.5 * RIGHT_RAD
-    kept, first = np.abs(off) < ACROSS_RAD, len(fragments.node)
-    number = np.append(np.where(kept, first + np.cumsum(kept) - 1, -1), -1)
-    found = _on_walls(nodes, node[kept], spots[kept], (spots[:, 2] - off)[kept])
-    columns = [np.concatenate([a, b]) for a, b in zip(fragments[:-1], found, strict=True)]
+    across, first = np.abs(off) < ACROSS_RAD, len(fragments.node)
+    number = np.append(np.where(across, first + np.cumsum(across) - 1, -1), -1)
+    on_walls = _on_walls(nodes, node[across], spots[across], (spots[:, 2] - off)[across])
+    columns = [np.concatenate([a, b]) for a, b in zip(fragments[:-1], on_walls, strict=True)]
     return Fragments(*[*columns, np.where(of_ping < 0, fragments.ping, number[of_ping])])
 
 
@@ -81,10 +79,10 @@ def _both_rangers(pings: Pings, free: Bools) -> tuple[Floats, Ints]:
         every = np.flatnonzero(pings.ranger == ranger)
         own = np.flatnonzero(free[every] & (pings.range_m[every] < FARTHEST_M))
         which = every[own]
-        found, of = _spots(pings.at_m[which], pings.axis_rad[which], pings.range_m[which], own)
+        ranger_rows, of = _spots(pings.at_m[which], pings.axis_rad[which], pings.range_m[which], own)
         of_ping[which] = np.where(of < 0, -1, of + count)
-        rows.append(found)
-        count += len(found)
+        rows.append(ranger_rows)
+        count += len(ranger_rows)
     return np.concatenate(rows), of_ping
 
 
@@ -96,7 +94,7 @@ def _spots(at: Floats, axis: Floats, range_m: Floats, number: Ints) -> tuple[Flo
     """
     n = len(range_m)
     rows, of_ping = np.zeros((n // LEAST + 1, 5)), np.full(n, -1, np.int64)
-    found, begin = 0, 0
+    row_count, begin = 0, 0
     while begin + LEAST <= n:
         total, end = range_m[begin], begin + 1
         while (
@@ -109,11 +107,11 @@ def _spots(at: Floats, axis: Floats, range_m: Floats, number: Ints) -> tuple[Flo
             end += 1
         low, high, count = axis[begin:end].min(), axis[begin:end].max(), end - begin
         if count >= LEAST and high - low > SWEEP_RAD:
-            rows[found, 0], rows[found, 1] = at[begin:end, 0].mean(), at[begin:end, 1].mean()
-            rows[found, 2], rows[found, 3], rows[found, 4] = 0.5 * (low + high), total / count, count
-            of_ping[begin:end] = found
-            found += 1
+            rows[row_count, 0], rows[row_count, 1] = at[begin:end, 0].mean(), at[begin:end, 1].mean()
+            rows[row_count, 2], rows[row_count, 3], rows[row_count, 4] = 0.5 * (low + high), total / count, count
+            of_ping[begin:end] = row_count
+            row_count += 1
             begin = end
         else:
             begin += 1
-    return rows[:found], of_ping
+    return rows[:row_count], of_ping

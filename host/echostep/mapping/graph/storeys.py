@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The storeys of a walk: level stretches of path, told apart by what the foot climbed between them.
+"""The storeys of a walk: level stretches of path, separated by the climb of the foot between them.
 
 In: measured segments, nodes. Out: `Storeys`. Owns the limits. From one stretch to the next the foot's rise is exact to centimetres; a storey that is
 entered again gets its height of before, so its errors do not add up over a walk. Pressure counts only where no foot is worn.
@@ -18,19 +18,19 @@ from echostep.arrays import Floats, Ints, spans
 from echostep.mapping.graph.nodes import Nodes
 from echostep.path import MeasuredSegment
 
-# By reason:
+# Assumed, not measured.
 WINDOW_M = 2.5  # of path to either side of a node: longer than the landing between two flights
 FLAT_M = 0.5  # of rise in both windows, from which it is no level ground: steeper than a wheelchair's ramp (8 %)
 STRETCH_M = 4.0  # of level path that is a storey; a shorter one is a landing
 APART_M = 1.5  # between two storeys, at least: half a storey
 SILL_M = 0.25  # of rise from the last level place, up to which a node still belongs to it: one step
 PRESSURE_S = 10.0  # over which heights by pressure are averaged by their median, where no foot is worn
-STAIRS = -1
+BETWEEN = -1  # storey of a node on stairs
 
 
 @dataclass(frozen=True, slots=True)
 class Storeys:
-    """`of` (n,): storey of each node, STAIRS between two; `height_m` (s,) of each above the first node's, ascending."""
+    """`of` (n,): storey of each node, BETWEEN on stairs; `height_m` (s,) of each above the first node's, ascending."""
 
     of: Ints
     height_m: Floats
@@ -38,17 +38,17 @@ class Storeys:
     @property
     def stairs(self) -> list[tuple[int, int]]:
         """The last node on a storey and the first one on another, of each way between them."""
-        level = np.flatnonzero(self.of != STAIRS)
+        level = np.flatnonzero(self.of != BETWEEN)
         changed = np.flatnonzero(np.diff(self.of[level]))
         return [(int(level[k]), int(level[k + 1])) for k in changed]
 
     @property
     def with_flights(self) -> Ints:
         """The storey of each node (n,); each way over stairs is one of its own, numbered after the storeys."""
-        found = self.of.copy()
-        for k, (first, end) in enumerate(spans(self.of == STAIRS).tolist(), len(self.height_m)):
-            found[first:end] = k
-        return found
+        storey = self.of.copy()
+        for k, (first, end) in enumerate(spans(self.of == BETWEEN).tolist(), len(self.height_m)):
+            storey[first:end] = k
+        return storey
 
 
 def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys | None:
@@ -74,7 +74,7 @@ def find_storeys(segments: Sequence[MeasuredSegment], nodes: Nodes) -> Storeys |
         return None
     order = np.argsort(heights)
     rank = np.argsort(order)
-    of = np.full(len(way), STAIRS)
+    of = np.full(len(way), BETWEEN)
     for (first, end), storey in zip(stretches, which, strict=True):
         low, high = _widened(climb, first, end)
         of[low:high] = rank[storey]
@@ -99,7 +99,7 @@ def _widened(climb: Floats, first: int, end: int) -> tuple[int, int]:
 
 def _filled(of: Ints) -> Ints:
     """Nodes between two stretches of one storey, as over a few steps up and down, belong to it."""
-    level = np.flatnonzero(of != STAIRS)
+    level = np.flatnonzero(of != BETWEEN)
     for a, b in zip(level[:-1], level[1:], strict=True):
         if of[a] == of[b]:
             of[a:b] = of[a]
@@ -112,10 +112,10 @@ def _climb(segments: Sequence[MeasuredSegment]) -> tuple[Floats, Floats]:
     if any(math.isfinite(m.segment.rise_sd_m) for m in segments):
         rise = [m.segment.rise_m if math.isfinite(m.segment.rise_sd_m) else 0.0 for m in segments]
         return t_s, np.concatenate([[0.0], np.cumsum(rise)])
-    heard = [(m.segment.t1_s, median(m.height_m.tolist())) for m in segments if len(m.height_m)]
-    if not heard:
+    measured = [(m.segment.t1_s, median(m.height_m.tolist())) for m in segments if len(m.height_m)]
+    if not measured:
         return t_s, np.zeros(len(t_s))
-    times, heights = np.array(heard).T
+    times, heights = np.array(measured).T
     low, high = (np.searchsorted(times, times + side * 0.5 * PRESSURE_S) for side in (-1.0, 1.0))
     smooth = np.array([np.median(heights[a:b]) for a, b in zip(low, np.maximum(high, low + 1), strict=True)])
     return times, smooth - smooth[0]

@@ -23,10 +23,8 @@ from echostep.mapping.walls.lines import Lines
 from echostep.plan.model import Level
 
 SMOOTH_M = 0.4  # of wall, over which pings are counted together
-LEAST_PASSED, PASSED_ODDS = (
-    4.0,
-    2.0,
-)  # pings through a place of a wall, and how many for each that heard it, that make it doubtful
+# Pings through a place of a wall, and how many for each that detected it, that make it doubtful
+LEAST_PASSED, PASSED_ODDS = 4.0, 2.0
 LEAST_DOUBTFUL_M, LEAST_NEW_M = 0.6, 0.6  # of a piece
 KNOWN_M = 0.3  # a drawn wall so near to one of the plan is that wall
 SAMPLE_M = 0.05
@@ -43,16 +41,16 @@ class Completed(NamedTuple):
 def complete(level: Level, graph: Graph, pings: Pings, drawing: Drawing) -> Completed:
     """The level, corrected."""
     cells = _counts(level.walls, graph, pings)
-    kept, doubtful = [np.zeros((0, 4))], [level.doubtful]
+    standing, doubtful = [np.zeros((0, 4))], [level.doubtful]
     for k, wall in enumerate(level.walls):
         there, gone = _split(wall, _passed(cells, k, float(np.hypot(*(wall[2:] - wall[:2])))))
-        kept.append(there)
+        standing.append(there)
         doubtful.append(gone)
-    found = _unknown(drawing.walls, np.concatenate([*kept, level.windows, level.solid[len(level.walls) :]]))
+    new_walls = _unknown(drawing.walls, np.concatenate([*standing, level.windows, level.solid[len(level.walls) :]]))
     gone = np.concatenate(doubtful)
-    walls = np.round(np.concatenate([*kept, found]), 3)
+    walls = np.round(np.concatenate([*standing, new_walls]), 3)
     completed = replace(level, walls=walls, doubtful=np.round(gone, 3))
-    return Completed(completed, _length_m(found), _length_m(gone) - _length_m(level.doubtful))
+    return Completed(completed, _length_m(new_walls), _length_m(gone) - _length_m(level.doubtful))
 
 
 def _counts(walls: Floats, graph: Graph, pings: Pings) -> Cells:
@@ -79,9 +77,9 @@ def _passed(cells: Cells, k: int, length_m: float) -> Bools:
     """Which cells of wall k, from its first end on, are doubtful."""
     first, count = round(MARGIN_M / CELL_M), max(1, round(length_m / CELL_M))
     window = np.ones(round(SMOOTH_M / CELL_M))
-    heard, passed = (np.convolve(c[k], window, "same")[first : first + count] for c in (cells.heard, cells.passed))
-    found: Bools = (passed >= LEAST_PASSED) & (passed > PASSED_ODDS * heard)
-    return found
+    answered, passed = (np.convolve(c[k], window, "same")[first : first + count] for c in (cells.heard, cells.passed))
+    doubtful: Bools = (passed >= LEAST_PASSED) & (passed > PASSED_ODDS * answered)
+    return doubtful
 
 
 def _split(wall: Floats, gone: Bools) -> tuple[Floats, Floats]:

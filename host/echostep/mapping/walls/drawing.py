@@ -21,8 +21,8 @@ from echostep.mapping.walls.lines import Lines, find_lines, joined
 from echostep.mapping.walls.segments import ACROSS, ANY, ASKEW, Run, find_runs, meets, segments_of
 from echostep.mapping.walls.wall_sd import wall_sds
 
-# Of wall on one line, at least; shorter ones must be heard again, or be across the path. One passer-by in 15, in 70, goes along for longer, when one
-# second is the mean
+# Of wall on one line, at least; shorter ones must be detected again, or be across the path. One passer-by in 15, in 70, goes along for longer, when
+# one second is the mean
 LONE_M, LONE_ASKEW_M = 2.5, 6.0
 PASSAGE_M = 5.0  # of path, between two passages
 ALONG_RAD = 2.0 * ALONG_SD_RAD  # of a piece from the course of the path, within which a person may have gone along
@@ -44,15 +44,15 @@ def draw(graph: Graph, pings: Pings) -> tuple[Drawing, ...]:
     storeys = graph.storeys
     if storeys is None:
         return (_drawn(graph, pings, graph.paths()),)
-    found = []
+    walls = []
     for k in range(len(storeys.height_m)):
         on = storeys.of == k
         of = np.where(on[graph.fragments.node], graph.walls.of, -1)
         own = on[pings.node]
         paths = tuple(piece for path in graph.paths() for piece in pieces_on(path, on))
         part = replace(graph, walls=replace(graph.walls, of=of))
-        found.append(_drawn(part, Pings(*(getattr(pings, f.name)[own] for f in fields(pings))), paths))
-    return tuple(found)
+        walls.append(_drawn(part, Pings(*(getattr(pings, f.name)[own] for f in fields(pings))), paths))
+    return tuple(walls)
 
 
 def pieces_on(path: Floats, on: Bools) -> list[Floats]:
@@ -72,25 +72,25 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     """The walls that these pings show, beside these paths."""
     poses = ping_poses(graph, pings)
     way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
-    heard = _Heard(poses, way_m, course_of(graph.pose, graph.nodes.way_m, way_m))
+    placed_pings = _Heard(poses, way_m, course_of(graph.pose, graph.nodes.way_m, way_m))
     lines = find_lines(graph)
     free = np.ones(len(poses), np.bool_)
     aligned = lines.aligned if lines.aligned.any() else np.ones(len(lines.rho_m), np.bool_)
     straight = _selected(lines, aligned)
     cells = cell_counts(straight, poses, pings.range_m, free, ahead)
     add_crossings(straight, paths, cells)
-    found = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
-    runs = _without_lone(found, straight, LONE_M, heard, cells.of)
+    candidates = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
+    runs = _without_lone(candidates, straight, LONE_M, placed_pings, cells.of)
     if not aligned.all():
         walls = segments_of(straight, runs, cells)
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
         more = cell_counts(askew, poses, pings.range_m, free, ahead)
         add_crossings(askew, paths, more)
-        found = _without_lone(find_runs(more, ASKEW), askew, LONE_ASKEW_M, heard, more.of)
-        kept = sorted({run.line for run in found})
-        both = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), kept)))
-        runs += [run._replace(line=len(straight.rho_m) + kept.index(run.line)) for run in found]
+        candidates = _without_lone(find_runs(more, ASKEW), askew, LONE_ASKEW_M, placed_pings, more.of)
+        with_runs = sorted({run.line for run in candidates})
+        both = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), with_runs)))
+        runs += [run._replace(line=len(straight.rho_m) + with_runs.index(run.line)) for run in candidates]
         cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
         add_crossings(both, paths, cells)
         straight = both
@@ -111,7 +111,7 @@ def _without_lone(runs: list[Run], lines: Lines, least_m: float, heard: _Heard, 
 
 
 def _is_of_a_person(run: Run, lines: Lines, heard: _Heard, of: Ints) -> bool:
-    """Whether a piece may be one: heard in one passage, and along the path or along no direction of the building."""
+    """Whether a piece may be of a person: detected in one passage, and along the path or along no direction of the building."""
     normal = lines.normal_rad[run.line]
     along = math.cos(normal) * heard.poses[:, 1] - math.sin(normal) * heard.poses[:, 0]
     own = np.flatnonzero((of == run.line) & (along >= run.low_m) & (along <= run.high_m))

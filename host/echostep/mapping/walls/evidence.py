@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where along its line a wall stands: cells that echoes came from, and cells through which a ranger heard something farther.
+"""Where along its line a wall stands: cells that echoes came from, and cells through which a ranger detected something farther.
 
 In: lines, pings at their corrected places. Out: counts by line and cell. Owns the sensor's inverse model: a smooth wall answers from the foot of the
-perpendicular, so one ping says something about one cell of each line within its cone.
+perpendicular, so one ping is evidence about one cell of each line within its cone.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
 FITS_M = 0.1  # of a range from the distance of the line
 BEYOND_M = 0.18  # a range longer by more than so much passed through the cell
 HALF_CONE_RAD = math.radians(27.5)
-NEAR_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
+BEYOND_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
 HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least so wide; weight of that against pings
 CORNER_M = 0.15  # of a range from the distance of a corner
 TURNING_RAD = math.radians(15.0)  # turn of a stride
@@ -58,8 +58,8 @@ def is_straight(graph: Graph, pings: Pings) -> Bools:
     """Pings (k,) on a stride that turns little: in between two nodes the heading is interpolated."""
     after = np.minimum(pings.node + 1, len(graph.pose) - 1)
     turn = wrap(graph.pose[after, 2] - graph.pose[pings.node, 2])
-    found: Bools = np.abs(turn) < TURNING_RAD
-    return found
+    straight: Bools = np.abs(turn) < TURNING_RAD
+    return straight
 
 
 def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: Bools) -> Cells:
@@ -69,10 +69,10 @@ def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, strai
     """
     first = lines.low_m - MARGIN_M
     count = np.ceil((lines.high_m - lines.low_m + 2.0 * MARGIN_M) / CELL_M).astype(np.int64)
-    heard, passed = np.zeros((2, len(count), int(count.max(initial=1))))
+    answered, passed = np.zeros((2, len(count), int(count.max(initial=1))))
     of = np.full(len(range_m), -1, np.int64)
-    _count(lines, poses, range_m, free, straight, Cells(heard, passed, first, count, of))
-    return Cells(heard, passed, first, count, of)
+    _count(lines, poses, range_m, free, straight, Cells(answered, passed, first, count, of))
+    return Cells(answered, passed, first, count, of)
 
 
 def add_crossings(lines: Lines, paths_m: Sequence[Floats], cells: Cells) -> None:
@@ -115,7 +115,7 @@ def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: 
             if cell < 0 or cell >= cells.size[line]:
                 continue
             if fits:
-                near = lines.low_m[line] - NEAR_M < along < lines.high_m[line] + NEAR_M
+                near = lines.low_m[line] - BEYOND_M < along < lines.high_m[line] + BEYOND_M
                 if free[k] and cells.of[k] < 0 and near:
                     cells.heard[line, cell] += 1.0
                     cells.of[k] = line
@@ -126,10 +126,10 @@ def _count(lines: Lines, poses: Floats, range_m: Floats, free: Bools, straight: 
 def explained_by_ends(segments: Floats, poses: Floats, range_m: Floats) -> Bools:
     """Which pings (k,) the ends of segments (n, 4) explain: corners and edges."""
     ends = np.unique(np.round(segments.reshape(-1, 2), 2), axis=0)
-    found = np.zeros(len(range_m), np.bool_)
+    explained = np.zeros(len(range_m), np.bool_)
     for x, y in ends:
         dx, dy = x - poses[:, 0], y - poses[:, 1]
         fits = np.flatnonzero(np.abs(np.hypot(dx, dy) - range_m) < CORNER_M)
         off_axis = np.abs((np.arctan2(dy[fits], dx[fits]) - poses[fits, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-        found[fits] |= off_axis < HALF_CONE_RAD + 0.1
-    return found
+        explained[fits] |= off_axis < HALF_CONE_RAD + 0.1
+    return explained

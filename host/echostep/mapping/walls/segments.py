@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Walls as segments: runs of cells that answered, joined over what was not heard, extended to the walls that they meet.
+"""Walls as segments: runs of cells that answered, joined over gaps without echoes, extended to the walls that they meet.
 
 In: lines and counts by cell. Out: segments. Owns the limits.
 """
@@ -19,9 +19,8 @@ from echostep.mapping.walls.lines import Lines
 SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 HEARD_ODDS, PASSED_ODDS = 1.0, 0.6  # weight of a ping from a cell, and of one that passed it
 BRIDGE_M, SILENT_BRIDGE_M = 0.3, 1.5  # longest gap that is closed: at any evidence, and where no ping passed
-EXTEND_M = (
-    2.6  # farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
-)
+# Farthest to the wall that an end is extended to, where no ping passed: a corridor and the corner that was cut
+EXTEND_M = 2.6
 SURE_M = 0.5  # an end is extended by so much though pings passed: they may have passed the end itself
 MEETS_M, LONG_M = 0.5, 2.0  # a short piece so near to a wall of such a length meets it
 SNAP_M = 0.4  # an end that stands out beyond a crossing by less is cut there
@@ -101,8 +100,8 @@ def segments_of(lines: Lines, runs: list[Run], cells: Cells) -> Floats:
 def meets(lines: Lines, runs: list[Run], i: int) -> bool:
     """Whether run i reaches another wall as it stands: a corner or a junction."""
     low, high = runs[i].low_m - MEETS_M, runs[i].high_m + MEETS_M
-    found = (_crossing(lines, runs, i, j) for j in range(len(runs)) if runs[j].high_m - runs[j].low_m > LONG_M)
-    return any(c is not None and c[1] and low < c[0] < high for c in found)
+    crossings = (_crossing(lines, runs, i, j) for j in range(len(runs)) if runs[j].high_m - runs[j].low_m > LONG_M)
+    return any(c is not None and c[1] and low < c[0] < high for c in crossings)
 
 
 def _crossing(lines: Lines, runs: list[Run], i: int, j: int) -> tuple[float, bool] | None:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """How well drawn walls are known against the path beside them.
 
-In: a solved graph, the pieces of lines that are walls, pings. Out: a standard deviation of each. Owns the number of places asked. What is said of a
-wall is not where it is on the map but how far it is from the places beside it, by all passages: so a drawing that is turned or shifted as a
-whole is as good as another to the next person, and one whose passages do not fit together is worse.
+In: a solved graph, the pieces of lines that are walls, pings. Out: a standard deviation of each. Owns the number of places used. The standard
+deviation is not that of a wall's place on the map but of its distance from the places beside it, over all passages: a drawing that is turned or
+shifted as a whole serves a person as well as another, one whose passages do not fit together is worse.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ def _path_sd_m(graph: Graph, pings: Pings, poses: Floats, lines: Lines, run: Run
 def distance_variances(graph: Graph, normal_rad: float, own: Ints, places: Ints) -> Floats:
     """Variance (m,) of the distance of a wall from each of the nodes `places` (m,), as factored last.
 
-    `own` (k,): node of each ping that heard the wall, which moves with their mean and turns with them.
+    `own` (k,): node of each ping that detected the wall, which moves with their mean and turns with them.
     """
     assert graph.factor is not None
     moves = distance_derivatives(graph.pose, normal_rad, own, places, graph.factor.shape[0])
-    found: Floats = (moves * graph.factor.solve(moves)).sum(0)
-    return np.maximum(found, 0.0)
+    variance: Floats = (moves * graph.factor.solve(moves)).sum(0)
+    return np.maximum(variance, 0.0)
 
 
 def distance_derivatives(pose: Floats, normal_rad: float, own: Ints, places: Ints, unknowns: int) -> Floats:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The wearer's alarm: asked after 20 s without motion, mayday after 30 s; asked after a fall, mayday 10 s later; or when help is asked for.
+"""The wearer's alarm: a question after 20 s without motion, a mayday after 30 s; a question after a fall, a mayday 10 s later; a call for help.
 
 In: signs of the wearer (windows with or without motion, steps, falls), taps. Out: the present `Alarm`, and every change of it. Owns the time of the
 last motion. All times are those of the samples.
 
-They follow NFPA 1982 (PASS), as remembered: alarm after 30 s without motion (+5/-0 s), a warning about 10 s before; compare them with a copy
-before relying on them. Different from it: a mayday for lack of motion also ends when the wearer walks, there only by hand; a fall is asked about
-and called sooner, and motion alone, which ends a question for lack of motion, does not end that one. There is no sound of 95 dB, no housing and no
-test of the standard: this is no PASS.
+The times follow NFPA 1982 (PASS), quoted from memory: alarm after 30 s without motion (+5/-0 s), a warning about 10 s before; to be compared with a
+copy of the standard before use. Differences: a mayday for lack of motion also ends when the wearer walks, there only by hand; a fall leads to a
+question and a mayday sooner, and motion alone, which ends a question for lack of motion, does not end that one. There is no sound of 95 dB, no
+housing and no test by the standard: this is no PASS.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from echostep.odometry.incapacity.wearer_signs import Sign, StepTaken
 
 ASK_S, MAYDAY_S = 20.0, 30.0  # without motion
 ANSWER_S = 10.0  # to answer after a fall: as long as between question and mayday for lack of motion
-WALKED_STEPS = 3  # of the foot: the wearer walks. By reason: a helper who turns a wearer over makes fewer
-OVER_S = 30.0  # an alarm that has ended is told as over for so long
-SWAY_S = 120.0  # so long after the last movement sway alone keeps the question back, by reason: longer than a foot is not moved by chance
+WALKED_STEPS = 3  # of the foot: the wearer walks; a helper who turns a wearer over makes fewer
+OVER_S = 30.0  # an alarm that has ended is reported as over for so long
+SWAY_S = 120.0  # after the last movement, for which sway alone suppresses the question: a foot at rest is moved more often than that
 GAP_S = 2.0  # a longer time without samples is no time without motion
 MARGIN_S = WINDOW_S  # how late windows of the other sensor may come
 MOST_CHANGES = 1000  # that are kept
 
 
 class AlarmKind(StrEnum):
-    """What is told."""
+    """Kind of an alarm."""
 
     ASKING = "asking"
     MAYDAY = "mayday"
@@ -41,7 +41,7 @@ class AlarmKind(StrEnum):
 
 
 class AlarmReason(StrEnum):
-    """Why."""
+    """Cause of an alarm."""
 
     STILL = "no motion"
     FALL = "fall"
@@ -76,7 +76,7 @@ class WearerAlarm:
         self._begun_s = math.nan  # when the last question or mayday began
 
     def add(self, signs: Sequence[Sign]) -> None:
-        """Take signs in order; before the first steps nothing is watched: a device that lies ready is not worn yet."""
+        """Take signs in order; there is no alarm before the first steps: a device that lies ready is not worn yet."""
         for sign in signs:
             if isinstance(sign, StepTaken):
                 self._steps.append(sign.t_s)
@@ -89,9 +89,9 @@ class WearerAlarm:
                 self._pass(sign)
 
     def _ask_about(self, fall: Fall) -> None:
-        """Ask at once, unless a question or a mayday is under way."""
+        """Begin a question, unless a question or a mayday is active."""
         if self.alarm is None or self.alarm.kind is AlarmKind.OVER:
-            self._begin(AlarmKind.ASKING, AlarmReason.FALL, fall.t_s, fall.told_s)
+            self._begin(AlarmKind.ASKING, AlarmReason.FALL, fall.t_s, fall.known_s)
 
     def _pass(self, window: Window) -> None:
         if math.isnan(self._seen_s):
@@ -107,12 +107,12 @@ class WearerAlarm:
         self._advance(self._seen_s - MARGIN_S)
 
     def call_for_help(self, t_s: float) -> None:
-        """The wearer asks for help."""
+        """Raise a mayday: the wearer calls for help."""
         if self.alarm is None or self.alarm.kind is not AlarmKind.MAYDAY or self.alarm.reason is not AlarmReason.HELP:
             self._begin(AlarmKind.MAYDAY, AlarmReason.HELP, self._time(t_s), self._time(t_s))
 
     def answer(self, t_s: float, *, ends_help: bool) -> None:
-        """The wearer has tapped. `ends_help`: the tap says that all is well; another one says only that the wearer is conscious."""
+        """The wearer has tapped. `ends_help`: the tap means that all is well; any other one means only that the wearer is conscious."""
         self._motion_s = self._moved_s = self._time(t_s)
         if self.alarm and (ends_help or self.alarm.reason is not AlarmReason.HELP):
             self._end(self._time(t_s))

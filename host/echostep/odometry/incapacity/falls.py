@@ -5,12 +5,13 @@ In: tenths of a second of the belt (with the thigh's force beside them) and of t
 trunk's tilt. Owns the standing directions and what was last upright.
 
 The phases are those of [Kangas et al. 2008, Gait & Posture 28, 285-291] at the waist: impact of at least 2 g, then posture, lying when the vertical
-force is at most half of gravity, a tilt of 60 degrees; their dip below 0.6 g before the impact is not asked for, since slow falls lack it. Against
-work on the knees the thigh must lie too, where its accelerometer tells; against impacts of walking, running and jumps, the impact must come after
+force is at most half of gravity, a tilt of 60 degrees; their dip below 0.6 g before the impact is not asked for, since slow falls lack it. To exclude
+work on the knees the thigh must lie too, where it has an accelerometer; to exclude impacts of walking, running and jumps, the impact must come after
 the trunk was last upright (or just before), and the wearer must then move little.
 
 At the foot each step is an impact, and a kneeling or crawling wearer's foot does not stand. There a fall is an impact after the foot last stood,
-and then a foot that lies on its side: told only while the belt has no accelerometer. What neither tells is left to `alarm.py`: no motion.
+and then a foot that lies on its side: reported only while the belt has no accelerometer. Falls that neither detects are left to `alarm.py`: no
+motion.
 """
 
 from __future__ import annotations
@@ -23,11 +24,9 @@ from echostep.foot.ins import GRAVITY_M_S2
 from echostep.odometry.incapacity.standing_direction import StandingDirection, Vector
 from echostep.odometry.incapacity.tenths import TENTH_S, Tenth
 
-# By reason, where no source is named.
-STRIDE_M, STRIDE_S = (
-    0.9,
-    2.0,
-)  # a stride of a wearer on foot is longer and takes less time; on the knees it is half as long
+# Assumed, not measured, where no source is named.
+# A stride of a wearer on foot is longer and takes less time; on the knees it is half as long
+STRIDE_M, STRIDE_S = 0.9, 2.0
 CALM_M_S2, CALM_RAD_S = 1.0, 1.0  # unrest and turning of a standing foot in mid-stance
 QUIET_M_S2, QUIET_RAD_S = 0.5, 0.25  # of a wearer who moves little: five times noise and breath, a third of crawling
 AROUND_GRAVITY_M_S2 = 3.5  # of a mean force that shows a posture
@@ -35,7 +34,7 @@ UPRIGHT_RAD, LYING_RAD = math.radians(35.0), math.radians(60.0)  # lying: [Kanga
 THIGH_RAD = math.radians(45.0)  # of a lying wearer's thigh; on the knees it is upright
 SIDEWAYS = math.sin(math.radians(45.0))  # of gravity along a foot that lies on its side
 MOSTLY = 0.9  # of the tenths of a quiet time: a twitch does not end it
-FRESH_S = 1.0  # the belt tells while its newest tenth is not older
+FRESH_S = 1.0  # the belt is used while its newest tenth is not older
 MOST_RAD_S = 70.0  # that a gyro measures [ICM-20649 data sheet DS-000192: 4000 deg/s]
 KEPT = 50  # tenths, for the strides that are known later
 
@@ -60,14 +59,14 @@ FOOT = FallLimits(5.0 * GRAVITY_M_S2, -0.5 * TENTH_S, 5.0, 4.0, 1)
 
 
 class Fall(NamedTuple):
-    """The wearer fell: the impact was at `t_s`; known at `told_s`, after lying for a while."""
+    """The wearer fell: the impact was at `t_s`; known at `known_s`, after lying for a while."""
 
     t_s: float
-    told_s: float
+    known_s: float
 
 
 class Watch:
-    """What the tenths of one place tell about lying; a fall is told once for each time upright."""
+    """Detector of lying from the tenths of one place; a fall is reported once for each time upright."""
 
     def __init__(self, limits: FallLimits) -> None:
         self._limits = limits
@@ -78,7 +77,7 @@ class Watch:
         self.tilt_rad = math.nan
 
     def add(self, tenth: Tenth, up: StandingDirection, *, may_lie: bool) -> Fall | None:
-        """The fall that a tenth completes; `may_lie`: what else is known does not contradict lying."""
+        """The fall that a tenth completes; `may_lie`: no other sensor contradicts lying."""
         limits = self._limits
         if math.isnan(tenth.force[0]):
             return None
@@ -117,17 +116,19 @@ class Falls:
         self._foot_tenths: deque[Tenth] = deque(maxlen=KEPT)
 
     def trunk_tilt_rad(self, now_s: float) -> float:
-        """Tilt of the trunk over the last half second against its direction in walking; NaN where the belt does not tell.
+        """Tilt of the trunk over the last half second against its direction in walking; NaN without the belt's accelerometer.
 
         A lift, a turn or a blow shifts it for as long as it lasts: 1 m/s2 to the side is 6 degrees.
         """
         return self._belt.tilt_rad if now_s - self._belt.newest_s <= FRESH_S else math.nan
 
     def add_stride(self, t0_s: float, t1_s: float, length_m: float) -> None:
-        """A stride between two times: one of a wearer on foot teaches the standing directions."""
+        """A stride between two times: the standing directions are learnt from those of a wearer on foot."""
         if length_m < STRIDE_M or not 0.0 < t1_s - t0_s < STRIDE_S:
             return
-        belt, foot = ([x for x in kept if t0_s < x.end_s <= t1_s] for kept in (self._belt_tenths, self._foot_tenths))
+        belt, foot = (
+            [x for x in tenths if t0_s < x.end_s <= t1_s] for tenths in (self._belt_tenths, self._foot_tenths)
+        )
         self._trunk.add_stride([x.force for x in belt], [])
         self._thigh.add_stride([x.beside for x in belt], [])
         calm = [x.force for x in foot if x.unrest < CALM_M_S2 and x.turning < CALM_RAD_S]

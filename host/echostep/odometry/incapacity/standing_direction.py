@@ -2,7 +2,7 @@
 """The direction of gravity in a sensor's axes while its wearer walks upright, and the tilt against it.
 
 In: tenths of strides. Out: tilts. Owns the learnt direction. Over a stride the specific force of a trunk, a thigh or a standing foot averages to
-gravity, so no mounting has to be known. Only long strides teach: a wearer on the knees makes none. Limits: a sensor that slips is followed within
+gravity, so no mounting has to be known. Only long strides are used: a wearer on the knees makes none. Limits: a sensor that slips is followed within
 about 20 strides; before the first upright strides there is no direction, hence no tilt.
 """
 
@@ -18,15 +18,13 @@ from echostep.foot.ins import GRAVITY_M_S2
 
 Vector = tuple[float, float, float]
 
-AROUND_GRAVITY_M_S2 = (
-    2.0  # of a stride's mean force from gravity's size; by reason: more is a damaged or saturated sensor
-)
+AROUND_GRAVITY_M_S2 = 2.0  # of a stride's mean force from gravity's size: more is a damaged or saturated sensor
 LEAST_STRIDES = 3  # before a direction is known
-MEMORY = 0.95  # weight of the earlier strides, per stride; by reason: a mean over 20
+MEMORY = 0.95  # weight of the earlier strides, per stride: a mean over 20
 
 
 class StandingDirection:
-    """Call `add_stride` with the mean forces of a stride; `tilt_rad` tells how far another force is from the learnt direction."""
+    """Call `add_stride` with the mean forces of a stride; `tilt_rad` is the angle of another force from the learnt direction."""
 
     def __init__(self) -> None:
         self._sum = np.zeros(3)

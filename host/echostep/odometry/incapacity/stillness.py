@@ -6,9 +6,9 @@ A window of half a second has motion when the range of a channel (largest less s
 orientation in which a wearer lies do not matter, and the result does not depend on how samples are cut into portions. Pings are not used: they change
 when others walk by. A window below these limits may still show that a living wearer stands or crouches on the foot (`sway.py`).
 
-Sway, the small slow turning of a foot or a leg that carries a living wearer, is told from the noise of its gyros. Noise is white: means over 0.1 s
-have a fifth of the variance of means over 0.02 s. Sway is slow (below 3 Hz), so it adds to the former alone; shivering, machines and engines add to
-the latter as well. No level of noise has to be known or learnt.
+Sway, the small slow turning of a foot or a leg that carries a living wearer, is separated from the noise of its gyros by spectrum. Noise is white:
+means over 0.1 s have a fifth of the variance of means over 0.02 s. Sway is slow (below 3 Hz), so it adds to the former alone; shivering, machines and
+engines add to the latter as well. No level of noise has to be known or learnt.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.legs.trunk_path import GyroBlock
 
 SHORT, GROUPS = 25, 5  # short means of 0.02 s in a window of half a second, long means of 0.1 s
-# Ratio of the long means' variance to that of white noise. By reason: a pair of leg gyros, the least that is judged, exceeds 2.5 by chance in 3 % of
+# Ratio of the long means' variance to that of white noise. A pair of leg gyros, the least that is tested, exceeds 2.5 by chance in 3 % of
 # all windows, hence never in most of ten. Where recorded feet are stillest it is 0.6 to 2.
 LEAST_RATIO = 2.5
 # rad/s, standard deviation of the long means, all channels: in public recordings of quiet standing 40-100 % of the half seconds of shanks and
 # thighs exceed it, 0-80 % of those of feet; breathing turns neither.
 LEAST_RAD_S = 0.004
 WINDOW_S = 0.5
-# Limits by reason: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
+# Limits: twice the largest range of an MTx's noise in half a second (0.105 rad/s, 0.26 m/s2 by its manual, simulated; other sensors of the
 # public recordings: 0.04 rad/s, 0.16 m/s2). A foot that is lifted, turned or shifted exceeds them several times; breathing turns no shoe.
 FOOT_RAD_S, FOOT_M_S2 = 0.2, 0.6
 LEG_RAD_S = 0.15  # of thigh, shank and belt; noise of an ADIS16100 has a range of 0.05 rad/s, breathing turns a belt by less than 0.03 rad/s
@@ -38,7 +38,7 @@ SWAY_WINDOWS, LEAST_SWAYING = 10, 8
 
 
 class SwayWindows:
-    """`add` takes samples; `restart` tells of the last window when the next sample is of a later one."""
+    """`add` takes samples; `restart` returns whether the last window sways, when the next sample is of a later one."""
 
     def __init__(self, channels: int) -> None:
         self.channels = channels
@@ -75,8 +75,8 @@ def sways(short: Floats) -> Bools:
     long = short.reshape(len(short), GROUPS, SHORT // GROUPS, -1).mean(axis=2)
     slow = long.var(axis=1, ddof=1).sum(axis=1)
     noise = 0.5 * (np.diff(short, axis=1) ** 2).mean(axis=1).sum(axis=1) / (SHORT // GROUPS)
-    found: Bools = (slow > LEAST_RATIO * noise) & (slow > LEAST_RAD_S**2)
-    return found
+    sway: Bools = (slow > LEAST_RATIO * noise) & (slow > LEAST_RAD_S**2)
+    return sway
 
 
 class Window(NamedTuple):
@@ -91,7 +91,7 @@ class MotionWindows:
     """Windows of one sensor: `add` takes samples and returns the windows that they complete."""
 
     def __init__(self, limits: Floats, swaying: int = 0) -> None:
-        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros by which sway is judged."""
+        """`limits` (c,): of the range of each channel; the first `swaying` ones are gyros, used for the test of sway."""
         self._limits = limits
         self._index = -1  # of the unfinished window
         self._low, self._high = np.full(len(limits), np.inf), np.full(len(limits), -np.inf)
@@ -104,14 +104,14 @@ class MotionWindows:
         Samples of an earlier window are skipped.
         """
         index = np.floor(t_s / WINDOW_S).astype(np.int64)
-        kept = np.flatnonzero(index >= self._index)
-        t_s, index, values = t_s[kept], index[kept], values[kept]
+        fresh = np.flatnonzero(index >= self._index)
+        t_s, index, values = t_s[fresh], index[fresh], values[fresh]
         if not len(index):
             return []
         begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
         low, high = np.minimum.reduceat(values, begins), np.maximum.reduceat(values, begins)
         sways = self._sways(t_s, index, values)
-        index, completed_by = index[begins], kept[begins]
+        index, completed_by = index[begins], fresh[begins]
         if index[0] == self._index:
             completed_by = completed_by[1:]
             low[0], high[0] = np.minimum(low[0], self._low), np.maximum(high[0], self._high)
@@ -157,14 +157,14 @@ class Stillness:
 
     def add_legs(self, block: GyroBlock) -> list[Window]:
         """Windows completed by a block of the leg gyros."""
-        found = self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
-        return [window for _, window in self._of_worn(self._legs, found)]
+        windows = self._legs.add(block.t_s, np.column_stack([block.thigh, block.calf, block.belt]))
+        return [window for _, window in self._of_worn(self._legs, windows)]
 
     def _of_worn(self, source: MotionWindows, windows: list[tuple[int, Window]]) -> list[tuple[int, Window]]:
-        kept: list[tuple[int, Window]] = []
+        finished: list[tuple[int, Window]] = []
         for index, window in windows:
             if window.moved:
                 self._worn.add(source)
             if source in self._worn:
-                kept.append((index, window))
-        return kept
+                finished.append((index, window))
+        return finished

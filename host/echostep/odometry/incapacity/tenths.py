@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tenths of a second of an accelerometer and a gyro: the means, peaks and unrest from which posture and falls are told.
+"""Tenths of a second of an accelerometer and a gyro: the means, peaks and unrest from which posture and falls are detected.
 
 In: samples of one place of the body with their times. Out: `Tenth`s. Owns the samples of the unfinished tenth. A tenth is computed from all of its
 samples at once, so the result does not depend on how they are cut into portions, to the last bit.
@@ -46,20 +46,20 @@ class Tenths:
         `t_s` (n,), `force` and `rate` (n, 3), `beside` (n, 3): of another sensor, read at the same instants.
         """
         index = np.floor(t_s / TENTH_S).astype(np.int64)
-        kept = np.flatnonzero(index >= np.maximum.accumulate(np.r_[self._index, index])[:-1])
-        if not len(kept):
+        in_order = np.flatnonzero(index >= np.maximum.accumulate(np.r_[self._index, index])[:-1])
+        if not len(in_order):
             return []
         waiting = len(self._rows)
         other = np.full_like(force, np.nan) if beside is None else beside
-        rows = np.concatenate([self._rows, np.column_stack([t_s, force, rate, other])[kept]])
-        index = np.concatenate([np.full(waiting, self._index), index[kept]])
+        rows = np.concatenate([self._rows, np.column_stack([t_s, force, rate, other])[in_order]])
+        index = np.concatenate([np.full(waiting, self._index), index[in_order]])
         begins = np.flatnonzero(np.r_[True, index[1:] != index[:-1]])
         last = int(begins[-1])
-        completed_by = kept[begins[1:] - waiting].tolist()
+        completed_by = in_order[begins[1:] - waiting].tolist()
         with np.errstate(over="ignore", invalid="ignore"):  # of numbers that no sensor measures
-            found = _tenths(rows[:last], index[:last], begins[:-1]) if last else []
+            tenths = _tenths(rows[:last], index[:last], begins[:-1]) if last else []
         self._rows, self._index = rows[last:].copy(), int(index[-1])
-        return [(k, tenth) for k, tenth in zip(completed_by, found, strict=True) if tenth is not None]
+        return [(k, tenth) for k, tenth in zip(completed_by, tenths, strict=True) if tenth is not None]
 
 
 def _tenths(rows: Floats, index: Ints, begins: Ints) -> list[Tenth | None]:

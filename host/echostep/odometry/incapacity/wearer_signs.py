@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Signs of the wearer, from which the alarm is judged: motion or none, steps, falls.
+"""Signs of the wearer, the input of the alarm: motion or none, steps, falls.
 
 In: samples of foot, legs and belt and segments of the path, each with the index of the message that brought it. Out: `Sign`s in order of those
 messages, so that a replay has the same ones in portions of any size. Owns the windows, the tenths and the detection of falls.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.localization.estimate import Estimate
-from echostep.mapping.graph.storeys import STAIRS
+from echostep.mapping.graph.storeys import BETWEEN
 
 if TYPE_CHECKING:
     from echostep.mapping.mapper import Mapped
@@ -52,7 +52,7 @@ def walk_drawing(mapped: Mapped) -> WalkDrawing:
     """What a page can show of a drawing."""
     pose = mapped.graph.pose
     storey = mapped.graph.storey_of(np.arange(len(pose)))
-    newest = int(storey[storey != STAIRS][-1])
+    newest = int(storey[storey != BETWEEN][-1])
     drawing = mapped.drawings[newest]
     walls = np.column_stack([drawing.walls, drawing.sd_m])
     middle = 0.5 * (walls[:, 0:2] + walls[:, 2:4]) - pose[-1, :2]

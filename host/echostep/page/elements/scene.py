@@ -21,7 +21,7 @@ from echostep.page.elements.meetings import ShownMeeting
 from echostep.page.elements.stream_rates import StreamRates
 from echostep.page.elements.true_position import TruePosition
 from echostep.page.elements.undo_offer import UndoOffer
-from echostep.tracker.state import Particles
+from echostep.tracker.state import ParticleSnapshot
 
 KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle instead of an arrow
 MOST_SHOWN = 10_000  # particles in a frame
@@ -70,7 +70,7 @@ class PageScene:
     met: ShownMeeting | None = None
 
 
-def sample_of(particles: Particles) -> ParticleSample:
+def sample_of(particles: ParticleSnapshot) -> ParticleSample:
     """The tracker's published particles as they are drawn: weights relative to the greatest, positions in single precision."""
     weight = np.exp(particles.log_weight)
     shown = (255.0 * weight / max(float(weight.max()), 1e-300)).astype(np.uint8)

@@ -26,7 +26,7 @@ from echostep.localization.height.levels import (
     level_change_model,
 )
 from echostep.localization.particle_arrays import Move, ParticleArrays
-from echostep.localization.particles.kernels import NOISE_BEND, Piece, effective_size, propagate, systematic
+from echostep.localization.particles.kernels import NOISE_BEND, MovePiece, effective_size, propagate, systematic
 from echostep.localization.particles.start import Start, draw_poses
 from echostep.localization.settings import CloudSettings
 from echostep.path import MeasuredSegment, PathSegment
@@ -114,7 +114,7 @@ class AugmentedMcl:
         noise[:NOISE_BEND] = math.sqrt(share) * sds * self._rng.standard_normal((NOISE_BEND, SIZE))
         p, dx, dy = self._particles, share * segment.dx_m, share * segment.dy_m
         walls = self._walls.near(p.x_m, p.y_m, math.hypot(dx, dy))
-        propagate(p, Piece(dx, dy, 0.0, 0.0), 1.0, noise, s.wall_cost, walls)
+        propagate(p, MovePiece(dx, dy, 0.0, 0.0), 1.0, noise, s.wall_cost, walls)
 
     def _weight(self, axis: float, range_m: float, walk_heading_rad: float) -> None:
         """Weights and their mean (lines 5 to 10 of the table), then resampling (lines 11 to 16)."""

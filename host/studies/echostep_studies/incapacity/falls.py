@@ -102,7 +102,7 @@ def fallen(seed: int) -> FallRun:
         for t_s, change in alarm.changes
         if change and change.reason is AlarmReason.FALL
     }
-    early = sum(isinstance(sign, Fall) and sign.told_s <= samples.event_s for sign in signs)
+    early = sum(isinstance(sign, Fall) and sign.known_s <= samples.event_s for sign in signs)
     asked_s, mayday_s = began.get(AlarmKind.ASKING), began.get(AlarmKind.MAYDAY)
     return FallRun(name=f"{kit}: {manner}", seed=seed, early=early, asked_s=asked_s, mayday_s=mayday_s)
 

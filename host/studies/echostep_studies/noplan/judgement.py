@@ -17,7 +17,7 @@ from msgspec import UNSET, UnsetType
 
 from echostep.arrays import Bools, Floats
 from echostep.mapping.graph.graph import Closure
-from echostep.mapping.graph.storeys import STAIRS
+from echostep.mapping.graph.storeys import BETWEEN
 from echostep.mapping.mapper import Mapped
 from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, Z
 
@@ -122,7 +122,7 @@ def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> StoreyColumns:
     on = np.array([np.abs(z - level.height_m) < LEVEL_M for level in walk.built.levels])
     storey = mapped.graph.storey_of(np.arange(len(z)))
     level = np.array(levels_of(mapped, walk))[np.maximum(storey, 0)]
-    wrong = on.any(0) & (storey != STAIRS) & ~on[level, np.arange(len(z))]
+    wrong = on.any(0) & (storey != BETWEEN) & ~on[level, np.arange(len(z))]
     return StoreyColumns(
         wrong_storey=float(wrong.mean()), storeys=len(mapped.drawings), storeys_walked=int(on.any(1).sum())
     )

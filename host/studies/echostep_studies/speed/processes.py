@@ -23,12 +23,12 @@ FIRST_FIX = """
 import time
 import numpy as np
 from echostep.localization.echoes.likelihood import EchoSettings, echo_model
-from echostep.localization.particles.kernels import ParticleArrays, Ping, reweight_by_ping
+from echostep.localization.particles.kernels import ParticleArrays, WeightedPing, reweight_by_ping
 from echostep.walls.echo_sources import Walls
 x = np.linspace(0.5, 3.5, 300)
 index = Walls(np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0]])).near(x, x * 0.5)
 cloud = ParticleArrays(x, x * 0.5, x * 0.1, np.ones(300), np.zeros(300))
-reweight_by_ping(cloud, np.zeros(300), Ping(1.57, 1.2, 1.0, 0.1, 0.0, 0.5, 0.5), echo_model(EchoSettings()), index)
+reweight_by_ping(cloud, np.zeros(300), WeightedPing(1.57, 1.2, 1.0, 0.1, 0.0, 0.5, 0.5), echo_model(EchoSettings()), index)
 print(time.process_time())
 """
 
