@@ -201,7 +201,7 @@ def test_the_foots_samples_are_corrected() -> None:
 @contextmanager
 def foot_on_a_pseudo_terminal() -> Iterator[Any]:
     """A foot board in real time."""
-    made = importlib.import_module("run").LyingBoard(3, foot=True)
+    made = importlib.import_module("twin.run").LyingBoard(3, foot=True)
     over = threading.Event()
 
     def play() -> None:

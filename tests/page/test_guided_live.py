@@ -75,7 +75,7 @@ class PortBoard:
 @contextlib.contextmanager
 def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
     """Ports of a board and an MTx whose wearer begins to walk when somebody opens them; a gateway tells what beacons hear of him."""
-    run = importlib.import_module("run")
+    run = importlib.import_module("twin.run")
     with pseudo_terminal() as (ours, port):
         board, mtx = PortBoard(ours), run.PtyMtx()
         scenario = Scenario(load_plan(PLAN), WALK, SEED, board)

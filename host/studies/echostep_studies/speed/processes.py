@@ -53,7 +53,8 @@ import sys
 import time
 from unittest import mock
 from echostep.cli import app
-from echostep.session import replay, results
+from echostep.session import results
+from echostep.session.runs import replay
 from echostep.session.session import Session
 def timed(owner, name):
     work = getattr(owner, name)
