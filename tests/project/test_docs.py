@@ -50,6 +50,9 @@ PROGRAMS = (
 )  # that console blocks may call besides echostep and make
 
 
+FILE_NAMES = {path.name for folder in ("host", "tools", "tests", "protocol") for path in (ROOT / folder).rglob("*.py")}
+
+
 def name_of(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
@@ -82,6 +85,13 @@ def test_a_named_file_of_the_project_exists(page: Path) -> None:
     roots = (ROOT, ROOT / "host/echostep", page.parent)
     for path in re.findall(r"`((?:[\w.-]+/)+[\w-]+\.(?:py|c|h|toml|js|md))`", page.read_text()):
         assert "NAME" in path or any((root / path).exists() for root in roots), path
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=name_of)
+def test_a_file_named_without_its_folder_exists(page: Path) -> None:
+    """`estimate.py` and the like in the text."""
+    names = set(re.findall(r"`([a-z][a-z0-9_]*\.py)`", page.read_text()))
+    assert names <= FILE_NAMES, names - FILE_NAMES
 
 
 @pytest.mark.parametrize("flow", ["echo", "step", "tap", "plan file"])
