@@ -7,9 +7,8 @@ import threading
 import time
 from collections.abc import Callable
 
-PATIENCE_S = (
-    120.0  # reached only by a test that fails: far more than anything takes while other programs have the cores
-)
+# Reached only by a test that fails: far more than anything takes while other programs have the cores
+PATIENCE_S = 120.0
 
 
 def until(holds: Callable[[], object], timeout_s: float = PATIENCE_S) -> bool:

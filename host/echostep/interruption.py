@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TextIO
 
-SIGNAL_POLL_S = 0.1  # by reason: a run that ends this late ends at once
+SIGNAL_POLL_S = 0.1  # a run that ends this late ends at once
 _asked = threading.Event()  # a signal has come since `end_by_signals`
 _holding = threading.Event()  # the first one is held back
 HANGUP: signal.Signals | None = getattr(signal, "SIGHUP", None)  # missing on Windows

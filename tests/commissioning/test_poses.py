@@ -41,7 +41,7 @@ from waiting import PATIENCE_S
 
 G = 9.81
 SIDES = np.vstack([np.eye(3), -np.eye(3)])
-OFFSET_ERROR, SCALE_ERROR, BIAS_ERROR = 0.04, 0.004, math.radians(0.1)  # that six leaning sides may leave; by reason
+OFFSET_ERROR, SCALE_ERROR, BIAS_ERROR = 0.04, 0.004, math.radians(0.1)  # that six leaning sides may leave; assumed
 POSE_MS = 1800
 
 

@@ -33,7 +33,7 @@ from twin.live_walk import BEGIN_S, END_S, HostFault, LiveWalk
 PAGE = ROOT / "host/docs/faults.md"
 MARKS = "<!-- table -->\n", "<!-- end of table -->\n"
 SEED = 1
-LATE_S = 1.0  # of a walk in real time that still counts, by reason
+LATE_S = 1.0  # of a walk in real time that still counts; assumed
 PORTION = 50  # chunks that are tracked together
 
 

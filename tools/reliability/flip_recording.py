@@ -33,8 +33,8 @@ from places import PLAN
 from reliability.campaign import Figure, none, options, report, track
 from walks import walk_chunks
 
-ASTRAY_M = 0.5  # from the track of the undamaged recording; by reason: half the radius of a sure position
-EARLY_S = 1.0  # before the end of the undamaged track; by reason: two estimates
+ASTRAY_M = 0.5  # from the track of the undamaged recording: half the radius of a sure position
+EARLY_S = 1.0  # before the end of the undamaged track: two estimates
 
 
 @dataclass(frozen=True, slots=True)

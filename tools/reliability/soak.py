@@ -48,7 +48,7 @@ SAMPLE_S = 60.0  # simulated, between two looks at the memory
 SETTLED_S = 1800.0  # from then on memory must not grow
 TICKS_S = 2_000_000  # of the board's clock [host/DESIGN.md, Time]
 WRAP = 1 << 32
-# Limits, by reason: what a day of 24 h may cost.
+# Limits: what a day of 24 h may cost.
 HOST_MB_H, TWIN_MB_H = 8.0, 0.1
 SURE_M = 1.0
 FRAME_S = 10.0  # simulated, between two frames of the page at the least; live it gets 30 a second

@@ -51,7 +51,7 @@ FALLEN_WAY: tuple[Waypoint, ...] = (
 )  # into a room, where nothing moves any more
 RESCUE_WAY: tuple[Waypoint, ...] = ((24.0, 2.0), (24.0, 7.5), (9.5, 7.5), (9.5, 10.8))
 RATE_HZ = 10.0  # of the simulated reports
-LONGEST_S = 300.0  # by reason: of the whole operation
+LONGEST_S = 300.0  # of the whole operation
 
 
 def walk(role: str, url: str, plan: Plan, speed: float) -> None:

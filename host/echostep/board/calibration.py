@@ -28,11 +28,12 @@ STANDARD_PA = 101_325.0  # pressure at height 0 [ISO 2533]
 HEIGHT_SCALE_M, HEIGHT_EXPONENT = 44_330.77, 0.190263  # of the height by pressure in the troposphere [ISO 2533]
 GYROS = ("thigh", "calf", "belt")  # fields of a gyro sample, columns of `gyro_rates`
 BELT = GYROS.index("belt")
-OFFSET_MAX_M_S2 = 1.5  # of an accelerometer: 65 mg when new, and soldering [ICM-20649 data sheet DS-000192, table 2], twice; by reason
-SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; by reason
-BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; by reason
+# Of an accelerometer: 65 mg when new, and soldering [ICM-20649 data sheet DS-000192, table 2], twice; assumed
+OFFSET_MAX_M_S2 = 1.5
+SCALE_ERROR_MAX = 0.05  # 1.5 % when new [table 2], three times; assumed
+BIAS_MAX_RAD_S = math.radians(30.0)  # of a gyro; assumed
 AXES = ("x", "y", "z")
-MOST_AHEAD_DEG = 60.0  # that rangers look off abeam, by reason: then they look along the way
+MOST_AHEAD_DEG = 60.0  # that rangers look off abeam: then they look along the way
 
 
 class Echo(NamedTuple):

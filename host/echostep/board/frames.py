@@ -29,7 +29,7 @@ HEAD = 3  # bytes before the body: id, sequence
 CHECKSUM = 2  # bytes
 SHORTEST = HEAD + CHECKSUM + 2  # bytes of a frame with an empty body: one byte of COBS, the closing zero
 TICKS_SIZE = 4  # bytes at the beginning of a body with a time stamp; ticks of 0.5 us [protocol/messages.toml]
-# Ticks from the last frame, in which numbers are missing because frames were lost; else the board restarted. By reason: pings are reported late.
+# Ticks from the last frame, in which numbers are missing because frames were lost; else the board restarted: pings are reported late.
 OLDEST_TICKS, GAP_TICKS = 2_000_000, 120_000_000  # 1 s, 60 s: in less, the sequence number does not wrap
 MAX_BODY = max(kind.itemsize for kind in ROWS.values())
 _HEAD_FORMAT = struct.Struct("<BH")

@@ -14,18 +14,18 @@ from typing import NamedTuple
 from echostep.board.frames import BoardReader, StaleFirmwareError
 from echostep.board.messages import BEACON_BEARING_INVALID, BEACON_RANGE_MM_INVALID, Beacon
 
-MOST_BEACONS = 64  # by reason
-NEAREST_M, FURTHEST_M = 0.0, 30.0  # limits of a range; by reason: ultrasound does not reach farther
-OLDEST_S = 1.0  # greatest age of a reading; by reason
-GAP_S = 0.045  # least time between two readings of a beacon; by reason: a beacon measures at most 20 times a second
-CLOCK_S = 1.0  # largest jump of the gateway's clock relative to the tracker's between two messages; by reason
-CLOCK_GAIN = 0.05  # of a message in the running mean of the gateway's clock offset; by reason
-NEW_CLOCK_MESSAGES = 10  # consecutive messages that agree on a new clock offset before it is accepted; by reason
+MOST_BEACONS = 64  # assumed: more than a team drops
+NEAREST_M, FURTHEST_M = 0.0, 30.0  # limits of a range: ultrasound does not reach farther
+OLDEST_S = 1.0  # greatest age of a reading; assumed
+GAP_S = 0.045  # least time between two readings of a beacon: a beacon measures at most 20 times a second
+CLOCK_S = 1.0  # largest jump of the gateway's clock relative to the tracker's between two messages; assumed
+CLOCK_GAIN = 0.05  # of a message in the running mean of the gateway's clock offset; assumed
+NEW_CLOCK_MESSAGES = 10  # consecutive messages that agree on a new clock offset before it is accepted; assumed
 FEW_READINGS, FEW_S = (
     5,
     60.0,
-)  # a beacon of so few readings gives up its slot after so long without one; by reason: invented numbers
-SILENT_S = 1800.0  # any beacon does after so long; by reason: it is out of power or out of the building
+)  # a beacon of so few readings gives up its slot after so long without one: invented numbers
+SILENT_S = 1800.0  # any beacon does after so long: it is out of power or out of the building
 LARGEST_BEARING_DEG = 180.0
 
 

@@ -23,11 +23,11 @@ POSES = 6  # as many equations as unknowns; one for each side of a box
 LEAST_SAMPLES = 100  # of a pose
 STILL_M_S2 = 0.15  # largest sd of a force at rest; noise of the ICM-20649 is 0.033, of the LSM6DSO 0.02 [data sheets]
 STILL_RAD_S = math.radians(1.5)  # the same of a rate; noise of the ICM-20649 is 0.22 deg/s
-LEAST_M_S2 = 5.0  # at rest, half of gravity; by reason
-DRIFT_M_S2 = 0.05  # between the means of both halves of a pose; by reason: three degrees of turn are more
-ALIKE_RAD = math.radians(35.0)  # by reason: sides of a box are 90 degrees apart
-POSE_ERROR_M_S2 = 0.02  # of a pose's mean: noise, and the 0.1 to 0.2 % by which parts are not linear; by reason
-OFFSET_SD_M_S2 = 0.06  # largest sd that the poses may leave, three times that of six sides; by reason
+LEAST_M_S2 = 5.0  # at rest, half of gravity; assumed
+DRIFT_M_S2 = 0.05  # between the means of both halves of a pose: three degrees of turn are more
+ALIKE_RAD = math.radians(35.0)  # sides of a box are 90 degrees apart
+POSE_ERROR_M_S2 = 0.02  # of a pose's mean: noise, and the 0.1 to 0.2 % by which parts are not linear; assumed
+OFFSET_SD_M_S2 = 0.06  # largest sd that the poses may leave, three times that of six sides; assumed
 TURNS = 8  # of Gauss and Newton; errors of 5 % need three
 
 

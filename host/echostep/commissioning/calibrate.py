@@ -32,9 +32,9 @@ from echostep.ports.chunks import BOARD
 from echostep.settings import Settings, parse_settings, read_settings
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0  # duration of each measurement
-POSE_S = 3.0  # of a board in each pose; by reason: a second passes before it sends all axes, the mean of 200 samples is known to 0.003 m/s2
+POSE_S = 3.0  # of a board in each pose: a second passes before it sends all axes, the mean of 200 samples is known to 0.003 m/s2
 ACCELEROMETERS = "accelerometers"  # only when asked for: the boxes have to be taken off
-WALKED_RANGE_M = (3.0, 100.0)  # of --walked; by reason: shorter walks have too few strides
+WALKED_RANGE_M = (3.0, 100.0)  # of --walked: shorter walks have too few strides
 
 
 Sections = dict[str, dict[str, Any]]  # of a settings file

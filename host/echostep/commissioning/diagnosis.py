@@ -29,7 +29,7 @@ from echostep.ports.chunks import BOARD, MTX
 from echostep.timing.timeline import MtxTiming
 from echostep.xsens.configuration.products import force_range_g
 
-DRIFT_MAX_PPM = 200.0  # by reason: a crystal is within 50, a ceramic resonator within 5000
+DRIFT_MAX_PPM = 200.0  # a crystal is within 50, a ceramic resonator within 5000
 ANSWER_MAX_S = 0.02
 MTX_RATE_ERROR = 0.02  # relative
 CONSTANT_SAMPLES = 400  # so many equal samples in a row are a fault: a gyro has two counts of noise

@@ -17,7 +17,7 @@ from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.ports.serial_ports import SerialPorts
 from echostep.recording.device import LISTENED_BYTES, sender
 
-SEARCH_S = 2.0  # longest time to listen; by reason: an MTx that has just been plugged in wakes up in 0.5 s
+SEARCH_S = 2.0  # longest time to listen: an MTx that has just been plugged in wakes up in 0.5 s
 ROLES = {Role.BOARD: BOARD, Role.MTX: MTX}
 
 

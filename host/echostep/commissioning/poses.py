@@ -22,7 +22,7 @@ from echostep.commissioning.probe import SETTLED_S, TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
 from echostep.foot.ins import GRAVITY_M_S2
 
-TRIES = 3  # of each pose; by reason
+TRIES = 3  # of each pose; assumed
 FOOT_PLACE = "foot"
 REQUEST = "Pose {number} of {count}: lay {parts} on another side, each on a side on which it has not lain, and let go."
 EVERYTHING = "the boxes of belt, thigh, calf and foot"

@@ -49,9 +49,7 @@ SELF_TEST_S = 2.2  # for a self-test and its report
 SETTLED_S = 0.7  # of board time after the first message; until then buffered bytes arrive
 MTX_WINDOW_S = 1.5  # for the rate of the MTx
 LEAST_REPLIES = 8  # for a drift
-LEAST_BOARD_S = (
-    3.0  # of a board that starts while it is listened to; by reason: all its streams run 1 s after the start
-)
+LEAST_BOARD_S = 3.0  # of a board that starts while it is listened to: all its streams run 1 s after the start
 LEAST_RATE_S = 1.0  # for rates
 
 

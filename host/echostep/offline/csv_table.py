@@ -19,11 +19,11 @@ import numpy as np
 from echostep.arrays import Floats, Ints
 from echostep.errors import EchostepError
 
-LONGEST_LINE = 10_000  # characters; by reason: no line of numbers is longer
+LONGEST_LINE = 10_000  # characters: no line of numbers is longer
 EARLY_ROWS = 2000  # rows after which a file of garbage is given up
 SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
-GREATEST = 1e19  # of any number; by reason: nanoseconds since 1970 have 19 digits
+GREATEST = 1e19  # of any number: nanoseconds since 1970 have 19 digits
 TIME_UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))  # per second
 
 Result = TypeVar("Result")

@@ -22,7 +22,7 @@ FORCE = slice(1, 4)
 RATE = slice(4, 7)
 SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
-# By reason, all of them.
+# Assumed, all of them.
 CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
 GRAVITY_RANGE_M_S2 = (
     7.0,

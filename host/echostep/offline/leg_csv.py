@@ -38,10 +38,10 @@ AXES = {name: tuple(f"{name.split('_')[0]}_{axis}" for axis in "xyz") for name i
 OTHER = "other_"  # before the names of the columns of the other leg
 TIME, THIGH, SHANK, BELT, COMPASS = range(5)  # columns of a table of samples
 
-FASTEST_LEG_RAD_S = 20.0  # for the 99 % quantile of the rates; by reason: the shank of a sprinter reaches it
-MOST_TURNS = 4  # of a compass column that was not wrapped; by reason: beyond it, degrees are more likely than radians
-LARGEST_NUMBER = 1e6  # of a rate in any unit; by reason: larger ones are no measurement, and their squares overflow
-FEWEST_ROWS = 100  # by reason: fewer rows do not show a dead sensor
+FASTEST_LEG_RAD_S = 20.0  # for the 99 % quantile of the rates: the shank of a sprinter reaches it
+MOST_TURNS = 4  # of a compass column that was not wrapped: beyond it, degrees are more likely than radians
+LARGEST_NUMBER = 1e6  # of a rate in any unit: larger ones are no measurement, and their squares overflow
+FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,10 +33,10 @@ from echostep.offline.leg_track import (
 )
 
 LEGS_DIFFER = 0.04  # standard deviation of the ratio of a person's two legs [14 legs of 7 people]
-DOUBTFUL = 3.0  # times that: no two legs of one person; by reason
-STRAIGHT_S, STRAIGHT_RAD = 1.0, math.radians(15.0)  # of trunks that go straight on: about a stride; by reason
+DOUBTFUL = 3.0  # times that: no two legs of one person; assumed
+STRAIGHT_S, STRAIGHT_RAD = 1.0, math.radians(15.0)  # of trunks that go straight on: about a stride; assumed
 NAMES = "the first", "the other"
-LEAST_M = 3.0  # seen by both legs, to compare them; by reason: two strides
+LEAST_M = 3.0  # seen by both legs, to compare them: two strides
 Legs = tuple[tuple[Stride, ...], tuple[Stride, ...]]
 UNKNOWN = Flag.UNSEEN | Flag.BACKWARD | Flag.GAP  # strides of which a leg does not know the length
 

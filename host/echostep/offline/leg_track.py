@@ -18,7 +18,7 @@ from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings, about_
 from echostep.legs.strides import StrideEstimator
 from echostep.offline.leg_csv import LegSamples
 
-# By reason, all of them.
+# Assumed, all of them.
 START_SD_RAD = math.radians(3.0)  # of a heading given for the start, as read from a plan
 TURNING_RAD_S = math.radians(25.0)  # mean rate of a stride that is flagged as turning: 28 degrees in 1.1 s
 SHORTEST_TURN_S = 0.3  # a shorter stride is not flagged: strides take about 1 s

@@ -37,7 +37,7 @@ from echostep.team.restorer import Restorer
 if TYPE_CHECKING:
     from echostep.operation.page import TablePage
 
-TABLE_S = 0.25  # between two drawings of the table, by reason
+TABLE_S = 0.25  # between two drawings of the table; assumed
 
 
 def command(plan_path: Path, url: str, team: str | None, seconds: float | None, views: Views, out: Path) -> None:

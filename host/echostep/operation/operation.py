@@ -38,7 +38,7 @@ from echostep.team.messages.marks import Mark, MarkBoard, ack_message, is_shared
 from echostep.team.messages.report import BadReportError
 from echostep.team.roster import Member, MemberState, Roster
 
-LIST_S = 0.5  # between two versions of the list, by reason: words are read, not watched
+LIST_S = 0.5  # between two versions of the list: words are read, not watched
 MOST_EVENTS = 64  # of a wearer's history
 SHOWN_STATUS = {"tracking", "uncertain"}  # of which a trail is drawn
 Key = tuple[str, str, str]  # team, name, run

@@ -22,7 +22,7 @@ from echostep.page.protocol import FRAME_S, Refused
 from echostep.page.shared import PageCounts
 from echostep.page.web.faults import Faults
 
-BAR_S = 0.5  # between two frames of one scene, by reason: the time bar grows
+BAR_S = 0.5  # between two frames of one scene: the time bar grows
 PAST = "The page shows the past: return to now first."
 
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from echostep.team.messages.report import Position
 
-TRAIL_S = 180.0  # by reason: the way of some minutes shows where a wearer came from
-STEP_M = 0.7  # least distance between two points, by reason: about a step
-MOST_POINTS = 40_000  # of all wearers; by reason: 200 of them walk 3 min at 0.8 m/s
+TRAIL_S = 180.0  # the way of some minutes shows where a wearer came from
+STEP_M = 0.7  # least distance between two points: about a step
+MOST_POINTS = 40_000  # of all wearers: 200 of them walk 3 min at 0.8 m/s
 
 
 class TrailPoint(NamedTuple):

@@ -17,7 +17,7 @@ from echostep.recording.recorder import DerivedMessage, Topic
 
 MAP_FRAME, TRUNK_FRAME = "map", "trunk"
 NUMBER, TEXT, WHOLE, TRUTH = {"type": "number"}, {"type": "string"}, {"type": "integer"}, {"type": "boolean"}
-MOST_WALLS = 20_000  # drawn of a level; by reason: keeps the recording of a large plan small
+MOST_WALLS = 20_000  # drawn of a level: keeps the recording of a large plan small
 LINE_STRIP, LINE_LIST = 0, 2
 COVARIANCE_KNOWN = 3  # `position_covariance_type` of LocationFix: all elements are known
 LINE_PIXELS = 2.0

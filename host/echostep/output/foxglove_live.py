@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 LOCAL = "127.0.0.1"
 ALL_TOPICS = (*TOPICS, POSE, FRAME, SCENE, LOCATION)
-BACKLOG = 256  # messages that may wait for one viewer; by reason: some seconds
+BACKLOG = 256  # messages that may wait for one viewer: some seconds
 
 
 @dataclass(frozen=True, slots=True)

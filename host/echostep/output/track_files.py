@@ -38,7 +38,7 @@ from echostep.tracker import Tracker
 Columns = dict[str, list[Any]]
 
 ELLIPSE_POINTS = 33
-GAP_S = 5.0  # without an estimate, after which a new stretch of a GPX track begins, by reason
+GAP_S = 5.0  # without an estimate, after which a new stretch of a GPX track begins; assumed
 KML = "http://www.opengis.net/kml/2.2"
 COLORS = {"tracking": "ffff8020", "uncertain": "ff20a0ff", "lost": "ff2020ff"}  # alpha, blue, green, red
 

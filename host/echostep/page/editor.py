@@ -35,7 +35,7 @@ from echostep.plan.writer import plan_json
 
 PAGE = Path(__file__).parent / "edit"
 SHARED = ("style.css", "icon.svg", "theme.js", "view.js")  # files of the live page
-MOST_BODY = 8_000_000  # bytes of a plan. By reason: a browser draws so much smoothly
+MOST_BODY = 8_000_000  # bytes of a plan: a browser draws so much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 POST_S = 20.0  # time for a posted plan to arrive
 NO_FILE = "none"  # state of a plan file that does not exist

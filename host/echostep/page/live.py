@@ -38,7 +38,7 @@ from echostep.ports.arrival_clock import now_ns
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
 
-# By reason, all of them:
+# Assumed, all of them:
 STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
 RATES_NS = 250_000_000  # time between two measurements of the stream rates
 SILENT_S = 2.0  # without bytes of the MTx and the board: the position is lost

@@ -21,9 +21,7 @@ from echostep.plan.model import Plan
 from echostep.plan.routing import RoutePlace
 from echostep.ports.people.check_in import Call, CheckIn, Undo
 
-MOST_CHECK_INS = (
-    16  # in the queue to the tracker; further ones are refused. By reason: a person makes a few in a minute
-)
+MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
 
 T = TypeVar("T")
 

@@ -21,7 +21,7 @@ from echostep.plan.places.leaks import narrowest_opening
 from echostep.plan.places.reachability import unreachable_rooms
 from echostep.plan.places.standing import StandingGround
 
-# Tolerances, by reason:
+# Tolerances, assumed:
 NEAR_M = 0.1  # a wall's end that is nearer than this to a wall was meant to touch it
 OVERLAP_M = 0.02  # shorter overlaps are not reported
 ELBOW_M2 = 1.0  # stairs with less free area beside them than this have no access

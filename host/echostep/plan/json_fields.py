@@ -15,8 +15,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-MOST_CORNERS = 10_000  # of an outline. By reason: a room of a drawing with arcs has hundreds
-LIMIT_M = 1e5  # greatest coordinate. By reason: 100 km, more than any site
+MOST_CORNERS = 10_000  # of an outline: a room of a drawing with arcs has hundreds
+LIMIT_M = 1e5  # greatest coordinate: 100 km, more than any site
 
 
 def number(value: Any, where: str, limit: float = LIMIT_M, unit: str = "m") -> float:

@@ -15,8 +15,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-SMALLER = (1.0, 0.8, 0.6)  # of the wanted size, tried in this order; by reason
-SMALLEST_PT = 3.0  # of a name; by reason: still read when magnified
+SMALLER = (1.0, 0.8, 0.6)  # of the wanted size, tried in this order; assumed
+SMALLEST_PT = 3.0  # of a name: still read when magnified
 APART_PX = 1.0  # between two names
 
 

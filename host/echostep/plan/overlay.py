@@ -26,7 +26,7 @@ from echostep.plan.georeference import EarthTransform
 from echostep.plan.model import Plan
 
 KML = "http://www.opengis.net/kml/2.2"
-PIXELS_PER_M, MOST_PX = 40.0, 4096  # by reason: a door is 36 pixels wide; what older phones can show as one texture
+PIXELS_PER_M, MOST_PX = 40.0, 4096  # a door is 36 pixels wide; what older phones can show as one texture
 EDGE_M = 1.0  # around the walls
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of every file in the archive, so that the same plan gives the same bytes
 

@@ -20,7 +20,7 @@ from echostep.plan.cropping import is_clear
 from echostep.plan.model import Plan
 from echostep.plan.polyline import way_m
 
-# By reason, all of them:
+# Assumed, all of them:
 CELL_M = 0.15  # side of a grid cell
 BODY_M = 0.25  # half a person's width: shortest distance of a route from a wall
 MARGIN_M = 1.5  # of the grid around the walls

@@ -13,7 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-SLEPT_S = 1.0  # a shorter difference of the clocks is none; by reason: they are not read at one moment
+SLEPT_S = 1.0  # a shorter difference of the clocks is none: they are not read at one moment
 
 
 def _choose() -> Callable[[], int]:

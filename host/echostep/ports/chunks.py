@@ -24,8 +24,8 @@ MTX = "mtx"
 FOOT = "foot"  # a second board, at the ankle, in the place of an MTx
 GATEWAY = "gateway"
 
-LATEST_NS = 1 << 62  # a later arrival time (damage in a recording) is replaced by this one; by reason
-MOST_BYTES = 1 << 24  # of one port that wait; by reason: minutes of the board's or the MTx's bytes
+LATEST_NS = 1 << 62  # a later arrival time (damage in a recording) is replaced by this one; assumed
+MOST_BYTES = 1 << 24  # of one port that wait: minutes of the board's or the MTx's bytes
 CHUNK_BYTES = 100  # of memory that a chunk takes besides its bytes, about
 
 

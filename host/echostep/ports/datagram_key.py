@@ -17,7 +17,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 
 COUNTER = struct.Struct("<Q")
-TAG_SIZE = 16  # bytes; by reason: 128 bits cannot be guessed
+TAG_SIZE = 16  # bytes: 128 bits cannot be guessed
 TRAILER_SIZE = COUNTER.size + TAG_SIZE
 KEY_SIZES = range(16, 65)  # bytes; HMAC hashes longer keys [RFC 2104]
 LARGEST_FILE = 1024  # bytes, of a key's file

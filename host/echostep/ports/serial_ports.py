@@ -22,7 +22,7 @@ from echostep.ports.chunks import Chunk, ChunkQueue
 from echostep.ports.port_faults import PORT_FAULTS
 from echostep.ports.udp import UdpPort
 
-# All by reason.
+# Assumed, all of them.
 IDLE_S = 0.05  # longest wait for a chunk; short, so that the set-up of the MTx repeats its requests in time
 READ_TIMEOUT_S = 0.1
 WRITE_TIMEOUT_S = 0.5

@@ -20,9 +20,9 @@ from urllib.parse import parse_qs, urlsplit
 from echostep.errors import EchostepError
 from echostep.ports.datagram_key import Opener, read_key
 
-READ_TIMEOUT_S = 0.1  # by reason: the reading thread sees `close` in time
+READ_TIMEOUT_S = 0.1  # the reading thread sees `close` in time
 LARGEST = 1472  # bytes of a datagram: one Ethernet frame; longer ones are dropped
-# By reason: 64 beacons, 20 measurements a second each, one datagram of 25 bytes each.
+# Assumed: 64 beacons, 20 measurements a second each, one datagram of 25 bytes each.
 BYTES_A_SECOND = 32_000.0
 DATAGRAMS_A_SECOND = 2_000.0
 BURST_S = 1.0  # of either budget that may be used at once

@@ -23,8 +23,8 @@ from echostep.recording.reading import open_recording
 from echostep.xsens import FrameReader, MtMessage, MtxReader
 from echostep.xsens.message import MessageReader, as_object
 
-READ_BYTES = 1 << 16  # of one read of the file; by reason: many frames, little memory
-HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; by reason
+READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
+HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; assumed
 BOARD_FRAME, MT_FRAME = 10, 5  # bytes of a frame besides the body, about: to compare what two readers have understood
 MESSAGE_NAMES: dict[type, str] = {kind: kind.__name__ for kind in BY_ID.values()}
 Chunks = Iterator[tuple[str, bytes]]  # port, bytes

@@ -14,7 +14,7 @@ from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.xsens import FrameReader
 
 DEVICES = {BOARD: "the sensor board", MTX: "the MTx", FOOT: "the foot board"}
-LEAST_FRAMES = 3  # by reason: one of 256 wrong frames of an MTx passes its checksum
+LEAST_FRAMES = 3  # one of 256 wrong frames of an MTx passes its checksum
 LISTENED_BYTES = 1 << 14  # by which a device has sent so many frames: half a second of a board, two of an MTx
 
 

@@ -33,7 +33,7 @@ LOG_TIME_OFFSET = 6  # in the body of a message
 CHANNEL_IDS = 1 << 16  # a channel number has 16 bits
 
 RAW_ENCODING = "application/octet-stream"  # message encoding of the ports' channels
-# By reason: bounds the memory that a damaged file can ask for.
+# Assumed: bounds the memory that a damaged file can ask for.
 RECORD_LIMIT = 1 << 28  # bytes of one record, and of one decompressed chunk
 ZSTD_WINDOW = 1 << 27  # bytes
 

@@ -27,7 +27,7 @@ from echostep.recording.mcap_records import (
 )
 from echostep.recording.scan import record_end
 
-PORTION_BYTES = 1 << 18  # about, of the file in one portion: about five seconds of a walk; by reason
+PORTION_BYTES = 1 << 18  # about, of the file in one portion: about five seconds of a walk; assumed
 
 
 @dataclass

@@ -12,7 +12,7 @@ from pathlib import Path
 from echostep.recording.names import RecordingExistsError, new_name
 from echostep.recording.recorder import Recorder
 
-TRIES = 10  # of a new name, while other processes take the same one; by reason
+TRIES = 10  # of a new name, while other processes take the same one; assumed
 
 
 def numbered_recorder(wanted: Path, metadata: Mapping[str, str]) -> Recorder:

@@ -23,7 +23,7 @@ from echostep.recording.background_writer import BackgroundWriter
 from echostep.recording.mcap_records import RAW_ENCODING
 
 METADATA_NAME = "echostep"  # of the metadata record
-# All by reason.
+# Assumed, all of them.
 WAIT_NS = 500_000_000  # arrival time between two waits of `wait_for_disk`
 RAW_LIMIT = 1 << 26  # bytes of chunks that may wait for a full disk: an hour and a half
 DERIVED_LIMIT = 1 << 20  # unwritten bytes from which on derived messages are skipped: they can be computed again

@@ -34,7 +34,7 @@ CHUNK = 0x06  # opcode
 LAST_OPCODE = 0x0F
 FOOTER_SIZE = 20  # bytes of its body
 DATA_END_SIZE = 4  # bytes of its body: the checksum of all bytes before it, 0 for none
-# By reason.
+# Assumed.
 VALID_RUN = 4  # so many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
 LARGE = (

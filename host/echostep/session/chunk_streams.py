@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from echostep.session.team.team_ear import TeamEar
     from echostep.session.team.teammates_ear import TeammatesEar
 
-LEAST_SLEEP_S = 0.02  # by reason: shorter waits are not worth a system call per chunk
+LEAST_SLEEP_S = 0.02  # shorter waits are not worth a system call per chunk
 
 
 def paced(chunks: Iterable[Chunk], speed: float) -> Iterator[Chunk]:

@@ -27,7 +27,7 @@ from echostep.tracker import Tracker
 from echostep.tracker.last_place import LastPlace, start_after
 
 FILE = "last.json"
-KEPT_S = 5.0  # between two writes, by reason: a few strides
+KEPT_S = 5.0  # between two writes: a few strides
 MOST_BYTES = 4096  # of the file
 GIVE = "give a start with --start X,Y,DEG, a room, or ?"
 

@@ -16,8 +16,8 @@ from echostep.recording.reading import Recording
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState, TrackerState
 
-ECHOLESS_S = 5.0  # without a ping for so long there are no echoes; by reason: ten pings of each ranger at the slowest
-LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long. By reason: estimates come twice a second
+ECHOLESS_S = 5.0  # without a ping for so long there are no echoes: ten pings of each ranger at the slowest
+LONGEST_S = 10.0  # between two estimates; a longer gap counts as so long: estimates come twice a second
 SILENT = "nothing came from the foot"
 UNFITTING = "the echoes did not fit the plan"
 ECHOLESS = "there were no echoes"

@@ -29,11 +29,11 @@ from echostep.ports.people.check_in import MOST_SD_M
 from echostep.session.options import TrackingOptions
 
 ANYWHERE = "anywhere"  # value of the field `start`: the walk begins anywhere in the building, or in a room
-ROOM_M = 2.0  # standard deviation of a start in a room without an outline; by reason: half a large room
+ROOM_M = 2.0  # standard deviation of a start in a room without an outline: half a large room
 CHECK_IN_START = "tapped"  # value of the field `start`: the walk begins at a check-in
 LAST = "last"  # value of `--start`: where the last live run ended
 SIMULATED = "simulated"  # value of the field `source`
-START_LIMIT_M = 1e6  # of a start's x and y; by reason: no plan is larger
+START_LIMIT_M = 1e6  # of a start's x and y: no plan is larger
 
 
 def run_metadata(

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 from echostep.session.console import console
 
-SHOWN_AFTER_S = 2.0  # elsewhere than on a terminal; by reason: what ends before needs no line
+SHOWN_AFTER_S = 2.0  # elsewhere than on a terminal: what ends before needs no line
 Item = TypeVar("Item")
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 from echostep.team.messages.report import MAX_PAYLOAD
 from echostep.team.outbox import RETRY_PAUSES_S
 
-MESSAGES_PER_TOPIC = 8  # kept until the next look; by reason: trackers send about two a second
+MESSAGES_PER_TOPIC = 8  # kept until the next look: trackers send about two a second
 MAX_TOPICS = 1024
 MOST_OUTGOING = 64  # messages to the broker that wait
 MOST_TRIES = 5  # to publish a message; one at which the connection breaks every time holds up those behind it

@@ -21,9 +21,8 @@ from typing import Protocol
 from echostep.localization.estimate import RISK, WALKER_M_S, ellipse95, trust
 from echostep.team.messages.report import Position, Report, moment
 
-HEARTBEAT_S = (
-    2.0  # after so long without a new estimate the last one is sent again, with its age and a larger covariance
-)
+# After so long without a new estimate the last one is sent again, with its age and a larger covariance
+HEARTBEAT_S = 2.0
 STALE_S = 10.0  # a report is valid for so long
 MAX_QUEUED = 1024  # reports
 FRESH_S = 1.0  # a report that has waited longer is dropped when a newer one waits too

@@ -41,7 +41,7 @@ from echostep.tracker import Tracker
 Source = Literal["live", "replay", "simulated"]
 AVERAGING_S = 3.0  # of speed and rates
 MIN_SPEED_SPAN_S = 0.5  # a speed over less time is reported as 0
-MAX_PROTECTION_M = 100.0  # a larger protection radius is not reported, by reason: it says no more than none
+MAX_PROTECTION_M = 100.0  # a larger protection radius is not reported: it says no more than none
 MAX_HEADING_SD_RAD = 1.0  # a heading with a larger standard deviation is not reported
 POWER_SUPPLIES = Path("/sys/class/power_supply")
 

@@ -10,7 +10,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable
 
-RETAINED_S = 2.0  # within which a broker has sent all that it keeps, by reason: it does so before anything else
+RETAINED_S = 2.0  # within which a broker has sent all that it keeps: it does so before anything else
 AT_ONCE = 16  # messages at one look: fewer than a connection lets wait (`inbox.MOST_OUTGOING`)
 Message = tuple[str, bytes]  # topic and payload
 

@@ -21,7 +21,7 @@ from echostep.team.messages.report import checked_name
 from echostep.team.messages.shared_drawings import MOST_BYTES, checked_drawing, drawing_topic
 
 PREFIX = "wearer:"
-WAIT_S = 60.0  # for a drawing, by reason: the other wearer may just have set out
+WAIT_S = 60.0  # for a drawing: the other wearer may just have set out
 DIGITS = 16  # of the SHA-256, in the name of the file
 PrintLine = Callable[[str], None]
 

@@ -14,8 +14,8 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 
 ENU, NED, NWU = 0x0, 0x4, 0x8  # coordinate bits of an MTData2 identifier [LLCP, MTData2]
-EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees of roll, pitch, yaw; by reason: the range and some rounding
-ROTATION_ERROR = 0.02  # largest error of an element of R R^T and of the right-handed frame; by reason
+EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees of roll, pitch, yaw: the range and some rounding
+ROTATION_ERROR = 0.02  # largest error of an element of R R^T and of the right-handed frame; assumed
 IDENTITY = np.eye(3).ravel()
 _HALF = math.sqrt(0.5)
 TO_MAP = np.array([_HALF, 0.0, 0.0, _HALF])  # north, west, up -> east, north, up: a quarter turn about up

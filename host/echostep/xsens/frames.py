@@ -23,7 +23,7 @@ from echostep.jit import kernel
 
 PREAMBLE = 0xFA  # this and the next two [Manual 5.3.1]
 BUS_ID = 0xFF  # of a device alone, and of a master
-FIRST_BUS, LAST_BUS = 1, 32  # of the devices of a master; the last: more than any master has, by reason
+FIRST_BUS, LAST_BUS = 1, 32  # of the devices of a master; the last: more than any master has; assumed
 EXTENDED = 0xFF
 MTDATA, MTDATA2, WAKE_UP, ERROR = 0x32, 0x36, 0x3E, 0x42  # message identifiers [LLCP]
 CONFIGURATION, OUTPUT_MODE, OUTPUT_SETTINGS = 0x0D, 0xD1, 0xD3  # the same: answers to requests

@@ -17,9 +17,8 @@ from echostep.xsens.mtdata import ACCEL, ATTITUDE, COLUMNS, GYRO, MAG
 # Results of the gates, in the order of the gates; also entries of the tally. LOST is an entry only.
 GOOD, OTHER_DEVICE, INCOMPLETE, NOT_FINITE, BAD_QUATERNION, OUT_OF_RANGE, REPEATED, BAD_COUNTER, LOST = range(9)
 
-MAX_GAP = (
-    500  # samples; after a larger jump of the counter the sample waits until the next counter confirms it; by reason
-)
+# Samples; after a larger jump of the counter the sample waits until the next counter confirms it; assumed
+MAX_GAP = 500
 # The state of the gates; -1: none. ACCEPTED: last accepted counter. DEVICE: bus of the followed device. OTHER, OTHERS: last counter of a message
 # that is no sample, and how many of them came since ACCEPTED.
 ACCEPTED, DEVICE, OTHER, OTHERS = range(4)

@@ -21,7 +21,7 @@ from echostep.xsens.output_formats import OutputFormats, configured_devices
 from echostep.xsens.packets import Packet, read_packets
 from echostep.xsens.sample import Quaternion, Vector
 
-SHARED_GAP = 500  # counters; a longer step is called a jump, not lost messages; by reason
+SHARED_GAP = 500  # counters; a longer step is called a jump, not lost messages; assumed
 WORLDS = {ENU: "east, north, up", NED: "north, east, down", NWU: "north, west, up"}
 NAMES = {  # of messages without a measurement [LLCP, message identifiers]
     0x01: "DeviceID", 0x05: "SetPeriodAck", 0x0D: "Configuration", 0x11: "GoToMeasurementAck", 0x13: "FirmwareRevision", 0x31: "GoToConfigAck",

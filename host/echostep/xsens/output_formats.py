@@ -50,11 +50,11 @@ from echostep.xsens.mtdata import (
 # Of a Configuration message, in bytes: the number of devices, the first device's block, the length of a block [CMT].
 _DEVICES, _BLOCKS, _BLOCK = 96, 98, 20
 _BLOCK_FORMAT = struct.Struct(">IHHI")  # of a block: device, length of its data, output mode, output settings
-MOST_ROWS = 500  # messages by which a format is judged; by reason
-POSSIBLE = 0.9  # least share of messages with possible values; by reason: some are damaged
-# Possible values, by reason: magnitudes of a sensor on a body, m/s2, rad/s, earth's fields; mean acceleration with gravity in it; air, degC.
+MOST_ROWS = 500  # messages by which a format is judged; assumed
+POSSIBLE = 0.9  # least share of messages with possible values: some are damaged
+# Possible values: magnitudes of a sensor on a body, m/s2, rad/s, earth's fields; mean acceleration with gravity in it; air, degC.
 MOST = ((ACCEL, 200.0), (GYRO, 40.0), (MAG, 20.0))
-STRONGEST_FIELD = 4.0  # median; by reason: some iron, no magnet
+STRONGEST_FIELD = 4.0  # median: some iron, no magnet
 MEAN_ACCEL = (5.0, 20.0)  # m/s2
 AIR_C = (-40.0, 85.0)  # [MTx data sheet, operating temperature]
 UNIT_ERROR = 0.01  # of |q| = 1

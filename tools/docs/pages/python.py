@@ -15,7 +15,7 @@ from typing import Any, ForwardRef, Literal, get_origin
 import echostep
 from docs.pages import MADE
 
-LINE = 100  # characters; by reason: the width of the page
+LINE = 100  # characters: the width of the page
 HEAD = """# Python
 {made}
 What is listed here keeps its names; everything else may move between versions. All of it is typed.

@@ -38,8 +38,8 @@ from echostep.board.messages import (
     Wiring,
 )
 
-TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; by reason
-UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; by reason
+TEMPERATURE_C = (-20.0, 60.0)  # degC, range of a gyro on a person; assumed
+UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; assumed
 CELSIUS_AT_ZERO, CELSIUS_PER_COUNT = 25.0, 0.1453  # 8.4 mV per degC [ADXRS300], counts of 5 V / 4096
 PROPER_RESPONSES = "-121 to -376 and 121 to 376"  # counts, to ST1 and ST2
 

@@ -40,7 +40,7 @@ from echostep.board.messages import (
 )
 
 LEAST_MV = 4100  # a measurement below it is below the 4.5 V that 16 MHz need, although the reference is off by up to 9 % [data sheet]
-SAG = 0.08  # of the usual voltage; by reason: 0.4 V, more than the drop on a good cable
+SAG = 0.08  # of the usual voltage: 0.4 V, more than the drop on a good cable
 _POWER_REMEDY = (
     "use a shorter, thicker USB cable or a powered hub; set the brown-out fuse to 4.3 V (firmware/README.md)"
 )
@@ -50,8 +50,8 @@ __all__ = [
 
 MEMORY_BYTES = 2560  # of the processor
 MEMORY_MAX_BYTES = 2200  # [firmware/README.md, budgets]
-RATE_LEAST = 0.9  # of the expected rate; by reason
-RATE_FAULT = 0.5  # of the expected rate, below it the finding is a fault; by reason
+RATE_LEAST = 0.9  # of the expected rate; assumed
+RATE_FAULT = 0.5  # of the expected rate, below it the finding is a fault; assumed
 PINGS_HZ = {Schedule.CONCURRENT: 28.0, Schedule.SEQUENTIAL: 13.5}  # both rangers [firmware/README.md]
 MAXSONAR_PINGS_HZ = {Schedule.CONCURRENT: 19.0, Schedule.SEQUENTIAL: 9.5}  # both rangers [firmware/ranger.h]
 PRESSURE_HZ = {PressureMode.HIGH_SPEED: 9.0, PressureMode.HIGH_RESOLUTION: 1.8}

@@ -30,7 +30,7 @@ from echostep.session.console import console
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
 
-SCALE_RANGE = (0.5, 2.0)  # of --scale; by reason: beyond it the lengths of the leg are wrong
+SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wrong
 
 
 def foot(path: Path, out: Path, profile: str, *, plot: bool) -> None:

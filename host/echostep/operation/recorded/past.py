@@ -12,9 +12,7 @@ from echostep.operation import requests
 from echostep.operation.operation import Operation, TableScene
 from echostep.operation.recorded.tape import Player, Tape
 
-NEAR_END_S = (
-    0.5  # closer to the end of a growing tape is now; by reason: what was heard just now is not on the disk yet
-)
+NEAR_END_S = 0.5  # closer to the end of a growing tape is now: what was heard just now is not on the disk yet
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from echostep.team.roster import MAX_REASONS
 
 OPERATION = "operation"  # name of the port
 KIND = "operation"  # value of the metadata's field `kind`
-COUNTS_S = 1.0  # between two records of changed counts, by reason
+COUNTS_S = 1.0  # between two records of changed counts; assumed
 MOST_TOPIC = 200  # characters; the longest that is believed has about 100
 MOST_BYTES = MAX_PAYLOAD + 1024  # of one record
 

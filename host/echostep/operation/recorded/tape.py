@@ -22,7 +22,7 @@ from echostep.ports.chunks import Portion
 from echostep.recording.reading import Recording
 from echostep.team.inbox import ReceivedMessage
 
-# All by reason.
+# Assumed, all of them.
 STEP_S = 0.25  # of an operation that is played: a state changes at most so much later than it did
 MOST_STEPS = 1000  # for one gap without messages, so that a damaged time does not keep the player busy
 MESSAGES, SPAN_S = 5000, 300.0  # between two keyframes at most, at first: 0.1 to 0.7 s of work

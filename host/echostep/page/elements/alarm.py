@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason
 from echostep.tracker import Tracker
 
-AGAIN_S = 5.0  # between two times that a sentence is spoken, by reason
+AGAIN_S = 5.0  # between two times that a sentence is spoken; assumed
 
 
 @dataclass(frozen=True, slots=True)

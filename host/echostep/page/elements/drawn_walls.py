@@ -21,7 +21,7 @@ from echostep.mapping.graph.storeys import BETWEEN
 if TYPE_CHECKING:
     from echostep.mapping.mapper import Mapped
 
-MOST_WALLS, MOST_POINTS = 2000, 4000  # in a message; of more walls those nearest to the wearer. By reason: 72 KB
+MOST_WALLS, MOST_POINTS = 2000, 4000  # in a message; of more walls those nearest to the wearer: 72 KB
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from echostep.angles import wrap
 from echostep.localization.estimate import Estimate, ellipse95, trust
 from echostep.path import PathSegment
 
-DRIFT_M = 0.05  # standard deviation that is added per segment and axis to the foot's own. By reason: no source
+DRIFT_M = 0.05  # standard deviation that is added per segment and axis to the foot's own; assumed
 
 
 def extrapolate(estimate: Estimate, segment: PathSegment, later: Sequence[PathSegment]) -> Estimate:

@@ -15,7 +15,8 @@ from echostep.localization.estimate import CHI2_95, ellipse95
 from echostep.ports.people.team_beacons import MOST_SHARED
 from echostep.tracker import Tracker
 
-HEARD_S = 1.5  # a beacon counts as heard this long after its last reading. By reason: longer than a step, at whose end readings are used
+# A beacon counts as heard this long after its last reading: longer than a step, at whose end readings are used
+HEARD_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)

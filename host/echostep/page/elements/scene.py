@@ -27,7 +27,7 @@ KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle
 MOST_SHOWN = 10_000  # particles in a frame
 
 
-STOREY_M = 1.5  # least height against the start that is said, by reason: half a storey
+STOREY_M = 1.5  # least height against the start that is said: half a storey
 
 
 @dataclass(frozen=True, slots=True)

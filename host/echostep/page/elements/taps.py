@@ -19,7 +19,7 @@ from echostep.plan.places.standing import StandingGround
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.ports.people.check_in import CheckIn
 
-ASIDE_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted, by reason
+ASIDE_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-# By reason.
+# Assumed.
 MOST_CONNECTIONS = 256
 MOST_OF_ADDRESS = 128  # a page needs about eight for a moment
 REQUEST_S = 5.0  # for the first request, and between two

@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 from echostep.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, ring
 from echostep.plan.model import Connector
 
-SHARED = 0.4  # shapes that share more than this part of the smaller area are one staircase. By reason: no source
+SHARED = 0.4  # shapes that share more than this part of the smaller area are one staircase; assumed
 
 
 def join_connectors(drawn_levels: Sequence[DrawnLevel]) -> tuple[Connector, ...]:

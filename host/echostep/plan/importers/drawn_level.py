@@ -19,7 +19,7 @@ from echostep.arrays import Floats
 from echostep.plan.importers.straight import merge_collinear
 from echostep.plan.model import ConnectorKind, Door, Level, Room
 
-# By reason, all of them:
+# Assumed, all of them:
 CLOSE_M = 0.01  # half the width of the widest crack between two pieces of a wall that is closed
 FLAT_M = 0.005  # greatest distance of a curve from the straight pieces that replace it
 SLIVER_M2 = 1e-3  # smaller areas are dropped

@@ -16,7 +16,7 @@ from echostep.plan.importers.parsing import FORMATS
 from echostep.plan.model import Plan, load_plan
 from echostep.plan.writer import plan_json
 
-STOREY_HEIGHT_M = 3.5  # from level to level, for formats without heights. By reason: a usual storey
+STOREY_HEIGHT_M = 3.5  # from level to level, for formats without heights: a usual storey
 OTHERS = {".dxf", ".ifc", ".imdf", ".osm", ".xml", ".zip"}  # suffixes of files that are imported, not read as plan.json
 SNIFFED_BYTES = 4096  # read to recognise a format
 

@@ -19,7 +19,7 @@ from echostep.plan.importers.formats import Hints, import_plan, is_foreign
 from echostep.plan.model import Plan, load_plan, parse_plan
 from echostep.plan.writer import plan_json
 
-# By reason: ten times what the largest plan that was tried takes.
+# Assumed: ten times what the largest plan that was tried takes.
 LONGEST_S = 300.0
 MOST_MEMORY = 4 << 30  # bytes of address space
 MOST_OUTPUT = 1 << 28  # characters of a plan

@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from echostep.arrays import Floats
 from echostep.plan.model import Door, Level, Plan
 
-# By reason:
+# Assumed:
 TOUCH_M = 0.01  # walls with a smaller distance touch
 JAMB_M = 0.1  # greatest distance of a door's end from its wall
 BESIDE_M = 0.1  # distance from a door at which the faces on its two sides are looked up

@@ -13,7 +13,7 @@ import shapely
 from echostep.arrays import Floats
 from echostep.plan.model import Door, Level
 
-# By reason:
+# Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
 JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
 TOUCH_M = 0.02  # walls with a smaller distance touch

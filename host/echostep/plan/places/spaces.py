@@ -19,7 +19,7 @@ from echostep.plan.model import Connector, Door, Plan, Room
 from echostep.plan.places.faces import OUTSIDE, Faces, door_faces, find_faces
 from echostep.plan.places.gaps import door_gaps
 
-# By reason:
+# Assumed:
 WALL_M = 0.6  # a space without room and door that is narrower than this is the inside of a wall
 CORRIDOR_DOORS = 3  # a space without a name with so many doors is a corridor
 ENCLOSED_SHARE = 0.5  # of the walls' hull that is enclosed in a building without names

@@ -19,7 +19,7 @@ from echostep.plan.cropping import within
 from echostep.plan.model import Level, Plan, Pose
 from echostep.plan.places.spaces import PlanSpaces, Spaces
 
-# By reason:
+# Assumed:
 WITHIN_WALL_M = 0.1  # a position nearer to a wall than this is impossible
 CLEAR_M = 0.3  # distance of a proposed position from walls: half a person's width
 REACHES_M = (3.0, 30.0, 300.0, 3000.0)  # half sides of the squares that are searched

@@ -17,7 +17,7 @@ from echostep.plan.model import Door, Plan, Room
 from echostep.plan.places.faces import OUTSIDE
 from echostep.plan.places.spaces import PlanSpaces, Spaces
 
-BY_M = 4.0  # a door within this distance is named in a corridor. By reason: it is seen from there
+BY_M = 4.0  # a door within this distance is named in a corridor: it is seen from there
 ON_OR_IN = {"stairs": "on", "lift": "in", "ramp": "on"}
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from echostep.plan.json_fields import LIMIT_M
 
 PERSON = "person"  # name of the port
-# All by reason.
+# Assumed, all of them.
 MOST_BYTES = 512  # of one encoded check-in
 MOST_LEVELS = 1000
 LEAST_SD_M, MOST_SD_M = 0.05, 100.0  # m, per axis; an entered value is limited to this range

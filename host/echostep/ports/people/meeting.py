@@ -16,7 +16,7 @@ from echostep.ports.people.check_in import MOST_LEVELS
 from echostep.ports.people.payloads import Metres, Variance, decoded, has_covariance
 
 MEETING = "meeting"  # name of the port
-MOST_BYTES = 512  # of one encoded meeting, by reason
+MOST_BYTES = 512  # of one encoded meeting; assumed
 MOST_RANGE_M = 1000.0  # beyond the reach of any radio for short ranges
 
 

@@ -15,7 +15,7 @@ from echostep.ports.people.check_in import MOST_LEVELS
 from echostep.ports.people.payloads import Metres, decoded
 
 TEAM = "team"  # name of the port
-MOST_BYTES = 512  # of one encoded position, by reason
+MOST_BYTES = 512  # of one encoded position; assumed
 
 
 class Teammate(msgspec.Struct, frozen=True):

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.recovery import RecordedMessage
 
-MOST_WAITING = 4096  # messages; by reason: some seconds of a walk, while another port is silent
+MOST_WAITING = 4096  # messages: some seconds of a walk, while another port is silent
 
 
 @dataclass(slots=True)

@@ -21,7 +21,7 @@ from echostep.recording.mcap_records import port_of
 from echostep.recording.repair.arrival_order import ArrivalOrder
 from echostep.recording.repair.recovery import RecordedMessage, Recovery
 
-# All by reason.
+# Assumed, all of them.
 MESSAGES_PER_UPDATE = 5000  # of the progress bar
 LONGEST_LINE = 4000  # characters
 LONGEST_VALUE = 100  # characters of a metadata value on the line of its key

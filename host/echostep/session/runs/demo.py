@@ -37,11 +37,12 @@ from echostep.simulation.people.walker import Person, Waypoint
 from echostep.simulation.scenario import DEMO_WAYPOINTS, Scenario, start_of
 from echostep.tracker import Tracker
 
-WATCHED_SPEED = 4.0  # times real time, on a terminal; by reason: a walk of 90 s is seen in 22 s
-WATCHED_PORTION = 16  # chunks that are tracked together in a run that is watched: 20 ms of the walk; by reason: no step is shown later
-UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run; by reason: fewer calls
+WATCHED_SPEED = 4.0  # times real time, on a terminal: a walk of 90 s is seen in 22 s
+# Chunks that are tracked together in a run that is watched: 20 ms of the walk: no step is shown later
+WATCHED_PORTION = 16
+UNSEEN_PORTION = 1000  # chunks that are tracked together when nothing shows the run: fewer calls
 FOOT_BOARD = 2  # seed of its simulator: another board than the belt's
-TOUR_CORNER_M = 0.3  # how far corners are cut on a tour; by reason: doors of any plan are passed without touching them
+TOUR_CORNER_M = 0.3  # how far corners are cut on a tour: doors of any plan are passed without touching them
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording.device import DEVICES, LISTENED_BYTES, sender, wrong_device
 
-CHECK_BYTES = 512  # between two looks at a port; by reason: some frames
+CHECK_BYTES = 512  # between two looks at a port: some frames
 
 
 def with_role_check(chunks: Iterable[Chunk | None], urls: Mapping[str, str]) -> Iterator[Chunk | None]:

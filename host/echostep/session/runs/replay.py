@@ -24,7 +24,7 @@ from echostep.session.session import Session
 from echostep.settings import parse_settings, read_settings
 from echostep.tracker import Tracker
 
-VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on, by reason: about 10 ms
+VIEWED_PORTION = 8  # chunks tracked at once while a viewer looks on: about 10 ms
 
 
 def replay(path: Path, tracking: TrackingOptions, truth_path: Path | None, output: OutputOptions) -> None:

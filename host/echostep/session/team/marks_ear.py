@@ -19,7 +19,7 @@ from echostep.team.messages.marks import MARKS, MarkBoard, acks_of
 from echostep.team.messages.report import BadReportError
 from echostep.team.mqtt.publisher import Listener
 
-LOOK_S = 0.5  # between two looks at what was heard, by reason
+LOOK_S = 0.5  # between two looks at what was heard; assumed
 
 
 class MarksEar:

@@ -20,8 +20,8 @@ from echostep.team.inbox import Inbox, Receiver
 from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
-LOOK_S = 0.5  # between two looks at what was heard, by reason
-NEWS_S = 1.0  # between two places that are passed on, by reason
+LOOK_S = 0.5  # between two looks at what was heard; assumed
+NEWS_S = 1.0  # between two places that are passed on; assumed
 
 
 class TeamEar:

@@ -26,8 +26,8 @@ from echostep.team.messages.shared_drawings import drawing_topic
 from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
-LOOK_S = 0.5  # between two looks at what was heard, by reason
-HEARD_S = 60.0  # a teammate who has been silent for longer is not listed, by reason
+LOOK_S = 0.5  # between two looks at what was heard; assumed
+HEARD_S = 60.0  # a teammate who has been silent for longer is not listed; assumed
 
 
 class TeammatesEar:

@@ -26,9 +26,7 @@ from echostep.simulation.people.attitude import rotations
 from echostep.simulation.people.walker import RATE_HZ, Walk
 from echostep.simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
-HEAD_START_MS = (
-    1700  # for which the foot board has power before the belt board; by reason: two boards do not start together
-)
+HEAD_START_MS = 1700  # for which the foot board has power before the belt board: two boards do not start together
 BLOCK_MS = 50
 USB_LATENCY_NS = 1_000_000
 INTERPOLATED = math.sqrt(

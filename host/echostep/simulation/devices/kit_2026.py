@@ -32,11 +32,11 @@ FORCE_NOISE_M_S2 = 0.02  # rms, 80 ug per root Hz [table 2]
 FORCE_BIAS_M_S2 = 0.2  # zero-g level, typical [table 2]
 FULL_SCALE = 32_767
 GRAVITY_M_S2 = 9.80665
-BELT_TILT_RAD = math.radians(4.0)  # sd of roll and pitch; by reason
-SPREAD_MS = 20  # of the second difference of the trunk's path; by reason: the path is piecewise smooth
+BELT_TILT_RAD = math.radians(4.0)  # sd of roll and pitch; assumed
+SPREAD_MS = 20  # of the second difference of the trunk's path: the path is piecewise smooth
 FIELD_COUNTS = EARTH_T * 1e4 * 6842.0  # per earth field [LIS3MDL data sheet, table 2: 6842 per gauss]
 FIELD_NOISE_COUNTS = 0.0035 * 6842.0  # rms in the finest mode [table 2: 3.2 to 4.1 mgauss]
-PRESSURE_NOISE_PA = 1.0  # by reason, above the data sheet's: oversampling 16 and 2
+PRESSURE_NOISE_PA = 1.0  # assumed: above the data sheet's: oversampling 16 and 2
 
 
 class Kit2026Sensors:

@@ -30,7 +30,7 @@ from echostep.extras import require
 from echostep.jit import kernel
 
 GRAVITY_M_S2 = 9.81
-GAP_S = 0.25  # over a longer time between two samples the attitude is not propagated; by reason: samples are missing
+GAP_S = 0.25  # over a longer time between two samples the attitude is not propagated: samples are missing
 NEAR_ZERO = 1e-6  # of a norm whose direction is undefined, m/s2 or the field's unit
 SMALL_RAD = 1e-9  # below this angle the limits of sin(a)/a and (1 - cos(a))/a^2 are used
 

@@ -20,9 +20,9 @@ from echostep.plan.routing import Route, RoutePlace, Routes
 from echostep.simulation.people.walker import Waypoint
 
 TURN_M = 0.9  # room to turn at the ends of a flight
-MOST_ROOMS = 8  # of `room_tour`; by reason: two minutes of walking in an office
-MOST_TOUR_M = 300.0  # after which `room_tour` visits no further room, by reason
-SHORTEST_LEG_M = 2.0  # of `room_tour`: the next room is farther away, by reason
+MOST_ROOMS = 8  # of `room_tour`: two minutes of walking in an office
+MOST_TOUR_M = 300.0  # after which `room_tour` visits no further room; assumed
+SHORTEST_LEG_M = 2.0  # of `room_tour`: the next room is farther away; assumed
 SHORTEST_M = 0.05  # a waypoint nearer to the one before it is left out
 
 

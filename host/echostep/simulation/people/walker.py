@@ -27,7 +27,7 @@ Waypoint = (  # x, y, how long to pause there (s), height (m; 0 when not given)
 
 RATE_HZ = 1000
 SPACING_M = 0.01
-SHARP_RAD = math.radians(100.0)  # sharper corners are turned on the spot; by reason
+SHARP_RAD = math.radians(100.0)  # sharper corners are turned on the spot; assumed
 TURN_STRIDE_RAD = math.radians(75.0)  # per stride when turning on the spot
 SMOOTH_MS = 301
 STEEP = 0.1  # rise over run; less is a ramp, walked as the flat

@@ -16,9 +16,8 @@ from typing import NamedTuple
 from echostep.jit import kernel
 
 SILENT_DB = -1e3
-FIRST_NULL = (
-    3.8317  # of a piston's directivity 2 J1(x) / x; the side lobes beyond are 17 dB down each way and not modelled
-)
+# Of a piston's directivity 2 J1(x) / x; the side lobes beyond are 17 dB down each way and not modelled
+FIRST_NULL = 3.8317
 PIPE_RADIUS_M = 0.0275  # the 55 mm pipe of [Girard 2011, Figure 2a]
 
 
@@ -44,10 +43,10 @@ class Acoustics(NamedTuple):
 
 SRF02 = Acoustics()
 # Pulse rangers [HC-SR04 user guide: 2 to 450 cm, best within 30 degrees, accuracy of 3 mm]: two pistons, a narrower cone (-6 dB at 15 degrees each
-# way), a wall on the axis heard half of the time at 4.5 m. Noise and bias by reason: a wavelength is 8.6 mm.
+# way), a wall on the axis heard half of the time at 4.5 m. Noise and bias are assumed: a wavelength is 8.6 mm.
 PULSE_RANGER = Acoustics(size=8.56, threshold_db=-22.2, minimum_m=0.02, maximum_m=4.5, noise_m=0.008, bias_m=0.01)
 # I2CXL-MaxSonar-EZ0 [MaxBotix PD11848: 25 to 765 cm in steps of 1 cm, 42 kHz]: a piston of 7.5 mm (from memory), a wall on the axis heard half of the
-# time at 7.65 m. Noise and bias by reason.
+# time at 7.65 m. Noise and bias are assumed.
 MAXSONAR = Acoustics(size=5.77, threshold_db=-35.0, minimum_m=0.25, maximum_m=7.65, noise_m=0.01, bias_m=0.015)
 
 

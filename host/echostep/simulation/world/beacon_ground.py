@@ -19,7 +19,7 @@ from echostep.plan.polyline import along, way_m
 
 OUTLIER_M = 3.0  # added to a range [Fischer 2008, 4.1.1]
 
-# The constants below are by reason: the paper prints none of them.
+# The constants below are assumed: the paper prints none of them.
 PARTS = (4, 7)  # straight parts of a trail
 PART_M = (12.0, 25.0)
 TURNS_RAD = (math.radians(30.0), math.radians(110.0))  # between parts, to either side

@@ -18,7 +18,7 @@ from echostep.team.georeference import GroundPlane
 from echostep.team.messages.report import Motion, Position, Report, ReportedAlarm, moment, printable
 
 VERSION = 1
-STALE_S = 30.0  # a position is late after three intervals, by reason
+STALE_S = 30.0  # a position is late after three intervals; assumed
 HEAD = struct.Struct("<B4s4sdHBB")  # version, run, first bytes of the plan's digest, Unix time, number, flags, battery
 BODY = struct.Struct("<iieeeheebBeeHHB")  # as in `_packed`
 ALARM = struct.Struct("<BHH")  # kind and reason, number, age in s

@@ -10,7 +10,7 @@ from echostep.ports.people.team_beacons import TeamBeacons, parse_team_beacons
 from echostep.team.messages.report import BadReportError, is_printable
 
 BEACONS = "beacons"  # last part of the topic
-SHARE_S = 5.0  # between two messages of a wearer, at least, by reason
+SHARE_S = 5.0  # between two messages of a wearer, at least; assumed
 
 
 def beacons_message(team: str, told: TeamBeacons) -> tuple[str, bytes]:

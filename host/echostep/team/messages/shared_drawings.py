@@ -13,13 +13,11 @@ from echostep.errors import EchostepError
 from echostep.plan.model import Plan, parse_plan
 from echostep.team.messages.report import is_printable
 
-MOST_BYTES = 1 << 20  # of a drawing. By reason: an hour in a furnished office has 30 kB
-MOST_WALLS = 10_000  # of all storeys, by reason
-MOST_LENGTH_M = (
-    50_000.0  # of all walls together. By reason: a walk of four hours has 13 km of path, and a wall on either side
-)
-MOST_EXTENT_M = 5_000.0  # of the walls along x and y, by reason: one site
-MOST_STOREYS = 64  # by reason
+MOST_BYTES = 1 << 20  # of a drawing: an hour in a furnished office has 30 kB
+MOST_WALLS = 10_000  # of all storeys; assumed
+MOST_LENGTH_M = 50_000.0  # of all walls together: a walk of four hours has 13 km of path, and a wall on either side
+MOST_EXTENT_M = 5_000.0  # of the walls along x and y: one site
+MOST_STOREYS = 64  # assumed: no building has more
 
 
 def drawing_topic(team: str, name: str) -> str:

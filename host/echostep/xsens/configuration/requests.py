@@ -14,7 +14,7 @@ from echostep.xsens.mtdata import PROJECT, OutputFormat
 CLOCK_HZ = 115_200  # unit of SetPeriod [CMT: period 1152 at 100 Hz]
 SYNC_CLOCK_HZ = 29_491_200  # unit of SyncOut offsets and widths [CMT; LLCP, SetTransmitDelay: ticks of 1 / 29.4912 MHz]
 SHORTEST_PERIOD, LONGEST_PERIOD = 225, 11_520  # ticks of CLOCK_HZ: 512 Hz, 10 Hz [CMT; LLCP, SetPeriod]
-PULSE_S = 0.001  # width of a SyncOut pulse; by reason
+PULSE_S = 0.001  # width of a SyncOut pulse; assumed
 BAUD = 115_200  # Bd of the MTx's port, and bits per second on its line
 FRAME_OVERHEAD = 5  # bytes of a frame besides its payload [Manual 5.3.1]
 BITS_PER_BYTE = 10  # on the line: start, 8 data, stop

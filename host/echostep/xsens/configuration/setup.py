@@ -32,13 +32,13 @@ from echostep.xsens.configuration.requests import (
 from echostep.xsens.frames import ERROR, MTDATA, MTDATA2, WAKE_UP, Frame, FrameReader, encode_frame
 from echostep.xsens.mtdata import PROJECT
 
-TRIES = 4  # of each request; by reason: one more than Xsens' own library makes for GoToConfig [CMT]
-TIMEOUT_S = 0.25  # for an acknowledgement; by reason: buffered measurements arrive before it
-MAX_WAKE_UPS = 20  # after more wake-ups the setup is not started again; by reason: the supply is bad
-RATE_ERROR = 0.3  # largest relative error of the measured rate; by reason: it is measured over a short time
-RATE_SPAN_S = 0.5  # least time over which a rate is measured; by reason
-BACKLOG_S = 0.2  # measurements of this time are not used for the rate; by reason: buffered ones come at once
-MAX_MEASUREMENTS = 1000  # kept for the rate; by reason
+TRIES = 4  # of each request: one more than Xsens' own library makes for GoToConfig [CMT]
+TIMEOUT_S = 0.25  # for an acknowledgement: buffered measurements arrive before it
+MAX_WAKE_UPS = 20  # after more wake-ups the setup is not started again: the supply is bad
+RATE_ERROR = 0.3  # largest relative error of the measured rate: it is measured over a short time
+RATE_SPAN_S = 0.5  # least time over which a rate is measured; assumed
+BACKLOG_S = 0.2  # measurements of this time are not used for the rate: buffered ones come at once
+MAX_MEASUREMENTS = 1000  # kept for the rate; assumed
 
 BY_HAND = "set it once with Xsens' MT Manager to calibrated data + orientation as quaternion + sample counter, float, {rate:g} Hz, 115200 Bd"
 

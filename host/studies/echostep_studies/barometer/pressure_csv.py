@@ -27,7 +27,7 @@ TEMPERATURE = "temperature_c"
 FLOOR_COLUMNS = ("t_s", "floor", "probability", "height_m")
 TIME, PRESSURE, AIR_TEMPERATURE = range(3)  # columns of a table of samples
 
-# By reason, all of them.
+# Assumed, all of them.
 LIMITS = CsvLimits(line_chars=1000, lines=19_999_999, early_rows=None)  # they bound the memory: four days at 50 Hz
 RATE_HZ = (0.45, 55.0)  # 0.5 to 50 Hz with a margin of 10 %
 BACK_SHARE = 0.01  # largest share of rows whose time goes back: damage, not another order of rows

@@ -37,7 +37,7 @@ LONGEST_STEP_S = 0.5  # longest step of the mode transitions
 GAP_S = 5.0  # of missing samples: longer gaps reinitialise the modes
 TINY, TINIEST = 1e-9, 1e-14  # least weights of a hypothesis and of a successor; smaller ones are pruned
 
-# Rates of transitions, 1/s; by reason
+# Rates of transitions, 1/s; assumed
 GUST_BEGINS, GUST_ENDS, GUST_JUMPS = 1 / 40, 0.5, 0.3
 HELD_FADES, FADING_HOLDS = 0.3, 0.1
 SHIFTS, GUST_SHIFTS = 1 / 1200, 1 / 60  # the pressure of the building changes for good

@@ -20,7 +20,7 @@ from echostep.simulation.people.walker import Waypoint
 LEG_M = (5.0, 45.0)  # from place to place
 OTHER_LEVEL = 0.3  # share of the places that are on another level
 CLEAR_M = 0.6  # of a place from the nearest wall
-TRIES = 2000  # for one tour, and for one place; by reason
+TRIES = 2000  # for one tour, and for one place; assumed
 
 
 def random_tour(

@@ -31,9 +31,9 @@ from echostep_studies.fischer2008.walker import GuidedWalker
 CLOUD = CloudSettings()
 START_SD_M = CLOUD.start_sd_m  # per axis, of the known place at the start
 START_TURN_SD_RAD = math.radians(CLOUD.start_turn_sd_deg)
-SCALE_SD = 0.002  # drift of the scale per square root of a metre, by reason: dead reckoning by steps
+SCALE_SD = 0.002  # drift of the scale per square root of a metre: dead reckoning by steps
 RESAMPLE_BELOW = CLOUD.resample_below  # effective share of the particles
-TURN_SD_RAD = math.radians(1.0)  # drift of a compass's heading per square root of a metre; by reason
+TURN_SD_RAD = math.radians(1.0)  # drift of a compass's heading per square root of a metre; assumed
 OPEN_GROUND = Walls(np.zeros((0, 4))).near(np.zeros(1), np.zeros(1), 0.0)
 
 

@@ -20,7 +20,7 @@ from echostep.simulation.world.beacon_ground import BeaconGround
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud, update_by_ultrasound
 from echostep_studies.fischer2008.walker import STEP_M, WALKER, GuidedWalker, dead_reckon
 
-DROP_AHEAD_M = 0.3  # a beacon is dropped when the walker is so near to its place on the path; by reason
+DROP_AHEAD_M = 0.3  # a beacon is dropped when the walker is so near to its place on the path; assumed
 
 
 def walk_in(world: BeaconGround, cloud: BeaconCloud, ultrasound_ticks: int, rng: np.random.Generator) -> float:

@@ -28,12 +28,12 @@ from echostep_studies.fischer2008.walker import EXACT, SPEED_M_S, TICK_S, WALKER
 PDR, PAPER, OURS = 0, 1, 2  # systems: dead reckoning alone, the paper's fusion, the particle filter with beacons
 GUIDANCE_TICKS = 200  # between cues [Fischer 2008, 4.2]
 NEAR_EXIT_M = 3.0  # "within a short distance of the end" [Fischer 2008, 4.2]
-TIME_FACTOR = 2.5  # time allowed, in walks along the trail: "under a certain delay" [Fischer 2008, 4.2]; by reason
+TIME_FACTOR = 2.5  # time allowed, in walks along the trail: "under a certain delay" [Fischer 2008, 4.2]; assumed
 PARTICLES = 100
 MORE_PARTICLES = 300  # where the map is learnt or uncertain, or measurements are rare
 RARE_S = 2.0  # time between rare measurements
-COMPASS = BeaconSettings(kick_per_m=0.3, tries_per_m=0.5)  # heading by a compass near iron, as the paper's; by reason
-MAPPING = replace(COMPASS, kick_per_m=0.1)  # by reason: each accepted jump bends a map that is learnt
+COMPASS = BeaconSettings(kick_per_m=0.3, tries_per_m=0.5)  # heading by a compass near iron, as the paper's; assumed
+MAPPING = replace(COMPASS, kick_per_m=0.1)  # each accepted jump bends a map that is learnt
 
 
 @dataclass(frozen=True, slots=True)

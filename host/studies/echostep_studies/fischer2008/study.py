@@ -25,7 +25,7 @@ from echostep_studies.frame.report import as_dict, rows_by_name
 from echostep_studies.frame.study import Study, StudyRequest
 
 BATCH = 50  # returns a task
-INEXACT = Obedience(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)  # by reason
+INEXACT = Obedience(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)  # assumed
 SYSTEMS = {"pdr": PDR, "fischer2008": PAPER, "default": OURS}
 NOMINAL = GroundSettings()
 UNCERTAIN = replace(NOMINAL, place_sd_m=1.0, axis_sd_deg=15.0, outliers=0.2)

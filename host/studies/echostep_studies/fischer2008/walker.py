@@ -16,9 +16,9 @@ from echostep.jit import kernel
 from echostep.simulation.world.beacon_ground import BeaconGround, disturbance
 
 TICK_S = 0.01  # between inertial events [Fischer 2008, 4.2]
-SPEED_M_S = 1.0  # by reason: a slow walk
+SPEED_M_S = 1.0  # a slow walk
 STEP_M = SPEED_M_S * TICK_S  # of one inertial event
-WRONG_TURN_RAD = 0.5 * math.pi  # error of a wrong turn, to either side; by reason
+WRONG_TURN_RAD = 0.5 * math.pi  # error of a wrong turn, to either side; assumed
 
 
 class Obedience(NamedTuple):

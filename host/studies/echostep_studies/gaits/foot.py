@@ -18,7 +18,7 @@ from echostep_studies.simulation.rolling_foot import MANNERS, Course, Manner, co
 
 STEPS, RATE_HZ = 40, 200
 SOFT_LIMIT_RAD_S, SHARPNESS = math.radians(540.0), 24.0  # as real foot sensors bend off, at 520 to 558 deg/s
-# By reason: a crawling foot drags behind its knee, sole up; on a ladder a foot goes up two rungs of 28 cm [EN 131] and stands on its middle.
+# Assumed: a crawling foot drags behind its knee, sole up; on a ladder a foot goes up two rungs of 28 cm [EN 131] and stands on its middle.
 MORE = {
     "hurried": Manner((1.2, 0.0, 0.0), turn_rad=0.35, swing_s=0.55, stance_s=0.22, toe_off_rad=1.0, roll_s=0.09),
     "crawling": Manner(

@@ -2,7 +2,7 @@
 """Legs in manners of moving that two gyros in the plane of the leg do not show, or only in part.
 
 In: seeds. Out: a row a manner: true way forward and up, what the strides say, in units of what they state too, and how they are flagged. Owns the
-manners: curves of thigh and knee, by reason where `leg_angles` has none. The signs of the gyros are known, as from a walk before.
+manners: curves of thigh and knee, assumed where `leg_angles` has none. The signs of the gyros are known, as from a walk before.
 """
 
 from __future__ import annotations

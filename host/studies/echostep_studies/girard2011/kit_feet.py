@@ -21,9 +21,9 @@ from echostep.simulation.devices.mtx import MtxModel, measure
 from echostep.simulation.people.walker import RATE_HZ, Person, Walk, walk
 from echostep_studies.simulation.sites import otb
 
-PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; by reason
+PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; assumed
 SMALL_MTX_M_S2 = 50.0  # full scale of the MTx version of 5 g [Xsens MT0100P, 4.1]
-LEAN_RAD = 0.05  # of each side on which the part lies, by reason
+LEAN_RAD = 0.05  # of each side on which the part lies; assumed
 SIDES_RPY_RAD = np.pi / 2.0 * np.array([(0, 0, 0), (2, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
 POSE_MS = 2500  # as in `echostep calibrate accelerometers`
 Samples = tuple[Floats, Floats, Floats]  # t_s (n,), accel, gyro (n, 3)

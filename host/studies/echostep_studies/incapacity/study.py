@@ -38,12 +38,12 @@ SWAY_HZ, SWAY_SPREAD, SWAY_TONES = (
     (0.3, 2.5),
     0.5,
     6,
-)  # range; of the logarithm of its size, from one movement to the next, by reason; sinusoids
+)  # range; of the logarithm of its size, from one movement to the next; assumed; sinusoids
 TWITCH_PAUSE_S, TWITCH_S, TWITCH_RAD_S = (
     5.0,
     (0.1, 0.4),
     (0.02, 0.08),
-)  # of every second wearer who cannot move, by reason
+)  # of every second wearer who cannot move; assumed
 PORTION_S = 0.25  # that comes at once
 DAY_S = 8.0 * 3600.0
 PAUSES_S = {
@@ -51,9 +51,9 @@ PAUSES_S = {
     "crawl": 0.8,
     "crouch": 10.0,
     "wait": 15.0,
-}  # mean time between two movements of a foot, by reason
+}  # mean time between two movements of a foot; assumed
 SPANS_S = {"walk": (20.0, 300.0), "crawl": (20.0, 120.0), "crouch": (30.0, 600.0), "wait": (20.0, 300.0)}
-ANSWER_S, ANSWERED = (1.0, 6.0), 0.98  # how soon, and how often, the question is answered by a movement, by reason
+ANSWER_S, ANSWERED = (1.0, 6.0), 0.98  # how soon, and how often, the question is answered by a movement; assumed
 
 
 class SimulatedWearer:

@@ -30,7 +30,7 @@ from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.operation.own_tracks import track_of, truth_of
 from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
 
-ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for: by reason, a door; hardly ever another floor
+ASKED_CE95_M, ASKED_FLOOR = 0.5, 0.995  # what an operation asks for, assumed: a door; hardly ever another floor
 ALL, RESUMED = "all", "all, resumed"  # the rows of all points
 Parts = Callable[[OperationWalk, Floats, Any], dict[str, Bools]]
 COLUMNS = {

@@ -3,7 +3,7 @@
 
 In: a manner, a seeded generator. Out: `BodySamples`. Owns the manners, which are composed of the movements of `body_motion.py`.
 
-Ranges of drops, times and angles are by reason, except: hips meet the floor at 2 to 3.5 m/s [Feldman and Robinovitch 2007, as remembered], which is
+Ranges of drops, times and angles are assumed, except: hips meet the floor at 2 to 3.5 m/s [Feldman and Robinovitch 2007, as remembered], which is
 what a drop of 0.45 to 0.9 m by 0.5 to 0.8 of gravity gives. World: x ahead, y left, z up. Pitch: forward positive; of a foot, the heel goes up.
 """
 

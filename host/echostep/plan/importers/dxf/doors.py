@@ -26,7 +26,7 @@ from echostep.plan.importers.dxf.entities import DrawingFrame, parts
 from echostep.plan.model import Door
 
 NARROWEST_M, WIDEST_M = 0.3, 12.0
-LEAF_M = 0.1  # greatest distance of a leaf's line from the hinge. By reason: no source
+LEAF_M = 0.1  # greatest distance of a leaf's line from the hinge; assumed
 Line = tuple[float, float, float, float]
 
 

@@ -34,7 +34,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "obstacles": ("*obstacle*", "*hindernis*"),
 }
 INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
-REACH_M = 0.3  # half the greatest distance between neighbouring lines of one staircase. By reason: a tread
+REACH_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 
 
 def import_dxf(

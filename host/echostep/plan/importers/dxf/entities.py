@@ -25,7 +25,7 @@ from echostep.plan.json_fields import LIMIT_M
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FLAT_M = 0.005  # greatest distance of an arc from the straight pieces that replace it
 FAR_M = 1e4  # larger coordinates are of a national grid: the origin is then moved to the first wall
-STRAY_M = 1e8  # a line beyond is no building, in whatever grid; by reason: twice around the Earth
+STRAY_M = 1e8  # a line beyond is no building, in whatever grid: twice around the Earth
 STRAY = LineString([(0.0, 0.0), (STRAY_M, 0.0)])  # in the place of a line beyond
 MOST_PARTS = 300_000  # entities in blocks
 DEEPEST_BLOCK = 16

@@ -18,8 +18,8 @@ from echostep.arrays import Floats
 from echostep.plan.model import Door
 
 ASSUMED = "assumed"  # name of such a door
-THICKEST_M = 0.6  # greatest distance of neighbours: the thickness of a wall. By reason
-JAMB_M = 0.05  # of wall left beside a door. By reason
+THICKEST_M = 0.6  # greatest distance of neighbours: the thickness of a wall; assumed
+JAMB_M = 0.05  # of wall left beside a door; assumed
 ONE_LINE_M = 0.05  # nearer faces are one wall: half the width in which a door cuts a wall drawn as a line
 
 

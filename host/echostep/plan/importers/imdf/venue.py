@@ -59,7 +59,7 @@ SOLID_FIXTURES = {
     "waterfeature",
     "vegetation",
 }
-ON_M = 0.2  # greatest distance of an opening from the boundary that it opens. By reason: no source
+ON_M = 0.2  # greatest distance of an opening from the boundary that it opens; assumed
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from echostep.plan.importers.osm.elements import Elements, Tags, levels_of, read
 from echostep.plan.json_fields import LIMIT_M
 from echostep.plan.model import ConnectorKind, Door, DoorState, Georeference, Plan
 
-DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none. By reason: usual sizes
+DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: usual sizes
 MOST_LEVELS = 200
 
 

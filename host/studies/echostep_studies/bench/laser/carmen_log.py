@@ -23,7 +23,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 
-# All by reason.
+# Assumed, all of them.
 LONGEST_LINE = 100_000  # bytes
 MOST_LINES = 2_000_000
 MOST_SCANS = 20_000

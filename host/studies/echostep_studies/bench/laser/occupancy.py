@@ -18,7 +18,7 @@ from echostep_studies.bench.laser.carmen_log import CarmenLog
 
 CELL_M = 0.1
 STANDING = 0.25  # [GMapping's threshold of an occupied cell]
-USED_M = 10.0  # longer beams are left out, by reason: half a degree of pose error is 9 cm there
+USED_M = 10.0  # longer beams are left out: half a degree of pose error is 9 cm there
 NO_RETURN = 0.98  # a range above this share of the log's greatest is none
 MOST_CELLS = 40_000_000
 

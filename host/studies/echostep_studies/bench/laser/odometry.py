@@ -20,7 +20,7 @@ FITS_RAD = math.radians(10.0)  # error of a turn between two scans above which t
 FITTING = 0.95  # least share of turns that fit
 LENGTH_NOISE, TURN_NOISE_RAD = 0.03, math.radians(2.0)  # of the corrected increments, where the odometry does not fit
 SAME_M = 0.01  # the odometry counts on from a scan's pose when it begins so near to it
-VEER_SD_DEG = 2.0  # bias of wheels' odometry, on a metre: wheels 0.4 m apart that differ by 1.4 %, by reason
+VEER_SD_DEG = 2.0  # bias of wheels' odometry, on a metre: wheels 0.4 m apart that differ by 1.4 %; assumed
 PIECE_M, PIECE_RAD = 0.3, math.radians(10.0)  # a piece ends when it is so long or turns so much
 
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from echostep.arrays import Bools, Floats, Ints
 
-# All by reason.
+# Assumed, all of them.
 NEIGHBOURS_M = 0.35  # places so near tell the direction at a place
 ASIDE_M = 0.07  # greatest distance of a place from its line
 DOUBLE_M = 0.12  # places so near to an accepted line are not used again: a wall seen by scans that do not quite agree

@@ -16,9 +16,8 @@ from echostep.arrays import Bools, Floats, spans
 from echostep.foot.steps import Track
 
 FROZEN_SAMPLES = 5  # motion capture that repeats itself for longer has lost its markers
-SURVEYED_31 = (
-    29  # footprints of hallway 31 before two strides that contradict every inertial track by 0.3 and 0.6 m in length
-)
+# Footprints of hallway 31 before two strides that contradict every inertial track by 0.3 and 0.6 m in length
+SURVEYED_31 = 29
 
 
 class Figure(NamedTuple):

@@ -22,9 +22,9 @@ from echostep_studies.frame.recordings import Sets
 
 WAY_HZ = 10.0  # of the feet's path: slow enough that the noise of standing markers adds nothing
 PAUSE_S = 3.0  # feet that rest for longer end a walk
-MOVING_M_S = 0.1  # mean speed of both feet over `PAUSE_S` in a walk; by reason
+MOVING_M_S = 0.1  # mean speed of both feet over `PAUSE_S` in a walk; assumed
 SMOOTHED = 5  # samples of motion capture, against its noise
-STANDS_M_S, STANDS_S = 0.3, 0.08  # of an ankle in a stance, which turns on about the heel and the ball; by reason
+STANDS_M_S, STANDS_S = 0.3, 0.08  # of an ankle in a stance, which turns on about the heel and the ball; assumed
 Move = tuple[float, float, Floats]  # begin and end s, x and y m
 MARGIN_S = 1.0  # of standing, kept before and after the walk
 
