@@ -16,8 +16,8 @@ from echostep.page.elements.marks import ShownMark
 from echostep.page.mailbox import Mailbox
 from echostep.page.server import Address, PageServer
 from echostep.plan.model import load_plan
-from echostep.session.team import marks_ear
-from echostep.session.team.marks_ear import MarksEar
+from echostep.session.team import mark_feed
+from echostep.session.team.mark_feed import MarkFeed
 from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.inbox import Inbox, Receiver
 from echostep.team.messages.marks import ALL
@@ -64,10 +64,10 @@ class Commander:
 
 @needs_broker
 def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr(marks_ear, "LOOK_S", 0.0)
+    monkeypatch.setattr(mark_feed, "LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
         outlet = parse_outlet([broker.url], "anna", "red")
-        wearer = MarksEar(outlet.endpoints[0], outlet, "0123abcd", load_plan(PLAN).digest, print)
+        wearer = MarkFeed(outlet.endpoints[0], outlet, "0123abcd", load_plan(PLAN).digest, print)
         box = box_to(broker.url)
         box.offer(report("anna", alarm=ReportedAlarm("mayday", "no motion", 1, 31.0)))
         assert until(lambda: ann.look().rows and ben.look().rows)

@@ -21,7 +21,7 @@ from echostep.session.metadata import run_metadata
 from echostep.session.options import OutputOptions
 from echostep.session.runs.recording import start_recording
 from echostep.session.session import Session
-from echostep.session.team import teammates_ear
+from echostep.session.team import teammate_feed
 from echostep.simulation.devices.board import PythonBoard
 from echostep.simulation.scenario import demo_scenario
 from echostep.team.endpoint import parse_endpoint, parse_outlet
@@ -79,7 +79,7 @@ def draw(broker: Broker, folder: Path, page: Address | None) -> None:
 @needs_broker
 def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bo walks the demo's way too, by other feet, on what anna has drawn; the file replays it."""
-    monkeypatch.setattr(teammates_ear, "SHARE_S", 0.0)
+    monkeypatch.setattr(teammate_feed, "SHARE_S", 0.0)
     with Broker(tmp_path) as broker:
         draw(broker, tmp_path / "anna", None)
         bo = parse_outlet([broker.url], "bo", "red")
@@ -111,6 +111,6 @@ def test_what_one_walk_has_drawn_tracks_a_teammate(tmp_path: Path, monkeypatch: 
 
 @needs_broker
 def test_what_a_page_draws_is_shared_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(teammates_ear, "SHARE_S", 0.0)
+    monkeypatch.setattr(teammate_feed, "SHARE_S", 0.0)
     with Broker(tmp_path) as broker:
         draw(broker, tmp_path / "anna", Address(port=0))

@@ -65,37 +65,37 @@ class Ear:
 
 @contextmanager
 def listening(url: str) -> Iterator[Ear]:
-    ear = Ear(url)
+    feed = Ear(url)
     try:
-        assert until(lambda: ear.reception.connected)
-        yield ear
+        assert until(lambda: feed.reception.connected)
+        yield feed
     finally:
-        ear.reception.close()
+        feed.reception.close()
 
 
 @needs_broker
 @pytest.mark.usefixtures("patient")
 def test_a_broker_that_dies_and_returns_loses_no_later_report(tmp_path: Path) -> None:
     words: list[str] = []
-    with Broker(tmp_path) as broker, listening(broker.url) as ear:
+    with Broker(tmp_path) as broker, listening(broker.url) as feed:
         box = box_to(broker.url, words)
         for k in range(20):
             box.offer(at(float(k)))
-        assert until(lambda: 19.0 in ear.times)
+        assert until(lambda: 19.0 in feed.times)
         broker.stop()
         assert until(lambda: words)
         for k in range(100, 105):
             box.offer(at(float(k)))
         broker.start()
-        assert until(lambda: 104.0 in ear.times)
+        assert until(lambda: 104.0 in feed.times)
         for k in range(200, 250):
             box.offer(at(float(k)))
-        assert until(lambda: 249.0 in ear.times)
-        heard = dict.fromkeys(t for t in ear.times if t >= 200.0)  # a heartbeat may repeat the last one
+        assert until(lambda: 249.0 in feed.times)
+        heard = dict.fromkeys(t for t in feed.times if t >= 200.0)  # a heartbeat may repeat the last one
         assert list(heard) == [float(k) for k in range(200, 250)]
-        assert ear.only().state(time.monotonic()) is MemberState.TRACKING
+        assert feed.only().state(time.monotonic()) is MemberState.TRACKING
         summary = box.close()
-        assert until(lambda: ear.only().state(time.monotonic()) is MemberState.ENDED)
+        assert until(lambda: feed.only().state(time.monotonic()) is MemberState.ENDED)
     assert "broken 1 times" in summary
     assert words[-1].endswith("connected again")
 
@@ -105,18 +105,18 @@ def test_a_frozen_broker_neither_slows_the_tracker_nor_keeps_old_reports(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outbox, "FRESH_S", 0.3)
-    with Broker(tmp_path) as broker, listening(broker.url) as ear:
+    with Broker(tmp_path) as broker, listening(broker.url) as feed:
         box = box_to(broker.url)
         box.offer(at(0.0))
-        assert until(lambda: 0.0 in ear.times)
+        assert until(lambda: 0.0 in feed.times)
         broker.freeze()
         for k in range(100):
             assert ends(partial(box.offer, at(1.0 + k)))
             time.sleep(0.01)  # at least: the first ones are older than FRESH_S in the end
         broker.thaw()
-        assert until(lambda: 100.0 in ear.times)
+        assert until(lambda: 100.0 in feed.times)
         box.close()
-    assert len(ear.times) < 80
+    assert len(feed.times) < 80
     assert box.counts.overtaken > 30
 
 
@@ -127,9 +127,9 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
         line.open()
         line.send(at(7.0))
         line.close(ended=False)
-        with listening(broker.url) as ear:
-            assert until(lambda: ear.members() and ear.only().presence == "broken")
-            member = ear.only()
+        with listening(broker.url) as feed:
+            assert until(lambda: feed.members() and feed.only().presence == "broken")
+            member = feed.only()
             assert (member.retained, member.state(time.monotonic())) == (True, MemberState.STALE)
             assert member.report.position
             assert member.report.position.t_s == 7.0
@@ -138,16 +138,16 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
 @needs_broker
 @pytest.mark.usefixtures("patient")
 def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
-    with Broker(tmp_path) as broker, listening(broker.url) as ear:
+    with Broker(tmp_path) as broker, listening(broker.url) as feed:
         boxes = [box_to(broker.url, name=f"n{k:02d}", run=f"{k:08x}") for k in range(20)]
         for n in range(20):
             for k, box in enumerate(boxes):
                 box.offer(replace(at(float(n), f"n{k:02d}"), run=f"{k:08x}", status="lost" if k == 7 else "tracking"))
-            assert until(partial(ear.has_all_at, float(n)))
-        first = ear.members()[0]
+            assert until(partial(feed.has_all_at, float(n)))
+        first = feed.members()[0]
         assert (first.report.name, first.state(time.monotonic())) == ("n07", MemberState.LOST)
-        assert sum(m.missed for m in ear.members()) == 0
-        assert ear.roster.rejected == {}
+        assert sum(m.missed for m in feed.members()) == 0
+        assert feed.roster.rejected == {}
         for box in boxes:
             box.begin_close()
         assert [box.close().split(", ")[0].rpartition(": ")[2] for box in boxes] == ["20 of 20 reports sent"] * 20
@@ -155,13 +155,13 @@ def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
 
 @needs_broker
 def test_two_trackers_of_one_name_do_not_throw_each_other_out(tmp_path: Path) -> None:
-    with Broker(tmp_path) as broker, listening(broker.url) as ear:
+    with Broker(tmp_path) as broker, listening(broker.url) as feed:
         boxes = [box_to(broker.url, run=run) for run in ("11111111", "22222222")]
         for k in range(5):
             for box, run in zip(boxes, ("11111111", "22222222"), strict=True):
                 box.offer(replace(at(float(k)), run=run))
-        assert until(lambda: len(ear.members()) == 2)
-        assert ear.roster.duplicates(time.monotonic()) == {("red", "anna")}
+        assert until(lambda: len(feed.members()) == 2)
+        assert feed.roster.duplicates(time.monotonic()) == {("red", "anna")}
         assert [box.counts.breaks for box in boxes] == [0, 0]
         for box in boxes:
             box.close()
@@ -176,10 +176,10 @@ def test_tls_with_client_certificates(tmp_path: Path, certificates: Certificates
     asked = (f"cafile {c.ca}", f"certfile {c.server}", f"keyfile {c.server}", "require_certificate true")
     with Broker(tmp_path, *asked) as broker:
         url = f"mqtts://127.0.0.1:{broker.port}"
-        with listening(url + c.query(c.client)) as ear:
+        with listening(url + c.query(c.client)) as feed:
             box = box_to(url + c.query(c.client))
             box.offer(at(3.0))
-            assert until(lambda: 3.0 in ear.times)
+            assert until(lambda: 3.0 in feed.times)
             box.close()
         for query in (c.query(), c.query(c.stranger)):
             words: list[str] = []
@@ -216,7 +216,7 @@ def test_a_wrong_password_is_said(tmp_path: Path) -> None:
 @needs_broker
 def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_path: Path) -> None:
     rng = random.Random(5)
-    with Broker(tmp_path, "max_queued_messages 100000") as broker, listening(broker.url) as ear:
+    with Broker(tmp_path, "max_queued_messages 100000") as broker, listening(broker.url) as feed:
         enemy = paho.Client(CallbackAPIVersion.VERSION2)
         enemy.connect("127.0.0.1", broker.port)
         enemy.loop_start()
@@ -227,26 +227,26 @@ def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_pat
         enemy.publish("echostep/red/\u202eeve/estimate", right)
         enemy.publish("echostep/red/bob/estimate", right)
         enemy.publish("echostep/red/eve/presence", b"{}")
-        assert until(lambda: ear.members() is not None and sum(ear.roster.rejected.values()) >= 5)
-        assert {"not JSON", "too long", "name and topic contradict each other"} <= set(ear.roster.rejected)
+        assert until(lambda: feed.members() is not None and sum(feed.roster.rejected.values()) >= 5)
+        assert {"not JSON", "too long", "name and topic contradict each other"} <= set(feed.roster.rejected)
         box = box_to(broker.url)
         for k in range(10_000):
             enemy.publish("echostep/red/eve/estimate", rng.randbytes(40))
             if k % 500 == 0:
                 box.offer(at(float(k)))
-        assert until(lambda: ear.members() is not None and ear.roster.received > 10_000)
-        assert until(lambda: 9500.0 in ear.times)
-        assert ear.only().report.name == "anna"
+        assert until(lambda: feed.members() is not None and feed.roster.received > 10_000)
+        assert until(lambda: 9500.0 in feed.times)
+        assert feed.only().report.name == "anna"
         broker.stop()
-        assert until(lambda: not ear.reception.connected)
+        assert until(lambda: not feed.reception.connected)
         broker.start()
-        assert until(lambda: ear.reception.connected)
+        assert until(lambda: feed.reception.connected)
         box.offer(at(20_000.0))
-        assert until(lambda: 20_000.0 in ear.times)
+        assert until(lambda: 20_000.0 in feed.times)
         enemy.loop_stop()
         enemy.disconnect()
         box.close()
-    assert ear.words[-1] == "connected again"
+    assert feed.words[-1] == "connected again"
 
 
 @pytest.mark.long
@@ -282,12 +282,12 @@ def test_a_broker_that_speaks_nonsense_stops_nobody(nonsense: bytes) -> None:
         thread.start()
         url = f"mqtt://127.0.0.1:{server.getsockname()[1]}"
         words: list[str] = []
-        box, ear = box_to(url, words), Ear(url)
+        box, feed = box_to(url, words), Ear(url)
         try:
             box.offer(at(1.0))
-            assert until(lambda: words and ear.words)
+            assert until(lambda: words and feed.words)
         finally:
-            ear.reception.close()
+            feed.reception.close()
             box.close()
             served.set()
             thread.join()

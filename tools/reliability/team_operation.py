@@ -65,7 +65,7 @@ def walk(role: str, url: str, plan: Plan, speed: float) -> None:
         with Session(tracker, role, "simulated", output, guide) as session:
             session.prepare()
             print("walks", flush=True)
-            chunks = with_team(paced(scenario.chunks(), speed), session.ear, _arrival_ns)
+            chunks = with_team(paced(scenario.chunks(), speed), session.feed, _arrival_ns)
             session.track(portions_of(chunks, 16))
             cue = session.guided.cue if session.guided else None
     print(json.dumps({"role": role, "cue": cue.text if cue else "", "kind": cue.kind.value if cue else ""}), flush=True)

@@ -23,8 +23,8 @@ from echostep.session.console import print_notices
 
 if TYPE_CHECKING:
     from echostep.page.live import LivePage
-    from echostep.session.team.team_ear import TeamEar
-    from echostep.session.team.teammates_ear import TeammatesEar
+    from echostep.session.team.team_feed import TeamFeed
+    from echostep.session.team.teammate_feed import TeammateFeed
 
 LEAST_SLEEP_S = 0.02  # shorter waits are not worth a system call per chunk
 
@@ -50,23 +50,23 @@ def with_check_ins(
     return _with(chunks, PERSON, page.pop_check_ins if page else tuple, arrival_ns)
 
 
-def with_team(chunks: Iterable[Chunk | None], ear: TeamEar | None, arrival_ns: ArrivalNs) -> Iterator[Chunk | None]:
+def with_team(chunks: Iterable[Chunk | None], feed: TeamFeed | None, arrival_ns: ArrivalNs) -> Iterator[Chunk | None]:
     """Insert what is heard of another wearer."""
-    return _with(chunks, TEAM, ear.pop if ear else tuple, arrival_ns)
+    return _with(chunks, TEAM, feed.pop if feed else tuple, arrival_ns)
 
 
 def with_teammates(
-    chunks: Iterable[Chunk | None], page: LivePage | None, ear: TeammatesEar | None, arrival_ns: ArrivalNs
+    chunks: Iterable[Chunk | None], page: LivePage | None, feed: TeammateFeed | None, arrival_ns: ArrivalNs
 ) -> Iterator[Chunk | None]:
     """Insert each meeting that a page tells, with the teammate's newest report, and the beacons that teammates share."""
 
     def told() -> Iterator[bytes]:
-        for name in page.pop_meetings() if page and ear else ():
-            if ear and (payload := ear.meeting(name)):
+        for name in page.pop_meetings() if page and feed else ():
+            if feed and (payload := feed.meeting(name)):
                 yield payload
 
     met = _with(chunks, MEETING, told, arrival_ns)
-    return _with(met, TEAM_BEACONS, ear.beacons if ear else tuple, arrival_ns)
+    return _with(met, TEAM_BEACONS, feed.beacons if feed else tuple, arrival_ns)
 
 
 def _with(

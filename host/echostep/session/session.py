@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from echostep.output.foxglove_live import FoxgloveServer
     from echostep.page.live import LivePage
     from echostep.page.shared_drawing import SharedDrawing
-    from echostep.session.team.marks_ear import MarksEar
-    from echostep.session.team.team_ear import TeamEar
-    from echostep.session.team.teammates_ear import TeammatesEar
+    from echostep.session.team.mark_feed import MarkFeed
+    from echostep.session.team.team_feed import TeamFeed
+    from echostep.session.team.teammate_feed import TeammateFeed
     from echostep.team.endpoint import Endpoint
     from echostep.team.publish import Publishing, Source
 
@@ -76,10 +76,10 @@ class Session:
         self.losses = Losses(tracker)
         self.page: LivePage | None = None
         self.estimates: list[Estimate] = []
-        self.ear: TeamEar | None = None  # hears the wearer whom a rescuer is guided to
-        self.teammates: TeammatesEar | None = None  # hears whom the wearer can have met, and beacons of theirs
+        self.feed: TeamFeed | None = None  # place of the wearer whom a rescuer is guided to
+        self.teammates: TeammateFeed | None = None  # teammates whom the wearer may have met, and their beacons
         self._publishing: Publishing | None = None
-        self._marks: MarksEar | None = None  # hears what commanders mark
+        self._marks: MarkFeed | None = None  # what commanders mark
         self._drawing: SharedDrawing | None = None  # of a walk without a plan, for the team
         self._foxglove: FoxgloveServer | None = None
         self._opened = ExitStack()
@@ -90,7 +90,7 @@ class Session:
             self._open_drawing(opened)
             self._open_page(opened)
             self._open_publishing(opened)
-            self._open_ear(opened)
+            self._open_feed(opened)
             self._open_marks(opened)
             self._open_foxglove(opened)
             self._opened = opened.pop_all()
@@ -170,30 +170,30 @@ class Session:
         self._foxglove = opened.enter_context(FoxgloveServer(self.output.foxglove, self.title))
         console.print(f"Foxglove: open connection, Foxglove WebSocket, {self._foxglove.url}", highlight=False)
 
-    def _open_ear(self, opened: ExitStack) -> None:
+    def _open_feed(self, opened: ExitStack) -> None:
         """A rescuer's live run listens to the other wearer; a replay has in its recording what was heard."""
         if self.recorded is not None or not isinstance(self.guided, GuidedRescue):
             return
-        from echostep.session.team.team_ear import TeamEar
+        from echostep.session.team.team_feed import TeamFeed
 
         print_line = partial(console.print, markup=False, highlight=False)
-        self.ear = TeamEar(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
-        opened.callback(self.ear.close)
+        self.feed = TeamFeed(self.output.outlet, self.guided.name, self.tracker.plan, print_line)
+        opened.callback(self.feed.close)
 
     def _open_marks(self, opened: ExitStack) -> None:
         """By the first broker of a live run beacons and drawings are shared; its page shows what commanders say, and offers meetings."""
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
         if outlet is None or publishing is None or broker is None or self.recorded is not None:
             return
-        from echostep.session.team.marks_ear import MarksEar
-        from echostep.session.team.teammates_ear import TeammatesEar
+        from echostep.session.team.mark_feed import MarkFeed
+        from echostep.session.team.teammate_feed import TeammateFeed
 
         print_line = partial(console.print, markup=False, highlight=False)
-        self.teammates = TeammatesEar(broker, outlet, publishing.run, self.tracker.plan, print_line)
+        self.teammates = TeammateFeed(broker, outlet, publishing.run, self.tracker.plan, print_line)
         opened.callback(self.teammates.close)
         if self.page is None:
             return
-        self._marks = MarksEar(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
+        self._marks = MarkFeed(broker, outlet, publishing.run, self.tracker.plan.digest, print_line)
         self.page.acknowledged_by = self._marks.acknowledged_by
         opened.callback(self._marks.close)
 

@@ -40,7 +40,7 @@ NEAREST_M = 1e-6  # a source no further away has no direction
 CONE = math.cos(CONE_RAD)
 
 
-class Ear(NamedTuple):
+class Receiver(NamedTuple):
     """A ranger: its place (m), and the unit vector of its axis."""
 
     x: float
@@ -163,13 +163,13 @@ def echo_sources(
         return 0
     k = index.tile_number[tile] - 1
     u = bearing(axis_rad)
-    ear = Ear(px, py, math.cos(axis_rad), math.sin(axis_rad))
+    receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
     sources = SourceList(distance_m, off_axis_rad, kind)
     if not 0 <= k < index.tabulated:
-        return _sources_of_missing_tile(ear, tile, u, index, sources)
+        return _sources_of_missing_tile(receiver, tile, u, index, sources)
     u += k * BEARINGS
-    n = _add_faces(ear, index.walls, index.faces, u, sources)
-    n = _add_points(ear, index.walls, index.points, u, n, sources)
+    n = _add_faces(receiver, index.walls, index.faces, u, sources)
+    n = _add_points(receiver, index.walls, index.points, u, n, sources)
     for i in range(n):
         off_axis_rad[i] = _angle(off_axis_rad[i])
     return n
@@ -183,29 +183,29 @@ def bearing(axis_rad: float) -> int:
 
 
 @allocating_kernel
-def _sources_of_missing_tile(ear: Ear, tile: int, u: int, index: WallIndex, sources: SourceList) -> int:
+def _sources_of_missing_tile(receiver: Receiver, tile: int, u: int, index: WallIndex, sources: SourceList) -> int:
     """`echo_sources` in a tile that is not tabulated: its tables are made for this call alone."""
     faces, points = tile_sources(tile, index, 0.0)
-    n = _add_faces(ear, index.walls, faces, u, sources)
-    n = _add_points(ear, index.walls, points, u, n, sources)
+    n = _add_faces(receiver, index.walls, faces, u, sources)
+    n = _add_points(receiver, index.walls, points, u, n, sources)
     for i in range(n):
         sources.off_axis[i] = _angle(sources.off_axis[i])
     return n
 
 
 @inline_kernel
-def _add_faces(ear: Ear, walls: Floats, faces: SourceTable, u: int, sources: SourceList) -> int:
+def _add_faces(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, sources: SourceList) -> int:
     """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number.
 
     In the wall's own axes: s along its tangent t, h to the left of it.
 
           h ^
-            |      o ear (s, h)        d = |h|
+            |      o receiver (s, h)        d = |h|
             |      |
             o------x----------> s      x: the source, at 0 <= s <= length
           start   foot         end
     """
-    px, py, ax, ay = ear
+    px, py, ax, ay = receiver
     n = 0
     for position in range(faces.start[u], faces.start[u + 1]):
         i = faces.order[position]
@@ -225,9 +225,9 @@ def _add_faces(ear: Ear, walls: Floats, faces: SourceTable, u: int, sources: Sou
 
 
 @inline_kernel
-def _add_points(ear: Ear, walls: Floats, points: SourceTable, u: int, n: int, sources: SourceList) -> int:
+def _add_points(receiver: Receiver, walls: Floats, points: SourceTable, u: int, n: int, sources: SourceList) -> int:
     """Corners and edges of unit u, beside n sources found before; the new number."""
-    px, py, ax, ay = ear
+    px, py, ax, ay = receiver
     for position in range(points.start[u], points.start[u + 1]):
         i = points.order[position]
         dx, dy = points.rows[i, 0] - px, points.rows[i, 1] - py

@@ -132,7 +132,7 @@ def _recorded_chunks(
     if session is not None:
         chunks = with_check_ins(chunks, session.page, lambda _: now_ns())
         chunks = with_teammates(chunks, session.page, session.teammates, lambda _: now_ns())
-        chunks = with_team(chunks, session.ear, lambda _: now_ns())
+        chunks = with_team(chunks, session.feed, lambda _: now_ns())
     chunks = _with_subscription(with_role_check(recorded(chunks, recorder), ports.urls), ports)
     return _with_mtx_setup(chunks, ports, rate_hz) if MTX in ports.names else chunks
 

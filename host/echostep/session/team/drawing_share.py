@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A live walk without a plan, drawn for the team: what the page draws, or a drawing of its own where there is no page.
 
-In: a tracker without a plan, under which name it publishes. Out: a `SharedDrawing`, which the teammates' ear sends. Owns the drawing where there is
+In: a tracker without a plan, under which name it publishes. Out: a `SharedDrawing`, which the teammate feed sends. Owns the drawing where there is
 no page.
 """
 

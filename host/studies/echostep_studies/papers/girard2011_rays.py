@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Int32s
 from echostep.jit import allocating_kernel, inline_kernel, kernel, lean_kernel
-from echostep.walls.echo_sources import Ear, bearing, hidden
+from echostep.walls.echo_sources import Receiver, bearing, hidden
 from echostep.walls.index import (
     BEARINGS,
     CONE_RAD,
@@ -279,7 +279,7 @@ def _cone_ranges(chosen: Int32s, poses: Poses, index: WallIndex, cone: Cone, tab
             continue
         k = index.tile_number[tile] - 1
         ax, ay = -math.sin(heading[i]), math.cos(heading[i])
-        to_left, to_right = Ear(x[i], y[i], ax, ay), Ear(x[i], y[i], -ax, -ay)
+        to_left, to_right = Receiver(x[i], y[i], ax, ay), Receiver(x[i], y[i], -ax, -ay)
         if not (0 <= k < index.tabulated and tables_hold):
             ranges[i, 0] = _cone_range_without_tables(to_left, tile, index, cone)
             ranges[i, 1] = _cone_range_without_tables(to_right, tile, index, cone)
@@ -292,19 +292,19 @@ def _cone_ranges(chosen: Int32s, poses: Poses, index: WallIndex, cone: Cone, tab
 
 
 @allocating_kernel
-def _cone_range_without_tables(ear: Ear, tile: int, index: WallIndex, cone: Cone) -> float:
+def _cone_range_without_tables(receiver: Receiver, tile: int, index: WallIndex, cone: Cone) -> float:
     """`_cone_range` where the index has no tables for the tile or for this slant."""
     faces, _ = tile_sources(tile, index, cone.slant)
     shortest = cone.maximum_m
     for u in range(BEARINGS):
-        shortest = min(shortest, _cone_range(ear, index.walls, faces, u, cone))
+        shortest = min(shortest, _cone_range(receiver, index.walls, faces, u, cone))
     return shortest
 
 
 @inline_kernel
-def _cone_range(ear: Ear, walls: Floats, faces: SourceTable, u: int, cone: Cone) -> float:
+def _cone_range(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, cone: Cone) -> float:
     """The shortest ray that counts of a ranger, among the walls of unit u."""
-    px, py, ax, ay = ear
+    px, py, ax, ay = receiver
     fan, slant, shortest = cone
     rays = fan.shape[1] - 1
     for position in range(faces.start[u], faces.start[u + 1]):

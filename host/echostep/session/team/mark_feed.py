@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The marks' ear: marks that commanders have set, and who has acknowledged which alarm of this run, for the page of a wearer's run.
+"""The mark feed: marks that commanders have set, and who has acknowledged which alarm of this run, for the page of a wearer's run.
 
 In: retained messages of the broker that a run publishes to. Out: marks on this plan, when they change; names of commanders. Owns the subscription
 and its thread; the tracker never waits for it.
@@ -22,7 +22,7 @@ from echostep.team.mqtt.publisher import Listener
 LOOK_S = 0.5  # between two looks at what was heard; assumed
 
 
-class MarksEar:
+class MarkFeed:
     """`news` gives the marks when they have changed; messages that are not believed are counted in `rejected`."""
 
     def __init__(

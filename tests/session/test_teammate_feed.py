@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The teammates' ear: who can be met, from a real broker, the meeting that a page tells, and beacons that are shared."""
+"""The teammate feed: who may be met, from a real broker, the meeting that a page tells, and beacons that are shared."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from echostep.ports.chunks import BOARD, Chunk
 from echostep.ports.people.meeting import MEETING, parse_meeting
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.session.chunk_streams import with_teammates
-from echostep.session.team import teammates_ear
-from echostep.session.team.teammates_ear import TeammatesEar
+from echostep.session.team import teammate_feed
+from echostep.session.team.teammate_feed import TeammateFeed
 from echostep.team import outbox
 from echostep.team.endpoint import parse_endpoint, parse_outlet
 from echostep.team.mqtt.publisher import Listener
@@ -47,14 +47,14 @@ class Told:
 def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wearer's own reports, those on another plan and those of another team are not among them."""
     monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
-    monkeypatch.setattr(teammates_ear, "LOOK_S", 0.0)
+    monkeypatch.setattr(teammate_feed, "LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
         outlet = parse_outlet([broker.url], "bo", "red")
-        ear = TeammatesEar(outlet.endpoints[0], outlet, RUN, load_plan(PLAN), print)
+        feed = TeammateFeed(outlet.endpoints[0], outlet, RUN, load_plan(PLAN), print)
         said: list[tuple[str, ...]] = []
 
         def hears(*names: str) -> bool:
-            said.extend([news] if (news := ear.news()) is not None else [])
+            said.extend([news] if (news := feed.news()) is not None else [])
             return bool(said) and said[-1] == names
 
         boxes = {name: box_to(broker.url, name=name) for name in ("zoe", "bo", "eve", "anna")}
@@ -65,10 +65,10 @@ def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.M
         boxes["anna"].offer(report("anna", position=replace(POSITION, x_m=5.0)))
         assert until(lambda: hears("anna", "zoe"))
         page = Told("anna", "eve", "nobody", "bo")
-        chunks = [*with_teammates([Chunk(BOARD, 7, b"")], cast("LivePage", page), ear, arrival_ns)]
+        chunks = [*with_teammates([Chunk(BOARD, 7, b"")], cast("LivePage", page), feed, arrival_ns)]
         for box in boxes.values():
             box.close()
-        ear.close()
+        feed.close()
     assert [(chunk.port, chunk.t_arrival_ns) for chunk in chunks if chunk] == [(BOARD, 7), (MEETING, 7)]
     met = parse_meeting(chunks[1].data if chunks[1] else b"")
     assert met is not None
@@ -85,14 +85,14 @@ def test_beacons_reach_teammates_once_and_hostile_ones_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Those of this run, of another plan and of another team are not heard; those of an earlier run under the same name are."""
-    monkeypatch.setattr(teammates_ear, "LOOK_S", 0.0)
-    monkeypatch.setattr(teammates_ear, "SHARE_S", 0.0)
+    monkeypatch.setattr(teammate_feed, "LOOK_S", 0.0)
+    monkeypatch.setattr(teammate_feed, "SHARE_S", 0.0)
     plan = load_plan(PLAN)
     early = TeamBeacons(1, "bo", "0000aaaa", plan.digest, (a_beacon(3),))
     heard: list[TeamBeacons] = []
     with Broker(tmp_path) as broker:
         publish(broker.url, "echostep/red/bo/beacons", early.encode())
-        bo, zoe = (an_ear(broker, plan, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN)))
+        bo, zoe = (a_feed(broker, plan, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN)))
 
         def hears(count: int) -> bool:
             bo.news()
@@ -127,6 +127,6 @@ def publish(url: str, topic: str, payload: bytes) -> None:
     sender.close()
 
 
-def an_ear(broker: Broker, plan: Plan, name: str, run: str) -> TeammatesEar:
+def a_feed(broker: Broker, plan: Plan, name: str, run: str) -> TeammateFeed:
     outlet = parse_outlet([broker.url], name, "red")
-    return TeammatesEar(outlet.endpoints[0], outlet, run, plan, print)
+    return TeammateFeed(outlet.endpoints[0], outlet, run, plan, print)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The team ear: the newest place of one other wearer, from the broker that a run publishes to.
+"""The team feed: the newest place of one other wearer, from the broker that a run publishes to.
 
 In: reports of all teams on the broker. Out: payloads of chunks of the port `TEAM`, at most one a second. Owns the subscription, its thread and the
 roster of what was heard; the tracker never waits for it.
@@ -24,7 +24,7 @@ LOOK_S = 0.5  # between two looks at what was heard; assumed
 NEWS_S = 1.0  # between two places that are passed on; assumed
 
 
-class TeamEar:
+class TeamFeed:
     """`pop` gives new places of the wearer; `close` ends the subscription."""
 
     def __init__(self, outlet: Outlet | None, name: str, plan: Plan, print_line: Callable[[str], None]) -> None:

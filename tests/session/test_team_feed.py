@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The team ear: places of another wearer from a real broker, as chunks."""
+"""The team feed: places of another wearer from a real broker, as chunks."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from echostep.errors import EchostepError
 from echostep.plan.model import load_plan
 from echostep.ports.people.teammate import Teammate, parse_teammate
-from echostep.session.team import team_ear
-from echostep.session.team.team_ear import TeamEar
+from echostep.session.team import team_feed
+from echostep.session.team.team_feed import TeamFeed
 from echostep.team import outbox
 from echostep.team.endpoint import parse_outlet
 from team.network import box_to
@@ -24,7 +24,7 @@ from waiting import PATIENCE_S, until
 def test_without_a_broker_it_is_said_what_is_missing() -> None:
     for outlet in (None, parse_outlet(["cot+udp://127.0.0.1:6969"], "bo", "red")):
         with pytest.raises(EchostepError, match="--publish mqtt://HOST"):
-            TeamEar(outlet, "anna", load_plan(PLAN), print)
+            TeamFeed(outlet, "anna", load_plan(PLAN), print)
 
 
 @needs_broker
@@ -32,15 +32,15 @@ def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outbox, "FRESH_S", PATIENCE_S)
-    monkeypatch.setattr(team_ear, "NEWS_S", 0.0)
-    monkeypatch.setattr(team_ear, "LOOK_S", 0.0)
+    monkeypatch.setattr(team_feed, "NEWS_S", 0.0)
+    monkeypatch.setattr(team_feed, "LOOK_S", 0.0)
     said: list[str] = []
     heard: list[Teammate | None] = []
     with Broker(tmp_path) as broker:
-        ear = TeamEar(parse_outlet([broker.url], "bo", "red"), "anna", load_plan(PLAN), said.append)
+        feed = TeamFeed(parse_outlet([broker.url], "bo", "red"), "anna", load_plan(PLAN), said.append)
 
         def is_at(x_m: float) -> bool:
-            heard.extend(parse_teammate(payload) for payload in ear.pop())
+            heard.extend(parse_teammate(payload) for payload in feed.pop())
             return any(place and place.x_m == x_m for place in heard)
 
         anna, eve = box_to(broker.url), box_to(broker.url, name="eve")
@@ -56,7 +56,7 @@ def test_the_newest_place_of_the_wearer_is_heard_although_the_broker_dies(
         assert until(lambda: is_at(6.0) or any("another plan" in line for line in said))
         for box in (anna, eve):
             box.close()
-        ear.close()
+        feed.close()
     assert {place.name for place in heard if place} == {"anna"}
     assert heard[0] == Teammate("anna", 3.0, 2.0, 0, 0.8, "on Ground floor, in Office 1")
     assert not any(place and place.x_m == 6.0 for place in heard)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The teammates' ear: whom a wearer can have met, from the broker that a run publishes to.
+"""The teammate feed: teammates whom the wearer may have met, from the broker that a run publishes to.
 
 In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates who are heard on this
 plan, when they change; the bytes of a `Meeting` with one of them, and of the beacons that they share; this wearer's own and its drawing for the
@@ -30,7 +30,7 @@ LOOK_S = 0.5  # between two looks at what was heard; assumed
 HEARD_S = 60.0  # a teammate who has been silent for longer is not listed; assumed
 
 
-class TeammatesEar:
+class TeammateFeed:
     """`news` gives the names when they have changed, `meeting` the bytes of a chunk; reports that are not believed are counted in `rejected`."""
 
     def __init__(
