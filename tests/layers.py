@@ -43,7 +43,7 @@ def is_alone(item: pytest.Item) -> bool:
 
 @contextlib.contextmanager
 def no_process() -> Iterator[None]:
-    """Whoever starts a process meanwhile is told to mark the test."""
+    """A process that is started meanwhile fails the test, with the advice to mark it."""
     refusal = AssertionError(ADVICE)
     with (
         mock.patch.object(subprocess.Popen, "__init__", side_effect=refusal),

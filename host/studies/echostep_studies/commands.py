@@ -94,7 +94,7 @@ STUDIES = (
     ),
     StudyCommand(
         "incapacity",
-        "How soon a wearer who cannot move is told, and how often one who can (simulated; recordings where they are).",
+        "Delay of the alarm for an incapacitated wearer, and rate of false alarms (simulated; recordings where they are).",
         (
             _runs(1000, "Wearers who cannot move."), _option("days", int, 5, "Working days of eight hours.", least=0), SEED, JSON,
             _data("Folder of the public recordings; without it $ECHOSTEP_DATA, or ../shared/data."),
