@@ -93,7 +93,7 @@ class VerticalFilter:
         return joint / total
 
     def _successors(self, s: int, seen: Floats, dt: float) -> list[Successor]:
-        """All that may follow hypothesis s within dt; what does not leave stays as it is, though nobody stays between levels for long."""
+        """All that may follow hypothesis s within dt; what does not leave stays as it is, though a stay between levels is short."""
         level, air, way = s // model.MODES, s % model.MODES // model.WAYS, s % model.WAYS
         here = Successor(level, air, way, 1.0, self.gaussians[s])
         leaving = self._calm(here, seen, dt) if air == CALM else self._gust(here, dt)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The study of falls, small; and the recordings, in which nobody falls."""
+"""The study of falls, small; and the recordings, which hold no fall."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class BeaconMark:
     """A beacon by its number, at the mean of its position over the particles. The field names are keys of the frame's JSON.
 
     `radius95_m`: radius of a circle with the beacon's spread, scaled as a 95 % ellipse. `state`: value of a `BeaconState`.
-    `heard`: whether a reading came within the last `HEARD_S`. `by`: the teammate who has placed it; None: this wearer.
+    `heard`: whether a reading came within the last `HEARD_S`. `by`: the teammate that placed it; None: this wearer.
     """
 
     number: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mark feed: marks that commanders have set, and who has acknowledged which alarm of this run, for the page of a wearer's run.
+"""The mark feed: marks that commanders have set, and the acknowledgements of this run's alarms, for the page of a wearer's run.
 
 In: retained messages of the broker that a run publishes to. Out: marks on this plan, when they change; names of commanders. Owns the subscription
 and its thread; the tracker never waits for it.

@@ -27,7 +27,7 @@ from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
 LOOK_S = 0.5  # between two looks at what was heard; assumed
-HEARD_S = 60.0  # a teammate who has been silent for longer is not listed; assumed
+HEARD_S = 60.0  # after a longer silence a teammate is not listed; assumed
 
 
 class TeammateFeed:
