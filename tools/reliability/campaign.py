@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What all campaigns share: options, a journal of what is done already, a progress bar, figures with their limits.
+"""Common parts of the campaigns: options, a journal of finished runs, a progress bar, figures with their limits.
 
-In: defaults, rows, figures. Out: what was asked for; JSON lines; a table on stdout and the exit status. Owns the form of a journal.
+In: defaults, rows, figures. Out: the options; JSON lines; a table on stdout and the exit status. Owns the form of a journal.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Journal:
 
 
 def options(doc: str | None, **known: tuple[Any, str]) -> argparse.Namespace:
-    """What was asked for: of each known option its default, which gives the type, and its help. The first line of `doc` says what it is all about."""
+    """Values of the options; `known`: default, which gives the type, and help of each. The first line of `doc` is the program's description."""
     parser = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
     for name, (default, text) in known.items():
         if isinstance(default, bool):

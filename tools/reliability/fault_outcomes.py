@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a fault did to a walk: streams that were silent, estimates that claimed too much, and the table of it.
+"""Effect of a fault on a walk: silent streams, estimates beyond their stated error, and the table of both.
 
-In: arrival times of valid measurements, estimates, the true path. Out: an `Outcome`, rows of a Markdown table. Owns what is normal for each stream.
+In: arrival times of valid measurements, estimates, the true path. Out: an `Outcome`, rows of a Markdown table. Owns the normal gap of each stream.
 """
 
 from __future__ import annotations

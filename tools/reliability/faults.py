@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Each fault of the twin and of the host during one simulated walk: what was lost, how long until the streams were whole, what the tracker claimed.
+"""Each fault of the twin and of the host during one simulated walk: losses, time until the streams are complete again, and the tracker's claims.
 
 In: the ELF and the twin. Out: one JSON line per fault in the output file, and their table on stdout; with `--page`, in host/docs/faults.md
 too. Faults that the file has already are not run again. Owns the list of the twin's faults; those of the host are in twin/host_faults.py.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Flips one random bit of a recording at a time, and replays it: what became of the track, and whether the replay said that something was wrong.
+"""Flips one random bit of a recording at a time, and replays it: the effect on the track, and whether the replay reported it.
 
 In: options, optionally a recording and its plan; without one the first seconds of the demo are simulated. Out: counts by result, each bad flip;
 exit status 1 when a track ended early or went astray without a word, or when the repaired file does not replay in full. Owns nothing.
@@ -39,7 +39,7 @@ EARLY_S = 1.0  # before the end of the undamaged track: two estimates
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """Estimates of a replay and what it said; no estimates and the error's text when it refused the file."""
+    """Estimates of a replay and its messages; no estimates and the error's text when the file is refused."""
 
     estimates: Sequence[Estimate]
     said: Sequence[str]
@@ -47,7 +47,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Flip:
-    """One flip: result of the replay, whether something was said, and the result of the repaired file."""
+    """One flip: result of the replay, whether a message was printed, and the result of the repaired file."""
 
     offset: int
     bit: int

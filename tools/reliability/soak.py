@@ -92,7 +92,7 @@ class Measured:
 
 
 class TourPorts:
-    """What `live` asks of its ports: the tour's chunks up to a time, and a way to the board; each minute of the tour it looks at the memory."""
+    """The ports as `live` uses them: the tour's chunks up to a time, and a way to the board; memory is measured once a minute of the tour."""
 
     names = (BOARD,)  # the MTx is set up already
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which boards are asked for their optional messages, and when.
 
-In: the board's messages in order. Out: whether to send `SUBSCRIBE` now. Owns whether the board has answered. A board that has restarted, or whose
+In: the board's messages in order. Out: whether to send `SUBSCRIBE` now. Owns the state of the request. A board that has restarted, or whose
 port was opened anew, must be asked again; one of older firmware would count the request as damaged.
 """
 

@@ -150,7 +150,7 @@ def _wait(console: Console) -> None:
 
 
 def _probe(port: str, seconds: float, text: str, console: Console) -> ProbeResult:
-    """What the board at this port says, with `text` at a bar that fills meanwhile."""
+    """The `ProbeResult` of the board at this port; a progress bar shows `text` meanwhile."""
     with listening_bar(text, seconds, console):
         probed = probe({BOARD: port}, seconds)
     if probed.stale_firmware:

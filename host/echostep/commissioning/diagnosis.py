@@ -115,7 +115,7 @@ def _version_findings(identity: Identity, port: str) -> list[Finding]:
 
 
 def silence(probed: ProbeResult, port: str, subject: str) -> Finding | None:
-    """A finding on a board that has not said who it is."""
+    """A finding on a board that has not answered the request for its identity."""
     if probed.reports.identity is not None:
         return None
     if not probed.bytes_of[BOARD]:

@@ -52,7 +52,7 @@ def find_ports(mtx: str | None = None, foot: str | None = None) -> FoundPorts:
 
 
 def find_boards(seen: list[PortSeen], board: str | None, foot: str | None) -> tuple[str | None, str | None]:
-    """The ports of belt board and foot board among those seen; several boards are told apart by what comes from them."""
+    """The ports of belt board and foot board among those seen; several boards are distinguished by the messages that they send."""
     paths = [port.path for port in seen if port.role is Role.BOARD and port.path not in (board, foot)]
     if len(paths) + (board is not None) + (foot is not None) < 2 or not paths:
         return board or find([port for port in seen if port.path != foot], Role.BOARD, BOARD_NAME), foot

@@ -81,7 +81,7 @@ class _Run:
     restorer: Restorer | None
 
     def look(self, now_s: float) -> None:
-        """Take what was heard, record it, and give back to the broker what it has lost."""
+        """Empty the inbox, record its messages, and send the broker those shared messages again that it has lost."""
         unix_s, connected = time.time(), self.receiver.connected
         believed = self.operation.update(self.inbox, now_s, unix_s)
         if self.restorer:

@@ -61,7 +61,7 @@ class Trails:
             self._first += 1
 
     def forget(self, wearers: set[int]) -> None:
-        """Wearers who are not followed any more."""
+        """Drop the trails of these wearers."""
         for wearer in wearers:
             self._last.pop(wearer, None)
 

@@ -104,7 +104,7 @@ def _listener(server: FoxgloveServer) -> Any:
     from foxglove.websocket import ChannelView, Client, ServerListener
 
     class Listener(ServerListener):
-        """Tells the server who has come."""
+        """Reports new viewers to the server."""
 
         def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
             server.subscribed(channel.topic)

@@ -74,7 +74,9 @@ class LivePage:
         self._mailbox = Mailbox(tracker.plan, title, replay=replay, keeps=keeps)
         self.truth: TruePath | None = None  # shown beside the estimates
         self.has_team = False  # the run's reports go somewhere
-        self.acknowledged_by: Callable[[int], str | None] | None = None  # the commander who has, by the alarm's number
+        self.acknowledged_by: Callable[[int], str | None] | None = (
+            None  # name of the acknowledging commander, by the alarm's number
+        )
         self.server = PageServer(self._mailbox, address)
         self._model = echo_model(tracker.settings.echo)
         self._rate_meter = StreamRateMeter()
@@ -146,7 +148,7 @@ class LivePage:
             time.sleep(OPENING_POLL_S)
 
     def end(self, summary: str) -> None:
-        """The run is over: pages say so and how well it went; a run whose scenes were kept can be played again."""
+        """End the run: pages show its end and its summary; a run with stored scenes can be replayed."""
         self._mailbox.end(summary)
 
     def pop_check_ins(self) -> Iterator[bytes]:
@@ -155,7 +157,7 @@ class LivePage:
             yield check_in.encode()
 
     def pop_meetings(self) -> Iterator[str]:
-        """Names of the teammates whom the wearer has met since the last call, by the pages."""
+        """Names of the teammates that the pages have reported as met since the last call."""
         return self._mailbox.pop_meetings()
 
     def note_arrival(self) -> None:

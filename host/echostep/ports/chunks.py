@@ -151,7 +151,7 @@ class ChunkQueue:
             self._changed.notify()
 
     def get(self, timeout_s: float) -> Chunk | None:
-        """The oldest chunk; None when none comes in time."""
+        """The oldest chunk; None after the timeout."""
         with self._changed:
             if not self._chunks and not self._changed.wait_for(lambda: bool(self._chunks), timeout_s):
                 return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a capture held, in sentences.
+"""Summary of a capture's contents, in sentences.
 
 In: a `Decoder` after the last byte. Out: lines of text. Owns nothing.
 """

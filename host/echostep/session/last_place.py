@@ -34,7 +34,7 @@ GIVE = "give a start with --start X,Y,DEG, a room, or ?"
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What the file says: the place, when (UTC), on which plan, with which board (its USB serial number; empty: it has none)."""
+    """Contents of the file: the place, when (UTC), on which plan, with which board (its USB serial number; empty: it has none)."""
 
     place: LastPlace
     utc: datetime

@@ -138,7 +138,7 @@ def start_given(tracking: TrackingOptions, plan: Plan) -> Pose | Start | None:
 
 
 def air_of(tree: Any) -> Air | None:
-    """What JSON says of the heights by pressure; raises ValueError, TypeError or KeyError when it is damaged."""
+    """The heights by pressure in a JSON object; raises ValueError, TypeError or KeyError when it is damaged."""
     if tree is None:
         return None
     (zero_m,) = bounded([float(tree["zero_m"])])

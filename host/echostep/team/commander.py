@@ -48,7 +48,7 @@ def update_roster(inbox: Inbox, roster: Roster) -> None:
 def take_messages(
     messages: Sequence[ReceivedMessage], dropped: Mapping[str, int], roster: Roster
 ) -> list[ReceivedMessage]:
-    """Put messages into the roster, and counts of dropped ones by reason; returns those that were believed."""
+    """Put messages into the roster, and counts of dropped ones by reason; returns the accepted ones."""
     believed = [message for message in messages if roster.receive(*message)]
     for reason, count in dropped.items():
         roster.received += count

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The gates that a measurement passes before the tracker uses it, and its counter's.
+"""The gates on a measurement's values and on its counter, applied before the tracker uses it.
 
 In: decoded messages, limits, the state of the gates. Out: which messages are samples. The caller owns the state and the tally.
 """

@@ -57,7 +57,7 @@ def limits(row: dict[str, Any]) -> str:
 
 
 def meaning(row: dict[str, Any]) -> str:
-    """What a field's description says."""
+    """A field's description."""
     parts = [row, *row.get("anyOf", [])]
     return next((str(part["description"]) for part in parts if "description" in part), "")
 

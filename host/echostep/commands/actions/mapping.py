@@ -41,7 +41,7 @@ WALK_START = "0,0,90"  # of the walk that is drawn: the recorded start moves the
 def map_recordings(paths: Sequence[Path], plan_path: Path | None, out: Path, picture: Path | None) -> None:
     """Draw the building of recorded walks, or complete a plan of it; raises EchostepError.
 
-    When one is no walk, has no certain place on the others or on the plan, or no wall was heard.
+    Raised when a recording is no walk, cannot be placed on the others or on the plan, or has no echo of a wall.
     """
     _check_files(paths, out, picture)
     known = None if plan_path is None else open_limited(plan_path)

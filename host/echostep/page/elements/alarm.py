@@ -31,7 +31,7 @@ def shown_alarm(
 ) -> ShownAlarm | None:
     """The present alarm; None while all is well. `has_team`: the run's reports go somewhere.
 
-    `acknowledged_by`: the commander who has acknowledged the alarm of a number.
+    `acknowledged_by`: name of the commander that acknowledged the alarm with a given number.
     """
     alarm = tracker.alarm.alarm
     if alarm is None:

@@ -27,7 +27,7 @@ KNOWN_HEADING_RAD = 1.0  # above this standard deviation the page draws a circle
 MOST_SHOWN = 10_000  # particles in a frame
 
 
-STOREY_M = 1.5  # least height against the start that is said: half a storey
+STOREY_M = 1.5  # least height against the start that a page shows: half a storey
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def status_text(
 ) -> str:
     """Status and accuracy in words.
 
-    `no_plan`: the height against the start is said, there are no floors. `needs_start`: the tracker waits for a check-in that gives the start.
+    `no_plan`: no floors; the page shows the height against the start. `needs_start`: the tracker waits for a check-in that gives the start.
     `accepts_taps`: the page takes check-ins (not so in a replay).
     """
     tap = " or tap where you are" if accepts_taps else ""

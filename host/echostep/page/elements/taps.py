@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Taps: what a check-in would do, before it is made.
+"""Taps: the preview of a check-in's effect.
 
 In: a plan; a check-in that a page considers, and the scene that it was shown. Out: `Considered`: plain data. Owns what is known of the plan's spaces.
 One thread asks at a time.
@@ -50,7 +50,7 @@ class Taps:
         self._last: tuple[Estimate | None, str, tuple[str, ...]] = (None, "", ())
 
     def where(self, estimate: Estimate) -> str:
-        """The place of an estimate in words; all pages of a live run ask for the same one."""
+        """The place of an estimate in words; cached, for all pages of a live run show the same one."""
         return self._words(estimate)[0]
 
     def places(self, estimate: Estimate) -> tuple[str, ...]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mark feed: marks that commanders have set, and who has acknowledged which alarm of this run, for the page of a wearer's run.
+"""The mark feed: marks set by commanders, and acknowledgements of this run's alarms, for the page of a wearer's run.
 
 In: retained messages of the broker that a run publishes to. Out: marks on this plan, when they change; names of commanders. Owns the subscription
 and its thread; the tracker never waits for it.
@@ -23,7 +23,7 @@ LOOK_S = 0.5  # between two looks at what was heard; assumed
 
 
 class MarkFeed:
-    """`news` gives the marks when they have changed; messages that are not believed are counted in `rejected`."""
+    """`news` gives the marks when they have changed; rejected messages are counted in `rejected`."""
 
     def __init__(
         self, broker: Endpoint, outlet: Outlet, run: str, plan_sha256: str, print_line: Callable[[str], None]
@@ -61,7 +61,7 @@ class MarkFeed:
         return shown
 
     def acknowledged_by(self, number: int) -> str | None:
-        """The commander who has acknowledged the alarm of this number; of what the last `news` has heard."""
+        """The commander that acknowledged the alarm of this number, as of the last call of `news`."""
         ack = self._board.acks.get((self._team, self._name, f"{self._run}-{number}"))
         return ack.by if ack else None
 

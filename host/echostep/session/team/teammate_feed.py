@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The teammate feed: teammates whom the wearer may have met, from the broker that a run publishes to.
 
-In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates who are heard on this
+In: messages of the own team; the beacons that this wearer has placed, and what its walk has drawn. Out: names of teammates with reports on this
 plan, when they change; the bytes of a `Meeting` with one of them, and of the beacons that they share; this wearer's own and its drawing for the
-broker. Owns the subscription, its thread and the roster of what was heard; the tracker never waits for it.
+broker. Owns the subscription, its thread and the roster of received reports; the tracker never waits for it.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
 LOOK_S = 0.5  # between two looks at what was heard; assumed
-HEARD_S = 60.0  # a teammate who has been silent for longer is not listed; assumed
+HEARD_S = 60.0  # a teammate without a report for longer is not listed; assumed
 
 
 class TeammateFeed:
-    """`news` gives the names when they have changed, `meeting` the bytes of a chunk; reports that are not believed are counted in `rejected`."""
+    """`news` gives the names when they have changed, `meeting` the bytes of a chunk; rejected reports are counted in `rejected`."""
 
     def __init__(
         self, broker: Endpoint, outlet: Outlet, run: str, plan: Plan, print_line: Callable[[str], None]
     ) -> None:
-        """`run`: of this wearer; what an earlier run under the same name has placed is heard like a teammate's."""
+        """`run`: of this wearer; beacons placed by an earlier run under the same name are taken like a teammate's."""
         self._own, self._run, self._plan = (outlet.team, outlet.name), run, plan
         self._inbox, self._roster = Inbox(), Roster()
         self.rejected = self._roster.rejected
@@ -60,7 +60,7 @@ class TeammateFeed:
         return names
 
     def meeting(self, name: str) -> bytes | None:
-        """A meeting with a teammate now, by the newest report; None when none is heard by this name."""
+        """A meeting with a teammate now, by the newest report; None when there is no report under this name."""
         now_s = time.monotonic()
         member = self._members(now_s).get(name)
         position = None if member is None else member.position(now_s)
@@ -80,7 +80,7 @@ class TeammateFeed:
         return [self._placed.pop(name) for name in due]
 
     def share(self, own_beacons: Callable[[], tuple[SharedBeacon, ...] | None]) -> None:
-        """Tell the team the beacons that this wearer has placed, every SHARE_S when they have changed; None: nothing is known of them now."""
+        """Publish the beacons that this wearer has placed, every SHARE_S when they have changed; None: they are unknown at present."""
         now_s = time.monotonic()
         if now_s - self._shared_s < SHARE_S or (beacons := own_beacons()) is None:
             return
@@ -90,7 +90,7 @@ class TeammateFeed:
             self._shared, self._shared_s = payload, now_s
 
     def share_drawing(self, drawing: SharedDrawing) -> None:
-        """Tell the team the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
+        """Publish the newest drawing, every SHARE_S when there is a newer one and the last one has been sent."""
         now_s = time.monotonic()
         if now_s - self._drawing_s < SHARE_S or not self._receiver.sent_all:
             return
@@ -103,7 +103,7 @@ class TeammateFeed:
         self._receiver.close()
 
     def _members(self, now_s: float) -> dict[str, Member]:
-        """The latest heard run of each teammate who has a position on this plan, by name."""
+        """The run with the newest report of each teammate with a position on this plan, by name."""
         self._look(now_s)
         heard = [
             m for m in self._roster.members(now_s)
@@ -114,7 +114,7 @@ class TeammateFeed:
         return {m.report.name: m for m in sorted(heard, key=lambda m: -m.silent_s(now_s))}
 
     def _look(self, now_s: float) -> None:
-        """Move what was heard into the roster, and note the beacons."""
+        """Move received messages into the roster, and note the beacons."""
         self._looked_s = now_s
         for message in take_messages(*self._inbox.take_all(), self._roster):
             if message.topic is not None and message.topic.endswith(f"/{BEACONS}"):

@@ -36,7 +36,7 @@ PRESSURE_US = {m.PressureMode.HIGH_SPEED: 1e6 / 9.0, m.PressureMode.HIGH_RESOLUT
 
 
 class Board(Protocol):
-    """What the simulation asks of a board."""
+    """Interface of a simulated board."""
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Let n milliseconds pass; bytes that left the board meanwhile."""
@@ -90,7 +90,7 @@ class PythonBoard:
                 self._configure(message)
 
     def fault(self, text: str) -> None:
-        """The Python board knows no faults."""
+        """Ignored: the Python board has no faults."""
         raise EchostepError(f"{text}: the Python board has no fault switches; build the twin (make demo)")
 
     def close(self) -> None:
@@ -229,7 +229,7 @@ class BoardProcess:
         self._write(b"F", text.encode())
 
     def close(self) -> None:
-        """Ask the child to end; make it, if it does not."""
+        """Request the child's end; kill it after the timeout."""
         with contextlib.suppress(EchostepError):
             self._write(b"Q", b"")
         with contextlib.suppress(OSError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A foot board: the ICM-20649 on the foot, what it feels, as rows for a board of its own; it was not built yet.
+"""A foot board: the ICM-20649 on the foot, its inputs as rows for a board of its own; it was not built yet.
 
 In: a walk, a seeded generator, a board. Out: extended rows whose first place is the foot, in counts of the ICM-20649; the chunks of the board's port.
 Owns the part's constant errors, and the board.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An Xsens MTx on the foot: what it feels, as the bytes that it would send.
+"""An Xsens MTx on the foot: its motion -> the bytes that it would send.
 
 In: a walk, a seeded generator. Out: samples at its own rate: when taken, and the MTData frames. Owns the sensor's constant errors.
 The versions for 18 g and 1200 deg/s, which a foot needs [Xsens MT0100P, 4.1 and 4.4].
@@ -148,7 +148,7 @@ def measure(
 
 
 def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.random.Generator) -> Floats:
-    """The attitude that the sensor believes in: its heading follows the disturbed field, its tilt wanders [MT0100P: 0.5 deg]."""
+    """The attitude that the sensor reports: its heading follows the disturbed field, its tilt wanders [MT0100P: 0.5 deg]."""
     error = np.zeros((len(r), 3))
     kept = math.exp(-period / LEAN_S)
     lean = model.lean_rad * math.sqrt(1.0 - kept * kept) * rng.standard_normal((len(r), 2))

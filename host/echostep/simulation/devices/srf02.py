@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The two SRF02 of the Python board: when they fire, and what they hear.
+"""The two SRF02 of the Python board: their schedule and their echoes.
 
 In: rows of one millisecond. Out: pings, with the time at which each is read. Owns the schedule, which is the firmware's (firmware/ranger.h).
 """

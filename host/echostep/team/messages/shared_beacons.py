@@ -19,7 +19,7 @@ def beacons_message(team: str, told: TeamBeacons) -> tuple[str, bytes]:
 
 
 def decode_beacons(name: str, payload: bytes) -> TeamBeacons:
-    """The message in a payload on the topic of this wearer; raises BadReportError with the reason why it is not believed."""
+    """The message in a payload on the topic of this wearer; raises BadReportError with the reason of its rejection."""
     told = parse_team_beacons(payload)
     if told is None:
         raise BadReportError("not valid beacons")

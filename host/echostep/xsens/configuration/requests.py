@@ -35,7 +35,7 @@ class Request:
     """A message to the MT, and the payload `answer` of its acknowledgement (None: any).
 
     `optional`: the setup goes on when it is refused. `instead`: when it is refused, these take the place of it and of all that follow, and
-    `remark` is said. `rates`: the answer lists at least these outputs at these rates (Hz), by identifier.
+    `remark` is printed. `rates`: the answer lists at least these outputs at these rates (Hz), by identifier.
     """
 
     name: str

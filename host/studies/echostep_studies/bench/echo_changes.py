@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a walk's echoes may be like: people that answer first, silence, one ranger alone, panes of glass that no plan has.
+"""Disturbances of a walk's echoes: people in front of walls, silence, one ranger alone, panes of glass that the plan lacks.
 
 In: a `SimulatedWalk` and a seeded generator. Out: the same walk with other pings. Owns nothing. The path is the same in all of them.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the claims of one run are worth against the truth.
+"""Evaluation of the claims of one run against the truth.
 
 In: claims, true places. Out: `JudgedRun`: arrays of one entry a claim, and the questions that the columns ask. Owns the definitions.
 

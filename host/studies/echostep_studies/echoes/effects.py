@@ -31,7 +31,7 @@ class SimulatedEcho:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect: walls that are there, what was heard, and the walls that the plan has."""
+    """One effect: the true walls, the received echoes, and the walls of the plan."""
 
     name: str
     axis: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the tracker's echo likelihood expects of simulated pings, and the settings under which it explains them best.
+"""Log-likelihood of simulated pings by the tracker's echo model, and the settings that maximise it.
 
 In: poses and ranges. Out: log-densities; fitted settings. Owns nothing.
 """
@@ -22,7 +22,7 @@ FITTED = ("sd_m", "slant_m", "rim_db", "soft_db", "edge_db", "corner_db", "stray
 
 
 def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model: EchoModel) -> Floats:
-    """What the likelihood says of ranges (n,) of the left ranger at a pose."""
+    """Log-likelihood of ranges (n,) of the left ranger at a pose."""
     x, y, heading = pose
     away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
     axis = heading + 0.5 * math.pi

@@ -27,7 +27,7 @@ RANGES_M = np.arange(0.0, 6.02, 0.02)
 
 
 def draw_effects(path: Path, effects: Sequence[Effect]) -> None:
-    """Ranges heard (dots), what the likelihood expects (grey), and the share of pings that are heard (line)."""
+    """Received ranges (dots), predicted density (grey), and share of the pings with an echo (line)."""
     figure, axes = axes_of(4, 2, (13.0, 15.0))
     panels = [ax for row in axes for ax in row]
     _cone(panels[0], panels[1])

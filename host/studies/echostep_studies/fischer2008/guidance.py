@@ -47,10 +47,10 @@ def advise_by_fusion(fusion: Fusion, trail: Floats, walker: GuidedWalker) -> Adv
 
 
 @kernel
-def note_contact(contact: Contact, walker: GuidedWalker, tick: int, heard: bool) -> bool:
-    """Whether the walker is to go back; `heard`: a beacon measures now. Places are those of dead reckoning."""
+def note_contact(contact: Contact, walker: GuidedWalker, tick: int, measured: bool) -> bool:
+    """Whether the walker is to go back; `measured`: a beacon measures now. Places are those of dead reckoning."""
     t_s = tick * TICK_S
-    known_s = t_s if heard else contact.known_s
+    known_s = t_s if measured else contact.known_s
     return update_contact(contact, t_s, known_s, walker.path_x, walker.path_y, False, SILENCE_S)
 
 

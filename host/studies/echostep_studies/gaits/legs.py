@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Legs in manners of moving that two gyros in the plane of the leg do not show, or only in part.
 
-In: seeds. Out: a row a manner: true way forward and up, what the strides say, in units of what they state too, and how they are flagged. Owns the
+In: seeds. Out: a row a manner: true and estimated way forward and up, the error over its stated deviation, the strides' flags. Owns the
 manners: curves of thigh and knee, assumed where `leg_angles` has none. The signs of the gyros are known, as from a walk before.
 """
 
@@ -71,7 +71,7 @@ MANNERS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegRun:
-    """One manner by a leg: the true way forward and what the strides say of it, the same upward, and how the strides are flagged."""
+    """One manner of moving, measured by a leg: true and estimated way forward and upward, and the flags of the strides."""
 
     name: str
     seed: int

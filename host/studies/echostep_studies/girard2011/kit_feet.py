@@ -65,7 +65,7 @@ def devices(walked: Walk, seed: int) -> dict[str, tuple[Samples, Noise]]:
 
 
 def calibrated(samples: Samples, walked: Walk, seed: int) -> Samples:
-    """The same samples less the errors that six poses of the same part tell; its temperature is that of the walk."""
+    """The same samples less the errors estimated from six poses of the same part; its temperature is that of the walk."""
     poses = []
     for side in SIDES_RPY_RAD:
         lying = replace(

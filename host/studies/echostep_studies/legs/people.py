@@ -113,7 +113,7 @@ def five_metres(person: JointGaitPerson, manner: WalkingPace, seed: int) -> Simu
 
 
 def measured_m(gait: SimulatedGait, person: JointGaitPerson, sensors: LegSensors, seed: int) -> float:
-    """What our method says of the way when these sensors are worn."""
+    """Distance (m) by our method, measured with these sensors."""
     rng = np.random.default_rng([seed, 52])
     moves = np.flatnonzero(np.abs(gait.shank_rad_s) > 0.0)
     begin, end = gait.t_s[moves[0]] - sensors.stand_s, gait.t_s[moves[-1]] + sensors.stand_s

@@ -6,7 +6,7 @@ In: seeds. Out: a row of all points, and one of each part. Simulated. The scores
 `floor`: share of the points on the nearest floor; `floor_tied`: the same, where both floors are right within TIE_M of the middle between them, as in
 `bench.judgement.true_levels`. Estimates that say lost count in both, but not in the row `not lost`, of the points that availability
 counts too. `search_s`: from the change of the battery on, until the new tracker says `tracking`. The rows `resumed` have the estimates of the tracker
-that begins where the first one ended, the others those of the one that knows nothing.
+that begins where the first one ended, the others those of a tracker without a start.
 """
 
 from __future__ import annotations

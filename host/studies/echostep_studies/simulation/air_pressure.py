@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The air of a building: what a barometer is carried through.
+"""The air of a building, as a carried barometer measures it.
 
 In: times, true heights of the wearer, when in a stairwell or lift shaft, a seeded generator. Out: true pressures and the temperature that a
-worn device reads. Owns the constants of the air. Nothing here knows how anybody estimates heights from it.
+worn device reads. Owns the constants of the air. Nothing here depends on how heights are estimated from it.
 
 The column of air is hydrostatic at the building's own temperature [ISO 2533 with another temperature]. On top of it: weather (a trend and a random
 walk), doors (pulses of 5 to 50 Pa: the air swings and settles), a fan that goes on and off, shafts whose pressure differs from the floors' by the

@@ -59,7 +59,7 @@ def with_dropped_beacons(walks: TeamWalks, seed: int) -> TeamWalks:
 
 
 def dropped_on(truth: Floats, who: int, rng: np.random.Generator) -> list[Dropped]:
-    """The beacons of wearer `who`, beside its way, truth (n, 5)."""
+    """The beacons dropped by wearer `who` beside its true path (n, 5)."""
     way = way_m(truth)
     rows = [int(np.searchsorted(way, k * SPACING_M)) for k in range(MOST_EACH) if k * SPACING_M <= way[-1]]
     found = []

@@ -3,7 +3,7 @@
 
 In: seeds. Out: rows `office/tap`, `tower/radio`, ... Owns the conditions. Simulated.
 
-All but the first wearer know their starts; the first is told a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
+All wearers but the first have their true starts; the first has a wrong one (`door`: all begin side by side, as teams go in; `tap`, `radio`: all begin
 apart; `beacons`: the same, each drops beacons, hears those of all and shares its own) or none (`unknown`, apart), or knows its own too and reports
 false places (`liar`: that wearer is left out of all columns). `drawing`: the first one walks without a plan, from a known start, then the others
 from theirs: `alone` without a plan, `together` on its drawing; the first one is left out. `ratio`: mean error of all wearers and runs together over
@@ -147,7 +147,7 @@ def _drawing_rows(length_m: float, seed: int) -> list[WearerRun]:
 
 
 def _told(walks: TeamWalks, begin: RoutePlace, kind: str, seed: int) -> Pose | Start:
-    """The start that the first wearer's tracker is told."""
+    """The start that is given to the first wearer's tracker."""
     true = walks.starts[FIRST]
     if kind not in ("wrong", "door", "beacons"):
         return Start() if kind == "unknown" else true

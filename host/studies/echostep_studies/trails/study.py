@@ -51,7 +51,7 @@ class TrailRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedRun(TrailRun):
-    """The same by the paper's method, with what the paper says of the trail."""
+    """The same by the paper's method, with the paper's figures of the trail."""
 
     printed: str
     printed_distance_error_percent: float | None
@@ -72,7 +72,7 @@ class TrailSummary(ErrorSummary):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedSummary(TrailSummary):
-    """The same by the paper's method, with what the paper says of the trail."""
+    """The same by the paper's method, with the paper's figures of the trail."""
 
     printed: str
     printed_distance_error_percent: float | None

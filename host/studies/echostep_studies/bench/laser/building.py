@@ -60,7 +60,7 @@ class LogWalk:
 
 @lru_cache(maxsize=1)
 def building_of(path: Path, seed: int) -> Building:
-    """Read a log, draw its plans, hear its pings; raises EchostepError that names file and line."""
+    """Read a log, draw its plans, simulate its pings; raises EchostepError that names file and line."""
     log = read_log(path)
     scans = np.arange(len(log.pose))
     segments = wall_segments(standing_places(log, scans[::2]))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What two rangers would hear where a scan was taken: the nearest return within half a cone at either side that is loud enough.
+"""Ranges of two simulated rangers at the pose of a laser scan: the nearest return within half a cone at either side that is loud enough.
 
 In: scans. Out: ranges of the left and the right ranger at each scan. Owns nothing. The losses are those of the simulated SRF02 (`acoustics`); scans
-end at 90 degrees, so the rear half of each cone is missing: the rangers look AHEAD_RAD ahead of abeam, which the filter is told.
+end at 90 degrees, so the rear half of each cone is missing: the rangers look AHEAD_RAD ahead of abeam; the filter's settings state this.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ AHEAD_RAD = 0.5 * HALF_CONE_RAD  # middle of the half before abeam
 
 
 def hear(log: CarmenLog, scans: Ints, rng: np.random.Generator, acoustics: Acoustics = SRF02) -> Floats:
-    """Ranges (k, 2) of the left and the right ranger at these scans, NaN where nothing is heard."""
+    """Ranges (k, 2) of the left and the right ranger at these scans, NaN where no echo is received."""
     bias_m = ranger_bias_m(rng, acoustics)
     heard = np.full((len(scans), 2), np.nan)
     for row, scan in enumerate(scans.tolist()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a foot's track is worth against a recording's truth, in that data set's own metric.
+"""Error of a foot's track against a recording's truth, in that data set's own metric.
 
 In: a `Track` and the truth. Out: `Figure`s. Owns nothing. Tracks and truth share no origin and no yaw: they are laid over each other by the rigid
 motion, without mirroring and without scale, that fits best over all points, which is how the peers' figures were taken.
