@@ -17,8 +17,8 @@ PROCESSOR_V = 5.0  # level of its outputs
 
 def problems(board: Board) -> list[str]:
     """All problems of a board."""
-    found = [f"{board.name}, {device.name}: {text}" for device in board.devices for text in _of_device(device)]
-    return found + [f"{board.name}, net {net}: {text}" for net in sorted(_nets(board)) for text in _of_net(board, net)]
+    texts = [f"{board.name}, {device.name}: {text}" for device in board.devices for text in _of_device(device)]
+    return texts + [f"{board.name}, net {net}: {text}" for net in sorted(_nets(board)) for text in _of_net(board, net)]
 
 
 def _nets(board: Board) -> set[str]:

@@ -208,11 +208,11 @@ def _end(running: subprocess.Popen[str]) -> None:
         running.communicate()
 
 
-def _wait(found: object) -> float | None:
+def _wait(condition: object) -> float | None:
     """The first value that is not None, within LONGEST_S."""
     end_s = time.monotonic() + LONGEST_S
     while time.monotonic() < end_s:
-        if (value := found()) is not None:  # type: ignore[operator]
+        if (value := condition()) is not None:  # type: ignore[operator]
             return float(value)
         time.sleep(0.1)
     return None

@@ -66,10 +66,10 @@ class PtyBoard:
 
     def _told_port(self) -> str:
         """The name of the pseudo terminal, which the twin prints when it makes one."""
-        found = re.match(rb"board port: (\S+)", self._log.readline())
-        if not found:
+        match = re.match(rb"board port: (\S+)", self._log.readline())
+        if not match:
             raise SystemExit("the twin made no port")
-        return found[1].decode()
+        return match[1].decode()
 
     def advance(self, rows: NDArray[Any]) -> Sent:
         """Run the firmware for one millisecond per row. The list is empty: the bytes go to the terminal."""

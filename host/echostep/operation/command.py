@@ -97,8 +97,8 @@ def restore(
     restorer: Restorer, operation: Operation, receiver: Receiver, believed: list[ReceivedMessage], now_s: float
 ) -> None:
     """Send marks and acknowledgements again that the broker has lost or replaced; `believed`: messages since the last call."""
-    heard = [m.topic for m in believed if m.topic and is_shared(m.topic)]
-    lost = restorer.look(receiver.connected, heard, lambda: operation.shared, now_s)
+    topics = [m.topic for m in believed if m.topic and is_shared(m.topic)]
+    lost = restorer.look(receiver.connected, topics, lambda: operation.shared, now_s)
     for topic, payload in lost + operation.take_answers():
         receiver.send(topic, payload)
 

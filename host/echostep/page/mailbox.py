@@ -155,11 +155,11 @@ class Mailbox:
         """Remove and yield the names of teammates reported as met; never blocks."""
         return _popped(self._met)
 
-    def _put(self, waiting: queue.Queue[T], told: T) -> bool:
+    def _put(self, waiting: queue.Queue[T], item: T) -> bool:
         if self.replay:
             return False
         try:
-            waiting.put_nowait(told)
+            waiting.put_nowait(item)
         except queue.Full:
             return False
         return True

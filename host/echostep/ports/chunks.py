@@ -79,9 +79,9 @@ class Portion:
 
     def rows(self, begin: int, end: int) -> Portion:
         """The chunks from row `begin` up to row `end`."""
-        kept = slice(begin, end)
+        part = slice(begin, end)
         return Portion(
-            self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received
+            self.ports, self.port[part], self.t_arrival_ns[part], self.start[part], self.end[part], self.received
         )
 
     def cut_after(self, *names: str) -> Iterator[Portion]:

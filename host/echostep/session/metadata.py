@@ -148,10 +148,10 @@ def air_of(tree: Any) -> Air | None:
 
 def bounded(values: Iterable[float], least: float = -START_LIMIT_M) -> list[float]:
     """The values (m or rad); raises ValueError for one that is not finite, or out of bounds."""
-    found = list(values)
-    if not all(least <= value < START_LIMIT_M for value in found):
+    numbers = list(values)
+    if not all(least <= value < START_LIMIT_M for value in numbers):
         raise ValueError
-    return found
+    return numbers
 
 
 def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:

@@ -44,7 +44,7 @@ def kind(row: dict[str, Any]) -> str:
 def limits(row: dict[str, Any]) -> str:
     """The range of a number, the length of a text."""
     if "anyOf" in row:
-        return next((found for part in row["anyOf"] if (found := limits(part))), "")
+        return next((limit for part in row["anyOf"] if (limit := limits(part))), "")
     low, high = row.get("minimum"), row.get("maximum")
     if low is not None:
         return f"{low:g} to {'2^53' if high == 2**53 else f'{high:g}'}"
@@ -64,8 +64,8 @@ def meaning(row: dict[str, Any]) -> str:
 
 def tree() -> dict[str, Any]:
     """The schema as objects."""
-    found: dict[str, Any] = json.loads(schema())
-    return found
+    parsed: dict[str, Any] = json.loads(schema())
+    return parsed
 
 
 def page() -> str:

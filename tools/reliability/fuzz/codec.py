@@ -59,8 +59,8 @@ def fuzz(program: Path, corpus: Path, shard: int, *limits: str) -> subprocess.Co
 
 def executions(log: str) -> int:
     """Executions of a run, from its log."""
-    found = re.search(r"stat::number_of_executed_units:\s+(\d+)", log)
-    return int(found[1]) if found else 0
+    match = re.search(r"stat::number_of_executed_units:\s+(\d+)", log)
+    return int(match[1]) if match else 0
 
 
 def main() -> int:

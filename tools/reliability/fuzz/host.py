@@ -120,8 +120,8 @@ def run_shard(name: str, shard: int, seconds: float, most: int = sys.maxsize) ->
         if count >= most or time.monotonic() > end_s:
             break
         count += 1
-        if found := fault(name, data):
-            return count, data, found
+        if problem := fault(name, data):
+            return count, data, problem
     return count, b"", ""
 
 
@@ -133,7 +133,7 @@ def main() -> int:
     """Replay the kept inputs, then fuzz all targets in turn."""
     asked = options(__doc__, seconds=(60.0, "of this run"), targets=(sorted(TARGETS), "only these"))
     signal.signal(signal.SIGALRM, too_slow)
-    journal, kept = Journal(LOG), Journal(KEPT)
+    journal, inputs = Journal(LOG), Journal(KEPT)
     shard, done = len(journal.rows) + 1, Counter[str]()
     failures = [(name, text) for name, data in kept_inputs() if (text := fault(name, data))]
     end_s, turn = time.monotonic() + asked.seconds, 0
@@ -143,7 +143,7 @@ def main() -> int:
         done[name], turn = done[name] + count, turn + 1
         if text:
             failures.append((name, text))
-            kept.add({"target": name, "hex": data.hex()})
+            inputs.add({"target": name, "hex": data.hex()})
     journal.add({"shard": shard, "executions": done})
     for name, text in failures:
         print(f"{name}: {text}")

@@ -92,9 +92,9 @@ def _completed(known: Plan, name: str, walks: Walks) -> Result:
             continue
         done = complete(level, mapped.graph, mapped.pings, mapped.drawing)
         levels = tuple(done.level if i == k else other for i, other in enumerate(known.levels))
-        found = f"{name}, {level.name}: {done.new_m:.0f} m of wall added, {done.doubtful_m:.0f} m doubtful: echoes passed them"
+        summary = f"{name}, {level.name}: {done.new_m:.0f} m of wall added, {done.doubtful_m:.0f} m doubtful: echoes passed them"
         walked_m = tuple(mapped.drawing.paths_m if i == k else () for i in range(len(levels)))
-        return replace(known, levels=levels), walked_m, [found, *(_join_line(join) for join in joins)]
+        return replace(known, levels=levels), walked_m, [summary, *(_join_line(join) for join in joins)]
     raise refused[0]
 
 

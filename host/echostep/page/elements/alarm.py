@@ -39,9 +39,9 @@ def shown_alarm(
     age_s = tracker.front_end.newest_s - alarm.since_s
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
     times = 1000 * alarm.number + int(age_s / AGAIN_S)
-    told = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
+    receipt = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
     if acknowledged_by and (commander := acknowledged_by(alarm.number)):
-        told = f"{commander} has acknowledged it."
+        receipt = f"{commander} has acknowledged it."
     left_s = max(math.ceil((alarm.mayday_s or alarm.since_s) - alarm.since_s - age_s), 0)
     match alarm.kind, alarm.reason:
         case AlarmKind.ASKING, reason:
@@ -52,9 +52,9 @@ def shown_alarm(
             )
             return ShownAlarm(alarm.kind.value, f"{asks} In {left_s} s it is a mayday.", asks, times)
         case AlarmKind.MAYDAY, AlarmReason.HELP:
-            return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {told}", f"Mayday. {told}", times)
+            return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {receipt}", f"Mayday. {receipt}", times)
         case AlarmKind.MAYDAY, reason:
             why = f"a fall {age_s:.0f} s ago" if reason is AlarmReason.FALL else f"no motion for {age_s:.0f} s"
-            text = f"Mayday: {why}. {told}"
-            return ShownAlarm(alarm.kind.value, text, f"Mayday. {told} Walk, or tap, if you are all right.", times)
+            text = f"Mayday: {why}. {receipt}"
+            return ShownAlarm(alarm.kind.value, text, f"Mayday. {receipt} Walk, or tap, if you are all right.", times)
     return ShownAlarm(alarm.kind.value, "The mayday is over.", "The mayday is over.", 1000 * alarm.number)

@@ -69,8 +69,8 @@ def shown_drawing(drawing: WalkDrawing, estimate: Estimate, trail_count: int) ->
     turned, place = np.array([[c, s], [-s, c]]), np.array([estimate.x_m, estimate.y_m])
 
     def moved(points: Floats) -> Floats:
-        found: Floats = (points - drawing.pose[:2]) @ turned + place
-        return found
+        moved_m: Floats = (points - drawing.pose[:2]) @ turned + place
+        return moved_m
 
     ends = moved(drawing.walls[:, :4].reshape(-1, 2)).reshape(-1, 4)
     walls = np.column_stack([ends, drawing.walls[:, 4]]).astype(np.float32)

@@ -59,8 +59,8 @@ class ShownGuidance:
 
 def guidance_of_cue(cue: Cue, route: Route | None, level: int, before: ShownGuidance | None) -> ShownGuidance:
     """A cue as it is shown on a level. `before`: the guidance shown until now; its sentence stays while the cue has no new one."""
-    kept = (before.spoken, before.spoken_s) if before else ("", cue.t_s)
-    spoken = (cue.spoken, cue.t_s) if cue.spoken else kept
+    previous = (before.spoken, before.spoken_s) if before else ("", cue.t_s)
+    spoken = (cue.spoken, cue.t_s) if cue.spoken else previous
     path = () if route is None or math.isnan(cue.left_m) else remaining_path(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
     return ShownGuidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *spoken)

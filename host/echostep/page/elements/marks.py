@@ -61,10 +61,10 @@ def beacon_marks(tracker: Tracker, t_s: float) -> tuple[BeaconMark, ...]:
         for b in tracker.beacon_places(t_s)
     )  # fmt: skip
     known = {mark.number for mark in own}
-    told = {b.number: (name, b) for name, beacons in state.team_beacons.items() for b in beacons}
+    shared = {b.number: (name, b) for name, beacons in state.team_beacons.items() for b in beacons}
     return own + tuple(
         BeaconMark(
             number, b.x_m, b.y_m, ellipse95(b.xx_m2, b.xy_m2, b.yy_m2).major_m, b.level, BeaconState.WELL.value, heard=False, by=name
         )
-        for number, (name, b) in islice(told.items(), MOST_SHARED) if number not in known
+        for number, (name, b) in islice(shared.items(), MOST_SHARED) if number not in known
     )  # fmt: skip

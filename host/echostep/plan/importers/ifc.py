@@ -102,17 +102,17 @@ def _floors(model: Any, path: Path) -> list[tuple[str, float]]:
     elevation: Any = import_module("ifcopenshell.util.placement").get_storey_elevation
     try:
         scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
-        found = [
+        floors = [
             (str(s.LongName or s.Name or "storey")[:80], float(elevation(s)) * scale_m)
             for s in model.by_type("IfcBuildingStorey")
         ]
     except Exception as error:
         raise EchostepError(f"{path}: its storeys cannot be read: {' '.join(str(error).split())[:200]}") from error
-    if not found or not all(abs(height) <= LIMIT_M for _, height in found):
+    if not floors or not all(abs(height) <= LIMIT_M for _, height in floors):
         raise EchostepError(
-            f"{path}: {'a storey has no sane height' if found else 'no IfcBuildingStorey'}: export the model with its storeys"
+            f"{path}: {'a storey has no sane height' if floors else 'no IfcBuildingStorey'}: export the model with its storeys"
         )
-    return sorted(((name, round(height, 6)) for name, height in found), key=lambda floor: floor[1])
+    return sorted(((name, round(height, 6)) for name, height in floors), key=lambda floor: floor[1])
 
 
 def _bodies(model: Any, path: Path) -> Iterator[Body]:
@@ -181,8 +181,8 @@ def _crossings(three: Floats, z_m: float) -> Floats:
     tip = three[rows, alone]
     others = np.stack((three[rows, (alone + 1) % 3], three[rows, (alone + 2) % 3]), axis=1)
     part = (z_m - tip[:, None, 2]) / (others[:, :, 2] - tip[:, None, 2])
-    found: Floats = tip[:, None, :2] + part[:, :, None] * (others[:, :, :2] - tip[:, None, :2])
-    return found
+    crossings: Floats = tip[:, None, :2] + part[:, :, None] * (others[:, :, :2] - tip[:, None, :2])
+    return crossings
 
 
 def _georeference(model: Any) -> Georeference | None:

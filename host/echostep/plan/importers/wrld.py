@@ -83,9 +83,9 @@ def _storey(file: Path, name: str, height_m: float, earth: EarthTransform) -> Dr
     return drawn
 
 
-def _place(drawn: DrawnLevel, kind: str, name: str, found: BaseGeometry) -> None:
+def _place(drawn: DrawnLevel, kind: str, name: str, shape: BaseGeometry) -> None:
     """Add a feature to a level; kinds that plans do not have (outlines, landscaping) are left out."""
-    for area in areas([found]):
+    for area in areas([shape]):
         if kind == "wall":
             drawn.walls.append(area)
         elif kind == "window":

@@ -37,8 +37,8 @@ def door_gaps(level: Level) -> tuple[Door, ...]:
     nearest_m = np.full(len(begin), np.inf)
     np.minimum.at(nearest_m, ray, reach_m)
     fits = (nearest_m >= NARROWEST_M) & np.isfinite(nearest_m)
-    found = np.concatenate((begin[fits], (begin + np.where(fits, nearest_m, 0.0)[:, None] * outward)[fits]), axis=1)
-    return tuple(Door((float(a), float(b), float(c), float(d))) for a, b, c, d in _once(found))
+    gaps = np.concatenate((begin[fits], (begin + np.where(fits, nearest_m, 0.0)[:, None] * outward)[fits]), axis=1)
+    return tuple(Door((float(a), float(b), float(c), float(d))) for a, b, c, d in _once(gaps))
 
 
 def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floats]:
@@ -60,8 +60,8 @@ def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floa
 
 def _once(gaps: Floats) -> list[list[float]]:
     """Gaps (n, 4) without those that were found from their other end too."""
-    kept: dict[tuple[float, float], list[float]] = {}
+    unique: dict[tuple[float, float], list[float]] = {}
     for row in gaps.tolist():
         middle = round((row[0] + row[2]) / 2, 1), round((row[1] + row[3]) / 2, 1)
-        kept.setdefault(middle, row)
-    return list(kept.values())
+        unique.setdefault(middle, row)
+    return list(unique.values())

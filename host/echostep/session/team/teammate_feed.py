@@ -84,8 +84,8 @@ class TeammateFeed:
         now_s = time.monotonic()
         if now_s - self._shared_s < SHARE_S or (beacons := own_beacons()) is None:
             return
-        told = TeamBeacons(1, self._own[1], self._run, self._plan.digest, beacons)
-        topic, payload = beacons_message(self._own[0], told)
+        message = TeamBeacons(1, self._own[1], self._run, self._plan.digest, beacons)
+        topic, payload = beacons_message(self._own[0], message)
         if payload != self._shared and (beacons or self._shared) and self._receiver.send(topic, payload):
             self._shared, self._shared_s = payload, now_s
 
@@ -105,13 +105,13 @@ class TeammateFeed:
     def _members(self, now_s: float) -> dict[str, Member]:
         """The run with the newest report of each teammate with a position on this plan, by name."""
         self._look(now_s)
-        heard = [
+        members = [
             m for m in self._roster.members(now_s)
             if (m.report.team, m.report.name) != self._own and m.report.position is not None
             and m.report.plan_sha256 == self._plan.digest and m.silent_s(now_s) < HEARD_S
             and m.state(now_s) is not MemberState.ENDED
         ]  # fmt: skip
-        return {m.report.name: m for m in sorted(heard, key=lambda m: -m.silent_s(now_s))}
+        return {m.report.name: m for m in sorted(members, key=lambda m: -m.silent_s(now_s))}
 
     def _look(self, now_s: float) -> None:
         """Move received messages into the roster, and note the beacons."""
@@ -121,11 +121,11 @@ class TeammateFeed:
                 self._note_beacons(message.payload)
 
     def _note_beacons(self, payload: bytes) -> None:
-        told = parse_team_beacons(payload)
-        if told is None or told.run == self._run or told.plan_sha256 != self._plan.digest:
+        message = parse_team_beacons(payload)
+        if message is None or message.run == self._run or message.plan_sha256 != self._plan.digest:
             return
         names = self._placed.keys() | self._taken.keys()
-        if told.name not in names and len(names) >= MOST_TEAMMATES:
+        if message.name not in names and len(names) >= MOST_TEAMMATES:
             self._roster.count_rejected(f"beacons of more than {MOST_TEAMMATES} wearers")
-        elif payload != self._taken.get(told.name, (0.0, b""))[1]:
-            self._placed[told.name] = payload
+        elif payload != self._taken.get(message.name, (0.0, b""))[1]:
+            self._placed[message.name] = payload

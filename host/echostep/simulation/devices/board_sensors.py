@@ -61,19 +61,19 @@ class WornGyro:
         wander = _correlated(n, self.wander_rad_s, self.wander_s * rate_hz, rng)
         jitter = _correlated(n, self.jitter_rad, self.jitter_s * rate_hz, rng)
         shaken = np.convolve(np.where(moving, jitter, 0.0), np.ones(JITTER_SMOOTH_MS) / JITTER_SMOOTH_MS, "same")
-        found: Floats = (1.0 + scale) * rate_rad_s + walking * moving + wander + np.gradient(shaken) * rate_hz
-        return found
+        measured: Floats = (1.0 + scale) * rate_rad_s + walking * moving + wander + np.gradient(shaken) * rate_hz
+        return measured
 
 
 def _correlated(n: int, sd: float, over: float, rng: np.random.Generator) -> Floats:
     """A Gauss-Markov series (n,) of a standard deviation, correlated over so many samples."""
     from scipy.signal import lfilter
 
-    kept = math.exp(-1.0 / over)
-    drawn = sd * math.sqrt(1.0 - kept * kept) * rng.standard_normal(n)
+    correlation = math.exp(-1.0 / over)
+    drawn = sd * math.sqrt(1.0 - correlation * correlation) * rng.standard_normal(n)
     drawn[0] = sd * rng.standard_normal()
-    found: Floats = lfilter([1.0], [1.0, -kept], drawn)
-    return found
+    noise: Floats = lfilter([1.0], [1.0, -correlation], drawn)
+    return noise
 
 
 class Adis16100Model:

@@ -90,8 +90,8 @@ class Kit2026Sensors:
     def _field(self, at: Ints) -> Floats:
         """True field (n, 3) at the belt in its axes, in earth fields."""
         field = self._magnetism.field(self._walk.trunk_m[at]) if self._magnetism else np.tile(EARTH, (len(at), 1))
-        found: Floats = np.column_stack([self._ahead_left(field[:, :2], at), field[:, 2]]) @ self._tilt
-        return found
+        tilted: Floats = np.column_stack([self._ahead_left(field[:, :2], at), field[:, 2]]) @ self._tilt
+        return tilted
 
     def _ahead_left(self, map_xy: Floats, at: Ints) -> Floats:
         """Map vectors (n, 2) in the trunk's axes, ahead and left."""
@@ -101,10 +101,10 @@ class Kit2026Sensors:
 
 def _accelerations(path_m: Floats) -> Floats:
     """Accelerations (n, 2) along a path (n, 2) at 1 kHz."""
-    found = np.zeros_like(path_m)
+    accelerations = np.zeros_like(path_m)
     k = SPREAD_MS
-    found[k:-k] = (path_m[2 * k :] - 2.0 * path_m[k:-k] + path_m[: -2 * k]) * (RATE_HZ / k) ** 2
-    return found
+    accelerations[k:-k] = (path_m[2 * k :] - 2.0 * path_m[k:-k] + path_m[: -2 * k]) * (RATE_HZ / k) ** 2
+    return accelerations
 
 
 def _counts(true: Floats, bias: Floats, noise: float, unit: float, rng: np.random.Generator) -> Floats:

@@ -47,10 +47,10 @@ def pack(report: Report, number: int, unix_s: float) -> bytes:
     )
     names = b"".join(bytes([len(part)]) + part for part in (report.team.encode(), report.name.encode()))
     alarm = report.alarm
-    told = b"" if alarm is None else ALARM.pack(
+    packed_alarm = b"" if alarm is None else ALARM.pack(
         KINDS.index(alarm.kind) | REASONS.index(alarm.reason) << 4, alarm.number & 0xFFFF, min(round(alarm.age_s), 0xFFFF)
     )  # fmt: skip
-    return head + names + told + (_packed(report.position, report.motion) if report.position else b"")
+    return head + names + packed_alarm + (_packed(report.position, report.motion) if report.position else b"")
 
 
 def _packed(p: Position, motion: Motion | None) -> bytes:

@@ -148,13 +148,13 @@ def _output_configuration(outputs: tuple[int, ...], rate: int) -> Request:
 
 def _rate_fault(wanted: dict[int, int], answer: bytes) -> str:
     """Outputs that a SetOutputConfigurationAck lacks or has at another rate, as text. `WITH_EACH` is any rate."""
-    told = dict(struct.iter_unpack(">HH", answer[: len(answer) // 4 * 4]))
+    rates = dict(struct.iter_unpack(">HH", answer[: len(answer) // 4 * 4]))
     faults = [
-        f"{OUTPUTS[identifier]} at {told[identifier]} Hz instead of {rate}"
-        if identifier in told
+        f"{OUTPUTS[identifier]} at {rates[identifier]} Hz instead of {rate}"
+        if identifier in rates
         else f"no {OUTPUTS[identifier]}"
         for identifier, rate in wanted.items()
-        if told.get(identifier) not in (rate, WITH_EACH)
+        if rates.get(identifier) not in (rate, WITH_EACH)
     ]
     return f"it would send {', '.join(faults)}" if faults else ""
 

@@ -100,12 +100,12 @@ def start(heights_m: Floats, prior: Floats, claimed_m: float, noise_m: float) ->
 
 
 @kernel
-def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, found: Floats, joint: Floats) -> None:
+def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, states: Floats, joint: Floats) -> None:
     """All samples of a portion; `state` (weights, means, covariances) goes on from them.
 
     `seen`: (n, 9) time since the sample before (s), claimed height, its noise, gait, place, the foot's vertical speed and its sd over a
     second (NaN: unknown), lowest and highest level. `free`: level ground is anywhere.
-    Filled: `found` (n, 15 k, 5) with weight, h, v, d and the variance of h; `joint`
+    Filled: `states` (n, 15 k, 5) with weight, h, v, d and the variance of h; `joint`
     (n, 15 k, 15 k) with p(now, before) for `smooth_backward`, unless it has length 0.
     """
     size = len(state[0])
@@ -130,9 +130,9 @@ def filter_samples(state: State, heights_m: Floats, free: bool, seen: Floats, fo
             if len(joint):
                 chain = merged[3].copy() if part == 0 else _chain_joint(merged[3], chain)
         for s in range(size):
-            found[i, s, RESULT_WEIGHT] = state[0][s]
-            found[i, s, RESULT_HEIGHT:RESULT_VARIANCE] = state[1][s, :GUST]
-            found[i, s, RESULT_VARIANCE] = state[2][s, HEIGHT, HEIGHT]
+            states[i, s, RESULT_WEIGHT] = state[0][s]
+            states[i, s, RESULT_HEIGHT:RESULT_VARIANCE] = state[1][s, :GUST]
+            states[i, s, RESULT_VARIANCE] = state[2][s, HEIGHT, HEIGHT]
         if len(joint):
             joint[i] = chain
 
@@ -152,7 +152,7 @@ def _chain_joint(later: Floats, earlier: Floats) -> Floats:
 def smooth_backward(joint: Floats, last: Floats) -> Floats:
     """Probabilities (n, 15 k) at the samples *before* those of `joint`, given all samples, and `last` (15 k,) at its last one [Kim 1994]."""
     n, size = len(joint), len(last)
-    found = np.zeros((n, size))
+    smoothed = np.zeros((n, size))
     later = last.copy()
     for i in range(n - 1, -1, -1):
         for s in range(size):
@@ -160,10 +160,10 @@ def smooth_backward(joint: Floats, last: Floats) -> Floats:
                 continue
             total = joint[i, s].sum()
             if total > 0.0:
-                found[i] += later[s] / total * joint[i, s]
-        later = found[i] / found[i].sum()
-        found[i] = later
-    return found
+                smoothed[i] += later[s] / total * joint[i, s]
+        later = smoothed[i] / smoothed[i].sum()
+        smoothed[i] = later
+    return smoothed
 
 
 @kernel

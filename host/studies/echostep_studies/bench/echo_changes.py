@@ -55,8 +55,8 @@ def one_ranger(walk: SimulatedWalk, ranger: int = LEFT) -> SimulatedWalk:
     """The pings of the other ranger are missing."""
     segments = []
     for s in walk.segments:
-        kept = s.ranger == ranger
-        segments.append(replace(s, t_s=s.t_s[kept], ranger=s.ranger[kept], range_m=s.range_m[kept]))
+        own = s.ranger == ranger
+        segments.append(replace(s, t_s=s.t_s[own], ranger=s.ranger[own], range_m=s.range_m[own]))
     return replace(walk, segments=tuple(segments))
 
 

@@ -84,17 +84,17 @@ class JudgedRun:
     def alarm_delays_s(self) -> list[float]:
         """For each time that the error exceeds ALARM_M: how long until a claim does not say "tracking", or the error is small again."""
         delays, since_s, flagged = [], None, False
-        for t_s, off, said in zip(
+        for t_s, off, claims_tracking in zip(
             self.t_s.tolist(), (self.error_m > ALARM_M).tolist(), (self.status != TRACKING).tolist(), strict=True
         ):
-            if since_s is not None and not flagged and (said or not off):
+            if since_s is not None and not flagged and (claims_tracking or not off):
                 delays.append(t_s - since_s)
                 flagged = True
             if not off:
                 since_s, flagged = None, False
             elif since_s is None:
                 since_s = t_s
-                if said:
+                if claims_tracking:
                     delays.append(0.0)
                     flagged = True
         if since_s is not None and not flagged:

@@ -54,11 +54,11 @@ def fitted(seed: int) -> list[SettingRow]:
         model = echo_model(replace(EchoSettings(), **chosen))
         return -float(np.mean([log_echo(z, n, d, off, kind, model) for z, n, d, off, kind in seen]))
 
-    found = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
-    console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-found.fun:.3f} fitted")
+    best = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
+    console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-best.fun:.3f} fitted")
     return [
         SettingRow(name=f"fit: {name}", set=getattr(EchoSettings(), name), fitted=round(value, 4))
-        for name, value in zip(FITTED, np.exp(found.x).tolist(), strict=True)
+        for name, value in zip(FITTED, np.exp(best.x).tolist(), strict=True)
     ]
 
 

@@ -45,8 +45,8 @@ def _effect(ax: Axes, effect: Effect) -> None:
     expected = np.array([np.exp(log_p(plan, h.pose, RANGES_M[1:], model)) for h in effect.heard])
     ax.pcolormesh(places, RANGES_M[1:], np.sqrt(expected.T), cmap="Greys", shading="nearest", rasterized=True)
     for h in effect.heard:
-        heard = h.range_m[~np.isnan(h.range_m)][:20]
-        ax.plot(np.full(len(heard), h.place), heard, ".", color=BLUE, ms=2.5)
+        ranges_m = h.range_m[~np.isnan(h.range_m)][:20]
+        ax.plot(np.full(len(ranges_m), h.place), ranges_m, ".", color=BLUE, ms=2.5)
     ax.plot([], [], ".", color=BLUE, label="ranges heard")
     ax.plot([], [], "s", color="0.6", label="expected by the likelihood")
     top = 6.5 if max(np.nanmax(h.range_m, initial=0.0) for h in effect.heard) > 3.2 else 3.4

@@ -78,9 +78,9 @@ def draw_figures(folder: Path, seed: int, _rows: list[EchoesRow]) -> None:
 
 
 def _tables(rows: list[EchoesRow], _request: StudyRequest) -> list[Table]:
-    found = as_dicts(row for row in rows if isinstance(row, EchoRow))
+    effects = as_dicts(row for row in rows if isinstance(row, EchoRow))
     settings = as_dicts(row for row in rows if isinstance(row, SettingRow))
-    tables = [Table("Simulated pings, and how the likelihood expects them", found, COLUMNS)]
+    tables = [Table("Simulated pings, and how the likelihood expects them", effects, COLUMNS)]
     return [*tables, Table("Echo settings", settings, SETTINGS_COLUMNS)] if settings else tables
 
 

@@ -95,12 +95,12 @@ def rows_of(recording: FootRecording, track: Track) -> list[FigureRow]:
 
 def medians(rows: list[FigureRow]) -> list[FigureRow]:
     """The median of each metric of a set that has several recordings; of its size where it has a sign."""
-    found = []
+    median_rows = []
     for group, metric in dict.fromkeys((row.set, row.metric) for row in rows if row.set != "stairs"):
         same = [row for row in rows if (row.set, row.metric) == (group, metric)]
         if len(same) > 1:
             middle = Figure(metric, median(abs(row.value) for row in same))
-            found.append(
+            median_rows.append(
                 _row(
                     group,
                     f"median of {len(same)}",
@@ -108,7 +108,7 @@ def medians(rows: list[FigureRow]) -> list[FigureRow]:
                     median(row.distance_m for row in same if row.distance_m is not None),
                 )
             )
-    return found
+    return median_rows
 
 
 def _row(group: str, name: str, figure: Figure, way_m: float) -> FigureRow:

@@ -76,14 +76,14 @@ def _mean_turn(
     `measured`: heading. Turns are averaged, not places: on maps that are bent differently a mean place has no meaning. On a learnt map a particle
     is looked for near the beacons that were heard at or after `since_tick`.
     """
-    particles, heard = cloud.particles, cloud.heard_ticks >= since_tick
+    particles, recent = cloud.particles, cloud.heard_ticks >= since_tick
     total, east, north, rest = 0.0, 0.0, 0.0, 0.0
     path, from_m, to_m = trail, 0.0, np.inf
     for i in range(len(particles.x_m)):
         w = math.exp(particles.log_weight[i])
         if deployed:
             path = believed_trail(cloud, i, trail[-1])
-            from_m, to_m = span_near_heard(path, heard)
+            from_m, to_m = span_near_heard(path, recent)
         turn, rest_m = _target(path, particles.x_m[i], particles.y_m[i], measured + particles.turn_rad[i], from_m, to_m)
         total += w
         east += w * math.cos(turn)

@@ -144,8 +144,8 @@ def _measure(
 ) -> None:
     """One ultrasound event."""
     if rules.system == OURS:
-        heard = update_by_ultrasound(world, state.cloud, state.walker, tick, order, rng)
-        note_contact(state.contact, state.walker, tick, heard)
+        measured = update_by_ultrasound(world, state.cloud, state.walker, tick, order, rng)
+        note_contact(state.contact, state.walker, tick, measured)
     elif rules.system == PAPER:
         fuse_nearest(world, state.walker, state.fusion, rng)
 

@@ -60,10 +60,10 @@ def foot_row(name: str, manner: Manner, seed: int) -> FootRun:
     t_s, accel, gyro = samples(walked, RATE_HZ, rng=rng)
     track = walk_track(t_s, accel, soft_limited(gyro))
     way = float(np.linalg.norm(np.diff(walked.prints_m, axis=0), axis=1).sum())
-    found = float(sum(np.linalg.norm(step.move_m) for step in track.steps))
+    measured_m = float(sum(np.linalg.norm(step.move_m) for step in track.steps))
     off = track.position_m[-1] - _end(walked)
     return FootRun(
-        name=f"foot/{name}", seed=seed, way_m=way, way_percent=100.0 * (found / way - 1.0),
+        name=f"foot/{name}", seed=seed, way_m=way, way_percent=100.0 * (measured_m / way - 1.0),
         ending_m=float(np.hypot(off[0], off[1])), height_m=abs(float(off[2])), steps_percent=100.0 * len(track.steps) / STEPS,
     )  # fmt: skip
 

@@ -96,10 +96,10 @@ def leg_row(name: str, manner: LegManner, seed: int) -> LegRun:
     strides = _strides(manner, rng)
     moved = [s for s in strides if Flag.STANDING not in s.flags]
     forward = CYCLES * manner.forward_m
-    found, sd = sum(s.length_m for s in strides), distance_sd_m(strides)
+    measured_m, sd = sum(s.length_m for s in strides), distance_sd_m(strides)
     return LegRun(
-        name=f"legs/{name}", seed=seed, forward_m=forward, found_m=found, sd_m=sd,
-        error_over_sd=(found - forward) / sd if sd > 0.0 else math.nan,
+        name=f"legs/{name}", seed=seed, forward_m=forward, found_m=measured_m, sd_m=sd,
+        error_over_sd=(measured_m - forward) / sd if sd > 0.0 else math.nan,
         up_m=CYCLES * manner.up_m, rise_m=sum(s.rise_m for s in strides),
         stairs_percent=_share(moved, STAIRS), blind_percent=_share(moved, BLIND),
     )  # fmt: skip
@@ -131,5 +131,5 @@ def _share(strides: list[Stride], flags: Flag) -> float:
 def _ease(share: Floats) -> Floats:
     """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
     v = np.clip(share, 0.0, 1.0)
-    found: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return found
+    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
+    return eased

@@ -77,8 +77,8 @@ def summarize(rows: Sequence[RunRow]) -> list[SummaryRow]:
 
 def _lying_summary(group: Sequence[LyingRun]) -> LyingSummary:
     told_s = [row.told_s for row in group]
-    told, median_s = sum(row.told for row in group), float(np.median(told_s))
-    return LyingSummary(name=group[0].name, runs=len(group), told=told, median_s=median_s, longest_s=max(told_s))
+    in_time, median_s = sum(row.told for row in group), float(np.median(told_s))
+    return LyingSummary(name=group[0].name, runs=len(group), told=in_time, median_s=median_s, longest_s=max(told_s))
 
 
 def _day_summary(group: Sequence[DayRun]) -> DaySummary:
@@ -91,8 +91,8 @@ def _day_summary(group: Sequence[DayRun]) -> DaySummary:
 
 def tables(rows: Sequence[SummaryRow], _: StudyRequest) -> list[Table]:
     """Tables of incapacitated wearers, of false alarms, and of falls."""
-    told = f"told within {TOLD_S:.0f} s"
-    lying = {"name": "", "runs": "wearers", "told": told, "median_s": "median s", "longest_s": "longest s"}
+    in_time = f"told within {TOLD_S:.0f} s"
+    lying = {"name": "", "runs": "wearers", "told": in_time, "median_s": "median s", "longest_s": "longest s"}
     days = {
         "name": "",
         "runs": "runs",

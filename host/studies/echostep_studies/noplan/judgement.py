@@ -41,8 +41,8 @@ class Frame:
 
     def to_map(self, points: Floats) -> Floats:
         """Points (n, 2) in the map."""
-        found: Floats = points @ self.turned.T + self.moved
-        return found
+        mapped: Floats = points @ self.turned.T + self.moved
+        return mapped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,9 +179,9 @@ def distances(places: Floats, walls: Floats) -> Floats:
         return np.full(len(places), np.inf)
     tree = shapely.STRtree(shapely.linestrings(walls.reshape(-1, 2, 2)))
     (which, _), away = tree.query_nearest(shapely.points(places), return_distance=True, all_matches=False)
-    found = np.full(len(places), np.inf)
-    found[which] = away
-    return found
+    away_m = np.full(len(places), np.inf)
+    away_m[which] = away
+    return away_m
 
 
 def in_sight(places: Floats, built: Floats, looks: Floats) -> Bools:

@@ -62,8 +62,8 @@ def pressures(t_s: Floats, height_m: Floats, in_shaft: Bools, weather: Weather, 
     stack = LEAKY * STACK_PA_M_K * weather.colder_k * (height_m - neutral) * _soft(t_s, in_shaft)
     speed = np.gradient(height_m, t_s) if len(t_s) > 1 else np.zeros(1)
     piston = PISTON_PA * np.where(np.abs(speed) > 0.6, speed * np.abs(speed), 0.0)
-    found: Floats = ground * np.exp(-column * height_m) + stack + piston
-    return found
+    pressure_pa: Floats = ground * np.exp(-column * height_m) + stack + piston
+    return pressure_pa
 
 
 def device_temperatures(t_s: Floats, air_c: float, rng: np.random.Generator) -> Floats:
@@ -74,7 +74,7 @@ def device_temperatures(t_s: Floats, air_c: float, rng: np.random.Generator) -> 
 
 def _doors(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
     """Pulses: a push of some tenths of a second to some seconds, then the air settles, at times swinging back."""
-    found = np.zeros_like(t_s)
+    pulses_pa = np.zeros_like(t_s)
     at = float(t_s[0])
     while math.isfinite(weather.doors_s):
         at += rng.exponential(weather.doors_s)
@@ -86,13 +86,13 @@ def _doors(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
         since = t_s[near] - at
         after = np.maximum(since - rise - held, 0.0)
         swing = np.cos(2.0 * np.pi * after / 3.0) if rng.random() < 0.3 else 1.0
-        found[near] += size * np.minimum(since / rise, 1.0) * np.exp(-after / fall) * swing
-    return found
+        pulses_pa[near] += size * np.minimum(since / rise, 1.0) * np.exp(-after / fall) * swing
+    return pulses_pa
 
 
 def _fan(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
     """A fan that presses the building on and off, with a time constant of some seconds."""
-    found = np.zeros_like(t_s)
+    pressure_pa = np.zeros_like(t_s)
     at, on, sign = float(t_s[0]), False, rng.choice((-1.0, 1.0))
     while math.isfinite(weather.fan_s):
         at += rng.exponential(weather.fan_s)
@@ -100,8 +100,8 @@ def _fan(t_s: Floats, weather: Weather, rng: np.random.Generator) -> Floats:
             break
         on = not on
         after = np.maximum(t_s - at, 0.0)
-        found += (1.0 if on else -1.0) * sign * weather.fan_pa * (1.0 - np.exp(-after / rng.uniform(1.0, 6.0)))
-    return found
+        pressure_pa += (1.0 if on else -1.0) * sign * weather.fan_pa * (1.0 - np.exp(-after / rng.uniform(1.0, 6.0)))
+    return pressure_pa
 
 
 def _soft(t_s: Floats, in_shaft: Bools) -> Floats:

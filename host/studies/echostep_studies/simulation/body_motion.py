@@ -102,5 +102,5 @@ class BodyMotion:
 
 def _smooth(u: Floats) -> Floats:
     u = np.clip(u, 0.0, 1.0)
-    found: Floats = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    return found
+    smoothed: Floats = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    return smoothed

@@ -160,14 +160,14 @@ def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.r
     ranger = np.arange(count) % 2
     t_s = (np.arange(count) // 2) * period_s + ranger * offset_s + rng.uniform(0.0, JITTER_US * 1e-6, count)
     xy, heading = body.at(t_s)
-    heard = echoes(xy, heading, built, bias_m, rng, a)
+    simulated = echoes(xy, heading, built, bias_m, rng, a)
     came = np.zeros((count, 4))  # us after the trigger: own, and the other's last three pings about this one
-    came[:, 0] = heard.own_us[np.arange(count), ranger]
+    came[:, 0] = simulated.own_us[np.arange(count), ranger]
     for k, other in enumerate((-3, -1, 1), start=1):
         at = np.arange(count) + other * np.where(ranger == 1, 1, -1)
         there = (at >= 0) & (at < count)
         at = np.clip(at, 0, count - 1)
-        cross_us = heard.cross_us[at, ranger].astype(float)
+        cross_us = simulated.cross_us[at, ranger].astype(float)
         came[:, k] = np.where(there & (cross_us > 0), cross_us + (t_s[at] - t_s) * 1e6, 0.0)
     came[(came < FIRST_US) | (came > max(LAST_US, 2e6 * a.maximum_m / a.speed_m_s))] = np.inf
     first_us = came.min(1)

@@ -126,10 +126,10 @@ def one_run(names: tuple[str, ...], length_m: float, seed: int) -> list[WearerRu
             if how == "beacons":
                 walks = with_dropped_beacons(walks, seed)
             kind = "wrong" if how in ("tap", "radio") else how
-            told = [_told(walks, begin, kind, seed), *walks.starts[1:]]
+            begins = [_told(walks, begin, kind, seed), *walks.starts[1:]]
             if kind not in alone:
-                alone[kind] = track_team(walks, told, None, seed), track_team(walks, told, None, seed + OTHER_DRAWS)
-            together = track_team(walks, told, HOWS[how], seed)
+                alone[kind] = track_team(walks, begins, None, seed), track_team(walks, begins, None, seed + OTHER_DRAWS)
+            together = track_team(walks, begins, HOWS[how], seed)
             rows += [_row(f"{building}/{how}", walks, k, [alone[kind][0][k], together[k], alone[kind][1][k]], seed)
                      for k in range(WEARERS) if not (how == "liar" and k == LIAR)]  # fmt: skip
     return rows + (_drawing_rows(length_m, seed) if DRAWING in names else [])

@@ -50,9 +50,9 @@ class How(StrEnum):
     BEACONS = "beacons"
 
 
-def track_team(walks: TeamWalks, told: Sequence[Pose | Start], how: How | None, seed: int) -> list[list[Estimate]]:
-    """Estimates of all wearers; `told`: their starts; `how`: None for trackers without meetings."""
-    team = [_Wearer(walks, k, start, seed) for k, start in enumerate(told)]
+def track_team(walks: TeamWalks, starts: Sequence[Pose | Start], how: How | None, seed: int) -> list[list[Estimate]]:
+    """Estimates of all wearers; `starts`: their starts; `how`: None for trackers without meetings."""
+    team = [_Wearer(walks, k, start, seed) for k, start in enumerate(starts)]
     if how is How.BEACONS:
         _share_all(walks, team)
     elif how is not None:
@@ -81,16 +81,16 @@ def _share_all(walks: TeamWalks, team: Sequence[_Wearer]) -> None:
         placed = [wearer.tracker.own_beacons() for wearer in team]
         for who, beacons in enumerate(placed):
             if beacons:
-                told = TeamBeacons(1, f"wearer {who}", f"{who:08x}", walks.plan.digest, beacons)
+                message = TeamBeacons(1, f"wearer {who}", f"{who:08x}", walks.plan.digest, beacons)
                 for other in (*team[:who], *team[who + 1 :]):
-                    other.hear(Chunk(TEAM_BEACONS, START_NS + int(1e9 * t_s), told.encode()))
+                    other.hear(Chunk(TEAM_BEACONS, START_NS + int(1e9 * t_s), message.encode()))
 
 
 def _told_at(encounters: Sequence[Encounter], how: How, rng: np.random.Generator) -> list[Encounter]:
     """The encounters in order of the times at which the trackers get them."""
     late_s = np.zeros(len(encounters)) if how is How.RADIO else rng.uniform(0.0, TAP_S, len(encounters))
-    told = [replace(e, t_s=e.t_s + float(s)) for e, s in zip(encounters, late_s, strict=True)]
-    return sorted(told, key=lambda e: e.t_s)
+    delayed = [replace(e, t_s=e.t_s + float(s)) for e, s in zip(encounters, late_s, strict=True)]
+    return sorted(delayed, key=lambda e: e.t_s)
 
 
 class _Wearer:

@@ -114,7 +114,7 @@ def summaries(rows: Sequence[TrailRun]) -> list[TrailSummary]:
 def _summary(rows: list[TrailRun]) -> TrailSummary:
     first = rows[0]
     off = [row.distance_error_percent for row in rows]
-    found = TrailSummary(
+    common = TrailSummary(
         **as_dict(summary(first.name, first.profile, [row.errors_m for row in rows], [])),
         rate_hz=first.rate_hz,
         distance_m=round(sum(row.distance_m for row in rows) / len(rows), 2),
@@ -125,9 +125,9 @@ def _summary(rows: list[TrailRun]) -> TrailSummary:
         heading_max_deg=round(max(row.heading_max_deg for row in rows), 2),
     )
     if not isinstance(first, PrintedRun):
-        return found
+        return common
     percent = first.printed_distance_error_percent
-    return PrintedSummary(**as_dict(found), printed=first.printed, printed_distance_error_percent=percent)
+    return PrintedSummary(**as_dict(common), printed=first.printed, printed_distance_error_percent=percent)
 
 
 def _tables(rows: list[TrailSummary], request: StudyRequest) -> list[Table]:

@@ -67,16 +67,16 @@ def mocap(
 def survey(track: Track, *, name: str, t_s: Floats, truth_m: Floats, peer: tuple[str, float] | None) -> list[Figure]:
     """Against surveyed footprints truth_m (n, 2), reached at t_s (n,)."""
     xy = places(track, t_s)
-    found = [
+    figures = [
         Figure("2D RMSE at strides", rmse(xy, truth_m), peer),
         Figure("stride length MAE", _stride_error(xy, truth_m)),
     ]
     if name == "31":
         part = f", first {SURVEYED_31} footprints"
         xy, truth_m = xy[:SURVEYED_31], truth_m[:SURVEYED_31]
-        found.append(Figure("2D RMSE at strides" + part, rmse(xy, truth_m)))
-        found.append(Figure("stride length MAE" + part, _stride_error(xy, truth_m)))
-    return found
+        figures.append(Figure("2D RMSE at strides" + part, rmse(xy, truth_m)))
+        figures.append(Figure("stride length MAE" + part, _stride_error(xy, truth_m)))
+    return figures
 
 
 def closure(track: Track, *, peer: tuple[str, float] | None, height_peer: tuple[str, float] | None) -> list[Figure]:
@@ -103,10 +103,10 @@ def climb(track: Track) -> list[Figure]:
 def _frozen(truth: Floats) -> Bools:
     """Where motion capture (n, 2) has lost its markers and repeats itself for longer than 25 ms, before it jumps."""
     same = np.concatenate([[False], (np.diff(truth, axis=0) == 0.0).all(1)])
-    found = np.zeros(len(truth), bool)
+    frozen = np.zeros(len(truth), bool)
     for begin, end in spans(same):
-        found[begin:end] = end - begin > FROZEN_SAMPLES
-    return found
+        frozen[begin:end] = end - begin > FROZEN_SAMPLES
+    return frozen
 
 
 def _stride_error(track: Floats, truth: Floats) -> float:
