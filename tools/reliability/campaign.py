@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-__all__ = ["Figure", "Journal", "none", "options", "report", "track"]
+__all__ = ["CampaignJournal", "Figure", "none", "options", "report", "track"]
 
 
 class Figure(NamedTuple):
@@ -28,7 +28,7 @@ class Figure(NamedTuple):
     passed: bool | None = None
 
 
-class Journal:
+class CampaignJournal:
     """Rows of a file, a JSON line each: the next run goes on behind them."""
 
     def __init__(self, path: Path) -> None:

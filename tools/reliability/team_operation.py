@@ -33,7 +33,7 @@ from echostep.simulation.people.walker import Waypoint
 from echostep.simulation.scenario import Scenario
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import parse_endpoint, parse_outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.mqtt.publisher import Listener, MqttTransport
 from echostep.team.outbox import Outbox
 from echostep.team.publish import empty_report
@@ -107,7 +107,7 @@ class Listening:
 
     def __init__(self, url: str) -> None:
         self.roster, self._inbox = Roster(), Inbox()
-        self.receiver = Receiver(Listener(parse_endpoint(url), ["echostep/+/+/+"], self._inbox.put), print)
+        self.receiver = ListenerThread(Listener(parse_endpoint(url), ["echostep/+/+/+"], self._inbox.put), print)
 
     def member(self, name: str) -> Member | None:
         """The newest of a wearer."""

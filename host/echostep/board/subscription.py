@@ -18,7 +18,7 @@ def knows_subscriptions(identity: Identity) -> bool:
     return (identity.version_major, identity.version_minor) >= FIRST_VERSION
 
 
-class Subscription:
+class BoardSubscription:
     """Call `is_due` with every message of the board. A subscribed board sends both `Identity` and `BoardHealth` once a second."""
 
     def __init__(self) -> None:

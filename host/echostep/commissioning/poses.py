@@ -16,7 +16,7 @@ from rich.console import Console
 from echostep.arrays import Bools, Floats
 from echostep.board.calibration import GYROS, ImuSettings, foot_axes, six_axes
 from echostep.board.faults.device_faults import foot_celsius, gyro_celsius
-from echostep.board.imu_errors import POSES, Pose, check_unlike, fit_errors, pose_of
+from echostep.board.imu_errors import POSES, RestPose, check_unlike, fit_errors, pose_of
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, ROWS, Foot, Gyro, Motion
 from echostep.commissioning.probe import SETTLED_S, TICKS_PER_S, ProbeResult
 from echostep.errors import EchostepError
@@ -67,7 +67,7 @@ def _settled(probed: ProbeResult, kind: type[Motion | Foot]) -> Bools:
 
 def measure_poses(listen: Listen, console: Console) -> dict[str, ImuSettings]:
     """Errors of each part, by place; raises EchostepError with what to repeat."""
-    poses: dict[str, list[Pose]] = {}
+    poses: dict[str, list[RestPose]] = {}
     celsius: dict[str, list[float]] = {}
     for number in range(1, POSES + 1):
         parts = _listed(list(poses)) if poses else EVERYTHING
@@ -85,8 +85,8 @@ def measure_poses(listen: Listen, console: Console) -> dict[str, ImuSettings]:
 
 
 def _one_pose(
-    listen: Listen, earlier: dict[str, list[Pose]], text: str, console: Console
-) -> dict[str, tuple[Pose, float]]:
+    listen: Listen, earlier: dict[str, list[RestPose]], text: str, console: Console
+) -> dict[str, tuple[RestPose, float]]:
     """The pose and temperature of each part, asked for again while one of them moved or lies as before."""
     for tries_left in reversed(range(TRIES)):
         measured = {place: lying for probed in listen(text) for place, lying in parts_of(probed).items()}
@@ -103,7 +103,7 @@ def _one_pose(
     raise AssertionError
 
 
-def _checked(measured: dict[str, Lying], earlier: dict[str, list[Pose]]) -> dict[str, tuple[Pose, float]]:
+def _checked(measured: dict[str, Lying], earlier: dict[str, list[RestPose]]) -> dict[str, tuple[RestPose, float]]:
     """Poses and temperatures by place; raises ValueError that names the part."""
     poses = {}
     for place in earlier or measured:

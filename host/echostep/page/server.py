@@ -70,7 +70,7 @@ S = TypeVar("S", bound=SocketSession)
 
 
 @dataclass(frozen=True, slots=True)
-class Site(Generic[S]):
+class PageSite(Generic[S]):
     """What a server serves: the page `index`, files of `folders` by the first part of their path, walls of `plan`, a session for each socket."""
 
     name: str
@@ -85,7 +85,7 @@ class Site(Generic[S]):
 class SocketServer(Generic[S]):
     """Serves a site until it is closed; raises EchostepError when it cannot listen at the address."""
 
-    def __init__(self, site: Site[S], address: Address = Address()) -> None:
+    def __init__(self, site: PageSite[S], address: Address = Address()) -> None:
         self.sessions: set[S] = set()
         self._site = site
         self._listener = open_listener(address)
@@ -196,7 +196,7 @@ class PageServer(SocketServer[PageSession]):
 
         folders = {"static": STATIC}
         index = STATIC / "index.html"
-        site = Site("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
+        site = PageSite("echostep page", mailbox.plan, index, folders, session, shared.faults, shared.counts)
         super().__init__(site, address)
 
     def __enter__(self) -> Self:

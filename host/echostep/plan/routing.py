@@ -24,7 +24,7 @@ from echostep.plan.polyline import way_m
 CELL_M = 0.15  # side of a grid cell
 BODY_M = 0.25  # half a person's width: shortest distance of a route from a wall
 MARGIN_M = 1.5  # of the grid around the walls
-ASIDE_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
+MOVED_M = 2.0  # start and destination are moved to the nearest free cell, at most so far
 MOST_TRIED = 60  # nearest free cells that are tried for one without a wall before it
 MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
@@ -149,7 +149,7 @@ class Routes:
         if not (0 <= place.level < levels and math.isfinite(place.x_m) and math.isfinite(place.y_m)):
             raise EchostepError(f"{what} is on level {place.level}, the plan has {levels}, counted from 0")
         c, r = (np.array([place.x_m, place.y_m]) - self._low) / CELL_M
-        reach = int(ASIDE_M / CELL_M)
+        reach = int(MOVED_M / CELL_M)
         near = np.argwhere(
             ~self._blocked[
                 place.level,

@@ -82,7 +82,7 @@ class Subscription(Protocol):
         """Disconnect; raises nothing."""
 
 
-class Receiver:
+class ListenerThread:
     """Runs a listener in a thread until `close`, and connects again after each break."""
 
     def __init__(self, listener: Subscription, print_line: Callable[[str], None]) -> None:

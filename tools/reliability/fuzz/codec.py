@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from places import OUT, ROOT
-from reliability.campaign import Figure, Journal, options, report
+from reliability.campaign import CampaignJournal, Figure, options, report
 
 FIRMWARE = ROOT / "firmware"
 SOURCES = [
@@ -65,7 +65,7 @@ def executions(log: str) -> int:
 
 def main() -> int:
     seconds = options(__doc__, seconds=(60, "of this run")).seconds
-    journal = Journal(FOLDER / "codec.jsonl")
+    journal = CampaignJournal(FOLDER / "codec.jsonl")
     shard = len(journal.rows) + 1
     with tempfile.TemporaryDirectory() as temporary:
         program = build(Path(temporary) / "fuzz")

@@ -22,7 +22,7 @@ from types import FrameType
 
 from echostep.errors import EchostepError
 from places import OUT, ROOT
-from reliability.campaign import Figure, Journal, none, options, report
+from reliability.campaign import CampaignJournal, Figure, none, options, report
 from reliability.fuzz.targets import ALLOWED, TARGETS
 
 KEPT = ROOT / "tests/hostile_inputs.jsonl"
@@ -98,7 +98,7 @@ def fault(name: str, data: bytes) -> str:
 
 def kept_inputs() -> Iterator[tuple[str, bytes]]:
     """Inputs that once were faults."""
-    for row in Journal(KEPT).rows:
+    for row in CampaignJournal(KEPT).rows:
         yield row["target"], bytes.fromhex(row["hex"])
 
 
@@ -133,7 +133,7 @@ def main() -> int:
     """Replay the kept inputs, then fuzz all targets in turn."""
     asked = options(__doc__, seconds=(60.0, "of this run"), targets=(sorted(TARGETS), "only these"))
     signal.signal(signal.SIGALRM, too_slow)
-    journal, inputs = Journal(LOG), Journal(KEPT)
+    journal, inputs = CampaignJournal(LOG), CampaignJournal(KEPT)
     shard, done = len(journal.rows) + 1, Counter[str]()
     failures = [(name, text) for name, data in kept_inputs() if (text := fault(name, data))]
     end_s, turn = time.monotonic() + asked.seconds, 0

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from echostep.odometry.incapacity.alarm import AlarmKind, AlarmReason
 from echostep.tracker import Tracker
 
-AGAIN_S = 5.0  # between two times that a sentence is spoken; assumed
+REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ def shown_alarm(
         return None
     age_s = tracker.front_end.newest_s - alarm.since_s
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
-    times = 1000 * alarm.number + int(age_s / AGAIN_S)
+    times = 1000 * alarm.number + int(age_s / REPEAT_S)
     receipt = "Your team has been alarmed." if has_team else "No team is connected: only this page says so."
     if acknowledged_by and (commander := acknowledged_by(alarm.number)):
         receipt = f"{commander} has acknowledged it."

@@ -20,7 +20,7 @@ from echostep.plan.model import Plan
 from echostep.plan.polyline import along, way_m
 from echostep.plan.routing import Route, RoutePlace, Routes
 
-AGAIN_S = 5.0  # shortest time between two searches for a route, in data time
+SEARCH_INTERVAL_S = 5.0  # shortest time between two searches for a route, in data time
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
 LOOKING, NO_ROUTE = "looking", "none"  # kinds of a guidance without a route
 
@@ -114,11 +114,11 @@ class Destination:
         return not self.searching and estimate.t_s >= self._search_again_s
 
     def set_route(self, route: Route | None, reason: str, estimate: Estimate) -> None:
-        """The result of a search from an estimate: a route, or None and the reason. Without a route the search is repeated after `AGAIN_S`."""
+        """The result of a search from an estimate: a route, or None and the reason. Without a route it is repeated after `SEARCH_INTERVAL_S`."""
         self.searching = False
         self._guide = Guide(route) if route is not None and route.stretches else None
         self._reason, self._last = reason, None
-        self._search_again_s = math.inf if self._guide else estimate.t_s + AGAIN_S
+        self._search_again_s = math.inf if self._guide else estimate.t_s + SEARCH_INTERVAL_S
 
     def guidance_at(self, estimate: Estimate) -> ShownGuidance:
         """The guidance at an estimate; the same object while the estimate is the same."""

@@ -19,7 +19,7 @@ from echostep.plan.places.standing import StandingGround
 from echostep.plan.places.whereabouts import Whereabouts
 from echostep.ports.people.check_in import CheckIn
 
-ASIDE_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
+DOUBTED_M = 1.0  # a check-in that is farther than this outside the ellipse of a fitting place is doubted; assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Taps:
         if scene is None or estimate is None:
             return [heading]
         away_m = math.dist((x_m, y_m), (estimate.x_m, estimate.y_m))
-        moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + ASIDE_M
+        moved = estimate.level != check_in.level or away_m > estimate.ellipse95.major_m + DOUBTED_M
         changes = [f"{format_metres(away_m)} from the estimate."] if estimate.level == check_in.level else []
         if moved and scene.echoes_fit and estimate.status is TrackStatus.TRACKING:
             changes.append("The echoes fit the estimate: are you sure?")

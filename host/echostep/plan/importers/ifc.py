@@ -36,7 +36,7 @@ SEEN = (*WALLS, *CONNECTOR_KINDS, "IfcWindow", "IfcDoor", "IfcSpace")
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class SolidBody:
     """An element as triangles: corners (n, 3) in metres, faces (m, 3) as indices of corners."""
 
     element: Any
@@ -115,7 +115,7 @@ def _floors(model: Any, path: Path) -> list[tuple[str, float]]:
     return sorted(((name, round(height, 6)) for name, height in floors), key=lambda floor: floor[1])
 
 
-def _bodies(model: Any, path: Path) -> Iterator[Body]:
+def _bodies(model: Any, path: Path) -> Iterator[SolidBody]:
     """All elements that a plan shows, in the model's world coordinates in metres; elements without a usable shape are left out."""
     geometry: Any = import_module("ifcopenshell.geom")
     settings = geometry.settings()
@@ -135,10 +135,10 @@ def _bodies(model: Any, path: Path) -> Iterator[Body]:
             raise EchostepError(
                 f"{path}: {element.is_a()} #{element.id()}: further than {LIMIT_M / 1000:.0f} km from the origin"
             )
-        yield Body(element, corners, faces)
+        yield SolidBody(element, corners, faces)
 
 
-def _place(drawn_levels: list[DrawnLevel], body: Body) -> None:
+def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> None:
     kind = next(kind for kind in SEEN if body.element.is_a(kind))
     low, high = body.z_m
     name = str(getattr(body.element, "LongName", None) or getattr(body.element, "Name", None) or "")[:80]
@@ -159,7 +159,7 @@ def _place(drawn_levels: list[DrawnLevel], body: Body) -> None:
             drawn.rooms += [room(name or "room", area) for area in body.cut(z)]
 
 
-def _place_way(drawn_levels: list[DrawnLevel], body: Body, kind: ConnectorKind, name: str) -> None:
+def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> None:
     """Add stairs, a ramp or a lift to all levels between its lowest and its highest corner."""
     if kind == "lift" and str(getattr(body.element, "PredefinedType", "ELEVATOR")) not in (
         "ELEVATOR",

@@ -15,7 +15,7 @@ from echostep.plan.model import Door, Level
 
 # Assumed:
 NARROWEST_M, WIDEST_M = 0.5, 1.6  # of an opening that a door could close
-JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
+LONGEST_JAMB_M = 0.3  # a shorter wall at the end of another one is a jamb: the longer one still ends free
 TOUCH_M = 0.02  # walls with a smaller distance touch
 THICKNESS_M = 0.05  # an opening ends at this distance from its own wall's end at the earliest
 
@@ -44,7 +44,7 @@ def door_gaps(level: Level) -> tuple[Door, ...]:
 def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floats]:
     """Ends (k, 2) of walls that touch neither a longer wall than a jamb nor a listed door, and the direction (k, 2) in which their wall points."""
     length = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
-    long = length > JAMB_M
+    long = length > LONGEST_JAMB_M
     ends = walls[long].reshape(-1, 2)
     along = (walls[long, 2:] - walls[long, :2]) / length[long, None]
     outward = np.stack((-along, along), axis=1).reshape(-1, 2)
@@ -54,7 +54,7 @@ def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floa
     free[end[end // 2 != other]] = False
     if level.doors:
         doors = shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2))
-        free[shapely.STRtree(doors).query(points, predicate="dwithin", distance=JAMB_M)[0]] = False
+        free[shapely.STRtree(doors).query(points, predicate="dwithin", distance=LONGEST_JAMB_M)[0]] = False
     return ends[free], outward[free]
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from echostep.board.frames import BoardReader, StaleFirmwareError, encode
 from echostep.board.messages import Identify
-from echostep.board.subscription import SUBSCRIBE, Subscription
+from echostep.board.subscription import SUBSCRIBE, BoardSubscription
 from echostep.errors import EchostepError
 from echostep.interruption import holding_signals, raise_held
 from echostep.localization.particles.start import Start
@@ -152,7 +152,7 @@ def _chunks_for(ports: SerialPorts, seconds: float | None) -> Iterator[Chunk | N
 
 def _with_subscription(chunks: Iterable[Chunk | None], ports: SerialPorts) -> Iterator[Chunk | None]:
     """The same chunks, while each board is asked for its optional messages at the start and whenever it has restarted."""
-    boards = {name: (BoardReader(), Subscription()) for name in (BOARD, FOOT)}
+    boards = {name: (BoardReader(), BoardSubscription()) for name in (BOARD, FOOT)}
     for chunk in chunks:
         if chunk is not None and chunk.port in boards:
             board, subscription = boards[chunk.port]

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 from echostep.page.elements.marks import ShownMark
 from echostep.team.endpoint import Endpoint, Outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.marks import MARKS, MarkBoard, acks_of
 from echostep.team.messages.report import BadReportError
 from echostep.team.mqtt.publisher import Listener
@@ -35,7 +35,7 @@ class MarkFeed:
         self._inbox, self._board = Inbox(), MarkBoard()
         self._shown: tuple[ShownMark, ...] = ()
         self._looked_s = -math.inf
-        self._receiver = Receiver(
+        self._receiver = ListenerThread(
             Listener(broker, [MARKS, acks_of(outlet.team, outlet.name)], self._inbox.put),
             lambda text: print_line(f"{broker}: marks: {text}"),
         )

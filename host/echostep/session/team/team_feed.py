@@ -16,7 +16,7 @@ from echostep.plan.model import Plan
 from echostep.ports.people.teammate import Teammate
 from echostep.team.commander import update_roster
 from echostep.team.endpoint import Outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
@@ -38,7 +38,7 @@ class TeamFeed:
         self._looked_s = self._told_s = -math.inf
         self._warned = False
         listener = Listener(broker, [f"echostep/+/{name}/+"], self._inbox.put)
-        self._receiver = Receiver(listener, lambda text: print_line(f"{broker}: {text}"))
+        self._receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: {text}"))
 
     def pop(self) -> Iterator[bytes]:
         """The wearer's place as the bytes of a chunk, when it is new; never waits."""

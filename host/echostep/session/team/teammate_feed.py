@@ -19,7 +19,7 @@ from echostep.plan.model import Plan
 from echostep.ports.people.team_beacons import SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep.team.commander import take_messages
 from echostep.team.endpoint import Endpoint, Outlet
-from echostep.team.inbox import Inbox, Receiver
+from echostep.team.inbox import Inbox, ListenerThread
 from echostep.team.messages.meeting import meeting_with
 from echostep.team.messages.shared_beacons import BEACONS, SHARE_S, beacons_message
 from echostep.team.messages.shared_drawings import drawing_topic
@@ -27,7 +27,7 @@ from echostep.team.mqtt.publisher import Listener
 from echostep.team.roster import Member, MemberState, Roster
 
 LOOK_S = 0.5  # between two looks at what was heard; assumed
-HEARD_S = 60.0  # a teammate without a report for longer is not listed; assumed
+LISTED_S = 60.0  # a teammate without a report for longer is not listed; assumed
 
 
 class TeammateFeed:
@@ -46,7 +46,7 @@ class TeammateFeed:
         self._taken: dict[str, tuple[float, bytes]] = {}  # those that were taken, and when
         self._shared = b""
         listener = Listener(broker, [f"echostep/{outlet.team}/+/+"], self._inbox.put)
-        self._receiver = Receiver(listener, lambda text: print_line(f"{broker}: teammates: {text}"))
+        self._receiver = ListenerThread(listener, lambda text: print_line(f"{broker}: teammates: {text}"))
 
     def news(self) -> tuple[str, ...] | None:
         """Names of the teammates, sorted; None when they are the same as before. Never waits."""
@@ -108,7 +108,7 @@ class TeammateFeed:
         members = [
             m for m in self._roster.members(now_s)
             if (m.report.team, m.report.name) != self._own and m.report.position is not None
-            and m.report.plan_sha256 == self._plan.digest and m.silent_s(now_s) < HEARD_S
+            and m.report.plan_sha256 == self._plan.digest and m.silent_s(now_s) < LISTED_S
             and m.state(now_s) is not MemberState.ENDED
         ]  # fmt: skip
         return {m.report.name: m for m in sorted(members, key=lambda m: -m.silent_s(now_s))}

@@ -31,7 +31,7 @@ FORCE_M_S2 = 0.244e-3 * 9.80665  # per count, 8 g [table 2]
 FORCE_NOISE_M_S2 = 0.02  # rms, 80 ug per root Hz [table 2]
 FORCE_BIAS_M_S2 = 0.2  # zero-g level, typical [table 2]
 FULL_SCALE = 32_767
-GRAVITY_M_S2 = 9.80665
+G0_M_S2 = 9.80665  # standard gravity
 BELT_TILT_RAD = math.radians(4.0)  # sd of roll and pitch; assumed
 SPREAD_MS = 20  # of the second difference of the trunk's path: the path is piecewise smooth
 FIELD_COUNTS = EARTH_T * 1e4 * 6842.0  # per earth field [LIS3MDL data sheet, table 2: 6842 per gauss]
@@ -81,9 +81,9 @@ class Kit2026Sensors:
         """True specific forces (n, 3 places, 3 axes)."""
         forces = np.zeros((len(at), 3, 3))
         for k, angle in enumerate(self._angles):
-            forces[:, k, 0] = GRAVITY_M_S2 * np.sin(angle[at])
-            forces[:, k, 1] = GRAVITY_M_S2 * np.cos(angle[at])
-        level = np.column_stack([self._ahead_left(self._trunk_m_s2[at], at), np.full(len(at), GRAVITY_M_S2)])
+            forces[:, k, 0] = G0_M_S2 * np.sin(angle[at])
+            forces[:, k, 1] = G0_M_S2 * np.cos(angle[at])
+        level = np.column_stack([self._ahead_left(self._trunk_m_s2[at], at), np.full(len(at), G0_M_S2)])
         forces[:, 2] = level @ self._tilt
         return forces
 

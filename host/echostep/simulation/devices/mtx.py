@@ -26,7 +26,7 @@ GRAVITY_M_S2 = 9.81
 ACCEL_LIMIT_M_S2, GYRO_LIMIT_RAD_S = 180.0, math.radians(1200.0)
 FIRST_S = 0.05  # when the first sample's interval begins
 COMPUTING_S = 0.002  # from the sample to the first byte
-TURN_S, LEAN_S = 5.0, 10.0  # how slowly the orientation filter follows the field, and forgets its tilt error
+FOLLOW_S, LEAN_S = 5.0, 10.0  # how slowly the orientation filter follows the field, and forgets its tilt error
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.
     lean = model.lean_rad * math.sqrt(1.0 - decay * decay) * rng.standard_normal((len(r), 2))
     error[:, :2] = np.column_stack([_followed(lean[:, k] / (1.0 - decay), decay, 0.0) for k in (0, 1)])
     north = np.arctan2(field[:, 0], field[:, 1])
-    error[:, 2] = _followed(north, math.exp(-period / TURN_S), float(north[0]))
+    error[:, 2] = _followed(north, math.exp(-period / FOLLOW_S), float(north[0]))
     return rotations(error) @ r
 
 

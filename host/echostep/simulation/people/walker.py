@@ -26,7 +26,7 @@ Waypoint = (  # x, y, how long to pause there (s), height (m; 0 when not given)
 )
 
 RATE_HZ = 1000
-SPACING_M = 0.01
+PATH_STEP_M = 0.01
 SHARP_RAD = math.radians(100.0)  # sharper corners are turned on the spot; assumed
 TURN_STRIDE_RAD = math.radians(75.0)  # per stride when turning on the spot
 SMOOTH_MS = 301
@@ -110,7 +110,7 @@ def round_corners(points: Floats, radius_m: float) -> Floats:
         pieces.append((1 - u) ** 2 * start + 2 * u * (1 - u) * corner + u**2 * end)
     corners = np.vstack([*pieces, points[-1:]])
     along = _along(corners)
-    even = np.linspace(0.0, along[-1], max(3, int(along[-1] / SPACING_M)))
+    even = np.linspace(0.0, along[-1], max(3, int(along[-1] / PATH_STEP_M)))
     return np.column_stack([np.interp(even, along, corners[:, k]) for k in range(points.shape[1])])
 
 

@@ -28,7 +28,7 @@ LAST_T, LAST_PA, HEIGHT_M, AIR_C = range(
     4
 )  # state of `AirColumn`: last sample's time and pressure, claimed height, temperature
 
-AIR_J_KG_K, GRAVITY_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
+AIR_J_KG_K, G0_M_S2, ZERO_C_K = 287.053, 9.80665, 273.15
 INDOORS_C, COLDEST_C, WARMEST_C = 20.0, -30.0, 45.0
 SCALE_SD = 0.015  # of a rise, by the air's temperature
 RESOLUTION_M = 0.1
@@ -165,7 +165,7 @@ def _claim(
             state[AIR_C] = INDOORS_C + (warm if known or warm < 0.0 else 0.5 * warm)
         elif state[AIR_C] != state[AIR_C]:
             state[AIR_C] = INDOORS_C
-        metres = AIR_J_KG_K * (state[AIR_C] + ZERO_C_K) / GRAVITY_M_S2
+        metres = AIR_J_KG_K * (state[AIR_C] + ZERO_C_K) / G0_M_S2
         first = state[LAST_T] != state[LAST_T]
         if not first:
             state[HEIGHT_M] -= metres * math.log(pressure_pa[i] / state[LAST_PA])

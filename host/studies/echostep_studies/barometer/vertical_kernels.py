@@ -45,6 +45,7 @@ from echostep_studies.barometer.vertical_model import (
     HEIGHT,
     HELD,
     HELD_FADES,
+    LEVEL_SD_M,
     LIFT_UP,
     LONGEST_STEP_S,
     MODES,
@@ -69,7 +70,6 @@ from echostep_studies.barometer.vertical_model import (
     SIZE,
     STAIRS_DOWN,
     STAIRS_UP,
-    STOREY_M,
     TINY,
     TREND_M_S,
     UNDER_WAY,
@@ -299,7 +299,7 @@ def _arrivals(state: State, s: int, heights_m: Floats, free: bool, dt: float, se
     stairs = way < LIFT_UP
     ends = weights[s] * probability_within(CLIMB_ENDS if stairs else RIDE_ENDS, dt)
     for j in range(len(heights_m)):
-        wide = math.hypot(STOREY_M, SCALE * (heights_m[j] - heights_m[s // MODES]))
+        wide = math.hypot(LEVEL_SD_M, SCALE * (heights_m[j] - heights_m[s // MODES]))
         if not free and abs(means[s, HEIGHT] - heights_m[j]) > 5.0 * math.sqrt(
             covariances[s, HEIGHT, HEIGHT] + wide**2
         ):
@@ -345,7 +345,7 @@ def _reinitialise_after_gap(
             )
     for target in range(STAIRS_UP, WAYS):
         x, c = _after_gap(state, s, dt, False, merged)
-        wide = WANDERED_M if free else 0.5 * (heights_m[count - 1] - heights_m[0]) + STOREY_M
+        wide = WANDERED_M if free else 0.5 * (heights_m[count - 1] - heights_m[0]) + LEVEL_SD_M
         reset_component(x, c, HEIGHT, wide)
         x[HEIGHT] = state[1][s, HEIGHT] if free else 0.5 * (heights_m[count - 1] + heights_m[0])
         stairs = target < LIFT_UP

@@ -34,7 +34,7 @@ CODES = {TrackStatus.TRACKING: TRACKING, TrackStatus.UNCERTAIN: UNCERTAIN, Track
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class TruePlaces:
     """True places `xy_m` (n, 2), and which levels are right there, `level_right` (n, levels)."""
 
     xy_m: Floats
@@ -137,7 +137,7 @@ def _nearest(away_m: Floats) -> Bools:
     return np.asarray(away_m <= away_m.min(1, keepdims=True) + 2.0 * TIE_M)
 
 
-def errors_m(place_m: Floats, level: Ints, true: Truth) -> Floats:
+def errors_m(place_m: Floats, level: Ints, true: TruePlaces) -> Floats:
     """Errors (n,) of places (n, 2) on levels (n,); on a wrong floor at least FLOOR_M."""
     away = place_m - true.xy_m
     error_m = np.hypot(away[:, 0], away[:, 1])
@@ -145,7 +145,7 @@ def errors_m(place_m: Floats, level: Ints, true: Truth) -> Floats:
     return np.asarray(np.where(right, error_m, np.maximum(error_m, FLOOR_M)))
 
 
-def judge(claims: Sequence[Claim], true: Truth, walked_m: Floats, search_m: float = SEARCH_M) -> JudgedRun:
+def judge(claims: Sequence[Claim], true: TruePlaces, walked_m: Floats, search_m: float = SEARCH_M) -> JudgedRun:
     """Claims (n,) against the truth at their times; `walked_m` (n,) since the search began."""
     place = np.array([(c.x_m, c.y_m) for c in claims]).reshape(-1, 2)
     error_m = errors_m(place, np.array([c.level for c in claims]), true)
@@ -155,7 +155,7 @@ def judge(claims: Sequence[Claim], true: Truth, walked_m: Floats, search_m: floa
     )  # fmt: skip
 
 
-def _listed(claim: Claim, error_m: float, true: Truth) -> bool:
+def _listed(claim: Claim, error_m: float, true: TruePlaces) -> bool:
     """Whether the true place is a claim's own or one of its hypotheses."""
     x, y = true.xy_m[-1].tolist()
     near = any(math.hypot(px - x, py - y) < LISTED_M and true.level_right[-1, level] for px, py, level in claim.places)

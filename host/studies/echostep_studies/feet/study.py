@@ -17,7 +17,7 @@ from echostep.foot.ins import Noise
 from echostep.foot.steps import Track, walk_track
 from echostep.output.table import Table, console
 from echostep_studies.bench.recordings.feet import SETS, FootRecording
-from echostep_studies.bench.recordings.foot_metrics import Figure, way
+from echostep_studies.bench.recordings.foot_metrics import FootFigure, way
 from echostep_studies.feet.latency import LIVE, pace_rows
 from echostep_studies.feet.leave_one_out import describe, leave_one_out, with_left_out
 from echostep_studies.feet.pictures import draw_tracks
@@ -99,7 +99,7 @@ def medians(rows: list[FigureRow]) -> list[FigureRow]:
     for group, metric in dict.fromkeys((row.set, row.metric) for row in rows if row.set != "stairs"):
         same = [row for row in rows if (row.set, row.metric) == (group, metric)]
         if len(same) > 1:
-            middle = Figure(metric, median(abs(row.value) for row in same))
+            middle = FootFigure(metric, median(abs(row.value) for row in same))
             median_rows.append(
                 _row(
                     group,
@@ -111,7 +111,7 @@ def medians(rows: list[FigureRow]) -> list[FigureRow]:
     return median_rows
 
 
-def _row(group: str, name: str, figure: Figure, way_m: float) -> FigureRow:
+def _row(group: str, name: str, figure: FootFigure, way_m: float) -> FigureRow:
     peer_name, peer = figure.peer or (None, None)
     return FigureRow(
         set=group,

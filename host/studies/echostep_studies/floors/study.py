@@ -30,7 +30,7 @@ from echostep_studies.simulation.vertical_day import VerticalMove, climb
 
 STOREYS_M = (0.0, 3.5, 7.0, 10.5, 14.0)
 RUN_S = 1200.0
-TIE_M = 0.25
+LANDING_TIE_M = 0.25
 COUNTS_PA = 0.25
 MODE_HZ: dict[Mode, float] = {"high-speed": 9.0, "high-resolution": 1.8}
 
@@ -131,7 +131,7 @@ def _measured(
 def judge(floors: Floors, away_m: Floats, name: str, seed: int) -> FloorRun:
     """The row of a run; `away_m`: (n, k) from each storey."""
     n = np.arange(len(floors.floor))
-    ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * TIE_M
+    ties = away_m <= away_m.min(axis=1, keepdims=True) + 2.0 * LANDING_TIE_M
     wrong = ~ties[n, floors.floor]
     true = away_m.argmin(axis=1)
     return FloorRun(

@@ -20,7 +20,7 @@ from echostep.odometry.incapacity.wearer_signs import Sign, WearerSigns
 from echostep.output.table import Table
 from echostep.path import PathSegment
 from echostep_studies.frame.report import as_dicts, rows_by_name
-from echostep_studies.simulation.body_motion import ICM20649, MTX, Part
+from echostep_studies.simulation.body_motion import ICM20649, MTX, SensorPart
 from echostep_studies.simulation.falling import FALLS, NO_FALLS, STRIDE_M, BodySamples, walk_then
 
 KITS = ("belt", "foot board alone", "MTx alone")
@@ -119,7 +119,7 @@ def _drawn(seed: int, manners: list[str]) -> tuple[str, str]:
     return KITS[seed % len(KITS)], manners[seed // len(KITS) % len(manners)]
 
 
-def _foot(kit: str) -> Part:
+def _foot(kit: str) -> SensorPart:
     return MTX if kit == "MTx alone" else ICM20649
 
 

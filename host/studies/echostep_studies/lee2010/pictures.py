@@ -18,7 +18,7 @@ from echostep_studies.lee2010.methods import METHODS, MethodTrack, floors_of, wi
 from echostep_studies.lee2010.walks import (
     STOREY_M,
     STOREYS,
-    Measured,
+    MeasuredWalk,
     chunks_of,
     descent_of,
     lap_of,
@@ -58,7 +58,7 @@ def draw(folder: Path, seed: int) -> None:
         raise EchostepError(f"{folder}: cannot write the pictures: {error.strerror}") from error
 
 
-def _tracks(walked: Walk, measured: Measured) -> dict[str, MethodTrack]:
+def _tracks(walked: Walk, measured: MeasuredWalk) -> dict[str, MethodTrack]:
     return {name: method(measured, start_of(walked)) for name, method in METHODS.items()}
 
 

@@ -33,7 +33,7 @@ WRONG_M = 0.5  # error of a closure along a direction that it claims to know
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class WalkFrame:
     """Rigid motion from the walk's own frame to the map: `turned` (2, 2), `moved` (2,)."""
 
     turned: Floats
@@ -87,14 +87,14 @@ def true_path(walk: SimulatedWalk, t_s: Floats) -> Floats:
     return np.column_stack([np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y)])
 
 
-def known_start(path: Floats, truth: Floats) -> Frame:
+def known_start(path: Floats, truth: Floats) -> WalkFrame:
     """The frame of a path (n, 2) whose start is known."""
     away_m = np.hypot(*(truth - truth[0]).T)
     k = int(np.argmax(away_m > min(COURSE_M, 0.9 * away_m.max())))
     (vx, vy), (ux, uy) = path[k] - path[0], truth[k] - truth[0]
     turn = math.atan2(uy, ux) - math.atan2(vy, vx)
     turned = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    return Frame(turned, truth[0] - turned @ path[0])
+    return WalkFrame(turned, truth[0] - turned @ path[0])
 
 
 def path_columns(path: Floats, truth: Floats) -> PathColumns:
@@ -150,13 +150,13 @@ def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> WallColumns:
     )
 
 
-def closure_columns(closures: list[Closure], pose: Floats, truth: Floats, frame: Frame) -> ClosureColumns:
+def closure_columns(closures: list[Closure], pose: Floats, truth: Floats, frame: WalkFrame) -> ClosureColumns:
     """Closures right and wrong: along each direction that one claims to know, within WRONG_M of the truth."""
     wrong = sum(_is_wrong(closure, truth, frame) for closure in closures)
     return ClosureColumns(closures=len(closures), wrong=wrong, nodes=len(pose))
 
 
-def _is_wrong(closure: Closure, truth: Floats, frame: Frame) -> bool:
+def _is_wrong(closure: Closure, truth: Floats, frame: WalkFrame) -> bool:
     apart = (truth[closure.new] - truth[closure.old]) @ frame.turned
     value, vector = np.linalg.eigh(closure.information[:2, :2])
     off = np.abs((closure.between[:2] - apart) @ vector)

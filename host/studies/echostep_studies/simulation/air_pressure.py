@@ -19,7 +19,7 @@ import numpy as np
 from echostep.arrays import Bools, Floats
 
 SEA_LEVEL_PA = 101_325.0
-GRAVITY_M_S2, DRY_AIR_J_KG_K, ZERO_C_K = 9.80665, 287.053, 273.15
+G0_M_S2, DRY_AIR_J_KG_K, ZERO_C_K = 9.80665, 287.053, 273.15
 STACK_PA_M_K = 0.04
 LEAKY = 0.3  # share of the stack effect that falls on the shaft's doors
 PISTON_PA = 1.0  # in a lift at 1 m/s, growing with its square; assumed: the car is open to the air before and behind it
@@ -46,7 +46,7 @@ class Weather:
 
 def pressures(t_s: Floats, height_m: Floats, in_shaft: Bools, weather: Weather, rng: np.random.Generator) -> Floats:
     """True pressures (n,) in Pa at times and heights (n,) above the entrance, the neutral plane in the middle of the heights."""
-    column = GRAVITY_M_S2 / (DRY_AIR_J_KG_K * (weather.air_c + ZERO_C_K))
+    column = G0_M_S2 / (DRY_AIR_J_KG_K * (weather.air_c + ZERO_C_K))
     steps = np.diff(t_s, prepend=t_s[0])
     wander = np.cumsum(weather.wander_pa * np.sqrt(steps) * rng.standard_normal(len(t_s)))
     trend = weather.trend_pa_h / 3600.0 * (t_s - t_s[0])

@@ -46,7 +46,7 @@ class ImuModel:
 
 
 @dataclass(frozen=True, slots=True)
-class Pings:
+class MarkerPings:
     """Each ping's trigger time (n,), ranger (n,) 0 left 1 right, and range (n,), nan when nothing was heard.
 
     Of the truth: `pose` (n, 3): x, y and the ranger's axis; `cross` (n,): whether it was the other ranger's sound.
@@ -75,7 +75,7 @@ class MarkerWalk:
     heading_rad: Floats
     turn_sd_rad: Floats
     pair_m: Floats
-    pings: Pings
+    pings: MarkerPings
 
 
 def lay_markers(route_m: Floats) -> Floats:
@@ -153,7 +153,9 @@ class _Body:
         return xy, heading + YAW_RAD * np.sin(math.pi * t_s + self._phase)
 
 
-def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.random.Generator, a: Acoustics) -> Pings:
+def _ping(
+    body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.random.Generator, a: Acoustics
+) -> MarkerPings:
     """The rangers ping in turn, the right one `offset_s` after the left one; each takes the first sound to arrive, be it the other's."""
     period_s = 2.0 * max(offset_s, HALF_US[Schedule.CONCURRENT] * 1e-6)
     count = 2 * int(body.end_s / period_s)
@@ -173,10 +175,10 @@ def _ping(body: _Body, built: Floats, bias_m: Floats, offset_s: float, rng: np.r
     first_us = came.min(1)
     range_m = np.where(np.isfinite(first_us), first_us * (0.5e-6 * a.speed_m_s), np.nan)
     axis = heading + np.where(ranger == 0, 0.5 * math.pi, -0.5 * math.pi)
-    return Pings(t_s, ranger, range_m, np.column_stack([xy, axis]), (came.argmin(1) > 0) & np.isfinite(first_us))
+    return MarkerPings(t_s, ranger, range_m, np.column_stack([xy, axis]), (came.argmin(1) > 0) & np.isfinite(first_us))
 
 
-def _pass(pings: Pings, share: float, rng: np.random.Generator) -> Pings:
+def _pass(pings: MarkerPings, share: float, rng: np.random.Generator) -> MarkerPings:
     """A passer-by on one side for about a second, at random times, nearer than the echo without the passer-by."""
     range_m = pings.range_m.copy()
     for side in (0, 1):

@@ -29,7 +29,7 @@ from echostep.output.table import Table
 from echostep.plan.model import NO_PLAN, Plan, Pose, load_plan
 from echostep.plan.routing import RoutePlace
 from echostep_studies.bench import judgement, sites
-from echostep_studies.bench.judgement import FALSE_TRACKING_M, Truth, true_levels
+from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
 from echostep_studies.bench.tours import random_tour
 from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.frame.report import as_dicts, rows_by_name
@@ -180,7 +180,7 @@ def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Float
     t_s = np.array([e.t_s for e in estimates])
     x, y, z = (np.interp(t_s, truth[:, T], truth[:, k]) for k in (X, Y, Z))
     place = np.column_stack([x, y])
-    true = Truth(place, true_levels(place, z, walks.plan))
+    true = TruePlaces(place, true_levels(place, z, walks.plan))
     places = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
     return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 

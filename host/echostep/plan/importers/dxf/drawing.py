@@ -34,7 +34,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "obstacles": ("*obstacle*", "*hindernis*"),
 }
 INSUNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m"}
-REACH_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
+HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread
 
 
 def import_dxf(
@@ -103,8 +103,8 @@ def _storey(entities: Mapping[str, list[Any]], frame: DrawingFrame, drawn: Drawn
     drawn.obstacles = areas(shapely.get_parts(shapely.polygonize(_noded(lines["obstacles"]))))
     drawn.rooms = [room for entity in entities["rooms"] if (room := _room(entity, frame))]
     for kind, layer in (("stairs", "stairs"), ("lift", "lifts")):
-        blots = shapely.union_all([line.buffer(REACH_M) for line in lines[layer]])
-        hulls = [blot.convex_hull.buffer(-REACH_M) for blot in shapely.get_parts(blots)]
+        blots = shapely.union_all([line.buffer(HALF_TREAD_M) for line in lines[layer]])
+        hulls = [blot.convex_hull.buffer(-HALF_TREAD_M) for blot in shapely.get_parts(blots)]
         drawn.connectors += [ConnectorShape(cast(ConnectorKind, kind), "", area) for area in areas(hulls)]
     return drawn
 

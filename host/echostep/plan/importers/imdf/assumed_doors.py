@@ -19,7 +19,7 @@ from echostep.plan.model import Door
 
 ASSUMED = "assumed"  # name of such a door
 THICKEST_M = 0.6  # greatest distance of neighbours: the thickness of a wall; assumed
-JAMB_M = 0.05  # of wall left beside a door; assumed
+FLANK_M = 0.05  # of wall left beside a door; assumed
 ONE_LINE_M = 0.05  # nearer faces are one wall: half the width in which a door cuts a wall drawn as a line
 
 
@@ -114,14 +114,14 @@ def _segments(points: Floats) -> Floats:
 
 
 def _fits(piece: Floats, width_m: float) -> bool:
-    return bool(np.hypot(*(piece[2:] - piece[:2])) >= width_m + 2 * JAMB_M)
+    return bool(np.hypot(*(piece[2:] - piece[:2])) >= width_m + 2 * FLANK_M)
 
 
 def _door(piece: Floats, at: Floats, width_m: float) -> Door:
     """A door in a straight piece (4,) of wall, as near to the point (2,) as its ends allow."""
     length = float(np.hypot(*(piece[2:] - piece[:2])))
     along = (piece[2:] - piece[:2]) / length
-    middle = min(max(float((at - piece[:2]) @ along), width_m / 2 + JAMB_M), length - width_m / 2 - JAMB_M)
+    middle = min(max(float((at - piece[:2]) @ along), width_m / 2 + FLANK_M), length - width_m / 2 - FLANK_M)
     (x0, y0), (x1, y1) = (piece[:2] + (middle + side * width_m / 2) * along for side in (-1, 1))
     return Door(
         (round(float(x0), 3), round(float(y0), 3), round(float(x1), 3), round(float(y1), 3)), "unknown", ASSUMED
