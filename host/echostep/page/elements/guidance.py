@@ -141,8 +141,8 @@ def without_route(goal: RoutePlace, estimate: Estimate, reason: str) -> ShownGui
 
     `reason`: why there is none, empty while it is searched for.
     """
-    floors = goal.level - estimate.level
-    climb = f", {abs(floors)} floor{'s' if abs(floors) > 1 else ''} {'up' if floors > 0 else 'down'}" if floors else ""
+    levels = goal.level - estimate.level
+    climb = f", {abs(levels)} floor{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
     if not reason:
         return ShownGuidance(LOOKING, f"Looking for a way{climb}", None, None, ())
     return ShownGuidance(NO_ROUTE, f"No way was found{climb}: {reason}", None, None, (), "No way was found.")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Building models (IFC; needs `pip install echostep[ifc]`) -> `Plan`.
 
-In: an .ifc file. Out: `Plan`. Owns nothing. Each storey is cut by a horizontal plane one metre above its floor: the sections of walls, columns and
+In: an .ifc file. Out: `Plan`. Owns nothing. Each level is cut by a horizontal plane one metre above its floor: the sections of walls, columns and
 curtain walls become walls, so that doors are gaps. Windows, doors, stairs and lifts are rectangles, seen from above.
 """
 
@@ -67,8 +67,8 @@ class SolidBody:
 def import_ifc(path: Path) -> Plan:
     """Import the building of a model; raises EchostepError that names the file and the element."""
     model = _open(path)
-    floors = _floors(model, path)
-    drawn_levels = [DrawnLevel(name, height) for name, height in floors]
+    levels = _level_heights(model, path)
+    drawn_levels = [DrawnLevel(name, height) for name, height in levels]
     count = 0
     for body in _bodies(model, path):
         count += 1
@@ -97,22 +97,22 @@ def _open(path: Path) -> Any:
         raise EchostepError(f"{path}: not an IFC file: {' '.join(str(error).split())[:200]}") from error
 
 
-def _floors(model: Any, path: Path) -> list[tuple[str, float]]:
-    """Names and heights (m) of the model's storeys, from the lowest."""
+def _level_heights(model: Any, path: Path) -> list[tuple[str, float]]:
+    """Names and heights (m) of the model's levels, from the lowest."""
     elevation: Any = import_module("ifcopenshell.util.placement").get_storey_elevation
     try:
         scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
-        floors = [
+        levels = [
             (str(s.LongName or s.Name or "storey")[:80], float(elevation(s)) * scale_m)
             for s in model.by_type("IfcBuildingStorey")
         ]
     except Exception as error:
         raise EchostepError(f"{path}: its storeys cannot be read: {' '.join(str(error).split())[:200]}") from error
-    if not floors or not all(abs(height) <= LIMIT_M for _, height in floors):
+    if not levels or not all(abs(height) <= LIMIT_M for _, height in levels):
         raise EchostepError(
-            f"{path}: {'a storey has no sane height' if floors else 'no IfcBuildingStorey'}: export the model with its storeys"
+            f"{path}: {'a storey has no sane height' if levels else 'no IfcBuildingStorey'}: export the model with its storeys"
         )
-    return sorted(((name, round(height, 6)) for name, height in floors), key=lambda floor: floor[1])
+    return sorted(((name, round(height, 6)) for name, height in levels), key=lambda level: level[1])
 
 
 def _bodies(model: Any, path: Path) -> Iterator[SolidBody]:

@@ -48,7 +48,7 @@ def import_dxf(
         entities = _sorted(drawing, patterns, file)
         scale_m = METRES[units or _units(drawing, file)]
         frame = replace(frame, scale_m=scale_m) if frame else DrawingFrame.about(entities["walls"], scale_m)
-        drawn_levels.append(_storey(entities, frame, DrawnLevel(file.stem, round(i * storey_height_m, 6)), file))
+        drawn_levels.append(_drawn_level(entities, frame, DrawnLevel(file.stem, round(i * storey_height_m, 6)), file))
     return Plan(files[0].stem, tuple(drawn.level() for drawn in drawn_levels), None, "", join_connectors(drawn_levels))
 
 
@@ -90,7 +90,7 @@ def _units(drawing: Any, file: Path) -> str:
     return INSUNITS[code]
 
 
-def _storey(entities: Mapping[str, list[Any]], frame: DrawingFrame, drawn: DrawnLevel, file: Path) -> DrawnLevel:
+def _drawn_level(entities: Mapping[str, list[Any]], frame: DrawingFrame, drawn: DrawnLevel, file: Path) -> DrawnLevel:
     lines = {
         kind: [line for entity in entities[kind] if (line := frame.line(entity, file))]
         for kind in entities
