@@ -65,10 +65,10 @@ def main() -> int:
         parts = [compiled(name, part, STL) for part in PARTS]
         for part, triangles in zip(PARTS, parts, strict=True):
             size = np.ptp(triangles.reshape(-1, 3), axis=0)
-            problems = faults(triangles)
-            sound &= not problems
+            found = faults(triangles)
+            sound &= not found
             print(f"{name} {part}: {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm, {volume(triangles) / 1000:.1f} cm3, "
-                  f"{'; '.join(problems) or 'closed'}")  # fmt: skip
+                  f"{'; '.join(found) or 'closed'}")  # fmt: skip
         draw(name, parts)
     return 0 if sound else 1
 

@@ -33,17 +33,17 @@ def faults(triangles: Triangles) -> list[str]:
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(-1, 3)
     edges = Counter((int(a), int(b)) for face in faces for a, b in zip(face, np.roll(face, -1), strict=True))
-    problems = []
+    found = []
     if any(a == b for a, b in edges):
-        problems.append("a triangle without an area")
+        found.append("a triangle without an area")
     open_edges = sum(count != edges.get((b, a), 0) for (a, b), count in edges.items())
     if open_edges:
-        problems.append(f"{open_edges} open edges")
+        found.append(f"{open_edges} open edges")
     if any(count > 1 for count in edges.values()):
-        problems.append(f"{sum(count > 1 for count in edges.values())} edges of more than two faces")
+        found.append(f"{sum(count > 1 for count in edges.values())} edges of more than two faces")
     if not len(corners) or volume(triangles) <= 0.0:
-        problems.append("no volume")
-    return problems
+        found.append("no volume")
+    return found
 
 
 def volume(triangles: Triangles) -> float:
